@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from balancing.amplitudes import AmplitudeFit, influence_from_amplitudes
     from balancing.balance import Balance, least_squares, minimax
-    from balancing.confidence import Readings, spread
     from balancing.correction import CoincidentPlanes, Correction, Unbalances, correct
     from balancing.dependence import (
         DependentPlanes,
@@ -26,13 +25,14 @@ if TYPE_CHECKING:
     from balancing.indexing import Indexed, index_balancing
     from balancing.influence import influence_coefficients
     from balancing.limited import Doubtful, Infeasible, NotConverged
-    from balancing.log_balance import LogBalance, region_factor
+    from balancing.log_balance import LogBalance, region_factor, spread
     from balancing.next_run import NextRun, suggest_run
     from balancing.placement import Placement, drill_depth, place, place_from_stock, transfer
     from balancing.prior import Prior, fit_with_prior, pooled_prior, stored_prior
     from balancing.rotor import by_size
     from balancing.rounding import influence_error
-    from balancing.run_log import JointFit, Undetermined, determined, joint_fit
+    from balancing.run_log import JointFit, Undetermined, determined, initial_alone, joint_fit
+    from balancing.severity import ZONE_BOUNDARIES, severity_zone
     from balancing.synchronous import OncePerTurn, once_per_turn
     from balancing.tolerance import (
         GRADES,
@@ -56,7 +56,6 @@ if TYPE_CHECKING:
 _HOMES = {
     "balancing.amplitudes": "AmplitudeFit influence_from_amplitudes",
     "balancing.balance": "Balance least_squares minimax",
-    "balancing.confidence": "Readings spread",
     "balancing.correction": "CoincidentPlanes Correction Unbalances correct",
     "balancing.dependence": "DependentPlanes DependentTrials condition_number plane_significance unseen",
     "balancing.doubt": "Drift drift outlier_probability phase_sense repeats robust_fit",
@@ -64,9 +63,10 @@ _HOMES = {
     "balancing.flywheel": "TorqueCycle torque_cycle",
     "balancing.indexing": "Indexed index_balancing",
     "balancing.influence": "influence_coefficients",
-    "balancing.run_log": "JointFit Undetermined determined joint_fit",
+    "balancing.run_log": "JointFit Undetermined determined initial_alone joint_fit",
     "balancing.limited": "Doubtful Infeasible NotConverged",
-    "balancing.log_balance": "LogBalance region_factor",
+    "balancing.severity": "ZONE_BOUNDARIES severity_zone",
+    "balancing.log_balance": "LogBalance region_factor spread",
     "balancing.next_run": "NextRun suggest_run",
     "balancing.synchronous": "OncePerTurn once_per_turn",
     "balancing.prior": "Prior fit_with_prior pooled_prior stored_prior",
@@ -93,6 +93,7 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "GRADES",
+    "ZONE_BOUNDARIES",
     "AmplitudeFit",
     "Balance",
     "CoincidentPlanes",
@@ -111,7 +112,6 @@ __all__ = [
     "OncePerTurn",
     "Placement",
     "Prior",
-    "Readings",
     "TorqueCycle",
     "TrialEffect",
     "Unbalances",
@@ -131,6 +131,7 @@ __all__ = [
     "influence_coefficients",
     "influence_error",
     "influence_from_amplitudes",
+    "initial_alone",
     "initial_unbalance",
     "joint_fit",
     "journal_loads",
@@ -149,6 +150,7 @@ __all__ = [
     "region_factor",
     "repeats",
     "robust_fit",
+    "severity_zone",
     "spread",
     "stored_prior",
     "suggest_run",

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from balancing.dependence import design
 from balancing.prior import Prior, fit_with_prior, runs_alone
-from balancing.run_log import Errors, JointFit, joint_fit
+from balancing.reading_errors import Errors
+from balancing.run_log import JointFit, joint_fit
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
 from dalembert.arithmetic.shapes import as_numbers, common_shape

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import design
+from balancing.balance import least_squares
+from balancing.dependence import design, directions
 from balancing.propagation import components, response
-from balancing.run_log import Errors, JointFit
+from balancing.reading_errors import Errors, wider_draws
+from balancing.run_log import JointFit
 from dalembert.arithmetic.records import numbers, record
 
 if TYPE_CHECKING:
@@ -82,9 +84,8 @@ class LogBalance:
 
     def machine(self, i: int) -> LogBalance:
         """Return the balance of one of many machines, along the leading axis."""
-        e = self.errors
-        errors = Errors(e.unit[i], e.along[i], e.across[i], e.degrees_of_freedom[i])
         weights, along = (None if part is None else part[i] for part in (self.weights, self.along))
+        errors = self.errors.machine(i)
         return LogBalance(self.fit.machine(i), self.corrections[i], errors, weights, along, self.ridge)
 
     def plot(
@@ -189,39 +190,42 @@ class LogBalance:
         )
         return Spread(own + before, freedom)
 
-    def problem_samples(self, machine: int, n: int = 200, seed: int = 0) -> Iterator[tuple[Complex, Complex]]:
-        """Draw coefficients (s, p) and vibration (s,) of one of the machines (leading axis) from its readings' errors."""
-        unit, along, across = (part[machine] for part in self._by_channel())
-        rng = np.random.default_rng(seed)
-        for _ in range(n):
-            one, other = rng.standard_normal((2, *unit.shape))
-            error = unit * (along * one + 1j * across * other)
-            unknowns = self.fit.unknowns[machine] + np.matvec(self.fit.gain[machine], error)
-            if self.fit.foreknown is not None:
-                sources = self.fit.foreknown.sources[machine]
-                one, other = rng.standard_normal((2, sources.shape[-1])) / np.sqrt(2)
-                unknowns = unknowns + np.matvec(sources, one + 1j * other)
+    def unknown_samples(self, n: int = 200, seed: int = 0) -> Complex:
+        """Draw x₀ and α of one machine from the errors of its readings, (n, s, 1 + p)."""
+        rng, fit = np.random.default_rng(seed), self.fit
+        drawn = fit.unknowns + np.matvec(fit.gain, self.errors.draw(fit.readings, n, rng))
+        if fit.foreknown is None:
+            return np.asarray(drawn)
+        sources = fit.foreknown.sources
+        one, other = rng.standard_normal((2, n, 1, sources.shape[-1])) / np.sqrt(2)
+        return np.asarray(drawn + np.matvec(sources, one + 1j * other))
+
+    def problem_samples(self, n: int = 200, seed: int = 0) -> Iterator[tuple[Complex, Complex]]:
+        """Draw coefficients (s, p) and vibration (s,) of one machine from the errors of its readings."""
+        for unknowns in self.unknown_samples(n, seed):
             yield unknowns[:, 1:], unknowns[:, 0]
 
-    def residual_samples(self, machine: int, n: int = 4000, seed: int = 0) -> Complex:
-        """Draw the true vibration (n, s) of one of the machines with its corrections on, Student's errors included.
+    def correction_samples(self, n: int = 4000, seed: int = 0) -> Complex:
+        """Draw least-squares corrections (n, p) of one machine from readings with their errors (Monte Carlo)."""
+        drawn = self.unknown_samples(n, seed)
+        return least_squares(drawn[..., 1:], drawn[..., 0], self.weights, ridge=self.ridge).corrections
+
+    def residual_samples(self, n: int = 4000, seed: int = 0) -> Complex:
+        """Draw the true vibration (n, s) of one machine with its corrections on, Student's errors included.
 
         At fixed corrections it is linear in the readings: no further approximation is made.
         """
         rng = np.random.default_rng(seed)
-        masses = np.concatenate([[1.0], self.corrections[machine]])
-        unit, along, across = (part[machine] for part in self._by_channel())
-        share = np.vecmat(masses.conj(), self.fit.gain[machine]) * unit
-        one, other = rng.standard_normal((2, n, *share.shape))
-        error = np.vecdot(share.conj(), along * one + 1j * across * other)
-        error = error * _wider(rng, float(self.errors.degrees_of_freedom[machine]), n)
+        masses = np.concatenate([[1.0], self.corrections])
+        share = np.vecmat(masses.conj(), self.fit.gain)
+        error = (share * self.errors.draw(self.fit.readings, n, rng, student=True)).sum(axis=-1)
         prior = self.fit.foreknown
         if prior is not None:
-            share = np.vecmat(masses.conj(), prior.sources[machine])
+            share = np.vecmat(masses.conj(), prior.sources)
             one, other = rng.standard_normal((2, n, share.shape[-1])) / np.sqrt(2)
-            wider = _wider(rng, float(prior.degrees_of_freedom[machine]), n)
+            wider = wider_draws(rng, float(prior.degrees_of_freedom), n)
             error = error + wider * ((one + 1j * other) @ share.T)
-        return np.asarray(self.residual[machine] + error)
+        return np.asarray(self.residual + error)
 
     @property
     def deviations(self) -> tuple[Real, Real]:
@@ -305,8 +309,8 @@ def _unit_errors(sources: Complex) -> tuple[Complex, Real, Real]:
     return ones.astype(complex), ones / np.sqrt(2), ones / np.sqrt(2)
 
 
-def _wider(rng: np.random.Generator, degrees_of_freedom: float, n: int) -> Real:
-    """Draw by what factor σ may be larger than its estimate, (n, 1)."""
-    if not 0 < degrees_of_freedom < np.inf:
-        return np.ones((n, 1))
-    return np.asarray(np.sqrt(degrees_of_freedom / rng.gamma(degrees_of_freedom, size=n))[:, None])
+def spread(samples: Complex, about: Complex) -> Real:
+    """Return the covariance (p, 2, 2) of drawn corrections (n, p) along and across the given ones."""
+    turned = (samples - about) * directions(about.conj())
+    parts = np.stack([turned.real, turned.imag])
+    return np.asarray(np.einsum("anp,bnp->pab", parts, parts) / len(samples))

@@ -6,7 +6,8 @@ For each sensor and operating state (one channel) the reading of run j, with the
 
 linear in the unknowns θ = (x₀, α). Every run has its error, the initial one too: weighted least squares of complex
 numbers (Goodman 1964; Seber and Lee, Linear Regression Analysis, 2nd ed., ch. 3 and 10), by QR. The errors ε are
-circular, E|ε|² = σ²/weight, of one σ for all channels of a machine.
+circular, E|ε|² = σ²/weight, of one σ for all channels of a machine. An initial run with a trial run for each plane is
+the fit with nothing to spare: x₀ is the initial reading, and α follows from the differences (`influence_coefficients`).
 """
 
 from __future__ import annotations
@@ -19,8 +20,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import Unseen, adjoint, design, directions, roundings, threshold
+from balancing.dependence import DependentTrials, Unseen, adjoint, design, directions, roundings, threshold
+from balancing.loads import loads_of
 from balancing.qr import factors
+from balancing.reading_errors import Errors
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
 from dalembert.arithmetic.shapes import spread_to
@@ -35,19 +38,6 @@ Complex = NDArray[np.complex128]
 
 class Undetermined(Unseen):
     """The runs do not determine x₀ and α: `combination` (1 + p,) of them leaves no trace, x₀ first; `case` says where."""
-
-
-@record
-@dataclass(frozen=True, eq=False, repr=False)
-class Errors:
-    """Standard deviations of readings, independent of one another: along the direction `unit` and across it."""
-
-    unit: Complex
-    """(..., r, s), size 1."""
-    along: Real
-    across: Real
-    degrees_of_freedom: Real
-    """Complex, of the estimate they are; inf where they are known. (...)"""
 
 
 @record
@@ -204,8 +194,26 @@ class JointFit:
         >>> bool((fit.error_estimate() < 1e-14).all())
         True
         """
-        from balancing.rounding import perturbed
+        from balancing.rounding import influence_error, perturbed
 
+        loads = loads_of(self.masses, self.present) if self.weights is None and self.count is None else None
+        if loads is not None:
+            of_reading, of_mass = (
+                np.zeros(like.shape) if e is None else np.broadcast_to(np.asarray(e, dtype=float), like.shape)
+                for e, like in ((reading_error, self.readings), (mass_error, self.masses))
+            )
+            first, *others = np.moveaxis(
+                loads.means(of_reading + len(loads.of_run) * EPS / 2 * np.abs(self.readings)), -2, 0
+            )
+            base, *trials = np.moveaxis(loads.means(self.readings), -2, 0)
+            of_alpha = influence_error(
+                base,
+                np.stack(trials, axis=-2),
+                self.masses[..., loads.first[1:], :],
+                reading_error=(first, np.stack(others, axis=-2)),
+                mass_error=of_mass[..., loads.first[1:], :],
+            )
+            return np.concatenate([first[..., None], of_alpha], axis=-1)
         root = np.where(self.present, 1.0 if self.weights is None else np.sqrt(self.weights), 0.0)
         root = np.swapaxes(root, -1, -2)
         off, of_masses = (
@@ -239,7 +247,8 @@ class JointFit:
         read = np.where(self.present, self.readings, 0.0)
         unit, size = directions(read), np.abs(read)
         degrees = np.full(self.readings.shape[:-2], np.inf)
-        return Errors(unit, amplitude * size, phase * size, degrees)
+        turn = np.full(size.shape, phase)
+        return Errors(unit, amplitude * size, phase * size, degrees, turn, np.ones(size.shape, dtype=bool))
 
 
 def joint_fit(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None = None) -> JointFit:
@@ -272,7 +281,8 @@ def joint_fit(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None 
     -----
     Channels are independent of one another, and each is a QR of its rows (1, w_j), columns scaled by powers of two and
     rows in the order of their size (`balancing.qr`); the normal equations are never formed. Leading axes are machines
-    of like shape, all solved in one go.
+    of like shape, all solved in one go. Runs with the same masses count as their mean; where there are but as many
+    different loads as unknowns, and one of them is none, the means alone are solved, and nothing is rounded in x₀.
 
     Examples
     --------
@@ -301,6 +311,11 @@ def joint_fit(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None 
         root = np.sqrt(w) * present
     elif not present.all():
         root = present.astype(float)
+    if w is None and (loads := loads_of(t, present)) is not None:
+        try:
+            return JointFit(y, t, None, *loads.solve(y))
+        except DependentTrials:
+            pass  # what the runs do not determine is named below
     b = np.swapaxes(np.where(present, y, 0.0), -1, -2)
     if root is not None:
         # where nothing is missing one QR serves all channels
@@ -319,6 +334,37 @@ def joint_fit(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None 
     gain = np.broadcast_to(gain, (*unknowns.shape, y.shape[-2]))
     leverage = np.swapaxes(np.broadcast_to(leverage, b.shape), -1, -2)
     return JointFit(y, t, w, np.asarray(unknowns + 0.0), gain, leverage)
+
+
+def initial_alone(readings: ArrayLike, influence: ArrayLike) -> JointFit:
+    """Fit the initial vibration alone, to runs without masses; the influence coefficients are known.
+
+    Parameters
+    ----------
+    readings
+        As for `joint_fit`, (..., r, s), each channel read once at least.
+    influence
+        α, complex (..., s, p), without errors.
+
+    Examples
+    --------
+    >>> fit = initial_alone([[5], [7]], [[2]])
+    >>> fit.unknowns.real, int(fit.degrees_of_freedom)
+    (array([[6., 2.]]), 1)
+    """
+    y, alpha = np.asarray(readings, dtype=complex), np.asarray(influence, dtype=complex)
+    present = np.isfinite(y)
+    count = present.sum(axis=-2, keepdims=True)
+    if not count.all():
+        raise ValueError("a channel has no reading")
+    share = np.where(present, 1 / count, 0.0)
+    x0 = (np.where(present, y, 0.0).sum(axis=-2) / count[..., 0, :])[..., None]
+    unknowns = np.concatenate([x0, np.broadcast_to(alpha, (*x0.shape[:-1], alpha.shape[-1]))], axis=-1)
+    gain = np.zeros((*unknowns.shape, y.shape[-2]))
+    gain[..., 0, :] = np.swapaxes(share, -1, -2)
+    masses = np.zeros((*y.shape[:-1], alpha.shape[-1]), dtype=complex)
+    known = np.full(y.shape[:-2], y.shape[-1])
+    return JointFit(y, masses, None, unknowns, gain, share, known)
 
 
 def determined(masses: ArrayLike, present: ArrayLike) -> NDArray[np.bool_]:

@@ -24,8 +24,8 @@ What tables and quantities may look like, and what is written: [tables](tables.m
 def page() -> Iterator[str]:
     """Yield the lines of the page."""
     yield from _HEAD.splitlines()
+    of_all = told(SHARED)
     shared: dict[str, list[tuple[str, str]]] = {}
-    of_all = {said.heading for said in told(SHARED).values()}
     for name, (_, line) in COMMANDS.items():
         group = typer.main.get_command(build(name))
         assert isinstance(group, TyperGroup)
@@ -34,20 +34,20 @@ def page() -> Iterator[str]:
         context = typer.Context(command, info_name=name, parent=typer.Context(group, info_name="dalembert"))
         yield from ("", f"## dalembert {name}", "", line)
         yield from ("", *inspect.cleandoc(command.help or "").replace("*", r"\*").splitlines())
-        panels = command.panels_of(context)
-        solves = any(param.name == "json" for param in command.get_params(context))
-        shared |= {heading: records for heading, records in panels.items() if solves and heading in of_all}
-        for heading, records in panels.items():
-            if solves and heading in of_all and heading != "What":
-                continue
+        parameters = {param.name or "" for param in command.get_params(context)}
+        solves = "json" in parameters
+        # --about may be a value of the command itself too
+        alike = [each for each in of_all if solves and each not in command.told]
+        for heading, records in command.panels_of(context, without=alike).items():
             yield from _table(heading, records)
+        if solves and not shared:
+            shared = command.panels_of(context, without=parameters - {*of_all})
         if command.example:
             described = describe(command.example)
             yield from ("", "```sh", f"dalembert examples {command.example}", described["command"], "```")
     yield from ("", "## What every command that solves takes too")
     for heading, records in shared.items():
-        if heading != "What":
-            yield from _table(heading, records)
+        yield from _table(heading, records)
 
 
 def _table(heading: str, records: list[tuple[str, str]]) -> Iterator[str]:

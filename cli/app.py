@@ -52,6 +52,13 @@ GROUPS = {
         "body": ("cli.body.command", "Put a body together: inertia, angular momentum, shaft reactions."),
         "spin": ("cli.spin.command", "Turn a body through time: free, under gravity, under a torque."),
     },
+    "Teaching": {
+        "exercise": (
+            "cli.exercise.command",
+            "Make the variants of an exercise: sheets, key, solutions, questions.",
+        ),
+        "grade": ("cli.grade.command", "Mark the answers to an exercise, and name likely mistakes."),
+    },
     "Files": {
         "import": ("cli.imports.command", "Import a mechanism drawn in another program."),
         "export": (
@@ -65,6 +72,8 @@ GROUPS = {
         "completion": ("cli.completion.command", "Print the completion script for bash, zsh or fish."),
     },
 }
+COMPLETE = "_DALEMBERT_COMPLETE"
+"""The environment variable by which a shell asks for completions."""
 COMMANDS = {name: line for group in GROUPS.values() for name, line in group.items()}
 
 
@@ -105,7 +114,7 @@ def _elsewhere() -> None:
 def _call_of(example: str) -> str:
     from cli.examples.command import describe
 
-    return describe(example)["command"]
+    return str(describe(example)["command"])
 
 
 def build(called: str | None) -> typer.Typer:
@@ -126,6 +135,10 @@ def build(called: str | None) -> typer.Typer:
             from cli.show.commands import with_help
 
             file = import_module(module)
+            if COMPLETE in os.environ:
+                from cli.completion.values import complete
+
+                complete(file.run, name)
             kind = with_help(getattr(file, "OPTIONS", ""), getattr(file, "EXAMPLE", ""), _call_of)
             app.command(name, short_help=line, cls=kind)(file.run)
         else:
@@ -135,7 +148,7 @@ def build(called: str | None) -> typer.Typer:
 
 def _words() -> list[str]:
     """Return the words of the command line; where a shell completes it, those that it has so far."""
-    if "_DALEMBERT_COMPLETE" not in os.environ:
+    if COMPLETE not in os.environ:
         return sys.argv[1:]
     from typer.completion import completion_init  # type: ignore[attr-defined]
 

@@ -10,7 +10,7 @@ docs/library.md has the first sentence of each; `help(dalembert.correct)` shows 
 Rotors (`balancing`):
     AmplitudeFit, Balance, CoincidentPlanes, Correction, DependentPlanes, DependentTrials, Doubtful,
     Drift, ErrorBudget, GRADES, Indexed, Infeasible, JointFit, LogBalance, NextRun, NotConverged,
-    OncePerTurn, Placement, Prior, Readings, TorqueCycle, TrialEffect, Unbalances, Undetermined,
+    OncePerTurn, Placement, Prior, TorqueCycle, TrialEffect, Unbalances, Undetermined,
     allocate_tolerance, api_unbalance, condition_number, correct, determined_channels, drift_test,
     drill_depth, error_budget, fit_with_prior, grade_value, groups_by_size, index_balancing,
     influence_coefficients, influence_error, influence_from_amplitudes, initial_unbalance,
@@ -21,9 +21,9 @@ Rotors (`balancing`):
     trial_effect, trial_unbalance, unseen_combination
 
 Mechanisms (`virtualwork`):
-    AssemblyError, Check, Cycle, DescriptionError, Equilibria, Equilibrium, Force, Friction, GROUND,
+    AssemblyError, Belt, Check, Cycle, DescriptionError, Equilibria, Equilibrium, Force, Friction, GROUND,
     Gear, Guess, Guide, Input, Link, LinkStates, Mechanism, MechanismError, MobilityError, Motion,
-    Motor, Spring, Target, Torque, TorsionSpring, UnitLoad, balance_virtual_power, block_on_bar,
+    Motor, Rack, Spring, Target, Torque, TorsionSpring, UnitLoad, balance_virtual_power, block_on_bar,
     counterweights, crank_rod_piston, direction_angle, equilibria, grashof_class, on_incline,
     on_moving_ramp, rotation_of_point, second_point, work_ledger
 

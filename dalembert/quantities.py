@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dalembert.units import (
     DIMENSIONS,
@@ -17,6 +17,9 @@ from dalembert.units import (
     nearest_unit,
     unit_name,
 )
+
+if TYPE_CHECKING:
+    from fractions import Fraction
 
 _SPOKEN_DIMENSION = {
     "inertia": "moment of inertia",
@@ -53,6 +56,29 @@ def decimal_to_si(number: str, factor: Factor) -> float:
     return float(Fraction(number) * Fraction(num, den))
 
 
+# to fifty digits
+PI = (31415926535897932384626433832795028841971693993751, 10**49)
+
+
+def exactly(number: str, factor: Factor) -> Fraction:
+    """A decimal number times a unit's factor, not rounded; of π, which an angle's factor has, fifty digits.
+
+    Examples
+    --------
+    >>> exactly("0.3", (1, 1000)), float(exactly("180", (math.pi, 180)) - exactly("1", (math.pi, 1)))
+    (Fraction(3, 10000), 0.0)
+    """
+    from fractions import Fraction
+
+    def exact(part: float) -> Fraction:
+        if isinstance(part, int):
+            return Fraction(part)
+        # the only irrational factor is π, times a ratio
+        return Fraction(part / math.pi).limit_denominator(10**6) * Fraction(*PI)
+
+    return Fraction(number) * exact(factor[0]) / exact(factor[1])
+
+
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.ASCII | re.DOTALL)
 
 
@@ -64,6 +90,12 @@ def quantity_in_si(text: str, dimension: str) -> float | None:
     >>> quantity_in_si("120 mm", "length"), quantity_in_si("0.1rev", "angle"), quantity_in_si("3 kg", "length")
     (0.12, 0.6283185307179586, None)
     """
+    parts = _quantity(text, dimension)
+    return None if parts is None else decimal_to_si(*parts)
+
+
+def _quantity(text: str, dimension: str) -> tuple[str, Factor] | None:
+    """The decimals of a quantity and the factor of its unit; None where text is no quantity of that dimension."""
     match = _QUANTITY.match(text.replace(MINUS, "-"))
     unit = composed(match[2]) if match and match[2] else None
     if match is None or unit is None:
@@ -72,7 +104,7 @@ def quantity_in_si(text: str, dimension: str) -> float | None:
     # rad is a pure number: a torque may be N m/rad, but a length is never an angle
     loose = own[:3] == wanted[:3] and wanted[:3] != (0, 0, 0) and 0 in (own[3], wanted[3])
     loose = loose and dimension not in ("speed", "angular acceleration", "angular jerk")
-    return decimal_to_si(match[1], unit[0]) if own == wanted or loose else None
+    return (match[1], unit[0]) if own == wanted or loose else None
 
 
 def parse_number(text: str) -> float:
@@ -137,12 +169,24 @@ def number_in_si(value: Any, dimension: str, factor: Factor = (1, 1)) -> float |
 
     None where it is neither, infinity where it is too large.
     """
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
+    if isinstance(value, (int, float)) and not abs(value) <= LARGEST:
         # a whole number of TOML has no bound
-        return decimal_to_si(repr(value), factor) if abs(value) <= LARGEST else math.inf
+        return math.inf
+    parts = decimals(value, dimension, factor)
+    return None if parts is None else decimal_to_si(*parts)
+
+
+def decimals(value: Any, dimension: str, factor: Factor = (1, 1)) -> tuple[str, Factor] | None:
+    """The decimals of a value of a TOML file and the factor of its unit; None where it is no number.
+
+    >>> decimals("120 mm", "length"), decimals(0.3, "angle", (1, 1000))
+    (('120', (1, 1000)), ('0.3', (1, 1000)))
+    """
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return repr(value), factor
     if not isinstance(value, str):
         return None
-    number = quantity_in_si(value, dimension)
-    if number is None and is_number(value):
-        return decimal_to_si(value.strip().replace(MINUS, "-"), factor)
-    return number
+    parts = _quantity(value, dimension)
+    if parts is None and is_number(value):
+        return value.strip().replace(MINUS, "-"), factor
+    return parts

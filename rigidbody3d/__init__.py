@@ -10,7 +10,8 @@ from rigidbody3d.freebody import FreeBody, FreeState
 from rigidbody3d.gyroscope import cones, gyroscopic_couple, sleeping_threshold, steady_precession
 from rigidbody3d.inertia import check, principal, products, shift, tensor
 from rigidbody3d.integration import Trajectory, integrate
-from rigidbody3d.momentum import Motion, Wrench, strike
+from rigidbody3d.momentum import Motion, Wrench
+from rigidbody3d.percussion import strike
 from rigidbody3d.shaft import Shaft
 from rigidbody3d.shapes import SHAPES, inertia_of, load_mesh, measure_of, mesh
 from rigidbody3d.top import Top, TopState

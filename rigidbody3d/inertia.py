@@ -217,6 +217,45 @@ def principal(inertia: ArrayLike) -> Principal:
     return Principal(moments, _right_handed(axes))
 
 
+def free_axes(moments: ArrayLike) -> NDArray[np.bool_]:
+    """Return whether two principal moments (..., 3), ascending, are equal to rounding: any axes across will do.
+
+    >>> bool(free_axes([1.0, 1.0, 2.0])), bool(free_axes([1.0, 1.5, 2.0]))
+    (True, False)
+    """
+    m = np.asarray(moments, dtype=float)
+    return np.asarray(np.diff(m, axis=-1).min(axis=-1) <= RTOL * np.abs(m).max(axis=-1))
+
+
+def own_axes(found: Principal) -> Array:
+    """Return principal axes (3, 3) that lie along the body's own axes where equal moments leave them free.
+
+    Examples
+    --------
+    A disk about an oblique pair of axes: the pair is turned back.
+
+    >>> own_axes(Principal(np.array([1.0, 1.0, 2.0]), np.array([[0.6, 0.8, 0], [-0.8, 0.6, 0], [0, 0, 1]])))
+    array([[1., 0., 0.],
+           [0., 1., 0.],
+           [0., 0., 1.]])
+    """
+    moments, axes = found.moments, np.array(found.axes)
+    close = np.diff(moments) <= RTOL * np.abs(moments).max()
+    if close.all():
+        return np.eye(3)
+    if not close.any():
+        return axes
+    first = 0 if close[0] else 1
+    alone = axes[2 if first == 0 else 0]
+    # the own axis that lies nearest to the plane across, and what is at right angles to it there
+    k = int(np.argmin(np.abs(alone)))
+    one = np.eye(3)[k] - alone[k] * alone
+    one = one / np.linalg.norm(one)
+    other = np.cross(alone, one)
+    axes[first], axes[first + 1] = one, other
+    return _right_handed(axes) + 0.0
+
+
 def _sorted(moments: Array) -> Principal:
     order = np.argsort(moments, axis=-1, kind="stable")
     return Principal(np.take_along_axis(moments, order, axis=-1), _right_handed(np.eye(3)[order]))

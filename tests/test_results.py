@@ -10,11 +10,11 @@ import pytest
 
 from balancing import (
     LogBalance,
-    Readings,
     correct,
     error_budget,
     index_balancing,
     influence_from_amplitudes,
+    initial_alone,
     joint_fit,
     least_squares,
     minimax,
@@ -58,7 +58,8 @@ def made(x: float) -> dict[str, object]:
         "minimax": minimax(COEFFICIENTS, [x, -1, 0], [0.2, 1]),
         "amplitudes": influence_from_amplitudes([6.1 * x], [[7.7], [3.2], [10.3]], np.exp([0, 2j, 4j])),
         "placement": place(0.0835 * x, [0.3, 1.2, 4.0]),
-        "readings": Readings(np.array([x + 1j]), 0.01, 0.02, influence=np.array([[1j]])),
+        "stated errors": log.fit.stated(0.01, 0.02 * x),
+        "known coefficients": initial_alone([[x + 1j]], [[1j]]),
         "log": log.fit,
         "log errors": log.errors,
         "log balance": log,

@@ -7,6 +7,7 @@ if TYPE_CHECKING:
     from virtualwork.describe import AssemblyError, DescriptionError, MechanismError, MobilityError
     from virtualwork.describe.parts import (
         GROUND,
+        Belt,
         Force,
         Friction,
         Gear,
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
         Input,
         Link,
         Motor,
+        Rack,
         Spring,
         Torque,
         TorsionSpring,
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
 __all__ = [
     "GROUND",
     "AssemblyError",
+    "Belt",
     "Check",
     "Cycle",
     "DescriptionError",
@@ -59,6 +62,7 @@ __all__ = [
     "MobilityError",
     "Motion",
     "Motor",
+    "Rack",
     "Spring",
     "Target",
     "Torque",
@@ -81,7 +85,7 @@ __all__ = [
 # where each name stands; a room is loaded when one of its names is asked for
 _ROOMS = {
     "virtualwork.describe": "AssemblyError DescriptionError MechanismError MobilityError",
-    "virtualwork.describe.parts": "GROUND Force Friction Gear Guess Guide Input Link Motor Spring Torque TorsionSpring",
+    "virtualwork.describe.parts": "GROUND Belt Force Friction Gear Guess Guide Input Link Motor Rack Spring Torque TorsionSpring",
     "virtualwork.formulas.effort": "ledger",
     "virtualwork.mechanism": "Mechanism equilibria",
     "virtualwork.motion": "Motion",

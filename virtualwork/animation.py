@@ -21,6 +21,7 @@ from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.drawing import Circle, Coil, Drawing, Line, Shape, tracers
 from virtualwork.forces import Forces
+from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import xy
 from virtualwork.formulas.poses import Poses
 from virtualwork.table import columns
@@ -159,9 +160,9 @@ class Series:
             if all(column in self._index for column in columns):
                 found[key] = [self._index[column] for column in columns]
         if unit and body != GROUND:
-            z = self.poses.values([("dpoint", body, place, name, 0, 1)])[0]
+            rates = self._unit_rates(("dpoint", body, place, name, 0, 1))
             found["v"] = [
-                self._add(f"{name} {axis}", v, exact=False) for axis, v in zip("xy", xy(z).T, strict=True)
+                self._add(f"{name} {axis}", v, exact=False) for axis, v in zip("xy", rates, strict=True)
             ]
         return found
 
@@ -182,10 +183,14 @@ class Series:
             found["omega"] = self._index.get(f"{name}_omega_rad_s")
             found["alpha"] = self._index.get(f"{name}_alpha_rad_s2")
             if unit:
-                found["omega"] = self._add(
-                    f"{name} omega", self.poses.values([("dangle", name, 0, 1)])[0], exact=False
-                )
+                (rate,) = self._unit_rates(("dangle", name, 0, 1))
+                found["omega"] = self._add(f"{name} omega", rate, exact=False)
         return found
+
+    def _unit_rates(self, key: Key) -> list[Any]:
+        """Return the columns of a derivative to the one input, that of x and of y."""
+        z = self.poses.values([key])[0]
+        return list(xy(z).T) if np.iscomplexobj(z) else [z]
 
     def _paths(self, names: list[str]) -> dict[str, list[Any]]:
         """Return the paths of points where the poses themselves are too few to draw them."""
@@ -230,6 +235,8 @@ def moving_page(
     series: Sequence[Series],
     time: str = "",
     plots: Sequence[str] = (),
+    computed: Callable[[], tuple[str, dict[str, Any]]] | None = None,
+    note: str = "",
 ) -> Page:
     """Return the page of a mechanism's motion.
 
@@ -241,6 +248,10 @@ def moving_page(
         The column of the poses' own times, s; without it a turn of the input takes some seconds.
     plots : sequence of str
         The columns that are plotted at first.
+    computed : callable
+        Returns the script that computes the first series anew, and the data that it reads.
+    note : str
+        What the page says below its drawing.
 
     Raises
     ------
@@ -267,7 +278,10 @@ def moving_page(
         rest["clock"] = documents[0]["over"][0]
     if time or len(m.inputs) == 1:
         rest["x"] = documents[0]["over"][0]
-    return page(title, "plane", documents, **rest)
+    if note:
+        rest["note"] = note
+    script, more = ("", {}) if computed is None else computed()
+    return page(title, "plane", documents, script, **rest, **more)
 
 
 def _first_plots(series: Series) -> list[str]:

@@ -18,15 +18,19 @@ from dataclasses import dataclass
 from itertools import chain
 from math import isfinite, pi
 
+from dalembert.arithmetic.varied import rotation
 from virtualwork.describe.description import Description
-from virtualwork.describe.parts import GROUND, Gear, Guide, Spring
+from virtualwork.describe.meshes import Belt, Gear, Rack
+from virtualwork.describe.parts import GROUND, Guide, Spring
 
 ROLES = {
     "rail": "the walls of a guide in the ground",
     "hatch": "what marks the ground as fixed",
     "frame": "the foot of a fixed pivot",
     "link": "a link: a bar, or the hull of its points, its slots and its centre of mass",
-    "wheel": "the pitch circle of a gear",
+    "wheel": "the pitch circle of a gear, or of a belt's pulley",
+    "belt": "a belt or a chain where it runs between its wheels",
+    "rack": "the pitch line of a rack, with its teeth",
     "spoke": "a mark that shows how a wheel turns",
     "slot": "the outline of a slot",
     "block": "the block of a slider",
@@ -38,6 +42,8 @@ ROLES = {
 
 SYMBOL = 0.016
 """The radius of a pin, of the size of the mechanism."""
+TOOTH = ((0.0, -1.0), (0.2, -1.0), (0.4, 1.0), (0.6, 1.0), (0.8, -1.0), (1.0, -1.0))
+"""The outline of a tooth: along the rack, of the tooth's length, and across, of half its height."""
 UNKNOWN_TRAVEL = 0.2
 """Where nobody says how far a guide is used: so much of the size of the mechanism either way."""
 
@@ -151,11 +157,17 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
         Of each guide, m: over which slides it is drawn. Default, and where NaN: some way about its `through`; of a guide
         that is hardly used some way about its block or pin.
     """
-    s = SYMBOL * mechanism.size
-    reach = UNKNOWN_TRAVEL * mechanism.size
+    # symbols keep their size where the dimensions vary
+    size = complex(mechanism.size).real
+    s, reach = SYMBOL * size, UNKNOWN_TRAVEL * size
     spans = [_long_enough(span, reach, s) for span in (travel or [(-reach, reach)] * len(mechanism.guides))]
     guides = list(zip(mechanism.guides, spans, strict=True))
-    wheels = list(dict.fromkeys(chain.from_iterable(_wheels(mechanism, gear) for gear in mechanism.gears)))
+    meshes = [
+        *(_wheels(mechanism, gear) for gear in mechanism.gears),
+        *(_pulleys(mechanism, belt) for belt in mechanism.belts),
+        *(_pinion(mechanism, rack) for rack in mechanism.racks),
+    ]
+    wheels = list(dict.fromkeys(chain.from_iterable(meshes)))
     slots = {
         name: [span for span in guides if span[0].on == name and not span[0].is_slider]
         for name in mechanism.bodies
@@ -170,7 +182,9 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
         layers += [_link(mechanism, name, guides, wheels, s)] if name != GROUND else []
         layers += [_slot(mechanism, guide, span, s) for guide, span in slots[name]]
     layers += [
+        *(_belt(mechanism, belt) for belt in mechanism.belts),
         wheels,
+        *(_teeth(mechanism, rack, spans[mechanism.guide_at(rack.slider)], s) for rack in mechanism.racks),
         [
             Line("spoke", w.body, (w.centre, w.centre + w.radius))
             for w in wheels
@@ -178,7 +192,7 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
         ],
         *(_block(mechanism, guide, s) for guide, _ in guides if guide.is_slider),
         (_coil(mechanism, spring, s) for spring in mechanism.springs),
-        *(_mass(body, own.center, s) for body, own in mechanism.rigid.items() if own.mass),
+        *(_mass(body, own.center, s) for body, own in mechanism.rigid.items() if complex(own.mass)),
         _points(mechanism, s),
     ]
     return Drawing(tuple(chain.from_iterable(layers)), tuple(_labels(mechanism)), s)
@@ -207,7 +221,7 @@ def _coil(mechanism: Description, spring: Spring, s: float) -> Coil:
 
 def _ends(mechanism: Description, guide: Guide, span: tuple[float, float], beyond: float) -> list[complex]:
     """Return the ends of a guide's line, in the axes of the body that carries it."""
-    along = cmath.exp(1j * guide.angle)
+    along = rotation(guide.angle)
     start = mechanism.through(guide)
     return [start + (span[0] - beyond) * along, start + (span[1] + beyond) * along]
 
@@ -217,7 +231,7 @@ def _in_ground(mechanism: Description, guide: Guide, span: tuple[float, float], 
     if guide.on != GROUND or not guide.is_slider:
         return
     low, high = _ends(mechanism, guide, span, 4 * s)
-    along = cmath.exp(1j * guide.angle)
+    along = rotation(guide.angle)
     for side in (2, -2):
         wall = (low + side * 1j * s * along, high + side * 1j * s * along)
         yield Line("rail", GROUND, wall)
@@ -226,7 +240,7 @@ def _in_ground(mechanism: Description, guide: Guide, span: tuple[float, float], 
 
 def _hatched(start: complex, end: complex, depth: float) -> Iterator[Line]:
     """Short strokes to the left of a line (to the right where the depth is negative)."""
-    count = max(2, round(abs(end - start) / (1.8 * abs(depth))))
+    count = max(2, round(abs(complex(end - start)) / (1.8 * abs(depth))))
     way = (end - start) / count
     along = way / abs(way) if way else 1
     for i in range(count):
@@ -254,7 +268,7 @@ def _link(
         if guide.on == name:
             points += _ends(mechanism, guide, span, 3 * s)
     own = mechanism.rigid[name]
-    if len(points) == 1 and own.mass:
+    if len(points) == 1 and complex(own.mass):
         points.append(own.center)
     outline = hull(points)
     if len(outline) > 1:
@@ -271,9 +285,14 @@ def hull(points: Iterable[complex]) -> tuple[complex, ...]:
     >>> hull([0, 2, 1])
     (0j, (2+0j))
     """
-    ordered = sorted(set(map(complex, points)), key=lambda z: (z.real, z.imag))
+    # numbers that vary stay what they are: which of them are corners is decided by their own values
+    own = {complex(z): z for z in points}
+    return tuple(own[z] for z in _corners(sorted(own, key=lambda z: (z.real, z.imag))))
+
+
+def _corners(ordered: list[complex]) -> Sequence[complex]:
     if len(ordered) < 3:
-        return tuple(ordered)
+        return ordered
     width = abs(ordered[-1] - ordered[0])
 
     def chain_of(line: Iterable[complex]) -> list[complex]:
@@ -298,7 +317,7 @@ def _wheels(mechanism: Description, gear: Gear) -> Iterator[Circle]:
     None where the wheels share their axis, or where the links turn alike.
     """
     arm = mechanism.bodies[gear.arm]
-    axes = [next((p for p in mechanism.bodies[body] if p in arm), "") for body in gear.links]
+    axes = [_axis(mechanism, body, gear.arm) for body in gear.links]
     if gear.ratio == 1 or gear.arm in gear.links or "" in axes or axes[0] == axes[1]:
         return
     second = abs(arm[axes[1]] - arm[axes[0]]) / abs(1 - gear.ratio)
@@ -306,10 +325,78 @@ def _wheels(mechanism: Description, gear: Gear) -> Iterator[Circle]:
         yield Circle("wheel", body, mechanism.bodies[body][axis], radius)
 
 
+def _pulleys(mechanism: Description, belt: Belt) -> Iterator[Circle]:
+    """The wheels of a belt, where they turn on pins of the body that carries both."""
+    axes = [_axis(mechanism, body, belt.arm) for body in belt.links]
+    if all(axes):
+        for body, axis, radius in zip(belt.links, axes, belt.radii, strict=True):
+            yield Circle("wheel", body, mechanism.bodies[body][axis], radius)
+
+
+def _belt(mechanism: Description, belt: Belt) -> Iterator[Line]:
+    """A belt: tangents of its wheels, and around them, in the axes of the body that carries both."""
+    axes = [_axis(mechanism, body, belt.arm) for body in belt.links]
+    if not all(axes):
+        return
+    here, there = (mechanism.bodies[belt.arm][axis] for axis in axes)
+    (first, second), way = belt.radii, there - here
+    side = -1 if belt.crossed else 1
+    if abs(way) <= abs(first - side * second):
+        # the one stands inside the other
+        return
+    # from the line of centres to where the belt touches
+    touch = cmath.acos((first - side * second) / abs(way)).real
+    along = way / abs(way)
+    behind, ahead = 2 * pi - 2 * touch, 2 * touch if side > 0 else 2 * pi - 2 * touch
+    start = touch if side > 0 else touch - pi
+    around = [there + second * along * cmath.exp(1j * (start - side * ahead * k / 24)) for k in range(25)]
+    back = [here + first * along * cmath.exp(-1j * (touch + behind * k / 24)) for k in range(25)]
+    yield Line("belt", belt.arm, (*around, *back), closed=True)
+
+
+def _pinion(mechanism: Description, rack: Rack) -> Iterator[Circle]:
+    """The wheel of a rack, about its pin on the body that carries the rack's guide, or about its own guided point."""
+    guide = mechanism.guides[mechanism.guide_at(rack.slider)]
+    axis = guide.point if guide.link == rack.gear else _axis(mechanism, rack.gear, guide.on)
+    if axis:
+        yield Circle("wheel", rack.gear, mechanism.bodies[rack.gear][axis], abs(rack.radius))
+
+
+def _teeth(mechanism: Description, rack: Rack, span: tuple[float, float], s: float) -> Iterator[Line]:
+    """The pitch line of a rack with its teeth, as long as its wheel rolls on it."""
+    guide = mechanism.guides[mechanism.guide_at(rack.slider)]
+    d, start = cmath.exp(1j * guide.angle), mechanism.through(guide)
+    low, high = span[0] - 4 * s, span[1] + 4 * s
+    if guide.link == rack.gear:
+        # the wheel rolls: its rack is of the body that carries the slot
+        body, origin, along = guide.on, start + 1j * rack.radius * d, d
+        depth = -1j * rack.radius * d
+    else:
+        axis = _axis(mechanism, rack.gear, guide.on)
+        if not axis or guide.turned is None:
+            return
+        back = cmath.exp(-1j * (guide.angle + guide.turned))
+        touch = mechanism.bodies[guide.on][axis] - 1j * rack.radius * d - start
+        body, along = guide.link, d * back
+        origin = mechanism.bodies[guide.link][guide.point] + touch * back
+        low, high = -high, -low
+        depth = 1j * rack.radius * along
+    depth *= 0.7 * s / abs(rack.radius)
+    count = min(120, max(4, round((high - low) / (2.4 * s))))
+    step = (high - low) / count
+    line = [origin + (low + step * (k + x)) * along + y * depth for k in range(count) for x, y in TOOTH]
+    yield Line("rack", body, tuple(line))
+
+
+def _axis(mechanism: Description, body: str, arm: str) -> str:
+    """The pin on which a wheel turns on the body that carries it; empty where there is none."""
+    return next((p for p in mechanism.bodies[body] if p in mechanism.bodies[arm]), "")
+
+
 def _slot(mechanism: Description, guide: Guide, span: tuple[float, float], s: float) -> Iterator[Shape]:
     """The rounded outline of a slot, as wide as its pin."""
     low, high = _ends(mechanism, guide, span, 0)
-    along = 1.35 * s * cmath.exp(1j * guide.angle)
+    along = 1.35 * s * rotation(guide.angle)
     round_ = [cmath.exp(1j * (pi / 2 + pi * k / 8)) for k in range(9)]
     outline = [*(low + along * turn for turn in round_), *(high - along * turn for turn in round_)]
     yield Line("slot", guide.on, tuple(outline), closed=True)
@@ -317,7 +404,7 @@ def _slot(mechanism: Description, guide: Guide, span: tuple[float, float], s: fl
 
 def _block(mechanism: Description, guide: Guide, s: float) -> Iterator[Shape]:
     centre = mechanism.bodies[guide.link][guide.point]
-    along = s * cmath.exp(-1j * (guide.turned or 0.0))
+    along = s * rotation(-(guide.turned or 0.0))
     corners = tuple(centre + along * corner for corner in (-3.2 - 2j, 3.2 - 2j, 3.2 + 2j, -3.2 + 2j))
     yield Line("block", guide.link, corners, closed=True)
 

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from dalembert.page import Page
-    from virtualwork.bounds.quantities import Bounds
+    from virtualwork.digits.estimates import Estimates
     from virtualwork.drawing import Drawing
     from virtualwork.family.sensitivity import Sensitivities
     from virtualwork.forces import Forces
@@ -74,13 +74,13 @@ class Motion:
         self.assembly, self.lock = assembly, assembly.lock
         self.poses = Poses(assembly, angle, speed, acceleration, jerk, block_of)
         self._units: dict[int, Motion] = {}
+        self._on_tape: dict[Key, bool] = {}
 
     def __repr__(self) -> str:
         m = self.mechanism
         return f"Motion({m.name!r}: {self.n} poses over {', '.join(e.name for e in m.inputs)})"
 
     def __eq__(self, other: object) -> bool:
-        """Say whether it is the same assembly over the same inputs and rates."""
         if not isinstance(other, Motion):
             return NotImplemented
         mine, its = self.poses, other.poses
@@ -92,7 +92,8 @@ class Motion:
 
     def __reduce__(self) -> tuple[Any, ...]:
         poses = self.poses
-        return _again, (self.assembly, self.inputs, poses.rates, self.input_error, poses.block_of, poses.time)
+        own = self.inputs, poses.input_error, poses.input_rest
+        return _again, (self.assembly, own, poses.rates, poses.block_of, poses.time)
 
     # --- over what ------------------------------------------------------------------------------------------------
     @property
@@ -112,7 +113,7 @@ class Motion:
 
     @property
     def input_error(self) -> ArrayLike:
-        """Bound of the inputs' own errors, for the estimates of rounding errors: 0 where they are exact as given."""
+        """The inputs' own errors, for the estimates of rounding errors: 0 where they are exact as given."""
         return self.poses.input_error
 
     @input_error.setter
@@ -131,10 +132,7 @@ class Motion:
 
     @property
     def condition(self) -> Reals:
-        """(n,): ‖J⁻¹‖∞ of the constraint Jacobian of all loops, lengths divided by the mechanism's size.
-
-        A relative error ε in the lengths or the input moves the pose by some ε·condition.
-        """
+        """(n,): ‖J⁻¹‖∞ of all loops, lengths divided by the size: a relative error ε moves the pose by some ε·condition."""
         return self.poses.condition
 
     # --- what moves -----------------------------------------------------------------------------------------------
@@ -185,10 +183,15 @@ class Motion:
     def values(self, keys: Sequence[Key]) -> list[Any]:
         """Quantities by their keys (`Recording.value`), (n,) each: from the tape where that pays, else over blocks."""
         keys = tuple(keys)
-        way = pays(self.assembly.recordings.setdefault("asked", {}), self.poses.n, keys)
-        if way == "lanes" or (
-            way == "one" and (self.lanes.known.keys() >= set(keys) or self.lanes.one(keys))
-        ):
+        new = tuple(key for key in keys if key not in self._on_tape)
+        if new:
+            way = pays(self.assembly.recordings.setdefault("asked", {}), self.poses.n, new)
+            taped = way == "lanes" or (way == "one" and self.lanes.one(new))
+            self._on_tape |= dict.fromkeys(new, taped)
+        # what was handed out once stays as it is, to its last digit
+        if len({self._on_tape[key] for key in keys}) > 1:
+            return [self.value(key) for key in keys]
+        if keys and self._on_tape[keys[0]]:
             return [value.copy() for value in self.lanes.values(keys)]
         if FORCES.isdisjoint(key[0] for key in keys):
             return self.poses.values(keys)
@@ -199,16 +202,16 @@ class Motion:
         return self.values((key,))[0]
 
     @cached_property
-    def rounding(self) -> Bounds:
-        """Bounds of the rounding errors of this motion, each formed when first asked for."""
-        from virtualwork.bounds.quantities import Bounds
+    def rounding(self) -> Estimates:
+        """Estimates of the rounding errors of this motion, each formed when first asked for."""
+        from virtualwork.digits.estimates import Estimates
 
-        return Bounds(self.poses)
+        return Estimates(self.poses, self.values)
 
     def error_estimates(self, *names: str) -> dict[str, Reals]:
-        """Return bounds (n,) of the rounding errors of several quantities, as their `error_estimate` gives them one by one.
+        """Return estimates (n,) of the rounding errors of several quantities, as `error_estimate` gives them one by one.
 
-        They come from one sweep, which they have most of in common.
+        They come from one second run, of which they have most in common.
 
         Parameters
         ----------
@@ -225,22 +228,20 @@ class Motion:
         >>> from virtualwork import Input, Link, Mechanism
         >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
         >>> found = crank.motion(1.0, speed=2.0).error_estimates("points.P", "links.crank.omega")
-        >>> bool(0 < found["points.P"][0] < 1e-15), found["links.crank.omega"]
-        (True, array([0.]))
+        >>> bool(0 < found["points.P"][0] < 1e-15), bool(found["links.crank.omega"][0] < 1e-28)
+        (True, True)
         """
         from virtualwork.evaluator import key_of
 
         keys = {name: key_of(self.assembly, name) for name in names}
-        joints = [key for key in keys.values() if key[0] == "reaction"]
-        self.rounding.together(key for key in keys.values() if key not in joints)
+        joints = {name: key for name, key in keys.items() if key[0] == "reaction"}
+        self.rounding.together(key for name, key in keys.items() if name not in joints)
+        found = {name: self.rounding.of(key) for name, key in keys.items() if name not in joints}
         if joints:
-            self.dynamics.error_estimate().together(joints)
-        return {
-            name: self.dynamics.error_estimate().reaction(*key[1:])
-            if key in joints
-            else self.rounding.of(key)
-            for name, key in keys.items()
-        }
+            errors = self.dynamics.error_estimate()
+            errors.together(joints.values())
+            found |= {name: errors.reaction(*key[1:]) for name, key in joints.items()}
+        return {name: found[name] for name in names}
 
     # --- forces -----------------------------------------------------------------------------------------------
     @cached_property
@@ -286,7 +287,8 @@ class Motion:
         if j not in self._units:
             k = self.inputs.shape[1]
             rates: list[list[Number]] = [[float(i == j) for i in range(k)], [0.0] * k, [0.0] * k]
-            self._units[j] = _again(self.assembly, self.inputs, rates, self.input_error, self.poses.block_of)
+            own = self.inputs, self.poses.input_error, self.poses.input_rest
+            self._units[j] = _again(self.assembly, own, rates, self.poses.block_of)
         return self._units[j]
 
     @property
@@ -435,13 +437,14 @@ class Motion:
 
 def _again(
     assembly: Assembly,
-    inputs: Reals,
+    own: tuple[Reals, ArrayLike, Any],
     rates: list[list[Number]],
-    input_error: ArrayLike,
     block_of: EvenSweep | None,
     time: Reals | None = None,
 ) -> Motion:
     """Make a motion again, as pickles and copies do; what it had solved is solved anew when asked for."""
+    inputs, error, rest = own
     motion = Motion(assembly, inputs, block_of=block_of)
-    motion.poses.rates, motion.poses.time, motion.input_error = rates, time, input_error
+    poses = motion.poses
+    poses.rates, poses.time, poses.input_error, poses.input_rest = rates, time, error, rest
     return motion

@@ -19,6 +19,8 @@ INK = "currentColor"
 LOOK = {
     "link": (4.5, 0.16),
     "wheel": (1.6, 0.07),
+    "belt": (2.2, 0.0),
+    "rack": (1.8, 0.0),
     "block": (1.6, 0.3),
     "hatch": (0.7, 0.0),
     "mass": (0.9, 0.0),

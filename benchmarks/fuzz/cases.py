@@ -55,6 +55,11 @@ DRIVEN = (
     'torque = 5\n[[forces]]\nlink = "rod"\npoint = "E"\nforce = [1, 2]\nframe = "link"\n'
 )
 STEADY = DRIVEN.replace('law = "law.csv"', 'angle = "0 deg"\nspeed = 10\nacceleration = 0')
+CASES = "crank_deg,links.rod.mass_kg\n10,1\n20,2\n"
+TOLERANCES = '[tolerances]\n"links.crank.B.x" = "1 mm"\n"links.rod.C" = 0.01\n'
+TARGET = "E_x_m,E_y_m\n1.5,2\n1,2.2\n"
+TURNS = "turned_deg,unbalance_g_mm,angle_deg\n0,209.8,50.6\n90,216.1,85.7\n180,107.9,109.6\n270,91.2,31.2\n"
+SIGNAL = "t_s,mark,A_um\n" + "".join(f"{i / 100},{int(i % 10 == 0)},{(i % 10 - 5) ** 2}\n" for i in range(60))
 GRAVITY = "gravity = [0, -9.81]\n"
 
 # command line -> its files; the examples have theirs
@@ -77,6 +82,16 @@ FURTHER: list[tuple[str, dict[str, str]]] = [
     ("spin body.toml --at 1 --at 2", {"body.toml": TORQUED}),
     ("forces driven.toml", {"driven.toml": GRAVITY + DRIVEN, "law.csv": LAW}),
     ("forces driven.toml --over 0deg:360deg/24 --counterweights crank", {"driven.toml": STEADY}),
+    ("mechanism driven.toml --over 0deg:360deg:30deg --set links.rod.mass=3 --branch 1", {"driven.toml": STEADY}),
+    ("mechanism driven.toml --at 10deg --at 20deg --over links.crank.B.x=0.9:1.1/4 --only rod,B.x", {"driven.toml": STEADY}),
+    ("mechanism driven.toml --cases cases.csv --order velocity", {"driven.toml": STEADY, "cases.csv": CASES}),
+    ("inspect driven.toml --over links.crank.B.x=0.9:1.1/4", {"driven.toml": STEADY}),
+    ("equilibrium driven.toml --over 0deg:360deg:1deg", {"driven.toml": GRAVITY + STEADY}),
+    ("simulate driven.toml --time 0:0.2:0.1 --until 5deg --accuracy 1e-6", {"driven.toml": GRAVITY + STEADY}),
+    ("tolerance driven.toml --over 0deg:90deg/3 --draws 20 --seed 3", {"driven.toml": STEADY + TOLERANCES}),
+    ("fit driven.toml target.csv --want E --free links.crank.B.x=0.8:1.2 --starts 4", {"driven.toml": STEADY, "target.csv": TARGET}),
+    ("index turns.csv", {"turns.csv": TURNS}),
+    ("signal signal.csv --pulses 1", {"signal.csv": SIGNAL}),
     ("examples klann", {}),
 ]  # fmt: skip
 
@@ -100,8 +115,13 @@ PLAUSIBLE = {
     "--integrator": ["DOP853", "splitting"],
     "--rotation": ["cw", "ccw"],
     "--grade": ["G2.5", "G6.3", "G0", "G-1", "G1e30", "2.5", "G"],
-    "--only": ["crank", "A", "B", "rod,coupler", "C", "ground", ","],
-    "--graph": ["B.x", "crank.omega", "rod.angle", "B.slide", "A.jx", "crank.x", ".", "B."],
+    "--only": ["B.x", "crank.omega", "A.jx", "crank.", "crank", "A", "B", "rod,coupler", "C", "ground", ","],
+    "--set": ["links.crank.B.x=1.1", "links.rod.mass=0", "input.speed=5", "x=1", "links.crank.B.x=", "=1"],
+    "--over": ["0deg:360deg:30deg", "0deg:90deg/3", "links.crank.B.x=0.9:1.1/2", "1:0:1", "crank=0:1:0", ":"],
+    "--at": ["10deg", "crank=10deg", "crank=10deg,arm=2deg", "10", "x=1"],
+    "--want": ["E", "rod.angle", "C.position", "ground", "."],
+    "--free": ["links.crank.B.x=0.8:1.2", "links.rod.C=1:2", "gravity=0:1", "x=1:2", "links.crank.B.x=2:1"],
+    "--distribution": ["normal", "uniform"],
     "--counterweights": ["crank", "coupler", "rod,crank", "ground"],
     "--flywheel": ["0.02", "1e-300", "2"],
     "--monte-carlo": ["40", "100"],

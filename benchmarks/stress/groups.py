@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache, partial
 from typing import Any
 
@@ -13,8 +14,9 @@ import numpy as np
 from benchmarks.stress.pairs import Pairs
 from benchmarks.stress.random_linkages import four_bar, geared_five_bar, slider_crank, triad, turning_block
 from benchmarks.truth.mechanism import DIGITS, Exact
-from virtualwork import Mechanism, MechanismError
-from virtualwork.formulas.positions import SWEEP
+from virtualwork import Link, Mechanism, MechanismError
+from virtualwork.digits.estimates import Estimates
+from virtualwork.formulas.asked import Key
 from virtualwork.motion import Motion
 
 Generator = np.random.Generator
@@ -79,7 +81,10 @@ def _size(apart: Any) -> float:
 def _klann() -> Mechanism:
     from benchmarks.scenes import klann
 
-    return klann()
+    # the truth takes the numbers as floats, and points by their coordinates
+    m = klann()
+    links = {name: Link(link.points, link.mass, link.center, link.inertia) for name, link in m.links.items()}
+    return replace(m, links=links, decimals=None)
 
 
 # --- campaigns --------------------------------------------------------------------------------------------------------
@@ -141,27 +146,30 @@ def _sweeps(rng: Generator) -> Pairs:
     found: Pairs = []
     for i in rng.choice(there, 4):
         alone = m.motion(q[i], **rates)
-        if not alone.assembled[0]:
-            continue
-        first = max(0, int(i) - SWEEP)
-        found += _picked(motion, int(i), m.motion(q[first : i + SWEEP + 1], **rates), int(i) - first, alone)
+        if alone.assembled[0]:
+            found += _picked(motion, int(i), alone)
     return found
 
 
-def _picked(sweep: Motion, i: int, near: Motion, k: int, alone: Motion) -> Pairs:
-    """One pose of a sweep against 50 digits; the bounds are those of a shorter sweep, in which it is pose k."""
+def _picked(sweep: Motion, i: int, alone: Motion) -> Pairs:
+    """One pose of a sweep against 50 digits; `alone` is that pose by itself."""
     exact = Exact(alone)
     if not exact.closed:
         return []
+
+    def values(keys: Sequence[Key]) -> list[Any]:
+        return [value[i : i + 1] for value in sweep.values(keys)]
+
+    estimates = Estimates(alone.poses, values)
     found: Pairs = []
     with mp.workdps(DIGITS):
         for name in sweep.mechanism.links:
-            link, bounds = sweep.link(name), near.link(name)
-            for order, values in enumerate((link.angle, link.omega, link.alpha)):
-                apart = exact.angle(name, order) - mp.mpf(float(values[i]))
+            link = sweep.link(name)
+            for order in range(3):
+                apart = exact.angle(name, order) - mp.mpf(float(link.value(order)[i]))
                 if order == 0:
                     apart -= 2 * mp.pi * mp.nint(apart / (2 * mp.pi))
-                found.append((_size(apart), float(bounds.error_estimate(order)[k])))
+                found.append((_size(apart), float(estimates.of(link.key(order))[0])))
     return found
 
 

@@ -108,9 +108,9 @@ def _vector(size: str, phase: str) -> Any:
 def _wrapped(rng: np.random.Generator) -> Pairs:
     """Single-plane balancing from a written table to the columns of the command."""
     from cli.field.field_balancing import FieldBalancing
+    from cli.field.reading import read_measured
     from cli.field.request import Request
     from cli.field.tables import corrections
-    from cli.field.trial_runs import read_runs, runs_table
 
     v0, t, v1 = _written(rng), _written(rng), _written(rng)
     if rng.random() < 0.4:  # a trial run that hardly differs from the initial one
@@ -125,7 +125,7 @@ def _wrapped(rng: np.random.Generator) -> Pairs:
         path = Path(folder) / "runs.csv"
         path.write_text("\n".join(rows) + "\n")
         request = Request()
-        runs = read_runs(runs_table(str(path)), request)
+        runs, _ = read_measured(str(path), request, (), None)
         columns = {c.header: c for c in corrections(FieldBalancing(runs, request), []).columns}
     size, angle = (float(str(columns[name].values[0])) for name in ("mass_g", "angle_deg"))
     bound = {name: column.error() for name, column in columns.items() if column.error is not None}

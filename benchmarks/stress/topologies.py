@@ -245,7 +245,7 @@ def _join(made: _Builder, left: int) -> bool:
 
 
 def rows(t: Topology) -> list[tuple[str, tuple[Any, ...]]]:
-    """Every scalar or vector constraint as data: pins, guides, turns (Σ c·θ = const), slides that are driven."""
+    """Every scalar or vector constraint as data: pins, guides, turns (Σ c·θ = a guide's angle and what is added), slides that are driven."""
     m = t.mechanism
     found: list[tuple[str, tuple[Any, ...]]] = []
     for pin, bodies in m.pins.items():
@@ -254,7 +254,7 @@ def rows(t: Topology) -> list[tuple[str, tuple[Any, ...]]]:
     for g in m.guides:
         found.append(("line", (g.link, m.links[g.link].points[g.point], g.on, g.through, g.angle)))
         if g.turned is not None:
-            found.append(("turn", ({g.link: 1.0, g.on: -1.0}, g.angle + g.turned, None)))
+            found.append(("turn", ({g.link: 1.0, g.on: -1.0}, (g.angle, g.turned), None)))
     for gear in m.gears:
         a, b = gear.links
         held = {b: 1.0, a: -gear.ratio}
@@ -262,7 +262,7 @@ def rows(t: Topology) -> list[tuple[str, tuple[Any, ...]]]:
         found.append(("turn", (held, None, None)))
     for j, e in enumerate(m.inputs):
         if e.link is not None:
-            found.append(("turn", ({e.link: 1.0, e.on: -1.0}, 0.0, j)))
+            found.append(("turn", ({e.link: 1.0, e.on: -1.0}, (0.0, 0.0), j)))
         else:
             g = next(g for g in m.guides if g.point == e.slider)
             found.append(("run", (g.link, m.links[g.link].points[g.point], g.on, g.through, g.angle, j)))
@@ -313,8 +313,8 @@ def evaluate(t: Topology, x: Reals, inputs: tuple[float, ...]) -> tuple[Reals, R
         elif kind == "turn":
             held, const, j = data
             columns = {b: _seat(t, x, b, 0j)[2] + 2 for b in held if b != GROUND}
-            if const is None:  # a gear stands as it was drawn
-                const = sum(c * t.angles.get(b, 0.0) for b, c in held.items())
+            # a gear stands as it was drawn
+            const = sum(c * t.angles.get(b, 0.0) for b, c in held.items()) if const is None else sum(const)
             value = sum(c * x[columns[b]] for b, c in held.items() if b in columns) - const
             if j is not None:
                 value -= inputs[j]

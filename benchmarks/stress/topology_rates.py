@@ -69,6 +69,8 @@ def _exact_rows(t: Topology, x: list[_Series], inputs: list[_Series]) -> list[_S
             held, const, j = data
             if const is None:
                 const = sum((mp.mpf(c) * t.angles.get(b, 0.0) for b, c in held.items()), mp.mpf(0))
+            else:
+                const = mp.arg(_exact_direction(const[0])) + mp.mpf(const[1])
             total = _series(-mp.mpmathify(const))
             for body, c in held.items():
                 if body != GROUND:

@@ -14,6 +14,7 @@ import mpmath as mp
 import numpy as np
 
 from virtualwork import GROUND
+from virtualwork.branch.assembly import Assembly
 from virtualwork.plan.topology import direction
 
 if TYPE_CHECKING:
@@ -23,6 +24,19 @@ if TYPE_CHECKING:
 
 DIGITS = 50
 Series = list[Any]  # Taylor coefficients in time
+
+
+def along(angle: float) -> Any:
+    """The direction of a guide: what stands at a quarter turn is exactly there."""
+    d = direction(angle)
+    return mp.mpc(d) if d in (1, -1, 1j, -1j) else mp.expj(mp.mpf(angle))
+
+
+def _ratio(part: Any) -> Any:
+    """The ratio of a gear, or of a belt by its radii."""
+    if not hasattr(part, "radii"):
+        return mp.mpf(part.ratio)
+    return mp.mpf(part.radii[0]) / mp.mpf(part.radii[1]) * (-1 if part.crossed else 1)
 
 
 class Exact:
@@ -70,23 +84,28 @@ class Exact:
             if entry.link is not None:
                 self.theta[entry.link][0] = self.theta[entry.on][0] + self.drive[j][0]
         self.turned = [self._whole(g) for g in self.m.guides]
-        self.phase = [self._phase(gear) for gear in self.m.gears]
+        # where a relation does not hang on inputs alone: the double that the motion takes from the guess
+        self.seat = Assembly.from_guess(self.m).phases
+        self.toothed: list[Any] = [*self.m.gears, *self.m.belts]
+        self.phase = [self._phase(i, part) for i, part in enumerate(self.toothed)]
 
     def _whole(self, g: Guide) -> Any:
         """The angle of a slider's link to its guide's, in the turn of the start."""
         if g.turned is None:
             return mp.mpf(0)
-        given = mp.mpf(g.angle) + mp.mpf(g.turned)
+        given = mp.arg(along(g.angle)) + mp.mpf(g.turned)
         here = self.theta[g.link][0] - self.theta[g.on][0]
         return given + 2 * mp.pi * mp.nint((here - given) / (2 * mp.pi))
 
-    def _phase(self, gear: Any) -> Any:
-        """θ_b − r θ_a + (r − 1) θ_arm at the guess; the gears here hang on inputs alone."""
+    def _phase(self, i: int, gear: Any) -> Any:
+        """θ_b − r θ_a + (r − 1) θ_arm at the guess."""
         a, b = gear.links
         at = {e.link: mp.mpf(float(q)) for e, q in zip(self.m.inputs, self.m.at, strict=True)} | {
             GROUND: mp.mpf(0)
         }
-        r = mp.mpf(gear.ratio)
+        if not {a, gear.arm} <= at.keys():
+            return mp.mpf(self.seat[i])
+        r = _ratio(gear)
         guess = self.m.guess.angles
         phase = mp.mpf(guess.get(b, 0.0)) - r * at[a] + (r - 1) * at[gear.arm]
         self.theta[b][0] = phase + r * self.theta[a][0] - (r - 1) * self.theta[gear.arm][0]
@@ -169,10 +188,23 @@ class Exact:
                 self.labels.append(("input", str(driven[g.point]), 0))
             if g.is_slider:
                 angles((f"moment:{i}", g.link), [(g.link, 1), (g.on, -1)], [self.turned[i]])
-        for i, gear in enumerate(m.gears):
+        for i, gear in enumerate(self.toothed):
             a, b = gear.links
-            r = mp.mpf(gear.ratio)
+            r = _ratio(gear)
             angles((f"gear:{i}", b), [(b, 1), (a, -r), (gear.arm, r - 1)], [self.phase[i]])
+        for i, rack in enumerate(m.racks):
+            g, r = m.guides[m.guide_at(rack.slider)], mp.mpf(rack.radius)
+            rel, row = self._along(g, order, point)
+            const = mp.mpf(self.seat[len(self.phase) + i])
+            value = [mp.re(v) - (const if k == 0 else 0) for k, v in enumerate(rel)]
+            row = {c: mp.re(v) for c, v in row.items()}
+            for body, f in ((rack.gear, -r), (g.on, r)):
+                value = [v + f * t for v, t in zip(value, self.theta[body], strict=False)]
+                if body != GROUND:
+                    c = 3 * self.links.index(body)
+                    row[c] = row.get(c, mp.mpf(0)) + f
+            found.append((value, row))
+            self.labels.append((f"rack:{i}", g.link, 0))
         for j, entry in enumerate(m.inputs):
             if entry.link is not None:
                 angles(("input", str(j)), [(entry.link, 1), (entry.on, -1)], self.drive[j])
@@ -180,8 +212,7 @@ class Exact:
 
     def _along(self, g: Guide, order: int, point: Any) -> tuple[Series, dict[int, Any]]:
         """The point from `through`, in axes along the guide, and its row."""
-        d = direction(g.angle)
-        exact = mp.mpc(d) if d in (1, -1, 1j, -1j) else mp.expj(mp.mpf(g.angle))
+        exact = along(g.angle)
         through = self.m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
         z = self.m.links[g.link].points[g.point]
         apart = [
@@ -316,6 +347,31 @@ class Exact:
             found += [(ts.links[0], 0j, mp.mpc(0), torque), (ts.links[1], 0j, mp.mpc(0), -torque)]
         return [load for load in found if load[0] != GROUND]
 
+    def _rack_guide(self, i: int) -> Guide:
+        return self.m.guides[self.m.guide_at(self.m.racks[i].slider)]
+
+    def _at_pitch_point(self, i: int, row: dict[int, Any]) -> None:
+        """Let the tooth force act where the teeth meet: at the pitch point, on the rack's body and on the wheel."""
+        rack, g = self.m.racks[i], self._rack_guide(i)
+        along = mp.expj(mp.mpf(g.angle)) * self.turn(g.on, 0)[0]
+        if rack.gear == g.link:
+            wheel = self.series(rack.gear, self.m.bodies[rack.gear][g.point], 0)[0]
+            touch, bodies = wheel + 1j * mp.mpf(rack.radius) * along, ((g.link, 1), (g.on, -1))
+        else:
+            pin = next((p for p in self.m.bodies[rack.gear] if p in self.m.bodies[g.on]), None)
+            if pin is None:
+                return
+            wheel = self.series(rack.gear, self.m.bodies[rack.gear][pin], 0)[0]
+            touch, bodies = wheel - 1j * mp.mpf(rack.radius) * along, ((g.link, 1), (rack.gear, -1))
+        row.clear()
+        for body, sign in bodies:
+            if body != GROUND:
+                c = 3 * self.links.index(body)
+                arm = touch - self.origin[body][0]
+                row[c] = row.get(c, mp.mpf(0)) + sign * mp.im(mp.conj(arm) * along)
+                row[c + 1] = row.get(c + 1, mp.mpf(0)) + sign * mp.re(along)
+                row[c + 2] = row.get(c + 2, mp.mpf(0)) + sign * mp.im(along)
+
     def generalized_loads(self) -> list[Any]:
         """The work of the loads for each coordinate: θ, x, y of every link."""
         q = [mp.mpf(0)] * (3 * len(self.links))
@@ -337,6 +393,8 @@ class Exact:
                         if motor.drives == self.m.inputs[int(which)].link:
                             c = 3 * self.links.index(motor.carrier)
                             row[c] = row.get(c, mp.mpf(0)) - 1
+            for i in range(len(self.m.racks)):
+                self._at_pitch_point(i, rows[self.labels.index((f"rack:{i}", self._rack_guide(i).link, 0))])
             self._factor(rows)
             return dict(
                 zip(self.labels, self._solve_transposed([-v for v in self.generalized_loads()]), strict=True)

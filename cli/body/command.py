@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from cli.body.moving import ShaftRequest
     from cli.show.result import Result
+    from dalembert.results.way import Topic
 
 _VECTOR = "X,Y,Z"
 
@@ -97,10 +98,16 @@ def run(
     def figure() -> Figure:
         return tables.draw(moving)
 
+    def way() -> list[Topic]:
+        from cli.body.way import way
+
+        return way(moving)
+
     return Result(
         tables=tables.tables(moving),
         screen=lambda: tables.quantities(moving),
         figure=figure,
+        way=way,
         method=tables.METHOD,
         about={
             "title": "A shaft on two bearings"

@@ -140,8 +140,8 @@ class Analysis:
 
         q = self.inputs
         found = tuple(Motion(a, q.values, q.speed, q.acceleration) for a in self.assemblies)
-        for motion in found:  # read from decimals, turned to radians: for the estimates of --digits
-            motion.input_error = float(np.finfo(float).eps) * np.abs(motion.inputs)
+        for motion in found:
+            motion.poses.input_rest = q.rest
             motion.poses.time = q.time
         return found
 

@@ -15,6 +15,7 @@ from cli.cases.values import Driven
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dalembert.arithmetic.doubled import Doubled
     from virtualwork import Mechanism
 
     Reals = NDArray[np.float64]
@@ -47,6 +48,18 @@ class Inputs:
         """The least and the largest value of the first input."""
         return float(self.values[:, 0].min()), float(self.values[:, 0].max())
 
+    def rest(self) -> Reals:
+        """What the inputs are exactly, by their decimals in degrees or metres, less the floats in SI, (n, k)."""
+        from dalembert.arithmetic.doubled import PI, Doubled
+
+        rest = np.zeros(self.values.shape)
+        for j, (si, shown) in enumerate(zip(self.values.T, self.shown.T, strict=True)):
+            exact = decimals(shown)
+            if not np.array_equal(si, shown):
+                exact = exact * (PI / 180.0)
+            rest[:, j] = (exact - Doubled(si)).value
+        return rest
+
     def part(self, low: int, high: int) -> Inputs:
         """The poses from low to high."""
         speed, acceleration = (None if r is None else r[low:high] for r in (self.speed, self.acceleration))
@@ -54,6 +67,21 @@ class Inputs:
         return Inputs(
             self.values[low:high], self.shown[low:high], speed, acceleration, self.steps[low:high], time
         )
+
+
+def decimals(shown: Reals) -> Doubled:
+    """The decimals that numbers are written with, in 32 digits; numbers without few decimals are what they are.
+
+    >>> float(decimals(np.array([0.1, 2.5])).low[0])
+    -5.551115123125783e-18
+    """
+    from dalembert.arithmetic.doubled import Doubled
+
+    for places in range(13):
+        whole = np.rint(shown * 10.0**places)
+        if (np.abs(whole) < 2.0**53).all() and (whole / 10.0**places == shown).all():
+            return Doubled(whole) / 10.0**places
+    return Doubled(shown)
 
 
 @dataclass(frozen=True)
@@ -132,6 +160,10 @@ class InputGrid:
     def shown(self) -> Reals:
         """The inputs as they are shown, degrees or metres, (n, k)."""
         return self._whole.shown
+
+    def rest(self) -> Reals:
+        """What the inputs are exactly less the floats in SI, (n, k)."""
+        return self._whole.rest()
 
     @property
     def steps(self) -> list[str]:

@@ -101,8 +101,8 @@ def ledger(
         names("link", [e.link for _, e in every], None),
         names("kind", [e.kind for _, e in every], None),
         *([names("point", [e.point or None for _, e in every], None)] if points else []),
-        *_components("F", "N", [e.force for _, e in every]),
-        *_components("V", "m_s", [e.velocity for _, e in every]),
+        *components("F", "N", [e.force for _, e in every]),
+        *components("V", "m_s", [e.velocity for _, e in every]),
         Column("torque", "N_m", [e.torque for _, e in every]),
         Column("omega", "rad_s", [e.omega for _, e in every]),
         Column("power", "W", [e.power for _, e in every]),
@@ -131,7 +131,7 @@ def ledger(
     )
 
 
-def _components(letter: str, unit: str, values: Sequence[complex | None]) -> list[Column]:
+def components(letter: str, unit: str, values: Sequence[complex | None]) -> list[Column]:
     """The two components of vectors, as they are shown."""
     return [
         Column(f"{letter}{axis}", unit, [None if v is None else getattr(v, part) for v in values])

@@ -153,6 +153,8 @@ def counted(m: Mechanism) -> str:
         "slot": [g for g in m.guides if g.turned is None],
         "slider": [g for g in m.guides if g.turned is not None],
         "gear mesh": m.gears,
+        "belt": m.belts,
+        "rack": m.racks,
         "force": m.forces,
         "torque": m.torques,
         "spring": m.springs,

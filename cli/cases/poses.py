@@ -180,6 +180,23 @@ def poses_of(
     return in_rows(tree, n)
 
 
+def pose_head(analysis: Analysis, i: int) -> Document:
+    """What names a pose in JSON: `input_deg`, or `inputs` of several."""
+    shown = analysis.inputs.shown[i].tolist()
+    every = {
+        e.name: {analysis.input_names[e.name]: value}
+        for e, value in zip(analysis.mechanism.inputs, shown, strict=True)
+    }
+    return next(iter(every.values())) if len(every) == 1 else {"inputs": every}
+
+
+def over_poses(analysis: Analysis, entries: list[Document]) -> Document:
+    """What a topic has in JSON: of one pose its entry, of several the list `poses`."""
+    if len(entries) == 1:
+        return entries[0]
+    return {"poses": [{**pose_head(analysis, i), **entry} for i, entry in enumerate(entries)]}
+
+
 def marks_of(analysis: Analysis, motion: Motion) -> list[list[str]]:
     """What is special about each pose: a change point, a limit of the input, a dead point."""
     found: list[list[str]] = [[] for _ in range(motion.n)]

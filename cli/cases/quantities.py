@@ -1,186 +1,68 @@
-"""What is shown of a pose, each number once: where it stands in JSON, its header in tables, what it is asked for by.
-
-Tables, JSON, bounds of errors, variants, motion in time and tolerances all walk these.
-"""
+"""Which quantities of a pose are requested, and what they are as they are shown; which there are: `virtualwork.quantities`."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dalembert.angles import degrees
 from virtualwork.formulas.asked import FORCES, Key, over_blocks
+from virtualwork.quantities import (
+    FORCE as FORCE,
+)
+from virtualwork.quantities import (
+    LINK as LINK,
+)
+from virtualwork.quantities import (
+    POINT as POINT,
+)
+from virtualwork.quantities import (
+    SLIDE as SLIDE,
+)
+from virtualwork.quantities import (
+    Quantity as Quantity,
+)
+from virtualwork.quantities import (
+    called as called,
+)
+from virtualwork.quantities import (
+    effort_name as effort_name,
+)
+from virtualwork.quantities import (
+    forces as forces,
+)
+from virtualwork.quantities import (
+    links as links,
+)
+from virtualwork.quantities import (
+    places as places,
+)
+from virtualwork.quantities import (
+    points as points,
+)
+from virtualwork.quantities import (
+    reactions as reactions,
+)
+from virtualwork.quantities import (
+    slides as slides,
+)
+from virtualwork.quantities import (
+    vector as vector,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from virtualwork import Mechanism
     from virtualwork.motion import Motion
-    from virtualwork.plan.steps import Joint
 
     Reals = NDArray[np.float64]
     Numbers = Sequence[float | None]
 
 # of an input that was turned to radians and back, or to metres
 TURNED = 2 * float(np.finfo(float).eps)
-# by how often they are differentiated in time
-POINT = (("x_m", "y_m"), ("vx_m_s", "vy_m_s"), ("ax_m_s2", "ay_m_s2"), ("jx_m_s3", "jy_m_s3"))
-LINK = ("angle_deg", "omega_rad_s", "alpha_rad_s2", "jerk_rad_s3")
-SLIDE = ("position_m", "speed_m_s", "acceleration_m_s2", "jerk_m_s3")
-FORCE = ("fx_N", "fy_N")
-
-
-class Quantity(NamedTuple):
-    """A number that is shown of every pose."""
-
-    path: tuple[Any, ...]
-    """Where it stands in JSON, a reaction below (joint, on, from); empty where tables alone have it."""
-    header: str
-    key: Key = ()
-    """What a motion computes for it (`Recording.value`); empty for what is zero throughout, or no motion has."""
-    imaginary: bool = False
-    """Whether it is the y of a vector."""
-    less: Key = ()
-    """What is subtracted."""
-    names: tuple[str, ...] = ()
-    """What `--only` calls it: `H.x`, `B.coupler.fx`, `B.coupler.guide.fx`."""
-    owners: tuple[str, ...] = ()
-    """The bare names that it belongs to."""
-    order: int = 0
-    """How often it is differentiated in time."""
-    reverse: bool = False
-    """Whether it is the other side of a joint force, shown only where its full name is requested."""
-
-    @property
-    def turns(self) -> bool:
-        """Whether it is an angle, shown in degrees."""
-        return self.key[:1] == ("angle",) and not self.key[2]
-
-    def of(self, value: Any) -> Reals:
-        """The number as it is shown, from the quantity or from its slope."""
-        part = value.imag if self.imaginary else value.real
-        return np.asarray(np.degrees(part) if self.turns else part)
-
-
-# --- which there are --------------------------------------------------------------------------------------------------
-def vector(path: tuple[Any, ...], lead: str, names: Sequence[str], key: Key) -> list[Quantity]:
-    """The two components of a vector."""
-    return [Quantity((*path, name), f"{lead}{name}", key, imaginary=bool(i)) for i, name in enumerate(names)]
-
-
-def called(found: Iterable[Quantity], owner: str, order: int = 0) -> list[Quantity]:
-    """Quantities with the names that a point, link or slide has for them: `H.vx`."""
-    return [each._replace(names=(f"{owner}.{_word(each)}",), owners=(owner,), order=order) for each in found]
-
-
-def _word(each: Quantity) -> str:
-    """The name of a quantity without its unit: `vx` of `vx_m_s`."""
-    return str(each.path[-1]).partition("_")[0]
-
-
-def points(m: Mechanism, names: Iterable[str], order: int) -> list[Quantity]:
-    """Places of points and their rates up to an order."""
-    return [
-        part
-        for name in names
-        for k in range(order + 1)
-        # the name says where on the body
-        for part in called(
-            vector(("points", name), f"{name}_", POINT[k], ("point", m.points[name][0], 0j, name, k)), name, k
-        )
-    ]
-
-
-def slides(m: Mechanism, names: Iterable[str], order: int) -> list[Quantity]:
-    """Travels along guides and their rates up to an order."""
-    guides = {g.point: i for i, g in reversed(list(enumerate(m.guides)))}
-    return [
-        part
-        for name in names
-        for k in range(order + 1)
-        for part in called(
-            [Quantity(("slides", name, SLIDE[k]), f"{name}_{SLIDE[k]}", ("slide", guides[name], k))], name, k
-        )
-    ]
-
-
-def links(names: Iterable[str], order: int) -> list[Quantity]:
-    """Angles of links and their rates up to an order."""
-    return [
-        part
-        for name in names
-        for k in range(order + 1)
-        for part in called(
-            [Quantity(("links", name, LINK[k]), f"{name}_{LINK[k]}", ("angle", name, k))], name, k
-        )
-    ]
-
-
-def places(m: Mechanism, order: int) -> list[Quantity]:
-    """All that moves, in the order of tables."""
-    guided = dict.fromkeys(g.point for g in m.guides)
-    return [*points(m, m.points, order), *slides(m, guided, order), *links(m.links, order)]
-
-
-def effort_name(slide: bool) -> str:
-    """`torque_N_m` of a turning input, `force_N` of a slide."""
-    return "force_N" if slide else "torque_N_m"
-
-
-def forces(m: Mechanism, pairs: Iterable[tuple[Joint, str, str]]) -> list[Quantity]:
-    """The effort of every input both ways and their difference, and what the joints carry and the ground feels."""
-    found = []
-    for j, entry in enumerate(m.inputs):
-        name, several = effort_name(entry.is_slide), len(m.inputs) > 1
-        lead = f"{entry.name}_" if several else ""
-        path = ("effort", "inputs", entry.name) if several else ("effort",)
-        euler, work = ("newton-euler", j), ("effort", j)
-        word, owner = name.partition("_")[0], str(entry.name)
-        every = [
-            Quantity((*path, f"input_{name}"), f"{lead}input_{name}", euler, names=(f"{owner}.{word}",)),
-            Quantity(
-                (*path, f"virtual_work_{name}"),
-                f"{lead}virtual_work_{name}",
-                work,
-                names=(f"{owner}.virtual_work_{word}",),
-            ),
-            Quantity((), f"{lead}difference_{name}", euler, less=work, names=(f"{owner}.difference_{word}",)),
-        ]
-        found += [each._replace(owners=(owner,)) for each in every]
-    return found + reactions(m, pairs)
-
-
-def reactions(m: Mechanism, pairs: Iterable[tuple[Joint, str, str]]) -> list[Quantity]:
-    """What the joints carry, on one side and on the other, and what shakes the ground."""
-    rub = {each.joint for each in m.friction}
-    found: list[Quantity] = []
-    for joint, on, of in pairs:
-        found += _joint_force(joint, on, of, joint.guide is not None or joint.name in rub)
-        if len(joint.bodies) == 2:
-            other = _joint_force(joint, of, on, joint.guide is not None or joint.name in rub)
-            found += [each._replace(reverse=True, owners=(f"{joint.name}.{of}",)) for each in other]
-    shaking = vector(("shaking",), "shaking_", FORCE, ("shaking",))
-    shaking.append(Quantity(("shaking", "moment_N_m"), "shaking_moment_N_m", ("shaking moment",)))
-    return found + called(shaking, "shaking")
-
-
-def _joint_force(joint: Joint, on: str, of: str, turns: bool) -> list[Quantity]:
-    """The force and the moment of a joint on a body; a pin has a moment where it rubs."""
-    path, lead = ("reactions", (joint.name, on, of)), f"{joint.name}_{of}_on_{on}_"
-    found = vector(path, lead, FORCE, ("force", joint.key, on))
-    key = ("moment", joint.key, on) if turns else ()
-    found.append(Quantity((*path, "moment_N_m"), f"{lead}moment_N_m", key))
-    side, kind = f"{joint.name}.{on}", joint.key.partition(":")[0]
-    return [
-        each._replace(
-            names=(f"{side}.{_word(each)}", f"{side}.{kind}.{_word(each)}"),
-            owners=(joint.name, on, of, side, f"{side}.{kind}"),
-        )
-        for each in found
-    ]
 
 
 # --- which are requested ----------------------------------------------------------------------------------------------
@@ -308,8 +190,12 @@ def bound(motion: Motion, key: Key, given: Mapping[str, Reals]) -> Reals:
         return motion.rounding.of(key)
     if of[0] in given:
         return TURNED * np.abs(given[of[0]])
-    # in degrees it lies in a whole turn
-    return np.asarray(np.degrees(motion.rounding.of(key)) + np.finfo(float).eps * 360)
+    from dalembert.arithmetic.doubled import PI, Doubled
+
+    # what the degrees as they are shown round besides
+    value = motion.value(key)
+    off = (Doubled(value) * (180.0 / PI) - degrees(np.exp(1j * value))).value
+    return np.asarray(np.degrees(motion.rounding.of(key)) + np.abs(off - 360.0 * np.rint(off / 360.0)))
 
 
 def bounds_of(bounds: Reals) -> list[float]:

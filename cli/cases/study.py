@@ -116,7 +116,7 @@ class PoseCase(Case):
             block.assemblies = (assembly,)
             its = block.inputs
             motion = Motion(assembly, its.values, its.speed, its.acceleration, block_of=sweep)
-            motion.input_error = float(np.finfo(float).eps) * np.abs(motion.inputs)
+            motion.poses.input_rest = its.rest
             motion.poses.time = its.time
             block.motions = (motion,)
             yield block

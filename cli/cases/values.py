@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from cli.read import options
@@ -184,7 +184,16 @@ def with_numbers(m: Mechanism, dimensions: Sequence[Dimension], shown: Sequence[
     """The mechanism with other numbers, as they are shown."""
     from virtualwork.describe.dimensions import changed
 
-    return changed(m, {d.path: Varied(d).si(value) for d, value in zip(dimensions, shown, strict=True)})
+    numbers = {d.path: Varied(d).si(value) for d, value in zip(dimensions, shown, strict=True)}
+    if m.decimals is not None:
+        read = ((d.kind, numbers[d.path], x, _factor(d)) for d, x in zip(dimensions, shown, strict=True))
+        m = replace(m, decimals=m.decimals.and_also(read))
+    return changed(m, numbers)
+
+
+def _factor(dimension: Dimension) -> tuple[float, float]:
+    """What a number as it is shown has to be multiplied by."""
+    return (math.pi, 180) if dimension.unit == "deg" else (1, 1)
 
 
 def quantity(of: Driven | Varied, text: str, flag: str, bare: Mapping[str, str]) -> float:

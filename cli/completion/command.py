@@ -10,6 +10,10 @@ from typer.completion import get_completion_script  # type: ignore[attr-defined]
 
 VARIABLE = "_DALEMBERT_COMPLETE"
 """The shell asks through this environment variable."""
+NAMES = """
+# NAME=VALUE is one word, and no blank follows NAME=
+COMP_WORDBREAKS=${COMP_WORDBREAKS//=/}
+"""
 
 
 class Shell(StrEnum):
@@ -22,4 +26,8 @@ class Shell(StrEnum):
 
 def run(shell: Annotated[Shell, typer.Argument(help="The shell that reads the script.")]) -> None:
     """Print the completion script of a shell: source <(dalembert completion bash), in fish dalembert completion fish | source."""
-    typer.echo(get_completion_script(prog_name="dalembert", complete_var=VARIABLE, shell=shell.value))
+    script = get_completion_script(prog_name="dalembert", complete_var=VARIABLE, shell=shell.value)
+    if shell is Shell.bash:
+        ends = "    [[ ${COMPREPLY[0]} == *= ]] && compopt -o nospace 2>/dev/null\n    return 0\n"
+        script = script.replace("    return 0\n", ends) + NAMES
+    typer.echo(script)

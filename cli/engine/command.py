@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.show.result import Result
+    from dalembert.results.way import Topic
 
 
 EXAMPLE = "inline-four"
@@ -63,7 +64,13 @@ def run(
 
         return draw(engine)
 
+    def way() -> list[Topic]:
+        from cli.engine.way import way
+
+        return way(engine)
+
     return Result(
+        way=way,
         tables=tables(engine),
         figure=figure,
         method=METHOD,

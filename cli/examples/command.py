@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cli.show.output import reported
 from dalembert.errors import DataError
@@ -65,7 +65,11 @@ def _here(name: str) -> dict[Path, tuple[bytes, str]]:
         A file of the user's own has that name.
     """
     found = {}
-    for file in sorted(EXAMPLES.joinpath(name).iterdir(), key=lambda file: file.name):
+    own = [
+        *EXAMPLES.joinpath(name).iterdir(),
+        *(EXAMPLES / each for each in describe(name).get("beside", ())),
+    ]
+    for file in sorted(own, key=lambda file: file.name):
         if file.name == ABOUT:
             continue
         here = Path(file.name)
@@ -105,7 +109,7 @@ def names() -> list[str]:
     return sorted(folder.name for folder in EXAMPLES.iterdir() if folder.joinpath(ABOUT).is_file())
 
 
-def describe(name: str) -> dict[str, str]:
-    """Return what an example's `example.toml` says of it: line, command, source."""
-    about: dict[str, str] = tomllib.loads(EXAMPLES.joinpath(name, ABOUT).read_text(encoding="utf-8"))
+def describe(name: str) -> dict[str, Any]:
+    """Return what an example's `example.toml` says of it: line, command, source; beside, which it has of other examples."""
+    about: dict[str, Any] = tomllib.loads(EXAMPLES.joinpath(name, ABOUT).read_text(encoding="utf-8"))
     return about

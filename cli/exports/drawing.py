@@ -26,7 +26,7 @@ LAYERS = {
     "GROUND": (8, "#777777", "hatch frame"),
     "GUIDES": (3, "#1c8a3c", "rail slot block"),
     "LINKS": (5, "#1f4fd8", "link"),
-    "GEARS": (6, "#8e24aa", "wheel spoke"),
+    "GEARS": (6, "#8e24aa", "wheel spoke belt rack"),
     "SPRINGS": (30, "#d2691e", "spring"),
     "MASSES": (2, "#b8860b", "mass"),
     "CURVES": (1, "#c62828", ""),

@@ -1,4 +1,4 @@
-"""MJCF: nested bodies, loops closed by `connect`, gears by fixed tendons, inputs by motors, the start as a key frame."""
+"""MJCF: nested bodies, loops closed by `connect`, gears, belts and racks by fixed tendons, inputs by motors, the start as a key frame."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from cli.exports.markup import add, digits, document, spatial
 from cli.exports.skeleton import LIGHT, THICK, Branching, Joint, Part, Skeleton, Travel
 from virtualwork.describe.parts import GROUND
 
+PLURAL = {"gear": "gears", "belt": "belt", "rack": "rack"}
 # MuJoCo takes nothing lighter
 LIGHTEST = 2e-15
 
@@ -40,9 +41,12 @@ def mjcf(s: Skeleton, travel: Travel, said: str) -> bytes:
     for link, block in s.welds:
         add(equality, "weld", body1=link, body2=block)
     tendon = Element("tendon")
-    for k, g in enumerate(m.gears, 1):
-        _fixed(tendon, f"gears {k}", s.terms(g.shares()))
-        add(equality, "tendon", tendon1=f"gears {k}")
+    count = dict.fromkeys(PLURAL, 0)
+    for mesh in m.meshes:
+        count[mesh.kind] += 1
+        name = f"{PLURAL[mesh.kind]} {count[mesh.kind]}"
+        _fixed(tendon, name, s.mesh(mesh))
+        add(equality, "tendon", tendon1=name)
     _springs(s, tendon, bodies)
     actuator = Element("actuator")
     for k, e in enumerate(m.inputs):

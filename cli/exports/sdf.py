@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from cli.exports.markup import add, digits, document
 from cli.exports.skeleton import LIGHT, Joint, Part, Skeleton, Travel
-from virtualwork.describe.parts import GROUND, Gear
+from virtualwork.describe.parts import GROUND, Belt, Gear
 
 WORLD = "world"
 SPACE = "https://dalembert.invalid/sdf"
@@ -29,7 +29,7 @@ def sdf(s: Skeleton, travel: Travel, said: str) -> bytes:
     for j in s.joints:
         joint(model, s, j, travel)
     welds(model, s)
-    gearboxes(model, m.gears, WORLD)
+    gearboxes(model, (*m.gears, *m.belts), WORLD)
     plugins(model, s)
     return document(root, said)
 
@@ -93,8 +93,8 @@ def welds(model: Element, s: Skeleton) -> None:
         add(made, "child", block)
 
 
-def gearboxes(model: Element, gears: Iterable[Gear], ground: str) -> None:
-    """Add the gears: θ of the child is −gearbox_ratio times that of the parent, both against the reference body."""
+def gearboxes(model: Element, gears: Iterable[Gear | Belt], ground: str) -> None:
+    """Add gears and belts: θ of the child is −gearbox_ratio times that of the parent, both against the reference body."""
     for k, g in enumerate(gears, 1):
         a, b, arm = (ground if x == GROUND else x for x in (*g.links, g.arm))
         ratio = g.ratio

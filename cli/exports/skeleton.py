@@ -16,6 +16,7 @@ import numpy as np
 
 from cli.read.names import Groups, unused
 from dalembert.errors import DataError
+from virtualwork.describe.meshes import Mesh
 from virtualwork.describe.parts import GROUND, TorsionSpring
 from virtualwork.drawing import hull, tracers
 from virtualwork.parts_of_motion import SlideMotion
@@ -144,9 +145,12 @@ class Skeleton:
 
     # --- joints -----------------------------------------------------------------------------------------------
     def _wanted(self) -> list[tuple[str, str]]:
-        """Pairs of bodies between which a joint is wanted: of inputs, then of gears and their arms."""
+        """Pairs of bodies between which a joint is wanted: of inputs, then of gears, belts and racks and their arms."""
         pairs = [(e.on, str(e.link)) for e in self.m.inputs if not e.is_slide]
-        return pairs + [(g.arm, link) for g in self.m.gears for link in g.links]
+        pairs += [(g.arm, link) for g in self.m.gears for link in g.links]
+        pairs += [(b.arm, link) for b in self.m.belts for link in b.links]
+        racks = [(self.m.guides[self.m.guide_at(rack.slider)].on, rack.gear) for rack in self.m.racks]
+        return pairs + racks
 
     def _pins(self) -> None:
         wanted = self._wanted()
@@ -291,6 +295,14 @@ class Skeleton:
             for name, sense in self.path[body].items():
                 found[name] = found.get(name, 0.0) + c * sense
         return {name: c for name, c in found.items() if abs(c) > 1e-12}
+
+    def mesh(self, mesh: Mesh) -> dict[str, float]:
+        """Return what a gear, a belt or a rack holds, as a sum of the tree's coordinates."""
+        found = self.terms(mesh.torques)
+        if mesh.guide is not None:
+            slide = next(j.name for j in self.joints if j.guide == mesh.guide)
+            found[slide] = mesh.shares[mesh.guide]
+        return found
 
     def twist(self, spring: TorsionSpring) -> float:
         """Return how far a torsion spring is wound, rad: within half a turn at the guess, and followed from there."""

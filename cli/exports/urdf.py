@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element
 from cli.exports import sdf
 from cli.exports.markup import add, digits, document, spatial
 from cli.exports.skeleton import Branching, Part, Skeleton, Travel
-from virtualwork.describe.parts import GROUND, Gear
+from virtualwork.describe.parts import GROUND, Belt, Gear, Rack
 
 # a limit that is none
 LARGE = 1e9
@@ -89,10 +89,11 @@ def _frames(s: Skeleton, root: Element, part: Part, origin: complex) -> None:
 
 
 def _gears(s: Skeleton, root: Element, gazebo: Element) -> None:
-    """Gears of two joints of the tree are mimicked; others are gearboxes of the simulator."""
-    boxes: list[Gear] = []
-    for g in s.m.gears:
-        terms = s.terms(g.shares())
+    """Gears, belts and racks of two joints of the tree are mimicked; other gears are gearboxes of the simulator."""
+    boxes: list[Gear | Belt] = []
+    parts: tuple[Gear | Belt | Rack, ...] = (*s.m.gears, *s.m.belts, *s.m.racks)
+    for g, mesh in zip(parts, s.m.meshes, strict=True):
+        terms = s.mesh(mesh)
         driven = {j.name for j in s.joints if j.input is not None}
         last = [name for name in terms if name not in driven]
         joint = next((e for e in root.iter("joint") if last and e.get("name") == last[-1]), None)
@@ -101,6 +102,6 @@ def _gears(s: Skeleton, root: Element, gazebo: Element) -> None:
             # of coordinates that may run against the pins' own sense
             factor = -terms[other] / terms[last[-1]]
             add(joint, "mimic", joint=other, multiplier=factor)
-        else:
+        elif not isinstance(g, Rack):
             boxes.append(g)
     sdf.gearboxes(gazebo, boxes, GROUND)

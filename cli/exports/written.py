@@ -96,6 +96,8 @@ def _left_out(s: Skeleton, suffix: str) -> list[str]:
     ):
         if loads and not (suffix == ".xml" and "springs" in what):
             found.append(f"{what} are left out: {len(loads)}")
+    if m.racks and suffix == ".sdf":
+        found.append(f"racks are left out: {len(m.racks)}: the format has no such joint")
     light = [name for name, part in s.parts.items() if part.mass <= 0 and name in m.links]
     if light and suffix != ".urdf":
         found.append(

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing import JointFit, joint_fit
 from cli.field.field_balancing import FieldBalancing
 from cli.field.runs import Complex, Real
 from cli.field.solution import Solved
@@ -18,7 +17,8 @@ from dalembert.results.columns import ABSENT, Column, Table, names, number
 from dalembert.units import from_si, to_si
 
 if TYPE_CHECKING:
-    from balancing.run_log import Errors
+    from balancing import JointFit
+    from balancing.reading_errors import Errors
 
 
 class Spread(NamedTuple):
@@ -37,15 +37,9 @@ class Spread(NamedTuple):
 
 def spread(b: FieldBalancing, solved: Solved) -> Spread | None:
     """Return how well a group's coefficients are known, from its fit or from stated errors; None where nothing tells."""
-    group, error = solved.group, b.request.reading_error
-    if solved.balance is not None:
-        return _spread(solved.balance.fit, solved.balance.errors)
-    if error is None or b.stored is not None or solved.fits:
+    if b.stored is not None or not (b.runs.fitted or b.request.reading_error) or solved.balance is None:
         return None
-    readings = np.concatenate([group.initial[:, None], group.runs], axis=1)
-    masses = np.concatenate([np.zeros_like(group.on[:, :1]), group.on], axis=1)
-    fit = joint_fit(readings, masses)
-    return _spread(fit, fit.stated(*error))
+    return _spread(solved.balance.fit, solved.balance.errors)
 
 
 def _spread(fit: JointFit, errors: Errors) -> Spread | None:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from cli.field.tables import Tables
     from cli.show.result import Result, Sheet
     from dalembert.results.columns import Column, Table
+    from dalembert.results.way import Topic
 
 
 EXAMPLE = "fan-one-plane"
@@ -39,16 +40,15 @@ How:
   from_here  Correct the rotor as it stands now.
   reading_error 2%,2deg  Standard deviations of amplitude, phase.
   grade GRADE  Tolerance: G6.3 (ISO 21940-11), API or MIL.
-  fit  Fit all runs, even where few are needed.
-Output: where masses go, the next run:
-  save_influence FILE.csv  Store the coefficients.
   blades N  Split onto N places, evenly spaced.
-  predict MASS@ANGLE,…  Predict a run: 10kg@-90deg or A=1g@0deg.
+  save_influence FILE.csv  Store the coefficients.
 Further options (docs/commands.md describes them):
+  fit  Fit all runs, even where few are needed.
+  predict MASS@ANGLE,…  Predict a run: 10kg@-90deg or A=1g@0deg.
   columns FILE.toml  Read columns by other headers: lines such as mass_g = "Masse", as --column has them.
   rotation  Direction of rotation seen against +z: phases lead in that direction, mass angles are ccw.
   exclude RUN  Leave a run out of the fit; repeatable.
-  method  By influence coefficients, or by amplitudes only in one plane.
+  method  By influence coefficients, or by amplitudes only (an initial run, then three trial runs in each plane).
   monte_carlo N  Uncertainties from N drawn sets of readings, 40 at least.
   ridge NUMBER  Damp the corrections of nearly dependent planes, such as 0.1.
   robust  In addition to the fit a robust one, on which outliers have little influence (Huber).
@@ -60,6 +60,7 @@ Further options (docs/commands.md describes them):
   first ANGLE  Angle of the first of --blades.
   suggest  Suggest the next run within --max-mass that tells most about the corrections.
   view  static-couple: the corrections of two planes as a static part and a couple.
+  zone_class  Zone A to D of ISO 10816-3 for velocities: group 1 (above 300 kW) or 2 (15 to 300 kW), rigid or flexible support.
   workers N  Processes that solve many machines.
 Moved:
   signal  Now dalembert signal.
@@ -105,6 +106,7 @@ def run(
     suggest: bool = False,
     robust: bool = False,
     view: Literal["static-couple"] | None = None,
+    zone_class: Literal["1-rigid", "1-flexible", "2-rigid", "2-flexible"] | None = None,
     columns: str | None = None,
     workers: Annotated[int, typer.Option(min=1)] = 1,
     signal: Annotated[str | None, typer.Option(hidden=True)] = None,
@@ -115,8 +117,8 @@ def run(
     """Balance rotors from measured vibration and trial masses (influence coefficients).
 
     RUNS has a row for each run and sensor: run, sensor, amplitude_*, phase_deg, trial_plane, trial_mass_* (or
-    trial_unbalance_*), trial_angle_deg; in the initial run the last three are empty. trial_kept is yes where the trial
-    mass stays on. Phase and mass angle are counted in one sense. docs/field-balancing.md has the other columns.
+    trial_unbalance_*), trial_angle_deg, trial_kept (yes: it stays on). In the initial run the last four are empty. Phase
+    and mass angle are counted in one sense. docs/field-balancing.md has more.
     """
     old = {"signal": signal, "suggest_trial": suggest_trial, "pulses": pulses, "planes": planes}
     for name in options.given(**old):
@@ -146,7 +148,7 @@ def run(
 
     from cli.field import request as read
     from cli.field.field_balancing import FieldBalancing
-    from cli.field.readers import read_measured
+    from cli.field.reading import read_measured
     from cli.read.tolerance import tolerance_of
 
     request = read.Request(
@@ -169,6 +171,7 @@ def run(
         suggest=suggest,
         robust=robust,
         view=view,
+        zone_class=zone_class,
     )
     measured, stored = read_measured(runs, request, influence or (), runout)
     with options.processes(workers) as executor:
@@ -203,6 +206,11 @@ def _result(b: FieldBalancing, save_influence: Path | None) -> Result:
 
         return draw(b, range(min(len(b.runs.rotors), 3)))
 
+    def way() -> list[Topic]:
+        from cli.field.way import way
+
+        return way(b)
+
     def aside() -> list[str]:
         if b.predict is None:
             return []
@@ -219,12 +227,13 @@ def _result(b: FieldBalancing, save_influence: Path | None) -> Result:
             "amplitude_unit": b.runs.amplitude_unit,
         },
         aside=aside,
-        companions=[name for name in ("prediction", "split", "predict") if name in tables],
+        companions=[name for name in ("prediction", "split", "predict", "zones") if name in tables],
         figure=figure,
         method=METHOD,
         sheets=sheets,
         shows_input=True,
         about={"title": "Balancing in the field"},
+        way=way,
         beside={} if save_influence is None else {save_influence: stored},
         warnings=remarks,
     )
@@ -232,6 +241,7 @@ def _result(b: FieldBalancing, save_influence: Path | None) -> Result:
 
 def _tables(b: FieldBalancing, warnings: list[str]) -> Tables:
     """The tables of a result, the CSV's first. `warnings` takes in why --digits leaves a correction whole."""
+    from cli.field import limits
     from cli.field import tables as of
 
     def influence() -> Table:
@@ -260,7 +270,9 @@ def _tables(b: FieldBalancing, warnings: list[str]) -> Tables:
         "rotors": lambda: of.rotors(b, further),
     }
     if b.request.tolerance is not None:
-        made["tolerance"] = lambda: of.tolerance(b)
+        made["tolerance"] = lambda: limits.tolerance(b)
+    if b.request.zone_class is not None:
+        made["zones"] = lambda: limits.zones(b)
     if b.request.four_run:
         made |= {"misfit": lambda: of.misfit(b), "alternatives": lambda: of.alternatives(b)}
     if b.request.view is not None:

@@ -50,7 +50,7 @@ def _remarks(found: FieldBalancing, solved: Solved) -> Iterator[str]:
         yield from _more(len(rows), "planes nearly dependent")
     if not found.request.four_run:
         yield from _thirty(found, group)
-    for i, fit in enumerate(solved.fits):
+    for i, (fit, *_) in enumerate(solved.fits):
         for s, (first, rival) in enumerate(zip(group.initial[i], fit.other, strict=True)):
             if rival == rival:
                 other = -first / rival
@@ -94,10 +94,10 @@ def _thirty(found: FieldBalancing, group: Group) -> Iterator[str]:
     """The 30/30 rule."""
     standing = group.initial
     for j, trial in enumerate(group.trials):
-        before, standing = standing, group.runs[:, j] if trial.kept else standing
-        if not trial.masses:
+        before, standing = standing, group.means[:, j] if trial.kept else standing
+        if not trial.tried:
             continue
-        effect = trial_effect(before, group.runs[:, j])
+        effect = trial_effect(before, group.means[:, j])
         little = ~((effect.amplitude >= 0.3) | (effect.phase >= np.radians(30))).any(axis=1)
         for i in np.flatnonzero(little)[:SHOWN]:
             most = np.max(effect.amplitude[i])

@@ -11,34 +11,33 @@ from balancing import (
     AmplitudeFit,
     Balance,
     DependentPlanes,
-    DependentTrials,
     Infeasible,
     JointFit,
     LogBalance,
     NotConverged,
-    Readings,
     condition_number,
-    influence_coefficients,
     influence_from_amplitudes,
+    initial_alone,
     initial_unbalance,
     least_squares,
     place,
-    spread,
     unseen,
 )
-from cli.field.one_rotor import Sought, confidence, least_maximum, limited_samples, within_limits
+from cli.field.one_rotor import Sought, confidence, least_maximum, within_limits
 from cli.field.request import Request, ceiling_in, limits_in, masses_at
 from cli.field.runs import SHOWN, Complex, Group, Real, Runs
-from cli.field.solution import Problem, Solved
+from cli.field.solution import Problem, Solved, errors_of_means
 from cli.field.stored import Stored
 from cli.read.options import bad
 from dalembert.angles import degrees
 from dalembert.arithmetic.parts import in_parts
 from dalembert.errors import DataError
-from dalembert.units import Scaled, from_si
+from dalembert.units import Scaled, amplitude_kind, from_si
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
+
+    from balancing.reading_errors import Errors
 
 Result = TypeVar("Result")
 
@@ -55,6 +54,11 @@ class FieldBalancing:
         self.runs, self.request, self.stored, self.executor = runs, request, stored, executor
         if request.tolerance is not None and runs.per == "mass" and request.radius is None:
             raise bad("--radius", "the tolerance is of unbalances: expected the radius of the trial masses")
+        if request.zone_class is not None and amplitude_kind(runs.amplitude_unit)[0] != "velocity":
+            raise bad(
+                "--zone-class",
+                f"zones are of velocities, the readings are in {runs.amplitude_unit}: expected mm_s",
+            )
         self.max_mass = limits_in(request.max_mass, runs) or runs.max_mass
         """Limit of each plane, SI; the key "" is for all."""
         self.ceiling = ceiling_in(request.max_residual, runs)
@@ -84,7 +88,8 @@ class FieldBalancing:
 
     def _solve(self, group: Group) -> Solved:
         request = self.request
-        planes, alpha, fits = self._coefficients(group)
+        planes, fit, fits = self._fit(group)
+        alpha = fit.influence
         standing = self._standing(group, planes)
         start = standing if request.from_here else np.zeros_like(standing)
         if request.from_here and not standing.any():
@@ -92,7 +97,7 @@ class FieldBalancing:
                 "--from-here: the last run has no mass on the rotor, so that it stands as in the initial run"
             )
         initial = group.initial - self.runout(group)
-        problem = Problem(group, planes, alpha, fits, initial, standing, start, self._limits(planes))
+        problem = Problem(group, planes, fit, fits, initial, standing, start, self._limits(planes))
         corrections, bound, condition = self._corrections(problem)
         if request.view is not None and len(planes) != 2:
             raise bad(
@@ -105,12 +110,10 @@ class FieldBalancing:
         unbalance = None
         if request.tolerance is not None:
             unbalance = initial_unbalance(alpha, initial, group.weights, singular=SINGULAR)
-        given = (group, planes, alpha, fits, initial, standing, start, problem.limit)
+        given = (group, planes, fit, fits, initial, standing, start, problem.limit)
         solved = Solved(*given, corrections, residual, condition, bound, unbalance)
-        if group.fit is not None:
-            self._doubt(solved, group.fit)
-        elif request.reading_error is not None or self._repeats_tell(group):
-            self._confidence(solved)
+        if self.runs.fitted or request.reading_error is not None or self._repeats_tell(group):
+            self._doubt(solved)
         return solved
 
     def _standing(self, group: Group, planes: list[str]) -> Complex:
@@ -131,27 +134,24 @@ class FieldBalancing:
                 )
         return standing
 
-    def _coefficients(self, group: Group) -> tuple[list[str], Complex, list[AmplitudeFit]]:
-        """Return the planes and their coefficients, (g, s, p): stored, of a fit, from amplitudes or from trial runs."""
-        planes = group.planes
-        if self.stored is not None:
-            matrices = []
-            for rotor in group.rotors:
-                planes, matrix = self.stored.matrix(self.runs.rotors[rotor], group.channels, self.runs)
-                matrices.append(matrix)
-                if "rotor" not in self.stored.table.texts:
-                    break
-            alpha = np.broadcast_to(np.stack(matrices), (len(group.rotors), *matrices[0].shape))
-            return planes, alpha, []
+    def _fit(self, group: Group) -> tuple[list[str], JointFit, list[list[AmplitudeFit]]]:
+        """Return the planes, and the fit of initial vibration and coefficients: these stored, or from amplitudes alone."""
         if group.fit is not None:
-            return planes, group.fit.influence, []
+            return group.planes, group.fit, []
         if self.request.four_run:
             fits = self._amplitudes(group)
-            return planes, np.stack([fit.influence for fit in fits])[..., None], fits
-        try:
-            return planes, influence_coefficients(group.initial, group.runs, group.on), []
-        except DependentTrials as error:
-            raise DataError(self.of(group, *error.case) + trials_say(group, error)) from None
+            alpha = np.array([[fit.influence for fit in one] for one in fits]).swapaxes(1, 2)
+            first = group.readings[:, group.trials[0].lines]
+            return group.planes, initial_alone(first, alpha), fits
+        assert self.stored is not None
+        planes, matrices = group.planes, []
+        for rotor in group.rotors:
+            planes, matrix = self.stored.matrix(self.runs.rotors[rotor], group.channels, self.runs)
+            matrices.append(matrix)
+            if "rotor" not in self.stored.table.texts:
+                break
+        alpha = np.broadcast_to(np.stack(matrices), (len(group.rotors), *matrices[0].shape))
+        return planes, initial_alone(group.readings, alpha), []
 
     def _repeats_tell(self, group: Group) -> bool:
         """Whether the scatter of repeats is to give uncertainties that nobody asked for."""
@@ -253,105 +253,98 @@ class FieldBalancing:
         except NotConverged as error:
             raise DataError(f"{self.of(problem.group, i or 0)}{error}") from None
 
-    def _amplitudes(self, group: Group) -> list[AmplitudeFit]:
-        """The four-run method, rotor by rotor."""
-        if len(group.planes) != 1:
+    def _amplitudes(self, group: Group) -> list[list[AmplitudeFit]]:
+        """The four-run method, rotor by rotor, plane by plane: each run with masses has them in one plane.
+
+        Several planes (Everett, J. Vib. Acoust. 109 (1987) 162-167): at each sensor the phases of all coefficients count from
+        that sensor's own initial vibration, so that O + Σ α w = 0 is one linear system whatever these phases are.
+        """
+        several = np.flatnonzero((group.on[:, 1:] != 0).sum(axis=2).max(axis=0, initial=0) > 1)
+        if len(several):
             raise DataError(
-                f"{self.of(group)}the four-run method is for one plane, found {', '.join(group.planes)}: with more planes "
-                "the phase must be measured"
+                f"{self.of(group)}run {group.trials[1 + several[0]].run}: masses in several planes: without phase each trial run "
+                "has a mass in one plane, the others empty: four runs for the first plane, then three for each other one"
             )
-        fits = []
-        for i in range(len(group.rotors)):
-            try:
-                fit = influence_from_amplitudes(group.initial[i].real, group.runs[i].real, group.on[i, :, 0])
-            except ValueError as error:
-                raise DataError(f"{self.runs.table.file}: {self.of(group, i)}{error}") from None
-            fits.append(fit)
-            unit = self.runs.amplitude_unit
-            for channel, misfit, first in zip(group.channels, fit.misfit, group.initial[i].real, strict=True):
-                text = (
-                    f"{self.of(group, i)}sensor {channel}: the readings are inconsistent: no influence coefficient fits them "
-                    f"better than {misfit:.3g} {unit} (r.m.s.), {misfit / first:.0%} of the initial reading"
+        return [
+            [self._amplitudes_of(group, i, p) for p in range(len(group.planes))]
+            for i in range(len(group.rotors))
+        ]
+
+    def _amplitudes_of(self, group: Group, i: int, p: int) -> AmplitudeFit:
+        """Fit one plane's coefficients to the amplitudes of its trial runs."""
+        named = f" plane {group.planes[p]}:" if len(group.planes) > 1 else ""
+        first, *runs = group.means[i].real
+        tried = np.flatnonzero(group.on[i, 1:, p] != 0)
+        try:
+            fit = influence_from_amplitudes(first, np.array(runs)[tried], group.on[i, 1 + tried, p])
+        except ValueError as error:
+            raise DataError(
+                f"{self.runs.table.file}: {self.of(group, i)}{named.lstrip()}{' ' * bool(named)}{error}"
+            ) from None
+        unit = self.runs.amplitude_unit
+        for channel, misfit, size in zip(group.channels, fit.misfit, first, strict=True):
+            text = (
+                f"{self.of(group, i)}sensor {channel}:{named} the readings are inconsistent: no influence coefficient fits them "
+                f"better than {misfit:.3g} {unit} (r.m.s.), {misfit / size:.0%} of the initial reading"
+            )
+            if misfit > 0.25 * size:
+                raise DataError(
+                    f"{self.runs.table.file}: {text}: expected four readings that fit one plane's effect"
                 )
-                if misfit > 0.25 * first:
-                    raise DataError(
-                        f"{self.runs.table.file}: {text}: expected four readings that fit one plane's effect"
-                    )
-                if misfit > 0.05 * first:
-                    self.warnings.append(text)
-        return fits
-
-    def _confidence(self, solved: Solved) -> None:
-        """Propagate the reading errors, rotor by rotor."""
-        relative, angle = self.request.reading_error or (0.0, 0.0)
-        group, sought, runout = solved.group, self._sought(solved), self.runout(solved.group)
-
-        def task(i: int) -> tuple[object, ...]:
-            readings = Readings(
-                group.initial[i],
-                relative,
-                angle,
-                trials=None if self.stored is not None else group.runs[i],
-                trial_masses=None if self.stored is not None else group.on[i],
-                influence=solved.alpha[i],
-                runout=runout,
-                scatter=group.mean_error[i] if group.reading_sd[i] else None,
-                degrees_of_freedom=group.repeats,
+            if misfit > 0.05 * size:
+                self.warnings.append(text)
+        if named and not np.isnan(fit.other).all():
+            raise DataError(
+                f"{self.runs.table.file}: {self.of(group, i)}two coefficients of plane {group.planes[p]} fit the amplitudes: expected "
+                "a third trial run in this plane, at an angle off the line of the others"
             )
-            own = group.own_weights(i)
-            return readings, solved.corrections[i], solved.start[i], own, sought, self.limited
-
-        found = list(in_parts(confidence, map(task, range(len(group.rotors))), self.executor))
-        solved.covariance = np.stack([covariance for covariance, _ in found])
-        self._unknown(solved)
-        solved.residual_95 = np.array([left for _, left in found])
+        return fit
 
     def _sought(self, solved: Solved) -> Sought:
         request = self.request
         return Sought(request.objective, solved.limit, self.ceiling, request.ridge, request.monte_carlo)
 
-    def _doubt(self, solved: Solved, fit: JointFit) -> None:
-        """Carry the errors of a fit of all runs to the corrections."""
-        request, group = self.request, solved.group
+    def _errors(self, solved: Solved) -> Errors:
+        """Return the errors of the readings: stated, as repeats or residuals scatter, or as those of sisters did."""
+        fit, group, stated = solved.fit, solved.group, self.request.reading_error
+        if group.trials:
+            return errors_of_means(fit, group, *(stated or (0.0, 0.0)))
+        if stated is not None:
+            return fit.stated(*stated)
         before = group.before
-        if request.reading_error is not None:
-            errors = fit.stated(*request.reading_error)
-        elif before is not None and before.reading is not None:
-            # where the runs leave nothing over, the readings scatter as those of the sisters did
-            told = fit.degrees_of_freedom > 0
-            errors = fit.known(
-                np.where(told, fit.residual_sd, before.reading[0]),
-                np.where(told, fit.degrees_of_freedom, before.reading[1]),
-            )
-        else:
-            errors = fit.scatter()
-        still = fit.without(self.runout(group))
+        if before is None or before.reading is None:
+            return fit.scatter()
+        # where the runs leave nothing over, the readings scatter as those of the sisters did
+        told = fit.degrees_of_freedom > 0
+        return fit.known(
+            np.where(told, fit.residual_sd, before.reading[0]),
+            np.where(told, fit.degrees_of_freedom, before.reading[1]),
+        )
+
+    def _doubt(self, solved: Solved) -> None:
+        """Carry the errors of the readings to the corrections, and to what they leave."""
+        request, group = self.request, solved.group
+        still, errors = solved.fit.without(self.runout(group)), self._errors(solved)
         balance = LogBalance(still, solved.total, errors, group.weights, solved.corrections, request.ridge)
         solved.balance = balance
         if not np.isfinite(errors.along).any():
             return
-        many = len(solved.corrections) > MANY
-        if not many:
-            left = [np.abs(balance.residual_samples(i)).max(axis=1) for i in range(len(solved.corrections))]
-            solved.residual_95 = np.quantile(left, 0.95, axis=1)
-        if not self.limited:
-            solved.covariance = balance.covariance
-        elif many:
-            self.warnings.append(
-                "uncertainties of so many rotors are not worked out under limits or with minimax"
-            )
-        else:
-            spreads = []
-            for i, corrections in enumerate(solved.corrections):
-                draws = balance.problem_samples(i, min(request.monte_carlo or 200, 1000))
-                own = group.own_weights(i)
-                try:
-                    samples = limited_samples(draws, solved.start[i], own, self._sought(solved))
-                    spreads.append(spread(samples, corrections))
-                except (DependentPlanes, NotConverged):
-                    spreads.append(np.full((len(corrections), 2, 2), np.nan))
-            solved.covariance = np.stack(spreads)
-            self._unknown(solved)
+        if self.runs.fitted and len(solved.corrections) > MANY:
+            if self.limited:
+                self.warnings.append(
+                    "uncertainties of so many rotors are not worked out under limits or with minimax"
+                )
+            else:
+                solved.covariance = balance.covariance
+            return
+        sought, rotors = self._sought(solved), range(len(solved.corrections))
+        tasks = (
+            (balance.machine(i), solved.corrections[i], solved.start[i], sought, self.limited) for i in rotors
+        )
+        found = list(in_parts(confidence, tasks, self.executor))
+        solved.covariance = np.stack([covariance for covariance, _ in found])
+        solved.residual_95 = np.array([left for _, left in found])
+        self._unknown(solved)
 
     def _unknown(self, solved: Solved) -> None:
         """Warn where the uncertainties of the corrections cannot be determined."""
@@ -424,19 +417,4 @@ def planes_say(planes: list[str], combination: Complex) -> str:
     return (
         f"the readings cannot tell the planes {' and '.join(told)} apart (singular): masses in the ratio "
         f"{_combination(planes, combination)} leave no trace; leave one of these planes out, or damp with --ridge"
-    )
-
-
-def trials_say(group: Group, error: DependentTrials) -> str:
-    """Say which planes the trial runs do not tell apart."""
-    told = [name for name, share in zip(group.planes, error.combination, strict=True) if abs(share) > 1e-6]
-    runs = len(group.trials)
-    if runs < len(group.planes):
-        return (
-            f"{len(group.planes)} planes ({', '.join(group.planes)}) and {runs} trial run{'s' * (runs != 1)}: expected a "
-            "trial run for every plane"
-        )
-    return (
-        f"the trial runs do not tell the planes {' and '.join(told)} apart: expected each plane tried by itself, "
-        "or in different proportions"
     )

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from cli.field.trial_runs import runs_table
-from cli.field.wide import is_wide
+from cli.field.wide import is_wide, long_form
 from dalembert.angles import phasor
 from dalembert.errors import DataError
 from dalembert.quantities import parse_number
 from dalembert.tables.sources import LINE, Source, open_source
-from dalembert.tables.table import Cells, Numbers, Table
+from dalembert.tables.table import Cells, Numbers, Table, read
 
 NAMES = {
     "mode": "state",
@@ -45,6 +45,32 @@ class Layout:
     """Limits of the corrections, plane -> kg."""
     runout: dict[str, complex] = field(default_factory=dict)
     """Slow roll, sensor -> vector."""
+
+
+def runs_table(
+    path: str,
+    texts: Sequence[str] = (
+        "rotor",
+        "run",
+        "sensor",
+        "trial_plane",
+        "trial_kept",
+        "date",
+        "ref",
+        "use",
+    ),
+    headers: Callable[[list[str]], list[str]] | None = None,
+) -> Table:
+    """Read a file as a table of runs."""
+    return read(
+        path,
+        numbers={"speed": "speed", "amplitude": "amplitude", "phase": "angle", "weight": "number"},
+        texts=texts,
+        cells={"trial_mass": "mass", "trial_unbalance": "unbalance", "trial_angle": "angle"},
+        blank=["speed", "weight", "amplitude", "phase"],
+        headers=headers,
+        layout=long_form,
+    )
 
 
 def headed(header: list[str]) -> list[str]:
@@ -225,6 +251,7 @@ def _vectors(file: str, text: str) -> Layout:
         "amplitude": Numbers("A", "um", size, "amplitude"),
         "phase": Numbers("A", "deg", turn, "angle"),
     }
+    table.warnings.append(f"{file}: no units: amplitudes are taken as um, masses as kg, angles as deg")
     for key in set(given) - {
         "A",
         "B",

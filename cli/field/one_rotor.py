@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from balancing import Balance, Doubtful, Infeasible, NotConverged, Readings, least_squares, minimax, spread
+from balancing import Balance, Doubtful, Infeasible, LogBalance, NotConverged, least_squares, minimax, spread
 from cli.field.runs import Complex, Real
 
 ROUNDED = 1 + 64 * float(np.finfo(float).eps)
@@ -60,27 +60,21 @@ def _quietly(solve: Callable[..., Balance], *data: object, **limits: object) -> 
 
 
 def confidence(
-    readings: Readings,
-    corrections: Complex,
-    standing: Complex,
-    weights: Real | None,
-    sought: Sought,
-    limited: bool,
+    balance: LogBalance, corrections: Complex, standing: Complex, sought: Sought, limited: bool
 ) -> tuple[Real, float]:
     """The covariance of the corrections, (p, 2, 2), and what 95 % of the largest residuals stay below."""
-    total, draws = corrections + standing, sought.draws or 4000
+    draws = sought.draws or 4000
     try:
         if limited:
-            problems = readings.problem_samples(min(sought.draws or 200, 1000))
-            covariance = spread(limited_samples(problems, standing, weights, sought), corrections)
+            problems = balance.problem_samples(min(sought.draws or 200, 1000))
+            covariance = spread(limited_samples(problems, standing, balance.weights, sought), corrections)
         elif sought.draws:
-            samples = readings.correction_samples(weights, sought.ridge, draws) - standing
-            covariance = spread(samples, corrections)
+            covariance = spread(balance.correction_samples(draws) - standing, corrections)
         else:
-            covariance = readings.covariance(total, weights, sought.ridge, along=corrections)
+            covariance = balance.covariance
     except (ValueError, NotConverged):
         covariance = np.full((len(corrections), 2, 2), np.nan)
-    left = np.abs(readings.residual_samples(total, draws)).max(axis=1)
+    left = np.abs(balance.residual_samples(draws)).max(axis=1)
     return covariance, float(np.quantile(left, 0.95))
 
 

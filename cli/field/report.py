@@ -99,9 +99,9 @@ class _Rotor:
         if b.runs.fitted:
             fit, residuals = self.tables["fit"], self.tables["residuals"]
             parts += [as_list(fit), fit.below, self._as_read(residuals)]
-        for j, trial in enumerate(group.trials):
+        for j, trial in enumerate(group.trials[1:], 1):
             on = masses_text(b, solved.planes, group.on[i, j], ".6g")
-            parts += [f"Run {trial.run}{': ' + on if on else ''}{', kept' if trial.kept else ''}", _vibration(b, solved, {"amplitude": group.runs[i, j]})]  # fmt: skip
+            parts += [f"Run {trial.run}{': ' + on if on else ''}{', kept' if trial.kept else ''}", _vibration(b, solved, {"amplitude": group.means[i, j]})]  # fmt: skip
         influence = self.tables["influence"]
         shown = [c for c in influence.columns if c.name not in ("correlation", "amplitude_unit")]
         parts += ["Influence coefficients:", replace(influence, columns=[c for c in shown if any(v == v and v is not None for v in c.values)])]  # fmt: skip

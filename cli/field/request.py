@@ -46,6 +46,8 @@ class Request:
     robust: bool = False
     view: str | None = None
     """`static-couple`: the corrections of two planes as a static part and a couple."""
+    zone_class: str | None = None
+    """The machine whose zones of severity are asked for."""
 
     @property
     def against(self) -> bool:

@@ -6,56 +6,51 @@ from dataclasses import replace
 
 import numpy as np
 
-from balancing import Balance, condition_number, influence_error
+from balancing import Balance, condition_number
 from cli.field.field_balancing import FieldBalancing
-from cli.field.runs import Group, Real
+from cli.field.runs import Real
 from cli.field.solution import Solved
 from cli.read.rounding import EPS
 
 
-def coefficient_errors(found: FieldBalancing, solved: Solved) -> Real:
-    """Bound the errors of the influence coefficients, (g, s, p)."""
-    group = solved.group
+def fit_errors(found: FieldBalancing, solved: Solved) -> Real:
+    """Bound the errors of initial vibration and coefficients, (g, s, 1 + p)."""
+    readings, masses = solved.group.errors()
+    if found.stored is None and not solved.fits:
+        return solved.fit.error_estimate(readings, masses)
+    first = readings[:, solved.group.trials[0].lines].mean(axis=1)
     if found.stored is not None:
         phase = found.stored.table.require("phase", "angle")
         turn = float(np.abs(phase.si).max())
-        return np.asarray(EPS * (6 + turn / 2) * np.abs(solved.alpha))
-    if group.fit is not None:
-        return _fit_errors(group)[..., 1:]
-    initial, runs, on = group.errors()
-    if solved.fits:
+        of_alpha = EPS * (6 + turn / 2) * np.abs(solved.alpha)
+    else:
         # relative errors of amplitudes and masses: what is written with many digits is rounded once
-        share = [float((e / np.abs(t)).max()) for e, t in zip(on[..., 0], group.on[..., 0], strict=True)]
-        return np.stack(
-            [fit.error_estimate(data_error=s) for fit, s in zip(solved.fits, share, strict=True)]
-        )[..., None]
-    return influence_error(group.initial, group.runs, group.on, reading_error=(initial, runs), mass_error=on)
-
-
-def _fit_errors(group: Group) -> Real:
-    """Bound the errors of what a fit of all runs found, (g, s, 1 + p)."""
-    assert group.fit is not None
-    _, readings, masses = group.errors()
-    return group.fit.error_estimate(readings, masses)
+        on = np.abs(solved.group.masses)
+        share = (masses / np.where(on > 0, on, 1.0)).max(axis=(1, 2)).tolist()
+        of_alpha = np.array(
+            [
+                [fit.error_estimate(data_error=s) for fit in one]
+                for one, s in zip(solved.fits, share, strict=True)
+            ]
+        ).swapaxes(1, 2)
+    return np.concatenate([first[..., None], of_alpha], axis=-1)
 
 
 def correction_errors(found: FieldBalancing, solved: Solved, warnings: list[str]) -> Real:
     """Bound the errors of the corrections, (g, p), SI; NaN where they cannot be bounded."""
     request, group = found.request, solved.group
-    if group.fit is not None and group.fit.foreknown is not None:
+    if solved.fit.foreknown is not None:
         said = "--digits: the corrections are given in full, for no bound of the rounding of a fit with --influence is known"
         if said not in warnings:
             warnings.append(said)
         return np.full(solved.corrections.shape, np.nan)
-    of_alpha = coefficient_errors(found, solved)
-    initial, _, on = group.errors()
-    if group.fit is not None:
-        initial = _fit_errors(group)[..., 0]
+    of_all = fit_errors(found, solved)
+    initial, of_alpha = of_all[..., 0], of_all[..., 1:]
     here, limit, ceiling = solved.here, solved.limit, found.ceiling
     of_here = initial + 8 * EPS * (np.abs(found.runout(group)) + np.abs(solved.initial))
     if solved.start.any():
         size = np.abs(solved.start)
-        of_standing = on.max(axis=1) + 4 * EPS * size
+        of_standing = group.errors()[1].max(axis=1) + 4 * EPS * size
         of_here = of_here + np.matvec(of_alpha, size) + np.matvec(np.abs(solved.alpha), of_standing)
     whole = Balance(solved.alpha, here, solved.corrections, group.weights, ridge=request.ridge)
     minimax = request.objective == "minimax"
@@ -86,9 +81,9 @@ def correction_errors(found: FieldBalancing, solved: Solved, warnings: list[str]
 
 def trim_errors(solved: Solved, bound: Real) -> Real:
     """Bound the errors of the trims, (g, p), SI, where `bound` is that of the corrections."""
-    errors = solved.group.errors()[2]
+    errors = solved.group.errors()[1]
     # of stored coefficients no trial run takes part
-    of_masses = errors.max(axis=1) if errors.size else 0.0
+    of_masses = errors.max(axis=1) if errors.shape[-1] == bound.shape[-1] else 0.0
     return np.asarray(bound + of_masses + 8 * EPS * (np.abs(solved.total) + np.abs(solved.standing)))
 
 
@@ -98,23 +93,24 @@ def uncertainty_share(found: FieldBalancing, solved: Solved, bound: Real) -> Rea
     To first order: the pseudo-inverses of coefficients and trial masses are right to their condition numbers times
     the relative errors of what they are of, and the corrections they are for to their own.
     """
-    if solved.group.fit is not None and solved.group.fit.foreknown is not None:
+    if solved.fit.foreknown is not None:
         return np.full(bound.shape, np.nan)
-    of_alpha = np.linalg.norm(coefficient_errors(found, solved), axis=-2)
+    of_all = fit_errors(found, solved)
+    of_alpha = np.linalg.norm(of_all[..., 1:], axis=-2)
     norms = np.linalg.norm(solved.alpha, axis=-2)
     relative = 8 * EPS + (of_alpha / np.where(norms > 0, norms, 1.0)).max(axis=-1)
     share = condition_number(solved.alpha, solved.group.weights) * relative
-    fit = solved.group.fit
-    if fit is not None:
+    fit = solved.fit
+    if found.runs.fitted:
         # the scatter of the residuals is a difference of readings, and the design is that of the masses
-        of_all = _fit_errors(solved.group).max(axis=1) / np.abs(fit.unknowns).max(axis=1)
+        of_fit = of_all.max(axis=1) / np.abs(fit.unknowns).max(axis=1)
         scatter = np.where(fit.residual_sd > 0, fit.residual_sd, np.inf)
         rounding = 32 * EPS * np.nanmax(np.abs(fit.readings), axis=(1, 2))
         share = (
-            share + of_all.max(axis=-1) + (rounding / scatter if found.request.reading_error is None else 0.0)
+            share + of_fit.max(axis=-1) + (rounding / scatter if found.request.reading_error is None else 0.0)
         )
     elif found.stored is None:
-        share = share + 8 * EPS * condition_number(solved.group.on)
+        share = share + 8 * EPS * condition_number(solved.group.on[:, 1:])
     # the scatter of repeats is a difference of readings
     sd = solved.group.reading_sd
     of_scatter = EPS * 8 * np.abs(solved.group.initial).max(axis=1) / np.where(sd > 0, sd, 1.0)

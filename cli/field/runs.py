@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,9 @@ from dalembert.units import UNITS, Scaled, amplitude_kind, from_si, to_si
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Rows = NDArray[np.intp]
-Value = TypeVar("Value", np.float64, np.complex128)
+YES = ("yes", "y", "true", "1", "kept", "on", "ja", "j", "bleibt")
+NO = ("no", "n", "false", "0", "", "removed", "off", "nein")
+NEAR_SPEED = 0.05  # speeds are one within this share
 
 SHOWN = 5  # of so many rotors, readings … the same is said; of the others how many they are
 
@@ -48,11 +49,13 @@ class Channel:
 
 @dataclass(frozen=True)
 class Trial:
-    """A trial run: its name, and the (plane, row) of the masses that were put on for it."""
+    """A run of an initial run with trial runs."""
 
     run: str
-    masses: list[tuple[int, int, int]]
-    """(plane, row of the rotor, place in the cell) of each mass."""
+    lines: list[int]
+    """Which rows of readings are of it."""
+    tried: bool
+    """Whether a mass was put on for it."""
     kept: bool
 
 
@@ -94,27 +97,23 @@ class Group:
     """Their numbers, (g,)."""
     channels: list[Channel]
     planes: list[str]
-    trials: list[Trial]
-    initial: Complex
-    """(g, s), as read, in the table's amplitude unit."""
-    runs: Complex
-    """(g, r, s)."""
-    on: Complex
-    """What was on the rotor in each trial run, (g, r, p), SI."""
+    logs: Sequence[Log]
+    """Of what run each row of readings is, rotor by rotor."""
+    readings: Complex
+    """(g, r, s), as read, in the table's amplitude unit; NaN where a row lacks a channel."""
+    masses: Complex
+    """What was on the rotor, (g, r, p), SI."""
     standing: Complex
     """What is on the rotor in its last run, whether it is meant to stay or not, (g, p), SI."""
     last: list[str]
     """What that run is called, (g,)."""
     weights: Real | None
-    counts: Rows
-    """How often each sensor was read in the initial and in each trial run, (1 + r, s)."""
-    scatter: Real
-    """Σ|reading - mean|² of the repeats, (g, 1 + r, s)."""
-    errors: Callable[[], tuple[Real, Real, Real]]
-    """Bounds of the errors of `initial`, `runs` and `on` against the decimals of the table; worked out when asked for."""
+    errors: Callable[[], tuple[Real, Real]]
+    """Bounds of the errors of `readings` and `masses` against the decimals of the table; worked out when asked for."""
     fit: balancing.JointFit | None = None
-    """Where all runs were fitted at once: `initial` is fitted then, and there are no trial runs."""
-    logs: Sequence[Log] = ()
+    """Where the readings alone tell the coefficients: not with stored ones, nor without phase."""
+    trials: Sequence[Trial] = ()
+    """The runs, the initial one first; none of a log whose runs are all fitted together."""
     before: Before | None = None
     """Where coefficients known before take part in the fit."""
 
@@ -131,26 +130,52 @@ class Group:
         return outlier_probability(self.fit)
 
     @property
+    def initial(self) -> Complex:
+        """The vibration without masses, (g, s): the mean of the initial run, or as fitted."""
+        return self.means[:, 0] if self.trials or self.fit is None else self.fit.initial
+
+    @cached_property
+    def counts(self) -> Rows:
+        """How often each sensor was read in each run, (1 + r, s)."""
+        return np.array([np.isfinite(self.readings[0, of.lines]).sum(axis=0) for of in self.trials])
+
+    @cached_property
+    def means(self) -> Complex:
+        """What was read in each run, (g, 1 + r, s): the mean of repeats."""
+        read = np.where(np.isfinite(self.readings), self.readings, 0)
+        sums = np.stack([read[:, of.lines].sum(axis=1) for of in self.trials], axis=1)
+        return np.asarray(sums / self.counts)
+
+    @property
+    def on(self) -> Complex:
+        """What was on the rotor in each run, (g, 1 + r, p)."""
+        return self.masses[:, [of.lines[0] for of in self.trials]]
+
+    @cached_property
+    def scatter(self) -> Real:
+        """Σ|reading - mean|² of the repeats of each run, (g, 1 + r, s)."""
+        off = [np.abs(self.readings[:, of.lines] - self.means[:, [j]]) for j, of in enumerate(self.trials)]
+        return np.stack([np.nansum(np.square(each), axis=1) for each in off], axis=1)
+
+    @property
     def repeats(self) -> int:
-        """Complex degrees of freedom of the repeats: readings less means."""
-        return int((self.counts - 1).sum())
+        """Complex degrees of freedom of the repeats in an initial run and trial runs: readings less means."""
+        return int((self.counts - 1).sum()) if self.trials else 0
 
     @cached_property
     def reading_sd(self) -> Real:
         """Standard deviation of one reading as the repeats show it, √(Σ|reading - mean|²/degrees of freedom), (g,)."""
-        sd = np.sqrt(self.scatter.sum(axis=(1, 2)) / max(self.repeats, 1))
+        if not self.repeats:
+            return np.zeros(len(self.rotors))
+        sd = np.sqrt(self.scatter.sum(axis=(1, 2)) / self.repeats)
         # what lies in the rounding of the mean is agreement
-        largest = np.maximum(
-            np.abs(self.initial).max(axis=1), np.abs(self.runs).max(axis=(1, 2), initial=0.0)
-        )
-        return np.where(sd > 1e-14 * largest, sd, 0.0)
+        return np.where(sd > 1e-14 * np.abs(self.means).max(axis=(1, 2)), sd, 0.0)
 
     @cached_property
     def contradictory(self) -> NDArray[np.bool_]:
         """Where repeats lie as far apart as a trial mass should move the vibration, 30 % of it, (g, 1 + r, s)."""
-        means = np.concatenate([self.initial[:, None], self.runs], axis=1)
         spread = self.scatter / self.counts
-        largest = np.sqrt((np.square(np.abs(means)) + spread).max(axis=1, keepdims=True))
+        largest = np.sqrt((np.square(np.abs(self.means)) + spread).max(axis=1, keepdims=True))
         return np.asarray(np.sqrt(spread) > 0.15 * largest)
 
     @cached_property
@@ -172,6 +197,8 @@ class Runs:
     rotors: list[str]
     mass_unit: str
     """Of the trials: a mass's or an unbalance's."""
+    fitted: bool = False
+    """Whether all runs are fitted together, or are an initial one and trial runs."""
     groups: list[Group] = field(default_factory=list)
     max_mass: dict[str, float] = field(default_factory=dict)
     """The limits that the file states, plane -> SI."""
@@ -207,11 +234,6 @@ class Runs:
         """Whether there are several rotors, which sentences and tables then name."""
         return len(self.rotors) > 1
 
-    @property
-    def fitted(self) -> bool:
-        """Whether all runs are fitted together."""
-        return any(group.fit is not None for group in self.groups)
-
     def in_unit(self, value: Scaled, unit: str, what: str) -> Scaled:
         """Convert amplitudes to the unit of the readings; DataError where they are another quantity, or read another way."""
         wanted = self.amplitude_unit
@@ -232,63 +254,3 @@ def apart(one: float | None, other: float) -> float:
     if one is None or other != other or one == other:
         return 0.0
     return abs(one - other) / max(abs(one), abs(other))
-
-
-def more_than_unknowns(table: Table) -> bool:
-    """Tell whether a rotor has more runs than unknowns: the initial vibration and a coefficient of each plane."""
-    sizes = [table.cells[name] for name in ("trial_mass", "trial_unbalance") if name in table.cells]
-    if "run" not in table.texts or len(sizes) != 1:
-        return False
-    _, rotor = table.numbered("rotor", "1")
-    _, run = table.numbered("run")
-    names, plane = table.numbered("trial_plane")
-    if "trial_plane" not in table.texts:
-        names, plane = ["", "1"], np.array([bool(cell) for cell in sizes[0].values]).astype(np.intp)
-    planes: dict[str, int] = {}
-    each = [
-        [planes.setdefault(part.strip(), len(planes)) for part in name.split(";") if part.strip()]
-        for name in names
-    ]
-
-    def count(codes: Rows, of: Rows) -> Rows:
-        """Count what differs, rotor by rotor."""
-        many = int(codes.max(initial=0)) + 1
-        # with indices: without them numpy loads its masked arrays, which takes longer than a small table
-        each, _ = np.unique(of * many + codes, return_index=True)
-        return np.bincount(each // many, minlength=int(rotor.max()) + 1)
-
-    most = max(map(len, each))
-    several = np.array([one + one[-1:] * (most - len(one)) if one else [-1] * most for one in each])[plane]
-    told = several[:, 0] >= 0 if most else np.zeros(table.rows, dtype=bool)
-    if not told.any():
-        return False
-    known = count(several[told].ravel(), np.repeat(rotor[told], most))
-    return bool(((count(run, rotor) > 1 + known) & (known > 0)).any())
-
-
-def alike(table: Table, rotor: Rows) -> Iterator[tuple[Rows, Rows]]:
-    """Yield rotors whose rows name the same runs, sensors, speeds and planes: their numbers, and rows (g, n)."""
-    order = np.argsort(rotor, kind="stable")
-    count = np.bincount(rotor)
-    start = np.cumsum(count) - count
-    if len(count) == 1:
-        yield np.zeros(1, dtype=np.intp), order[None]
-        return
-    kind = np.zeros(table.rows, dtype=np.intp)
-    for name in ("run", "sensor", "trial_plane", "trial_kept"):
-        names, code = table.numbered(name)
-        kind = np.unique(kind * len(names) + code, return_inverse=True)[1] if len(names) > 1 else kind
-    if (speed := table.numbers.get("speed")) is not None:
-        speeds, code = np.unique(np.nan_to_num(speed.values, nan=-1.0), return_inverse=True)
-        kind = np.unique(kind * len(speeds) + code, return_inverse=True)[1]
-    most = int(kind.max()) + 1
-    for size in np.unique(count):
-        rotors = np.flatnonzero(count == size)
-        rows = order[start[rotors, None] + np.arange(size)]
-        label = np.zeros(len(rotors), dtype=np.intp)
-        for of_place in kind[rows].T:
-            label = np.unique(label * most + of_place, return_inverse=True)[1]
-        by_label = np.argsort(label, kind="stable")
-        groups = np.split(by_label, np.cumsum(np.bincount(label))[:-1])
-        for same in sorted(groups, key=lambda group: int(group[0])):
-            yield rotors[same], rows[same]

@@ -7,8 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from balancing import AmplitudeFit, LogBalance
+from balancing import AmplitudeFit, JointFit, LogBalance
 from balancing.dependence import directions
+from balancing.reading_errors import Errors
 from cli.field.runs import Complex, Group, Real
 from cli.read.rounding import EPS
 
@@ -21,9 +22,10 @@ class Problem:
 
     group: Group
     planes: list[str]
-    alpha: Complex
-    fits: list[AmplitudeFit]
-    """Of the four-run method, rotor by rotor."""
+    fit: JointFit
+    """Initial vibration and coefficients, run-out and all."""
+    fits: list[list[AmplitudeFit]]
+    """Of the four-run method, rotor by rotor, plane by plane."""
     initial: Complex
     """(g, s), run-out off."""
     standing: Complex
@@ -32,6 +34,11 @@ class Problem:
     """(g, p): what is on the rotor where the corrections start from: that, or nothing."""
     limit: Real | None
     """Of each plane, SI; None where there is none."""
+
+    @property
+    def alpha(self) -> Complex:
+        """The influence coefficients, (g, s, p)."""
+        return self.fit.influence
 
     @cached_property
     def here(self) -> Complex:
@@ -90,3 +97,29 @@ class Solved(Problem):
         along, across = (np.sqrt(covariance[..., k, k]) for k in (0, 1))
         angle = np.where(size > 0, np.degrees(across / np.where(size > 0, size, 1.0)), np.nan)
         return along, np.where(angle <= UNKNOWN_ANGLE, angle, np.nan)
+
+
+def errors_of_means(fit: JointFit, group: Group, amplitude: float, phase: float) -> Errors:
+    """Return the errors of the readings of an initial run and trial runs: stated, or as repeats scatter where that is more.
+
+    What repeats show (a type A evaluation, JCGM 100:2008, 4.2) is the less for their mean; what is stated (type B, 4.3) is
+    not averaged away.
+    """
+    shape = fit.readings.shape
+    mean, scatter, count = np.zeros(shape, dtype=complex), np.zeros(shape), np.ones(shape)
+    for j, trial in enumerate(group.trials):
+        if trial.lines[-1] < shape[1]:
+            mean[:, trial.lines] = group.means[:, [j]]
+            scatter[:, trial.lines] = group.mean_error[:, [j]]
+            count[:, trial.lines] = group.counts[j]
+    size = np.abs(mean)
+    along, across = scatter > amplitude * size, scatter > phase * size
+    of_reading = np.sqrt(count) * fit.present
+    return Errors(
+        directions(mean),
+        of_reading * np.maximum(scatter, amplitude * size),
+        of_reading * np.maximum(scatter, phase * size),
+        np.full(len(mean), float(group.repeats) or np.inf),
+        np.where(across, 0.0, phase * np.sqrt(count)),
+        ~along,
+    )

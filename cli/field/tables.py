@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from cli.field.field_balancing import FieldBalancing
 from cli.field.runs import Channel, Complex, Real
 from cli.field.solution import Solved
-from cli.field.trim import Trim, verdicts
+from cli.field.trim import Trim
 from cli.read.rounding import angle_error, size_error
-from cli.read.tolerance import verdict_table
 from dalembert.angles import degrees
 from dalembert.results.columns import ABSENT, Column, Table, names, number
 from dalembert.results.text import angle_text
@@ -362,7 +361,7 @@ def _errors(b: FieldBalancing) -> str:
         )
         return f"{stated}, or as the repeats scatter where that is more" if scatter else stated
     if b.runs.fitted:
-        left = any((s.group.fit.degrees_of_freedom > 0).any() for s in b.solved if s.group.fit is not None)
+        left = any((s.fit.degrees_of_freedom > 0).any() for s in b.solved)
         return f"reading errors as the {'residuals of the fit' if left else 'readings behind the coefficients'} scatter"
     return "reading errors as the repeats scatter"
 
@@ -400,29 +399,17 @@ def _split(b: FieldBalancing, of: Callable[[Solved], Complex], name: str) -> Tab
     return Table(columns, ("rotor", "plane", "position"), f"rotors[].{name}[].split[]", documented=hidden)
 
 
-def tolerance(b: FieldBalancing) -> Table:
-    """One row per rotor and plane: what is permissible, what the unbalance was, what is predicted."""
-    limit = b.request.tolerance
-    assert limit is not None
-    planes = [
-        (rotor, v)
-        for rotor, (_, solved, i) in zip(b.runs.rotors, b.each(), strict=True)
-        for v in verdicts(b, solved, i)
-    ]
-    table = verdict_table(planes, "g_mm")
-    whole = from_si(limit.permissible, "unbalance", "g_mm")
-    named = f"{limit.grade}: " if limit.grade else ""
-    return replace(table, above=f"{named}U_per = {whole:.6g} g·mm, {limit.sharing}; residual as predicted")
-
-
 def misfit(b: FieldBalancing) -> Table:
     """Of the four-run method: how far the amplitudes of each sensor are from any vector's."""
-    rows = Rows(b, lambda solved: len(solved.group.channels))
-    off = rows.numbers(lambda solved: [fit.misfit for fit in solved.fits])
-    sensor = names("sensor", rows.cells(lambda solved: [c.sensor for c in solved.group.channels]))
+    rows = Rows(b, lambda solved: len(solved.group.channels) * len(solved.planes))
+    off = rows.numbers(lambda solved: [[fit.misfit for fit in one] for one in solved.fits])
+    sensor = names("sensor", rows.cells(lambda s: [c.sensor for c in s.group.channels] * len(s.planes)))
+    plane = names("plane", rows.cells(lambda s: [name for name in s.planes for _ in s.group.channels]))
+    planes = [plane] if any(len(solved.planes) > 1 for solved in b.solved) else []
     above = "r.m.s. misfit of the amplitudes"
-    columns = [*rows.shown, sensor, amplitude(b, "amplitude", off)]
-    return Table(columns, ("rotor", "sensor"), "rotors[].misfit[]", above, documented=rows.hidden)
+    columns = [*rows.shown, sensor, *planes, amplitude(b, "amplitude", off)]
+    keys = ("rotor", "sensor", *(column.name for column in planes))
+    return Table(columns, keys, "rotors[].misfit[]", above, documented=rows.hidden)
 
 
 def alternatives(b: FieldBalancing) -> Table:
@@ -430,7 +417,7 @@ def alternatives(b: FieldBalancing) -> Table:
     of = [
         (rotor, solved.planes[0], -v / a)
         for rotor, (_, solved, i) in zip(b.runs.rotors, b.each(), strict=True)
-        for v, a in zip(solved.group.initial[i], solved.fits[i].other, strict=True)
+        for v, a in zip(solved.group.initial[i], solved.fits[i][0].other, strict=True)
         if a == a
     ]
     rotor = [names("rotor", [one[0] for one in of])]

@@ -89,13 +89,13 @@ class LastRun(NamedTuple):
 def last_run(found: FieldBalancing, solved: Solved, i: int) -> LastRun | None:
     """Return a rotor's last run, where it tells how well it is balanced; None where it was a trial run."""
     group, request = solved.group, found.request
-    if group.fit is not None:
+    if found.runs.fitted:
         names, masses = _of_fit(solved, i)
         on = masses[names[-1]]
         if not on.any() or sum(mass.any() for mass in masses.values()) <= len(solved.planes):
             return None
         return LastRun(names[-1], on, _read(found, solved, i, names[-1]))
-    if request.four_run or not group.trials:
+    if request.four_run or len(group.trials) < 2:
         return None
     on = group.standing[i]
     if not (request.from_here and on.any()):
@@ -106,17 +106,17 @@ def last_run(found: FieldBalancing, solved: Solved, i: int) -> LastRun | None:
 def last_reading(found: FieldBalancing, solved: Solved, i: int) -> Complex:
     """Return what was read in a rotor's last run, run-out off, (s,); NaN where a sensor was not read."""
     group = solved.group
-    if group.fit is not None:
+    if found.runs.fitted:
         return _read(found, solved, i, group.last[i])
-    if group.trials and group.trials[-1].run == group.last[i]:
-        return np.asarray(group.runs[i, -1] - found.runout(group))
+    if len(group.trials) > 1 and group.trials[-1].run == group.last[i]:
+        return np.asarray(group.means[i, -1] - found.runout(group))
     bare = not group.standing[i].any()
     return np.asarray(solved.initial[i] if bare else np.full_like(solved.initial[i], np.nan))
 
 
 def first_reading(found: FieldBalancing, solved: Solved, i: int) -> Complex | None:
     """Return what was read in the first run without masses, run-out off, (s,); None where there is no such run."""
-    if solved.group.fit is None:
+    if not found.runs.fitted:
         return np.asarray(solved.initial[i])
     names, masses = _of_fit(solved, i)
     bare = next((name for name in names if not masses[name].any()), None)
@@ -125,15 +125,13 @@ def first_reading(found: FieldBalancing, solved: Solved, i: int) -> Complex | No
 
 def _of_fit(solved: Solved, i: int) -> tuple[list[str], dict[str, Complex]]:
     """The runs of a fit, in order, and what was on the rotor in each."""
-    assert solved.group.fit is not None
-    log, fit = solved.group.logs[i], solved.group.fit
+    log, fit = solved.group.logs[i], solved.fit
     return log.runs, {run: fit.masses[i, j] for j, (run, _) in enumerate(log.rows)}
 
 
 def _read(found: FieldBalancing, solved: Solved, i: int, run: str) -> Complex:
     """The mean readings of a run of a fit, run-out off."""
-    assert solved.group.fit is not None
-    fit = solved.group.fit.machine(i)
+    fit = solved.fit.machine(i)
     rows = [j for j, (name, _) in enumerate(solved.group.logs[i].rows) if name == run]
     there = fit.present[rows]
     sums = np.where(there, fit.readings[rows], 0).sum(axis=0)

@@ -293,7 +293,7 @@ def _text(file: str, found: Fit[Mechanism], bare: Mapping[str, str]) -> str:
 def _write(document: Any, dimension: Dimension, si: float, units: Units) -> None:
     """Put a number where it stands in the document, in the unit of the file."""
     path, where = dimension.path.split("."), dimension.where
-    if where[0] in ("guides", "gears"):
+    if where[0] in ("guides", "gears", "belts", "racks"):
         # lists count from 1, and slots apart from sliders
         rows = document[path[0]]
         of, rest = (rows[int(path[1]) - 1] if isinstance(rows, list) else rows), where[2:]

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.show.result import Result
+    from dalembert.results.way import Topic
 
 
 EXAMPLE = "flywheel-engine"
@@ -64,7 +65,13 @@ def run(table: str, speed: str | None = None, fluctuation: str | None = None) ->
 
         return draw(wheel)
 
+    def way() -> list[Topic]:
+        from cli.flywheel.way import way
+
+        return way(wheel)
+
     return Result(
+        way=way,
         tables=tables(wheel),
         figure=figure,
         method=METHOD,

@@ -48,6 +48,6 @@ def run(asked: Asked, show: ShowOptions) -> Result:
     def page(cases: Sequence[tuple[str, Case]]) -> bytes:
         from cli.cases.page import of_poses
 
-        return of_poses(cases, show.units)
+        return of_poses(cases, show.units, call.bare)
 
     return call.result(study, asked.page, page)

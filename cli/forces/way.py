@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.cases.ledger import PERPENDICULAR, REST, Entry, ledger
-from dalembert.results.columns import Column, names
-from dalembert.results.way import Topic, figures
+from cli.cases.ledger import PERPENDICULAR, REST, Entry, components, ledger
+from cli.cases.poses import over_poses
+from dalembert.results.columns import Column, Table, finite, names
+from dalembert.results.way import Topic, figures, vector_text
+from virtualwork.describe.parts import GROUND
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from cli.cases.analysis import Analysis
     from virtualwork.motion import Motion
+    from virtualwork.study.free_bodies import FreeBody
     from virtualwork.study.ledger import Item
 
 TINY = 1e-13
@@ -35,7 +41,115 @@ def way(analysis: Analysis) -> list[Topic]:
             if analysis.several:
                 head.append(names("branch", [assembly.number]))
             instants.append((head, [entry for each in entries for entry in each[i]]))
-    return [ledger("poses[]", instants, equations)]
+    return [*_motors(analysis), ledger("poses[]", instants, equations), *_free_bodies(analysis)]
+
+
+def _motors(analysis: Analysis) -> list[Topic]:
+    """Links that carry a motor: their common centre G′ and inertia, and the motor's torque on both (Ibrahim §2.3)."""
+    m, found = analysis.mechanism, []
+    for motor in m.motors:
+        if motor.carrier == GROUND:
+            continue
+        link, whole = m.links[motor.carrier], m.rigid[motor.carrier]
+        j = next((j for j, e in enumerate(m.inputs) if e.link == motor.drives), None)
+        torque = [None if j is None else finite(float(v)) for v in _effort(analysis, j)]
+        text = [
+            f"m′ = {figures(link.mass)} + {figures(motor.mass)} = {figures(whole.mass)} kg",
+            f"r_G′ = (m·r_G + m_M·r_M)/m′ = ({figures(link.mass)}·{_pair(link.center)} + "
+            f"{figures(motor.mass)}·{_pair(motor.center)})/{figures(whole.mass)} = {_pair(whole.center)} m in the link's axes",
+            f"I_G′ = I_G + m·|r_G − r_G′|² + m_M·|r_M − r_G′|² = {figures(whole.inertia)} kg·m²",
+        ]
+        if torque and torque[0] is not None:
+            text.append(
+                f"T_M = {figures(torque[0])} N·m on {motor.drives}, {figures(-torque[0])} N·m on {motor.carrier}"
+            )
+        head: dict[str, Any] = {
+            "carrier": motor.carrier,
+            "drives": motor.drives,
+            "mass_kg": whole.mass,
+            "center_m": [whole.center.real + 0.0, whole.center.imag + 0.0],
+            "inertia_kg_m2": whole.inertia,
+            "torque_N_m": torque[0] if len(torque) == 1 else torque,
+        }
+        title = f"Link {motor.carrier} with the motor of {motor.drives} (Ibrahim §2.3)"
+        found.append(Topic("motor", text, title, head))
+    return found
+
+
+def _effort(analysis: Analysis, j: int | None) -> list[float]:
+    motion = analysis.motions[0]
+    if j is None:
+        return []
+    values: list[float] = motion.dynamics.effort[:, j].tolist()
+    return values
+
+
+def _pair(z: complex) -> str:
+    return vector_text(z.real, z.imag)
+
+
+def _free_bodies(analysis: Analysis) -> list[Topic]:
+    """Every link cut loose: what acts on it, as a table and as a diagram to scale."""
+    from virtualwork.study.free_bodies import free_bodies
+
+    motion = analysis.motions[0]
+    whole = motion.assembled
+    if not whole.any():
+        return []
+    bodies = free_bodies(motion.dynamics)
+    first = int(np.argmax(whole))
+    entries: list[dict[str, Any]] = [
+        {"bodies": [_body(body, i) for body in bodies] if whole[i] else []} for i in range(motion.n)
+    ]
+    rows: list[tuple[str, str, str, complex | None, complex | None, float | None]] = []
+    for body in bodies:
+        rows += [
+            (body.link, f.name, f.kind, complex(f.at[first]), complex(f.force[first]), None)
+            for f in body.forces
+        ]
+        rows += [(body.link, t.name, t.kind, None, None, float(t.torque[first])) for t in body.torques]
+    links, called, kinds, places, forces, torques = zip(*rows, strict=True) if rows else ([],) * 6
+    table = Table(
+        [
+            names("link", links),
+            names("name", called),
+            names("kind", kinds),
+            *components("", "m", places),
+            *components("F", "N", forces),
+            Column("torque", "N_m", list(torques)),
+        ],
+        ("link", "name"),
+    )
+    text = "Every link cut loose: on each ΣF = 0 and ΣM_G = 0, inertia force −m·a_G and inertia torque −I_G·α among them."
+    if motion.n > 1:
+        text += f" At {figures(analysis.inputs.shown[first][0])}:"
+    title = "Free-body diagrams (Ibrahim §2.2, Riul, figures 3 to 5)"
+    head = over_poses(analysis, entries)
+    return [Topic("free bodies", [text, table], title, head, partial(_diagrams, bodies, first))]
+
+
+def _body(body: FreeBody, i: int) -> dict[str, Any]:
+    def pair(z: complex) -> list[float | None]:
+        return [finite(z.real + 0.0), finite(z.imag + 0.0)]
+
+    return {
+        "link": body.link,
+        "center_m": pair(complex(body.center[i])),
+        "forces": [
+            {"name": f.name, "kind": f.kind, "at_m": pair(complex(f.at[i])), "force_N": pair(complex(f.force[i]))}
+            for f in body.forces
+        ],
+        "torques": [{"name": t.name, "kind": t.kind, "torque_N_m": finite(float(t.torque[i]))} for t in body.torques],
+    }  # fmt: skip
+
+
+def _diagrams(bodies: list[FreeBody], i: int) -> Figure:
+    from cli.show.picture import blank
+    from virtualwork.picture.free_bodies import draw
+
+    figure = blank()
+    draw(bodies, i, figure)
+    return figure
 
 
 def _pose(analysis: Analysis, i: int) -> list[Column]:
@@ -80,7 +194,8 @@ def _entry(item: Item, i: int, fastest: float, field: str) -> Entry:
     elif at_rest:
         why = REST
     else:
-        why = PERPENDICULAR if not item.turns and abs(power) <= TINY * abs(load) * fastest else None
+        idle = load != 0 and not item.turns and abs(power) <= TINY * abs(load) * fastest
+        why = PERPENDICULAR if idle else None
     if why is not None:
         power = 0.0
     if item.turns:

@@ -19,7 +19,7 @@ from cli.show.report import CODE
 from cli.show.result import Section, Sheet
 from virtualwork import Mechanism
 from virtualwork.describe import MechanismError
-from virtualwork.describe.parts import Gear, Guess, Guide, Input, Link
+from virtualwork.describe.parts import Gear, Guess, Guide, Input, Link, Rack
 from virtualwork.describe.text import AsWritten, Table, document, written
 from virtualwork.motion import Motion
 
@@ -77,6 +77,9 @@ class _Speeds:
         for m in d.meshes:
             a, b, arm = (self.turns(name) for name in (m.a, m.b, m.arm))
             rows.append((b - arm - m.ratio * (a - arm))[None])
+        for r in d.racks:
+            turned = self.turns(r.gear) - self.turns(r.slide.on)
+            rows.append((self.along(r.slide, 0.0) - r.radius / self.size * turned)[None])
         return np.concatenate(rows)
 
     def driven(self, e: Drive) -> Rows:
@@ -140,12 +143,23 @@ def _parts(d: Drawing, origins: dict[str, Place]) -> dict[str, object]:
             for s in d.slides
         ],
         "gears": [Gear((m.a, m.b), m.ratio, m.arm) for m in d.meshes],
+        "racks": [Rack(r.gear, r.slide.point, r.radius) for r in d.racks],
         "inputs": [
             Input(e.link, e.on, value=e.at) if e.slide is None else Input(slider=e.slide.point, value=e.at)
             for e in d.drives
         ],
-        "guess": Guess([e.at for e in d.drives], {name: b.turn for name, b in links.items()}),
+        "guess": Guess(
+            [e.at for e in d.drives],
+            {name: b.turn for name, b in links.items()},
+            {r.slide.point: _stands(d, r.slide) for r in d.racks},
+        ),
     }
+
+
+def _stands(d: Drawing, s: Slide) -> complex:
+    """Return where the point of a slide stands in the pose."""
+    body = d.bodies[s.link]
+    return _place(body.at) + _place(body.points[s.point]) * cmath.rect(1.0, body.turn)
 
 
 def _link(b: Body, origin: Place) -> Link:

@@ -93,6 +93,15 @@ class Mesh:
 
 
 @dataclass
+class Toothed:
+    """A wheel and a rack: the slide grows by radius·(θ_gear − θ_on), `on` the body that carries it."""
+
+    gear: str
+    slide: Slide
+    radius: float
+
+
+@dataclass
 class Drive:
     """An input: the angle of `link` against `on`, or the way along a slide; `at` in the pose, `speed` as TOML has it."""
 
@@ -142,6 +151,7 @@ class Drawing:
     bodies: dict[str, Body] = field(default_factory=lambda: {GROUND: Body()})
     slides: list[Slide] = field(default_factory=list)
     meshes: list[Mesh] = field(default_factory=list)
+    racks: list[Toothed] = field(default_factory=list)
     drives: list[Drive] = field(default_factory=list)
     spare: list[Drive] = field(default_factory=list)
     """What may drive it where its inputs leave it free; of robots, whose files may name too few or too many of them."""
@@ -200,6 +210,8 @@ class Drawing:
             s.link, s.on = new(s.link), new(s.on)
         for m in self.meshes:
             m.a, m.b, m.arm = new(m.a), new(m.b), new(m.arm)
+        for r in self.racks:
+            r.gear = new(r.gear)
         for e in (*self.drives, *self.spare):
             e.link, e.on = e.link and new(e.link), new(e.on)
         for load in self.loads:
@@ -215,6 +227,7 @@ class Drawing:
             yield from [((GROUND, n), 1) for n in names] if GROUND in names else [(tuple(names), 1)]
         yield from (((s.link, s.on), 1) for s in self.slides)
         yield from (((m.a, m.b, m.arm), 1) for m in self.meshes)
+        yield from (((r.gear, r.slide.link, r.slide.on), 1) for r in self.racks)
         yield from ((e.pair, 2) for e in self.drives)
 
     def guide(self, point: str, link: str, on: str, at: Place, angle: float, prism: bool = True) -> Slide:
@@ -362,6 +375,13 @@ def _drop_what_is_rigid(d: Drawing) -> None:
         d.meshes.remove(m)
         d.leave(f"gears {m.a}, {m.b}", "they are one body, or one is its own arm")
     slides = list(map(id, d.slides))
+    for r in list(d.racks):
+        # a wheel in a slot may roll along a rack
+        held = (r.slide.on,) if r.slide.turned is None else (r.slide.on, r.slide.link)
+        if id(r.slide) in slides and r.gear not in held:
+            continue
+        d.racks.remove(r)
+        d.leave(f"rack at {r.slide.point}", "its wheel and its guide are one body")
     for e in list(d.drives):
         if (e.slide is not None and id(e.slide) not in slides) or (e.link is not None and e.link == e.on):
             d.drives.remove(e)
@@ -383,6 +403,7 @@ def _drop_what_dangles(d: Drawing) -> None:
             alone = "one joint alone holds it, and nothing drives it"
             d.leave(name, alone if holds[name] else "it has no joint")
         d.slides = [s for s in d.slides if {s.link, s.on} <= d.bodies.keys()]
+        d.racks = [r for r in d.racks if {r.gear, r.slide.link, r.slide.on} <= d.bodies.keys()]
         for load in [a for a in d.loads if not {name for name, _ in a.ends} <= d.bodies.keys()]:
             d.loads.remove(load)
             d.notes.append(f"load on {', '.join(name for name, _ in load.ends)}: left out with its link")
@@ -413,6 +434,7 @@ def _part(d: Drawing, names: set[str], drives: list[Drive]) -> Drawing:
         bodies={GROUND: ground} | bodies,
         slides=slides,
         meshes=[m for m in d.meshes if m.a in names or m.b in names],
+        racks=[r for r in d.racks if r.gear in names],
         drives=drives,
         spare=[e for e in d.spare if set(e.pair) <= {GROUND, *names}],
         loads=[load for load in d.loads if any(name in names for name, _ in load.ends)],

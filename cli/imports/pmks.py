@@ -5,6 +5,7 @@ M. I. Campbell, Planar Mechanism Kinematic Simulator.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import Any
@@ -12,11 +13,13 @@ from urllib.parse import unquote
 
 from cli.imports.drawn import (
     GROUND,
+    Body,
     Drawing,
     Drive,
     Mesh,
     Place,
     Slide,
+    Toothed,
     apart,
     centers,
     direction,
@@ -179,7 +182,12 @@ def _slot(d: Drawing, j: Joint, name: str, joints: list[Joint]) -> None:
 
 
 def mesh(d: Drawing, a: str, b: str, at: Place, what: str) -> None:
-    """Two gears that touch at a pitch point: their centres are pins that one arm holds (R. Willis, 1841)."""
+    """Two gears that touch at a pitch point: their centres are pins that one arm holds (R. Willis, 1841).
+
+    Where one of them slides on a body on which the other one turns, it is a rack.
+    """
+    if _rack(d, a, b, at) or _rack(d, b, a, at):
+        return
     best: tuple[float, Mesh] | None = None
     for p, q, arm in centers(d, a, b):
         zp, zq = d.bodies[a].points[p], d.bodies[b].points[q]
@@ -193,13 +201,32 @@ def mesh(d: Drawing, a: str, b: str, at: Place, what: str) -> None:
         if ra * rb != 0 and (best is None or off < best[0]):
             best = off, Mesh(a, b, ra / rb, arm)
     if best is None:
-        d.leave(f"{what} ({a}, {b})", "no link holds a pin of both (a rack has no joint here)")
+        d.leave(f"{what} ({a}, {b})", "no link holds a pin of both, and none slides where the other turns")
         return
     if best[0] > 1e-6:
         d.notes.append(
             f"{what}: its pitch point is off the line of the centres; the nearest point of it serves"
         )
     d.meshes.append(best[1])
+
+
+def _rack(d: Drawing, wheel: str, rack: str, at: Place) -> bool:
+    """Add a rack that slides on a body on which a wheel turns; False where it is none."""
+    pins = d.pins()
+    for s in d.slides:
+        if s.turned is None or s.link != rack:
+            continue
+        for pin in d.bodies.get(wheel, Body()).points:
+            if pin in pins and s.on in pins[pin]:
+                z = d.bodies[wheel].points[pin]
+                along = math.radians(s.angle)
+                to = [float(at[i] - z[i]) for i in (0, 1)]
+                # the pitch point lies on the right of the way that the slide takes as the wheel turns
+                radius = to[0] * math.sin(along) - to[1] * math.cos(along)
+                if radius != 0:
+                    d.racks.append(Toothed(wheel, s, radius))
+                    return True
+    return False
 
 
 def _json(file: str, data: Any) -> Drawing:

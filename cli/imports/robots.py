@@ -12,7 +12,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from cli.imports.drawn import GROUND, Body, Drawing, Drive, Load, Mesh, Place, Slide
+from cli.imports.drawn import GROUND, Body, Drawing, Drive, Load, Mesh, Place, Slide, Toothed
 from cli.imports.plane import plane_of
 from cli.read.names import Groups, unused
 from cli.read.robots.robot import Motor, Robot, RobotJoint, RobotLink, Spring
@@ -282,9 +282,11 @@ class _Layer:
         for a, b, ratio, arm in self.robot.gears:
             d.meshes.append(Mesh(self.group(a).name, self.group(b).name, ratio, self.group(arm).name))
         for name, terms in self.robot.couplings:
+            if self._rack(terms, name):
+                continue
             shares = self._shares(terms, name)
             if shares is None or len(shares) not in (2, 3) or abs(sum(shares.values())) > 1e-9:
-                d.leave(f"coupling {name}", "it is no gear of two bodies on an arm")
+                d.leave(f"coupling {name}", "it is no gear of two bodies on an arm, and no rack")
                 continue
             first = self.robot.joints[terms[0][0]]
             top = self.alike.of(self.group(first.parent).name)
@@ -297,6 +299,19 @@ class _Layer:
             pair = [body for body in shares if body != arm]
             b, a = pair[:2]
             d.meshes.append(Mesh(a, b, -shares[a] / shares[b], arm))
+
+    def _rack(self, terms: list[tuple[str, float]], where: str) -> bool:
+        """Add a rack where one slide and the angle of a body against its guide stay in step."""
+        slides = [(self.slides[name], factor) for name, factor in terms if name in self.slides]
+        turns = self._shares([term for term in terms if term[0] not in self.slides], where)
+        if len(slides) != 1 or turns is None or len(turns) != 2 or abs(sum(turns.values())) > 1e-9:
+            return False
+        (slide, factor), carrier = slides[0], self.alike.of(slides[0][0].on)
+        wheels = [body for body in turns if self.alike.of(body) != carrier]
+        if len(wheels) != 1 or factor == 0:
+            return False
+        self.d.racks.append(Toothed(wheels[0], slide, -turns[wheels[0]] / factor))
+        return True
 
     def _springs(self, moving: list[RobotJoint]) -> None:
         """Springs and dampers of joints and tendons; on a slide alone they have no like."""

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.show.result import Result
+    from dalembert.results.way import Topic
 
 
 EXAMPLE = "index-mandrel"
@@ -51,7 +52,13 @@ def run(readings: str, phase_lag: bool = False) -> Result:
         )
         return picture
 
+    def way() -> list[Topic]:
+        from cli.index.way import way
+
+        return way(positions)
+
     return Result(
+        way=way,
         tables=tables(positions),
         head={"amplitude_unit": positions.unit} if positions.quantity == "amplitude" else {},
         figure=figure,

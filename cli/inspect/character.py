@@ -168,7 +168,10 @@ def _angle_text(analysis: Analysis, step: Turn) -> str:
     parts = [
         f"{k:g}·input {inputs[j].name}" if k != 1 else f"input {inputs[j].name}" for j, k in step.angle.inputs
     ]
-    parts += [f"{r:g}·{base}" if r != 1 else base for base, r in step.angle.bases]
+    guides = analysis.mechanism.guides
+    for base, r in step.angle.bases:
+        name = f"slide {guides[base].point}" if isinstance(base, int) else base
+        parts.append(f"{r:g}·{name}" if r != 1 else name)
     if step.angle.const:
         parts.append(f"{math.degrees(step.angle.const):g} deg")
     return " + ".join(parts) or "fixed"

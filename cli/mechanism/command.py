@@ -23,6 +23,7 @@ What:
   newton  Newton-Raphson on all loops at once, with its iterates.
 Output:
   page FILE(.html)  Write a page on which the mechanism moves.
+Further options (docs/commands.md describes them):
   schema  Print the JSON Schema of FILE.toml; needs no FILE.
 """
 
@@ -58,6 +59,6 @@ def run(asked: Asked, show: ShowOptions) -> Result:
     def page(cases: Sequence[tuple[str, Case]]) -> bytes:
         from cli.cases.page import of_poses
 
-        return of_poses(cases, show.units)
+        return of_poses(cases, show.units, call.bare)
 
     return call.result(study, asked.page, page)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cli.cases.poses import over_poses, pose_head
 from dalembert.angles import read_degrees
 from dalembert.results.columns import Column, Table, names
 from dalembert.results.way import Topic, figures, vector_text
@@ -67,23 +68,6 @@ def way(analysis: Analysis, *, newton: bool = False) -> list[Topic]:
                 topic.title = f"Assembly {assembly.number}: {topic.heading}"
         found += topics
     return found
-
-
-def pose_head(analysis: Analysis, i: int) -> Document:
-    """What names a pose in JSON: `input_deg`, or `inputs` of several."""
-    shown = analysis.inputs.shown[i].tolist()
-    every = {
-        e.name: {analysis.input_names[e.name]: value}
-        for e, value in zip(analysis.mechanism.inputs, shown, strict=True)
-    }
-    return next(iter(every.values())) if len(every) == 1 else {"inputs": every}
-
-
-def over_poses(analysis: Analysis, entries: list[Document]) -> Document:
-    """What a topic has in JSON: of one pose its entry, of several the list `poses`."""
-    if len(entries) == 1:
-        return entries[0]
-    return {"poses": [{**pose_head(analysis, i), **entry} for i, entry in enumerate(entries)]}
 
 
 def _loops(analysis: Analysis, motion: Motion) -> list[Topic]:
@@ -365,8 +349,10 @@ def _parts_table(every: list[Parts], i: int, *, velocity: bool) -> Table:
         whole = abs(complex((each.velocity if velocity else each.acceleration)[i]))
         for word, name in wanted:
             value = complex(getattr(each, name)[i])
-            if word == "sum" or abs(value) > 1e-12 * whole:
-                rows.append((each, word, value))
+            # rounding of nothing is shown as nothing
+            x, y = (0.0 if abs(part) < 1e-12 * whole else part for part in (value.real, value.imag))
+            if word == "sum" or x or y:
+                rows.append((each, word, complex(x, y)))
     return Table(
         [
             Column("point", "", [each.point for each, *_ in rows]),

@@ -20,6 +20,7 @@ from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.result import Result
+    from dalembert.results.way import Topic
 
 
 EXAMPLE = "blades"
@@ -31,12 +32,10 @@ What:
   plane NAME  The plane, of a file.
   positions ANGLES  Where masses can go, such as 292.5deg,315deg.
   blades N  So many places, evenly spaced, numbered from 1.
-  first ANGLE  Angle of the first blade.
   max_mass MASS  Limit of each place, such as 5g.
 How: weights as they are:
   stock MASSES  Weights in stock, such as 1g,2g,5g; one a place; the fewest that come within 1 % of the correction, at most three.
   weights MASSES  Weights of fixed mass that stand at any angle, such as 4g,4g: the angle of each.
-  pieces N  How many weights from stock go on one place.
   max_pieces N  Least error with so many weights from stock altogether, in place of the fewest within 1 %.
 How: elsewhere:
   at_radius R  Radius the corrections were found for.
@@ -46,9 +45,12 @@ How: elsewhere:
 How: drilling:
   drill DIAMETER  Remove material instead, by drilling opposite.
   density DENSITY  Density of the material drilled, such as 7850kg_m3.
+  remove  The vectors are material to REMOVE already: drill there, not opposite.
+Further options (docs/commands.md describes them):
+  first ANGLE  Angle of the first blade.
+  pieces N  How many weights from stock go on one place.
   drill_point ANGLE  Point angle of the drill, such as 118deg; 180deg is flat.
   max_depth DEPTH  Deepest hole; more are drilled at a place if needed.
-  remove  The vectors are material to REMOVE already: drill there, not opposite.
 """
 
 
@@ -113,7 +115,13 @@ def run(
         sections = [Section(heading(name), [table.above, table]) for name, table in parts.items()]
         return Sheet(placing.of.name, sections, lambda: draw(placing))
 
+    def way() -> list[Topic]:
+        from cli.place.way import way
+
+        return [topic for each in placings for topic in way(each, "" if alone else each.of.name)]
+
     return Result(
+        way=way,
         tables=tables(placings),
         figure=(lambda: draw(placings[0])) if alone else None,
         method=METHOD,

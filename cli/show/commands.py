@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import wraps
 from inspect import Parameter, signature
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
 
 import typer
 from typer.core import TyperCommand
 
 from cli.read.about import HEAD
+from cli.show.taking import take
 
 if TYPE_CHECKING:
     from cli.show.result import Result
@@ -23,21 +25,21 @@ if TYPE_CHECKING:
 
 SHARED = """
 What:
-  column NAME=HEADER  Read the column HEADER as NAME: mass_kg=Masse; repeatable.
+  column NAME=HEADER  Read column HEADER as NAME; repeatable.
 Output:
   json  Print one JSON document, SI units, full precision.
   output -o --output FILE  Write to FILE (.csv .json .xlsx .parquet .md .tex).
   plot FILE  Draw a picture (.svg, .png or .pdf).
   expect FILE.csv  Check the result against expected values.
-  rtol NUMBER  Relative tolerance of --expect (angles: radians).
   steps  Show the worked solution: equations with their numbers.
   digits  Print only the digits that hold against rounding.
   units UNIT,...  Units of the columns: mm,g,deg,N_mm,rpm.
   report FILE  Write a report (.html or .md): data, results, method.
-  about KEY=TEXT  Its head: title=, machine=, customer=, date=, author=.
-Terminal:
+Further options (docs/commands.md describes them):
+  rtol NUMBER  Relative tolerance of --expect (angles: radians).
+  about KEY=TEXT  Head of the report: title=, machine=, customer=, date=, author=.
   text  Print the aligned table even into a pipe.
-  no_color  No colours; so does NO_COLOR in the environment.
+  no_color  No colours; NO_COLOR in the environment does the same.
   help  Show this message and exit.
 """
 """What the help says of the options that every command shares."""
@@ -183,7 +185,7 @@ def with_options(
     two = "about" in own
     if two:
         point, head = told(options)["about"], told(SHARED)["about"]
-        line = head._replace(metavar=point.metavar, help=f"{point.help} KEY=TEXT: {head.help}")
+        line = point._replace(help=f"{point.help} KEY=TEXT: {head.help}")
         shared["about"] = shared["about"].replace(annotation=_annotated(list[str] | None, line))
 
     @wraps(find)
@@ -208,7 +210,8 @@ def with_options(
             given["show"] = options
         result = find(**given) if asked is None else find(asked(**given), options)
         with result.within():
-            hand_on(result, options, said)
+            if not take(result):
+                hand_on(result, options, said)
 
     mine = [p for name, p in own.items() if name != "show" and not (two and name == "about")]
     parameters = [*mine, *shared.values()]
@@ -277,12 +280,20 @@ class Command(TyperCommand):
             typer.echo(line, err=True)
             raise typer.Exit(2) from None
 
-    def panels_of(self, ctx: Any) -> dict[str, list[tuple[str, str]]]:
-        """Return the rows of help below their headings."""
-        place = {name: said.heading for name, said in {**self.told, **told(SHARED)}.items()}
-        headings = ("Arguments", "Options", *place.values())
+    def panels_of(self, ctx: Any, without: Collection[str] = ()) -> dict[str, list[tuple[str, str]]]:
+        """Return the rows of help below their headings, further options last; `without`: parameters to leave out."""
+        shared = told(SHARED)
+        place = {name: line.heading for name, line in {**shared, **self.told}.items()}
+        listed = (
+            "Arguments",
+            "Options",
+            *(line.heading for of in (self.told, shared) for line in of.values()),
+        )
+        headings = sorted(listed, key=lambda heading: heading.startswith(FURTHER))
         rows: dict[str, list[tuple[str, str]]] = {heading: [] for heading in headings}
         for param in self.get_params(ctx):
+            if param.name in without:
+                continue
             record = param.get_help_record(ctx)
             if record is not None:
                 heading = "Arguments" if param.param_type_name == "argument" else "Options"
@@ -293,7 +304,11 @@ class Command(TyperCommand):
         for heading, records in self.panels_of(ctx).items():
             with formatter.section(heading):
                 if heading.startswith(FURTHER):
-                    formatter.write_text(", ".join(flags for flags, _ in records))
+                    lead = " " * formatter.current_indent
+                    text = ", ".join(flags for flags, _ in records)
+                    # names are not cut at their hyphens
+                    lines = wrap(text, formatter.width - len(lead), break_on_hyphens=False)
+                    formatter.write("".join(f"{lead}{line}\n" for line in lines))
                 else:
                     formatter.write_dl(records)
 
@@ -342,7 +357,8 @@ def parameters(
         if line.heading == "Arguments":
             info = typer.Argument(metavar=shown, help=line.help, **more)
         else:
-            words = "|" in (shown or "") and kind is not str
+            # typer shows the words of a choice itself
+            words = "|" in (shown or "") and (shown or "").islower()
             info = typer.Option(*line.flags, metavar=None if words else shown, help=line.help, **more)
         found[name] = Parameter(
             name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, info]

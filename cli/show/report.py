@@ -342,7 +342,7 @@ def _html(report: Report) -> Iterator[str]:
             yield f"<h2>{html.escape(page.title)}</h2>\n"
         for name, parts in page.sections:
             yield f"<h3>{html.escape(name)}</h3>\n"
-            yield from map(_html_part, parts)
+            yield from map(html_part, parts)
         if page.figure is not None:
             yield _figure(_picture(page))
         yield "</section>\n"
@@ -358,7 +358,7 @@ def _figure(drawing: str | None) -> str:
     return f"<figure{kind}>{drawing}</figure>\n"
 
 
-def _html_part(part: Part) -> str:
+def html_part(part: Part) -> str:
     if isinstance(part, str):
         tag, text = ("pre", part.removeprefix(CODE)) if part.startswith(CODE) else ("p", part.strip("\n"))
         return f"<{tag}>{html.escape(text)}</{tag}>\n"

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from cli.show.result import Result
     from cli.signal.recording import Recording
     from dalembert.results.columns import Table
+    from dalembert.results.way import Topic
 
 OPTIONS = """
 Arguments:
@@ -35,7 +36,14 @@ def run(
     from cli.signal.recording import read_signal
 
     read = read_signal(recording, pulses)
+
+    def way() -> list[Topic]:
+        from cli.signal.way import way
+
+        return way(read)
+
     return Result(
+        way=way,
         tables={"signal": lambda: vectors(read)},
         head={"amplitude_unit": read.unit},
         about={"title": "Vibration once per turn"},

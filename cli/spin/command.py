@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.show.result import Result
+    from dalembert.results.way import Topic
 
 
 class Method(StrEnum):
@@ -96,7 +97,13 @@ def run(
         made = turning_page(turning.name, turning.inertia, turning.omega, table, turning.mgl is not None)
         return made.html.encode()
 
+    def way() -> list[Topic]:
+        from cli.spin.way import way
+
+        return way(rotation)
+
     return Result(
+        way=way,
         tables=tables.tables(rotation),
         head={"method": "exact" if rotation.exact else rotation.integrator},
         figure=figure,

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
     from cli.show.result import Result
 
-EXAMPLE = ""
+EXAMPLE = "tolerances"
 OPTIONS = f"""
 {FILE}{CASES}{WORKERS}
 What:

@@ -12,6 +12,7 @@ from cli.show.output import command
 if TYPE_CHECKING:
     from cli.show.result import Result
     from dalembert.results.columns import Table
+    from dalembert.results.way import Topic
 
 RULE = "centrifugal force a tenth of the static load of each plane: m r ω² = 0.1 (M/planes) g"
 OPTIONS = """
@@ -57,4 +58,12 @@ def run(
             documented=[names("planes", [planes]), names("rule", [RULE])],
         )
 
-    return Result(tables={"trial": suggestion}, about={"title": "Trial mass"}, method=f"Rule: {RULE}.")
+    def way() -> list[Topic]:
+        from balancing import trial_unbalance
+        from cli.trial.way import way
+
+        return way(mass, omega, arm, planes, float(trial_unbalance(mass, omega, planes)))
+
+    return Result(
+        tables={"trial": suggestion}, way=way, about={"title": "Trial mass"}, method=f"Rule: {RULE}."
+    )

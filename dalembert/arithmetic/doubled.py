@@ -1,23 +1,24 @@
 """Numbers of twice as many digits: each the sum of two floats, of which the second is rounding beside the first.
 
-As T. J. Dekker, Numer. Math. 18 (1971) 224-242, section 4. For the few differences that are all cancellation.
+As T. J. Dekker, Numer. Math. 18 (1971) 224-242, section 4. The second run of a formula is in these numbers: what they
+and floats agree in are the digits that hold.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.exact import two_product, two_sum
+from dalembert.arithmetic.exact import halves, two_sum
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
 class Doubled:
-    """high + low, some 32 digits; arrays (...) that broadcast, with each other and with plain numbers.
+    """high + low, some 32 digits; arrays (...) that broadcast, or floats, with each other and with plain numbers.
 
     Examples
     --------
@@ -28,57 +29,110 @@ class Doubled:
     True
     """
 
-    high: Array
-    low: Array | float = 0.0
+    __slots__ = ("_halves", "high", "low")
 
     # numpy's own arrays leave their operators with a doubled number to it
     __array_ufunc__ = None
 
+    def __init__(self, high: Any, low: Any = 0.0) -> None:
+        self.high, self.low = high, low
+        self._halves: Any = None
+
+    @classmethod
+    def of(cls, exact: Fraction) -> Doubled:
+        """The number nearest to an exact one.
+
+        >>> Doubled.of(Fraction("0.1"))
+        Doubled(0.1, -5.551115123125783e-18)
+        """
+        high = float(exact)
+        return cls(high, float(exact - Fraction(high)))
+
+    def __repr__(self) -> str:
+        return f"Doubled({self.high!r}, {self.low!r})"
+
     @property
-    def value(self) -> Array:
+    def value(self) -> Any:
         """The nearest float."""
         return self.high + self.low
 
-    def __add__(self, other: Doubled | Array | float) -> Doubled:
-        b = _doubled(other)
+    @property
+    def halves(self) -> tuple[Any, Any]:
+        """The upper and the lower digits of `high`, formed once: their products are exact."""
+        if self._halves is None:
+            self._halves = halves(self.high)
+        return self._halves  # type: ignore[no-any-return]
+
+    def __add__(self, other: Any) -> Doubled:
+        b = doubled(other)
         total, rest = two_sum(self.high, b.high)
-        return _settled(total, rest + (self.low + b.low))
+        if not _none(self.low):
+            rest = rest + self.low
+        if not _none(b.low):
+            rest = rest + b.low
+        return settled(total, rest)
 
-    def __mul__(self, other: Doubled | Array | float) -> Doubled:
-        b = _doubled(other)
-        product, rest = two_product(self.high, b.high)
-        return _settled(product, rest + (self.high * b.low + self.low * b.high))
+    def __mul__(self, other: Any) -> Doubled:
+        b = doubled(other)
+        product = self.high * b.high
+        (a1, a2), (b1, b2) = self.halves, b.halves
+        rest = ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2
+        if not _none(b.low):
+            rest = rest + self.high * b.low
+        if not _none(self.low):
+            rest = rest + self.low * b.high
+        return settled(product, rest)
 
-    def __truediv__(self, other: Doubled | Array | float) -> Doubled:
-        b = _doubled(other)
-        first = self.high / b.high
-        return _settled(first, (self - b * first).value / b.high)
+    def __truediv__(self, other: Any) -> Doubled:
+        b = doubled(other)
+        first = _quotient(self.high, b.high)
+        left = self - b * first
+        return settled(first, _quotient(left.high, b.high))
 
-    def __rtruediv__(self, other: Array | float) -> Doubled:
-        return _doubled(other) / self
+    def __rtruediv__(self, other: Any) -> Doubled:
+        return doubled(other).__truediv__(self)
 
     def __abs__(self) -> Doubled:
+        if not np.ndim(self.high):
+            return -self if self.high < 0 else self
         sign = np.where(self.high < 0, -1.0, 1.0)
         return Doubled(self.high * sign, self.low * sign)
 
     def __neg__(self) -> Doubled:
         return Doubled(-self.high, -self.low)
 
-    def __sub__(self, other: Doubled | Array | float) -> Doubled:
-        return self + -_doubled(other)
+    def __sub__(self, other: Any) -> Doubled:
+        return self + -doubled(other)
 
-    def __rsub__(self, other: Array | float) -> Doubled:
-        return -self + other
+    def __rsub__(self, other: Any) -> Doubled:
+        return doubled(other) + -self
 
     __radd__ = __add__
     __rmul__ = __mul__
 
 
-def _settled(high: Array, low: Array) -> Doubled:
+def _none(low: Any) -> bool:
+    return isinstance(low, float) and low == 0.0
+
+
+def _quotient(a: Any, b: Any) -> Any:
+    """a/b, as numpy has it where b is zero."""
+    return (
+        a / b if np.ndim(b) or b else np.float64(a) / np.float64(b) if not np.ndim(a) else a / np.float64(b)
+    )
+
+
+def settled(high: Any, low: Any) -> Doubled:
     """The same number with low below half a unit in the last place of high: a cancellation leaves it above."""
-    total = np.asarray(high + low)
+    total = high + low
     return Doubled(total, low - (total - high))
 
 
-def _doubled(x: Doubled | Array | float) -> Doubled:
-    return x if isinstance(x, Doubled) else Doubled(np.asarray(x, dtype=float))
+def doubled(x: Any) -> Doubled:
+    """A number as a doubled one: exactly what it is."""
+    if isinstance(x, Doubled):
+        return x
+    return Doubled(float(x) if not np.ndim(x) else np.asarray(x, dtype=float))
+
+
+PI = Doubled(3.141592653589793, 1.2246467991473532e-16)

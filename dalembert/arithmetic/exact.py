@@ -23,12 +23,13 @@ def two_sum(a: Array, b: Array) -> tuple[Array, Array]:
 def two_product(a: Array, b: Array) -> tuple[Array, Array]:
     """Return a · b rounded, and the rounding error; exact (Dekker, Numer. Math. 18, 1971, 224-242)."""
     p = a * b
-    a1, a2 = _halves(a)
-    b1, b2 = _halves(b)
+    a1, a2 = halves(a)
+    b1, b2 = halves(b)
     return p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2
 
 
-def _halves(a: Array) -> tuple[Array, Array]:
+def halves(a: Array) -> tuple[Array, Array]:
+    """Return the upper and the lower digits of a number, 26 bits each: products of two such parts are exact."""
     # 2²⁷ + 1
     c = 134217729.0 * a
     high = c - (c - a)

@@ -104,7 +104,11 @@ class Page:
 
 
 def page(
-    title: str, scene: Literal["plane", "space"], series: Sequence[Mapping[str, Json]], **rest: Json
+    title: str,
+    scene: Literal["plane", "space"],
+    series: Sequence[Mapping[str, Json]],
+    script: str = "",
+    **rest: Json,
 ) -> Page:
     """Return the page of some series of poses.
 
@@ -116,28 +120,48 @@ def page(
     series : sequence of mappings
         Each holds `columns`, a list of {header, owner, and what `packed` gives}, `n`, the number of poses, and what its
         scene reads.
+    script : str
+        What computes the columns anew (tapes and engine); without it the page replays them.
     rest
         What else the script reads.
     """
-    data = json.dumps({"series": series, **rest}, separators=(",", ":"), ensure_ascii=False)
+    own = [_part("player.js"), _part(f"{scene}.js")]
+    if script:
+        own = [script, _part("texts.js"), _part("model.js"), *own, _part("entry.js"), _part("editor.js")]
+    return filled(title, "page.html", own, {"series": series, **rest})
+
+
+def filled(title: str, html: str, parts: Sequence[str], data: Mapping[str, Json]) -> Page:
+    """Return the page of some scripts and their data.
+
+    Parameters
+    ----------
+    title : str
+    html : str
+        The file of the page's own elements.
+    parts : sequence of str
+        The scripts, one after the other in one text, which the page's policy names by its hash.
+    data
+        What they read.
+    """
+    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False)
     # a name in the data cannot end the element that holds it
-    data = data.replace("<", "\\u003c")
-    script = f'"use strict";\n{_part("player.js")}\n{_part(f"{scene}.js")}\n'
+    text = text.replace("<", "\\u003c")
+    script = "\n".join(['"use strict";', *parts, ""])
     hashed = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     places = {
         "{{title}}": escape(title or "dalembert"),
         "{{hash}}": hashed,
         "{{style}}": _part("page.css"),
         "{{script}}": script,
-        "{{data}}": data,
+        "{{data}}": text,
     }
-    html = _part("page.html")
-    head, *parts = html.split("{{")
-    filled = [head]
-    for part in parts:
+    head, *rest = _part(html).split("{{")
+    found = [head]
+    for part in rest:
         name, after = part.split("}}", 1)
-        filled += [places["{{" + name + "}}"], after]
-    return Page("".join(filled))
+        found += [places["{{" + name + "}}"], after]
+    return Page("".join(found))
 
 
 @cache

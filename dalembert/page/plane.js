@@ -42,6 +42,7 @@ function outline(shape, stands) {
 function room() {
   let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
   for (const series of data.series) {
+    if (series.hidden?.()) continue;
     const step = Math.max(1, Math.floor(series.n / 90));
     for (let i = 0; i < series.n; i += step) {
       const stands = series.bodies.map((_, b) => stand(series, b, i));
@@ -56,7 +57,7 @@ function room() {
   }
   return left <= right ? [left, right, low, high] : [-1, 1, -1, 1];
 }
-const [left, right, low, high] = room();
+let [left, right, low, high] = room();
 const LEAST = { pin: 3.5, tip: 2.5, mass: 3 }; // pixels
 let scale, px, py, width, height;
 
@@ -77,8 +78,15 @@ const drawn = { names: true, velocity: false, acceleration: false, forces: whole
 const traced = new Set(whole.points.filter((p) => p.trace).map((p) => p.name));
 
 function drawFigure({ series, group, parts }, i) {
+  if (series.hidden?.()) {
+    group.style.display = "none";
+    return null;
+  }
   const stands = series.bodies.map((_, b) => stand(series, b, i));
-  group.style.display = real(stands) ? "" : "none";
+  // a page that computes keeps the last good pose, greyed
+  const kept = data.model && series === whole;
+  group.style.display = real(stands) || kept ? "" : "none";
+  if (kept) group.classList.toggle("gone", !real(stands));
   if (!real(stands)) return null;
   for (const [k, shape] of series.shapes.entries()) {
     const points = outline(shape, stands);
@@ -95,14 +103,20 @@ function drawFigure({ series, group, parts }, i) {
 // the places that move, each once, and the columns of their rates
 const movers = whole.points.filter((p) => p.moves);
 const longest = {};
+const measures = []; // of the arrows, again after numbers have changed
 function arrows(kind, tails) {
   const group = put(layers.over, "g");
   const parts = tails.map((tail) => put(group, "path", { class: kind }));
   const size = (i) => Math.max(0, ...tails.map(([, x, y]) => Math.hypot(at(whole, x, i), at(whole, y, i))).filter(Number.isFinite));
-  const sizes = Array.from({ length: n }, (_, i) => size(i));
-  longest[kind] = Math.max(0, ...sizes);
-  // one scale for all poses; a short peak may reach half across the picture
-  const usual = 2 * Math.sqrt(sizes.reduce((sum, x) => sum + x * x, 0) / n);
+  let usual;
+  const measure = () => {
+    const sizes = Array.from({ length: n }, (_, i) => size(i));
+    longest[kind] = Math.max(0, ...sizes);
+    // one scale for all poses; a short peak may reach half across the picture
+    usual = 2 * Math.sqrt(sizes.reduce((sum, x) => sum + x * x, 0) / n);
+  };
+  measure();
+  measures.push(measure);
   return (i, on) => {
     const length = (0.2 * Math.min(width, height)) / (Math.max(usual, longest[kind] / 2.5) || 1);
     for (const [k, [point, x, y]] of tails.entries()) {
@@ -223,9 +237,10 @@ function drawPolygon(i) {
 function drawTraces() {
   layers.traces.replaceChildren();
   for (const [s, series] of data.series.entries()) {
+    if (series.hidden?.()) continue;
     for (const p of series.points) {
       if (!traced.has(p.name)) continue;
-      const [xs, ys] = p.path ?? [p.x, p.y].map((k) => series.columns[k].values.map((x) => x * (series.columns[k].si ?? 1)));
+      const [xs, ys] = p.path ?? [p.x, p.y].map((k) => series.columns[k].values.subarray(0, series.n).map((x) => x * (series.columns[k].si ?? 1)));
       let d = "";
       let pen = false;
       for (let i = 0; i < xs.length; i++) {
@@ -239,6 +254,18 @@ function drawTraces() {
 }
 for (const series of data.series) {
   for (const p of series.points) p.path = p.path?.map((one) => unpack(one, series.fine));
+}
+// numbers have changed: what was measured over all poses
+function refresh() {
+  for (const measure of measures) measure();
+  legend();
+  drawTraces();
+  plots.forEach((one) => one.draw());
+  show(shown);
+}
+function fit() {
+  [left, right, low, high] = room();
+  resize();
 }
 
 // --- all of a pose ----------------------------------------------------------------------------------------------------
@@ -293,8 +320,8 @@ function labels(stands, i) {
 }
 function legend() {
   const said = [];
-  const [first, ...others] = data.series.map((series) => series.name);
-  if (others.length) said.push(`in full: ${first}; faint: ${others.slice(0, 4).join("; ")}${others.length > 4 ? ` and ${others.length - 4} more` : ""}`);
+  const [first, ...others] = data.series.filter((series) => !series.hidden?.()).map((series) => series.name);
+  if (others.length) said.push(`in full: ${first || "as it is now"}; faint: ${others.slice(0, 4).join("; ")}${others.length > 4 ? ` and ${others.length - 4} more` : ""}`);
   const of = (kind, unit) => longest[kind] && said.push(`longest arrow of ${kind}: ${short(longest[kind])} ${unit}`);
   if (drawn.velocity) of("velocity", data.units.v);
   if (drawn.acceleration) of("acceleration", data.units.a);
@@ -312,7 +339,9 @@ function drawAll(i) {
   words.put(...barText, "note");
   words.done();
   drawPolygon(i);
+  drawHandles?.(stands);
 }
+let drawHandles; // of a page that computes
 let barText;
 function resize() {
   width = Math.max(240, view.clientWidth);
@@ -364,4 +393,5 @@ toggle("i", "instant centres", false, flips("centres", centreTable), velocities 
 toggle("p", "velocity polygon", false, flips("polygon", polygonOn), velocities && longest.velocity > 0);
 legend();
 watchers.push(drawAll);
-start({ resize });
+// a page that computes begins when its editor stands
+if (!data.model) start({ resize });

@@ -61,8 +61,10 @@ function unpack(column, n) {
   return new Kind(bytes.buffer);
 }
 for (const series of data.series) {
-  for (const column of series.columns) column.values = unpack(column, series.n);
+  // what is computed here has one pose more than the sweep: the free one
+  for (const column of series.columns) column.values = data.model && series === data.series[0] ? new Float64Array(series.n + 1).fill(NaN) : unpack(column, series.n);
 }
+if (data.model) begin(data);
 // every digit, as the CSV has it
 function exact(x) {
   if (!Number.isFinite(x)) return "–";
@@ -110,17 +112,18 @@ const n = whole.n;
 const watchers = []; // called with each new pose
 let shown = 0;
 function show(i) {
-  shown = Math.max(0, Math.min(n - 1, Math.round(i)));
-  $("slider").value = shown;
+  // the pose beyond the last is the free one of a page that computes
+  shown = data.model && i === n ? n : Math.max(0, Math.min(n - 1, Math.round(i)));
+  if (shown < n) $("slider").value = shown;
   $("slider").setAttribute("aria-valuetext", said(shown));
-  $("pose").textContent = `${said(shown)}${n > 1 ? `  (pose ${shown + 1} of ${n})` : ""}`;
+  $("pose").textContent = `${said(shown)}${n > 1 && shown < n ? `  (pose ${shown + 1} of ${n})` : ""}`;
   for (const watch of watchers) watch(shown);
 }
 function said(i) {
   return whole.over.map((k) => `${whole.columns[k].header} ${short(whole.columns[k].values[i])}`).join(", ");
 }
 // seconds at speed 1 at which each pose is due: the poses' own time, or some seconds for a turn of the input
-const clock = data.clock === undefined ? Float64Array.from({ length: n }, (_, i) => (i * data.lasts) / Math.max(1, n - 1)) : whole.columns[data.clock].values.map((t) => t * (whole.columns[data.clock].si ?? 1));
+const clock = data.clock === undefined ? Float64Array.from({ length: n }, (_, i) => (i * data.lasts) / Math.max(1, n - 1)) : whole.columns[data.clock].values.subarray(0, n).map((t) => t * (whole.columns[data.clock].si ?? 1));
 const begins = clock[0];
 const lasts = clock[n - 1] - clock[0];
 const speeds = Array.from({ length: 21 }, (_, i) => 2 ** (i - 10));
@@ -136,6 +139,7 @@ function play(on) {
   $("play").textContent = playing ? "❚❚" : "▶";
   $("play").setAttribute("aria-label", playing ? "pause" : "play");
   if (!playing) return;
+  if (shown === n) show(Number($("slider").value));
   place = clock[shown] - begins;
   if (!wraps && shown === n - 1) way = -1;
   if (!wraps && shown === 0) way = 1;
@@ -161,7 +165,7 @@ function frame(now) {
 }
 function jump(i) {
   play(false);
-  show(i);
+  show(Math.min(i, n - 1));
 }
 function faster(by) {
   speed = Math.max(0, Math.min(speeds.length - 1, speed + by));
@@ -251,7 +255,8 @@ function table(caption, heads, rows, exactly, more) {
   watchers.push((i) => {
     for (const [cell, k, every] of cells) {
       const x = k === null ? NaN : whole.columns[k].values[i];
-      if (every) fill(cell, x);
+      if (data.model) fillHeld(cell, k, i, every);
+      else if (every) fill(cell, x);
       else cell.textContent = k === null ? "" : short(x);
     }
   });
@@ -274,7 +279,7 @@ function plot(column) {
   const value = put(line, "output");
   const away = put(line, "button", { type: "button", "aria-label": "remove this plot", title: "remove this plot" }, "×");
   const svg = svgIn(host);
-  const x = data.x === undefined ? Float64Array.from({ length: n }, (_, i) => i + 1) : whole.columns[data.x].values;
+  const x = data.x === undefined ? Float64Array.from({ length: n + 1 }, (_, i) => i + 1) : whole.columns[data.x].values;
   const margin = { left: 58, right: 18, top: 8, bottom: 30 };
   let cursor, dot, ghosts, px, py;
   const chart = {
@@ -284,14 +289,14 @@ function plot(column) {
       svg.replaceChildren();
       sized(svg, width, height);
       put(svg, "title", {}, whole.columns[k].header);
-      const lines = data.series.map((s) => s.columns[k]?.values ?? []);
+      const lines = data.series.map((s) => (s.hidden?.() ? [] : (s.columns[k]?.values.subarray(0, s.n) ?? [])));
       let [low, high] = range(lines.flatMap((values) => range(values)).filter(Number.isFinite));
       if (!(low <= high)) [low, high] = [0, 1];
       // what varies by rounding alone is constant
       const varies = high - low > 1e-12 * Math.max(Math.abs(low), Math.abs(high));
       const pad = varies ? (high - low) * 0.06 : Math.abs(high) * 0.1 || 1;
       [low, high] = [low - pad, high + pad];
-      let [left, right] = range(x);
+      let [left, right] = range(x.subarray(0, n));
       if (left === right) [left, right] = [left - 1, right + 1];
       px = (v) => margin.left + ((v - left) / (right - left)) * (width - margin.left - margin.right);
       py = (v) => height - margin.bottom - ((v - low) / (high - low)) * (height - margin.top - margin.bottom);
@@ -307,6 +312,7 @@ function plot(column) {
       put(svg, "text", { class: "tick", x: width - margin.right, y: height - 4, "text-anchor": "end" }, under);
       const jumps = /deg$/.test(whole.columns[k].header) ? 180 : Infinity;
       for (const [s, values] of [...lines.entries()].reverse()) {
+        if (!values.length) continue;
         let d = "";
         let pen = false;
         for (let i = 0; i < values.length; i++) {
@@ -370,6 +376,7 @@ function start(scene) {
   };
   lay();
   data.plots.forEach(plot);
+  if (data.note) $("legend").before(make("p", { id: "note" }, data.note));
   $("more").addEventListener("click", () => plot(data.plots.at(-1)));
   let width = innerWidth;
   addEventListener("resize", () => {

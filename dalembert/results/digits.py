@@ -1,4 +1,4 @@
-"""`--digits`: each number cut to the digits before its rounding error."""
+"""`--digits`: each number cut to the digits that it has in common with the second run, in 32 digits."""
 
 from __future__ import annotations
 
@@ -37,5 +37,10 @@ def _cut(value: Cell, error: float) -> Cell:
         return None
     if isinstance(value, str) or value is None or not value or not error > 0:
         return value
-    digits = floor(log10(abs(value) / error)) if error < abs(value) else 0
-    return float(f"{value:.{min(digits, 17) - 1}e}") if digits > 0 else 0.0
+    digits = min(floor(log10(abs(value) / error)), 17) if error < abs(value) else 0
+    for last in range(digits - 1, -1, -1):
+        # what the number and the other run agree in, wherever it lies within the error
+        cut = f"{value:.{last}e}"
+        if cut == f"{value + error:.{last}e}" == f"{value - error:.{last}e}":
+            return float(cut)
+    return 0.0

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dalembert.results.columns import Table, document
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from dalembert.results.columns import Document, Json
+    from dalembert.results.columns import Document
 
 
 @dataclass(eq=False, repr=False)
@@ -35,7 +35,7 @@ class Topic:
     """Equations and sentences as text, and tables; a table's `place` is where it stands in this topic's JSON."""
     title: str = ""
     """What stands above it, where that is more than the name."""
-    head: Mapping[str, Json] = field(default_factory=dict)
+    head: Mapping[str, Any] = field(default_factory=dict)
     """What else JSON has of it, in front of the tables."""
     figure: Callable[[], Figure] | None = None
     """Its picture, for the report."""

@@ -12,11 +12,11 @@ from balancing import (
     Doubtful,
     Infeasible,
     NotConverged,
-    Readings,
     least_squares,
     minimax,
 )
 from cli.field.one_rotor import Sought, confidence
+from tests.balancing.measured import balance, fitted
 from tests.balancing.referee import least_squares_by_clarabel, minimax_by_clarabel
 
 Real = NDArray[np.float64]
@@ -225,8 +225,8 @@ def test_uncertainties_under_limits_are_those_of_repeated_measurements(objective
             return minimax(a, v, limit).corrections
 
     w = solved(v)
-    readings = Readings(v, 0.02, np.radians(2), influence=a)
-    drawn, _ = confidence(readings, w, 0 * w, None, sought, True)
+    read = balance(fitted(v, influence=a), (0.02, np.radians(2)), w)
+    drawn, _ = confidence(read, w, 0 * w, sought, True)
     turn = (1 + 0.02 * rng.normal(size=(60, 6))) * np.exp(1j * np.radians(2) * rng.normal(size=(60, 6)))
     anew = np.array([solved(v * one) for one in turn]) - w
     total = float(np.square(np.abs(anew)).sum(axis=1).mean())

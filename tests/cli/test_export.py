@@ -21,6 +21,7 @@ from virtualwork import Mechanism
 ROBOTS = (".xml", ".urdf", ".sdf")
 # inputs that no joint is: another joint is driven in their place, and it is said
 ELSEWHERE = {"desk-lamp", "double-pendulum"}
+RACKS = {"rack-lift", "doubling-rack"}
 
 
 def taken_back(data: bytes) -> Mechanism:
@@ -36,6 +37,8 @@ def test_every_example_comes_back_with_the_same_motion(file: Path, suffix: str) 
     """Every named point of every link, over the input around the start, to 1e-13 of the mechanism's size."""
     if file.parent.name in ELSEWHERE and suffix != ".xml":
         pytest.skip("another joint is driven")
+    if file.parent.name in RACKS and suffix == ".sdf":
+        pytest.skip("the format has no rack: it is left out, and said")
     m = Mechanism.from_toml(file)
     back = taken_back(exported(m, suffix))
     order = [[e.name for e in back.inputs].index(e.name) for e in m.inputs]

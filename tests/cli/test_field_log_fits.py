@@ -174,7 +174,8 @@ def test_many_machines_with_runs_of_their_own(dalembert: Dalembert) -> None:
 
 
 def test_machines_with_runs_planes_and_repeats_of_their_own_are_each_least_squares(tmp_path: Any) -> None:
-    from cli.field.log import read_log
+
+    from cli.field.reading import read_measured
     from cli.field.request import Request
 
     rng = np.random.default_rng(11)
@@ -211,7 +212,7 @@ def test_machines_with_runs_planes_and_repeats_of_their_own_are_each_least_squar
         "rotor,run,state,amplitude_um,phase_deg,trial_plane,trial_mass_kg,trial_angle_deg\n"
         + "".join(lines[i] for i in mixed)
     )
-    runs = read_log(str(path), Request(rotation="ccw"))
+    runs, _ = read_measured(str(path), Request(rotation="ccw"), (), None)
     seen = 0
     for group in runs.groups:
         assert group.fit is not None

@@ -72,7 +72,7 @@ def test_an_old_spelling_is_answered_by_the_new_one(
 
 def test_the_help_lists_few_options_and_names_all(dalembert: Dalembert) -> None:
     page = dalembert("field", "--help").stdout
-    own = page[: page.index("\nFurther options")]
+    own = page[: page.index("\nOutput:\n")]
     assert len(re.findall(r"^  -", own, re.MULTILINE)) <= 14
     for name in ("--view", "--columns", "--ridge", "--method <influence|four-run>", "--rotation <ccw|cw>"):
         assert name in page

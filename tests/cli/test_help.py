@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from cli.app import COMMANDS
+from cli.show.commands import SHARED, told
 from cli.show.terminal import progress
 from tests.conftest import Dalembert
 
@@ -54,13 +55,25 @@ def test_options_stand_in_panels_of_at_most_ten(command: str, dalembert: Dalembe
     panels = re.split(r"^(?=\S.*:$)", page, flags=re.MULTILINE)[1:]
     titles = [panel.splitlines()[0] for panel in panels]
     assert titles[0] == "Arguments:"
-    assert titles[1] == "What:"
+    # in front of what is computed stand, of a mechanism, the poses that it is computed of
+    assert titles[1] == ("Which poses, which mechanism:" if command == "mechanism" else "What:")
+    assert "What:" in titles
     assert "Output:" in titles
-    # every option has a panel
+    # every option has a panel, those that the help names only have the last one
     assert "Options:" not in titles
+    further = next(panel for panel in panels if panel.startswith("Further options"))
+    assert further is panels[-2]
     for panel in panels:
         assert len(re.findall(r"^  -", panel, re.MULTILINE)) <= 10, panel
-    assert len(re.findall(r"^  (?:-., )?--", page, re.MULTILINE)) >= 17
+    for name in told(SHARED):
+        assert f"--{name.replace('_', '-')}" in page
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_is_at_most_60_lines_with_26_options(command: str, dalembert: Dalembert) -> None:
+    page = dalembert(command, "--help").stdout
+    assert len(page.splitlines()) <= 60
+    assert len(re.findall(r"^ +(?:-., )?--", page, re.MULTILINE)) <= 26
 
 
 def test_help_is_as_wide_as_the_terminal(tmp_path: Path) -> None:

@@ -192,3 +192,15 @@ def test_loops_are_closed_as_often_for_each_of_many_links(monkeypatch: pytest.Mo
         first = m.motion(0.05).point("C7").position[0]
         assert ends == pytest.approx(cells * first, rel=1e-9)
     assert counts[1] < 2.5 * counts[0]
+
+
+@pytest.mark.parametrize(("y", "sense"), [(-20, 1), (20, -1)])
+def test_a_rack_of_pmks_moves_with_its_wheel(y: int, sense: int) -> None:
+    text = f"ground wheel R 0 0 tfff\nground rack P 30 {y} 0\nwheel rack G 0 {y}\nrack tip R 40 {y}\n"
+    m = only(text)
+    (rack,) = m.racks
+    assert (rack.gear, rack.radius) == ("wheel", sense * 20)
+    motion = m.motion(0.3, speed=2.0)
+    assert motion.slide(rack.slider).speed == pytest.approx(sense * 40)
+    # it stands where it is drawn
+    assert m.motion(0.0).point(rack.slider).position[0] == pytest.approx([30, y])

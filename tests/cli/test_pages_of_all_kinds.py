@@ -18,7 +18,7 @@ from virtualwork import Mechanism
 
 
 @pytest.mark.slow
-def test_a_six_bar_takes_less_than_300_kB(dalembert: Dalembert, tmp_path: Path) -> None:
+def test_a_six_bar_takes_less_than_250_kB(dalembert: Dalembert, tmp_path: Path) -> None:
     """The Klann leg with masses, velocities, accelerations and all joint forces."""
     text = (files("cli.examples") / "klann" / "klann.toml").read_text()
     heavy = text.replace("points = {", "mass = 0.7\ncenter = [80, 5]\ninertia = 0.01\npoints = {") + "\n"
@@ -27,8 +27,8 @@ def test_a_six_bar_takes_less_than_300_kB(dalembert: Dalembert, tmp_path: Path) 
     done = dalembert("forces", "m.toml", *options, "--page", "m.html")
     assert done.returncode == 0, done.stderr
     page = (tmp_path / "m.html").read_text()
-    assert page.count('"f4":') > 40  # columns that vary
-    assert len(page.encode()) <= 300_000
+    assert "const tapes = {" in page
+    assert len(page.encode()) <= 250_000
 
 
 @pytest.mark.slow
@@ -185,9 +185,9 @@ def test_a_motion_under_forces_moves_by_its_own_time(
     (tmp_path / "m.toml").write_text(LET_GO)
     names = ("A", "D", "B", "C", "crank", "coupler", "rocker")
     call = ("m.toml", "--time", "0.5:2.5:0.01", "--forces", "--only")
-    done = dalembert("mechanism", *call, "B", "--page", "m.html")
+    done = dalembert("simulate", *call, "B", "--page", "m.html")
     assert done.returncode == 0, done.stderr
-    every = dalembert("mechanism", *call, ",".join(names))
+    every = dalembert("simulate", *call, ",".join(names))
     rows = list(csv.DictReader(every.stdout.splitlines()))
     assert len(rows) == 201
     turned = [float(row["crank_angle_deg"]) for row in rows]
@@ -200,13 +200,14 @@ def test_a_motion_under_forces_moves_by_its_own_time(
     for i in (0, 60, 137, 200):
         opened.set(i)
         row = rows[i]
-        assert {name: cells[:2] for name, cells in opened.table("Points").items()} == {
-            name: [row[f"{name}_x_m"], row[f"{name}_y_m"]] for name in "ADBC"
-        }
+        # the run that the page shows was made for other names: it agrees to rounding
+        for name, cells in opened.table("Points").items():
+            expected = [float(row[f"{name}_{axis}_m"]) for axis in "xy"]
+            assert list(map(float, cells[:2])) == pytest.approx(expected, rel=1e-9)
         links = opened.table("Links")
         assert set(links) == {"crank", "coupler", "rocker"}
         for name, (angle, omega, alpha) in links.items():
-            assert angle == row[f"{name}_angle_deg"]
+            assert float(angle) == pytest.approx(float(row[f"{name}_angle_deg"]), rel=1e-9)
             assert float(omega) == pytest.approx(float(row[f"{name}_omega_rad_s"]), rel=1e-5)
             assert float(alpha) == pytest.approx(float(row[f"{name}_alpha_rad_s2"]), rel=1e-5)
         forces = opened.table("Joint forces")

@@ -1,4 +1,4 @@
-"""`--set`, `--vary`, `--variants`: each variant says what its own file would."""
+"""`--set`, `--over`, `--cases`: each variant says what its own file would."""
 
 from __future__ import annotations
 

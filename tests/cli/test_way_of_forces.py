@@ -79,6 +79,28 @@ def check_instant(instant: Any) -> None:
     assert abs(total) <= 1e-9 * size
 
 
+def check_free_body(body: Any) -> None:
+    """On every link cut loose ΣF = 0 and ΣM_G = 0."""
+    x, y = body["center_m"]
+    fx = fy = moment = size = reach = 0.0
+    for force in body["forces"]:
+        (fx1, fy1), (px, py) = force["force_N"], force["at_m"]
+        if fx1 is None or fy1 is None:
+            # statics does not determine a redundant joint
+            return
+        fx, fy = fx + fx1, fy + fy1
+        moment += (px - x) * fy1 - (py - y) * fx1
+        size += math.hypot(fx1, fy1)
+        reach += math.hypot(px - x, py - y) * math.hypot(fx1, fy1)
+    for torque in body["torques"]:
+        if torque["torque_N_m"] is None:
+            return
+        moment += torque["torque_N_m"]
+        reach += abs(torque["torque_N_m"])
+    assert math.hypot(fx, fy) <= 1e-9 * size
+    assert abs(moment) <= 1e-9 * reach
+
+
 FORCES = (
     "crank-press", "door-closer", "engine", "grindstone", "robot-arm", "scissors-lift", "sledge", "toggle-clamp",
     "desk-lamp", "stephenson-six-bar", "quick-return",
@@ -97,7 +119,12 @@ def test_the_powers_of_every_worked_example_add_up_to_zero(name: str, dalembert:
         call = (
             example["command"].replace(":1deg", ":45deg").replace(":2deg", ":45deg").split(" --flywheel")[0]
         )
-    (topic,) = (each for each in document(dalembert, call)["way"] if each["topic"] == "ledger")
+    topics = document(dalembert, call)["way"]
+    (topic,) = (each for each in topics if each["topic"] == "ledger")
+    (cut,) = (each for each in topics if each["topic"] == "free bodies")
+    for pose in cut.get("poses", [cut]):
+        for body in pose["bodies"]:
+            check_free_body(body)
     assert topic["poses"]
     for pose in topic["poses"]:
         assert "input_deg" in pose or "input_m" in pose or "inputs" in pose
@@ -140,7 +167,13 @@ def test_a_weight_on_an_arm(dalembert: Any, tmp_path: Path) -> None:
         'gravity = [0, -9.81]\n[ground]\nO = [0, 0]\n[links.arm]\npoints = { O = [0, 0], P = [1, 0] }\nmass = 2\n'
         'center = [0.5, 0]\n[input]\nlink = "arm"\nangle = 0\n'
     )  # fmt: skip
-    (topic,) = document(dalembert, "dalembert forces arm.toml")["way"]
+    topic, cut = document(dalembert, "dalembert forces arm.toml")["way"]
+    (body,) = cut["bodies"]
+    assert [(f["name"], f["force_N"]) for f in body["forces"]] == [
+        ("W", [0, -19.62]),
+        ("O: ground", [0, 19.62]),
+    ]
+    assert [(t["name"], t["torque_N_m"]) for t in body["torques"]] == [("T", 9.81)]
     (pose,) = topic["poses"]
     weight, drive, bearing = pose["terms"]
     assert (weight["kind"], weight["force_N"], weight["velocity_m_s"]) == (
@@ -163,3 +196,24 @@ def test_the_way_is_on_the_terminal_and_in_the_report(dalembert: Any, copied: An
     for text in (done.stdout, report.read_text()):
         assert "Ti3·ω3 = 80·(−50) = −4 000 W" in text
         assert "T2 = 103 000 N·m" in text
+
+
+def test_a_link_that_carries_a_motor_has_their_common_centre(dalembert: Any, tmp_path: Path) -> None:
+    """2 kg at 0.5 m with a motor of 2 kg at 1 m: G′ at 0.75 m, I′ = 0.1 + 4·0.25² = 0.35; ±T_M on both (Ibrahim §2.3)."""
+    (tmp_path / "arm.toml").write_text(
+        "gravity = [0, -10]\n[ground]\nO = [0, 0]\n"
+        "[links.arm]\npoints = { O = [0, 0], P = [1, 0] }\nmass = 2\ncenter = [0.5, 0]\ninertia = 0.1\n"
+        "[links.tool]\npoints = { P = [0, 0] }\nmass = 1\ncenter = [0.2, 0]\n"
+        '[[motors]]\ncarrier = "arm"\ndrives = "tool"\nmass = 2\ncenter = [1, 0]\n'
+        '[[input]]\nlink = "arm"\nangle = 0\n[[input]]\nlink = "tool"\non = "arm"\nangle = 0\n'
+    )
+    motor, ledger, cut = document(dalembert, "dalembert forces arm.toml")["way"]
+    assert (motor["topic"], motor["carrier"], motor["drives"]) == ("motor", "arm", "tool")
+    assert (motor["mass_kg"], motor["center_m"]) == (4.0, [0.75, 0.0])
+    assert motor["inertia_kg_m2"] == pytest.approx(0.35)
+    assert motor["torque_N_m"] == pytest.approx(2.0)
+    for pose in ledger["poses"]:
+        check_instant(pose)
+    torques = {(b["link"], t["name"]): t["torque_N_m"] for b in cut["bodies"] for t in b["torques"]}
+    assert torques["tool", "T"] == pytest.approx(2.0)
+    assert torques["arm", "−T"] == pytest.approx(-2.0)

@@ -27,8 +27,12 @@ def drawn(m, rng, v, spread, only=None):
     }
 
 
+def scale(unit, size):
+    return size if unit == "m" else 1.0
+
+
 def compared(m, numbers, angle, speed=None, acceleration=None):
-    """The family beside a loop over mechanisms: the largest difference of anything, over the bound of its rounding."""
+    """The family beside a loop over mechanisms: the largest difference of anything, over what its pose rounds."""
     motion = m.vary(numbers).motion(angle, speed, acceleration)
     names = [name for link in m.links.values() for name in link.points]
     worst = 0.0
@@ -51,19 +55,23 @@ def compared(m, numbers, angle, speed=None, acceleration=None):
         pairs = []
         for name in names:
             mine, its = motion.point(name), alone.point(name)
-            pairs += [(mine.complex(k)[i], its.complex(k), its.error_estimate(k)) for k in range(3)]
+            pairs += [("m", mine.complex(k)[i], its.complex(k), its.error_estimate(k)) for k in range(3)]
         for link in m.links:
             mine, its = motion.link(link), alone.link(link)
-            pairs.append((np.exp(1j * mine.angle[i]), np.exp(1j * its.angle), its.error_estimate(0)))
+            pairs.append(("", np.exp(1j * mine.angle[i]), np.exp(1j * its.angle), its.error_estimate(0)))
             pairs += [
-                (mine.omega[i], its.omega, its.error_estimate(1)),
-                (mine.alpha[i], its.alpha, its.error_estimate(2)),
+                ("", mine.omega[i], its.omega, its.error_estimate(1)),
+                ("", mine.alpha[i], its.alpha, its.error_estimate(2)),
             ]
-        for mine, its, bound in pairs:
+        # what a pose rounds is in all its quantities, by chance more or less
+        size = m.size
+        share = [np.max([b / scale(name, size) for name, _, _, b in pairs[k::3]], axis=0) for k in range(3)]
+        for j, (name, mine, its, bound) in enumerate(pairs):
             np.testing.assert_array_equal(np.isfinite(mine), np.isfinite(its), str(i))
             good = there & np.isfinite(its) & np.isfinite(bound)
             # both are rounded, and the guess has its own
-            error = np.abs(mine - its)[good] / (2 * bound[good] + 4e-16 * np.abs(its[good]) + 1e-300)
+            rounded = 20 * share[j % 3][good] * scale(name, size) + 4e-15 * np.abs(its[good]) + 1e-300
+            error = np.abs(mine - its)[good] / rounded
             worst = max(worst, float(error.max(initial=0.0)))
     return worst, motion
 

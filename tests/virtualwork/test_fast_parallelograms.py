@@ -56,13 +56,8 @@ def test_speed_is_kept(crank: float, ground: float, at: float, speed: float) -> 
         (0.1, 0.4, 200.0, 1e-6),
         (0.1, 0.4, -200.0, 1e-9),
         (1.0, 2.0, 200.0, 1e-9),
-        pytest.param(
-            0.3,
-            0.3,
-            20.0,
-            1e-9,
-            marks=pytest.mark.xfail(reason="a rhombus: the error is 1.13 times the estimate at the end"),
-        ),
+        # a rhombus: a single stage of a long step lies next to a change point, with its weight over the whole step
+        (0.3, 0.3, 20.0, 1e-9),
         (0.3, 0.3, 0.1, 1e-9),
     ],
 )
@@ -78,8 +73,9 @@ def bounded(crank: float, ground: float, at: float, speed: float, accuracy: floa
     assert run.ended == "end"
     assert said_so(run, accuracy)
     assert np.all(error <= run.error_estimate[:, 0])
-    # and close to it: rounding of some turns, not of a choice of poses that rounding itself makes
-    assert run.error_estimate.max() <= max(accuracy, 1e-10 * abs(speed))
+    # and close to it: rounding of some turns with the largest weight of a stage, 5.8, not of a choice of poses that
+    # rounding itself makes
+    assert run.error_estimate.max() <= max(accuracy, 5e-9 * abs(speed))
 
 
 def test_rates_close_to_a_change_point_are_interpolated_from_far_poses() -> None:
@@ -97,8 +93,6 @@ def test_rates_close_to_a_change_point_are_interpolated_from_far_poses() -> None
 @pytest.mark.parametrize("seed", range(100))
 def test_estimates_at_random(seed: int) -> None:
     """Any lengths, speeds to 500 rad/s, both ways, and accuracies."""
-    if seed == 20261123075:
-        pytest.xfail("the error is 1.26 times the estimate")
     rng = np.random.default_rng(seed)
     crank, ground = 10 ** rng.uniform(-1.5, 0.5, 2)
     at, sense = rng.uniform(0.2, 2.9), rng.choice([-1, 1], 2)

@@ -257,7 +257,8 @@ def bars(n: int) -> Mechanism:
 )
 def test_n_four_bars_of_iftomm_a02_through_their_change_points(n: int, exact: float) -> None:
     """φ̈ = k sin φ, k = 3g(3N + 1)/(2(4N + 1)), from upright at 1 m/s: ten change points of every loop in 10 s."""
-    run = bars(n).simulate([0, 10])
+    # rounding close to the change points of forty loops may be 4e-9
+    run = bars(n).simulate([0, 10], accuracy=1e-9 if n < 40 else 1e-8)
     holds(run, abs(math.pi / 2 - run.angle[-1, 0] - exact), 1e-9)
     assert np.abs(run.energy_drift).max() < 1e-8
 

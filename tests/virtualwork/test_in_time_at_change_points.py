@@ -181,6 +181,10 @@ def test_energy_lost_between_interpolated_poses_is_refused(monkeypatch: pytest.M
     monkeypatch.setattr("virtualwork.intime.crossing.NARROWINGS", 1)
     monkeypatch.setattr("virtualwork.intime.crossing.NODES", 4)
     monkeypatch.setattr("virtualwork.intime.equations.OTHER", 1.0)
+    run = loop(0.5, 0.5, 0.3, 0.3, 0.6, 1).simulate([0, 1.2], speed=7.0, accuracy=1e-8)
+    # what interpolation misses is seen, and stands in the estimate
+    assert run.warnings[0].startswith("accuracy 1e-08 is beyond rounding here")
+    monkeypatch.setattr("virtualwork.intime.equations.SEEN", 0.0)
     with pytest.raises(MechanismError, match=r"^at 0\.\d+ s it passes a change point .* energy is lost"):
         loop(0.5, 0.5, 0.3, 0.3, 0.6, 1).simulate([0, 1.2], speed=7.0, accuracy=1e-8)
 
@@ -241,10 +245,8 @@ def lift(driver: str, angle: float) -> Mechanism:
     )
 
 
-ENDS = pytest.mark.xfail(reason="ends there with its time: the interpolated rates are judged to lose energy")
-
-
-@pytest.mark.parametrize("driver", ["B", "left", pytest.param("right", marks=ENDS)])
+@pytest.mark.whole
+@pytest.mark.parametrize("driver", ["B", "left", "right"])
 def test_a_scissors_lift_falls_freely_through_its_flat_pose(driver: str) -> None:
     """Only the platform has mass: it falls as a stone does, until the bars stand on end below."""
     begin = math.radians(24)

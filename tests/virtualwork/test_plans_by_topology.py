@@ -31,7 +31,9 @@ def scaled(m, factor):
     }
     guides = [g if isinstance(g.through, str) else replace(g, through=g.through * factor) for g in m.guides]
     ground = {p: z * factor for p, z in m.ground.items()}
-    return Mechanism(ground, links, guides, m.gears, m.inputs, Guess(m.at, m.guess.angles))
+    racks = [replace(rack, radius=rack.radius * factor) for rack in m.racks]
+    guess = Guess(m.at, m.guess.angles, {p: z * factor for p, z in m.guess.points.items()})
+    return Mechanism(ground, links, guides, m.gears, m.inputs, guess, belts=m.belts, racks=racks)
 
 
 def made_anew(m):

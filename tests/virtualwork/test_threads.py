@@ -30,8 +30,17 @@ def _often() -> Iterator[None]:
     sys.setswitchinterval(before)
 
 
-def agree(make: Callable[[], Any], questions: Questions, times: int, seed: int = 1) -> None:
-    """Ask fresh results from many threads, each in an order of its own; and one thread alone."""
+def agree(
+    make: Callable[[], Any],
+    questions: Questions,
+    times: int,
+    seed: int = 1,
+    apart: Mapping[str, Any] | None = None,
+) -> None:
+    """Ask fresh results from many threads, each in an order of its own; and one thread alone.
+
+    `apart` is by how much some may differ, else 1e-12 of their size.
+    """
     alone = make()
     truth = {name: ask(alone) for name, ask in questions.items()}
     for time in range(times):
@@ -49,7 +58,13 @@ def agree(make: Callable[[], Any], questions: Questions, times: int, seed: int =
                 for name, value in got.items():
                     # which is formed first moves the last digits
                     size = np.abs(np.nan_to_num(truth[name])).max(initial=0.0)
-                    np.testing.assert_allclose(value, truth[name], rtol=0, atol=1e-12 * size, err_msg=name)
+                    unit = 1e-12 * size if apart is None or name not in apart else apart[name]
+                    if not np.ndim(unit):
+                        np.testing.assert_allclose(value, truth[name], rtol=0, atol=unit, err_msg=name)
+                    else:
+                        np.testing.assert_allclose(
+                            value / unit, truth[name] / unit, rtol=0, atol=1, err_msg=name
+                        )
 
 
 def loaded(**more: Any) -> Mechanism:
@@ -149,10 +164,6 @@ def test_one_motion(name: str) -> None:
 @pytest.mark.parametrize("engine", ["", "numpy", "llvm"])
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_one_motion_often(name: str, engine: str, n: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    if (name, engine) == ("parallelogram", "llvm") and n in (361, 20_000):
-        pytest.xfail(
-            "at change points compiled code differs in last digits by the order of requests, to 1e-10 of the effort"
-        )
     if engine:
         monkeypatch.setenv("DALEMBERT_ENGINE", engine)
     questions = of_motion(MECHANISMS[name]())
@@ -161,11 +172,28 @@ def test_one_motion_often(name: str, engine: str, n: int, monkeypatch: pytest.Mo
     if n > 1000:
         questions = {k: v for k, v in questions.items() if not k.startswith(("frame", "effort's"))}
     sweep = np.linspace(0.3, 0.3 + 2 * np.pi, n)
-    agree(
-        lambda: MECHANISMS[name]().motion(sweep, speed=7.0, acceleration=3.0),
-        questions,
-        10 if n < 1000 else 3,
-    )
+
+    def make() -> Any:
+        return MECHANISMS[name]().motion(sweep, speed=7.0, acceleration=3.0)
+
+    apart = beside_change_points(make()) if (name, engine) == ("parallelogram", "llvm") else None
+    agree(make, questions, 10 if n < 1000 else 3, apart=apart)
+
+
+def beside_change_points(motion: Any) -> dict[str, Any]:
+    """How far compiled code's rates, whose order of operations hangs on what was asked before, may lie from each other.
+
+    Of a parallelogram's links most rates are zero, where nothing of their own says what rounding may make of them: it is
+    that of the crank's rates, and each order of them divides by the loop's Jacobian once more, which vanishes there.
+    """
+    found = {}
+    for order, rate in enumerate(("angle", "omega", "alpha", "jerk")):
+        each = 4e-15 * 7.0**order * np.maximum(motion.condition, 10.0) ** max(order, 1)
+        found |= {f"{link} {rate}": each for link in ("coupler", "rocker")}
+        if order == 3:
+            # of 0.1 m
+            found["C jerk"] = 0.1 * each[:, None]
+    return found
 
 
 def attributes(*names: str) -> dict[str, Callable[[Any], Any]]:

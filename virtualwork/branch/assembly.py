@@ -110,12 +110,16 @@ class Assembly(Choice):
         """The sign of a closed form at inputs."""
         return self.track.sign(group, q)
 
+    @property
+    def change_points(self) -> list[tuple[float, float]]:
+        """Where two branches meet, each with how far off poses are close to it, in what was covered."""
+        return [(change.input, change.reach) for of in self.track.changes.values() for change in of]
+
     def close_to_change(self, q: Reals) -> NDArray[np.bool_]:
         """Which inputs are close to a change point."""
         near = np.zeros(np.shape(q), dtype=bool)
-        for changes in self.track.changes.values():
-            for change in changes:
-                near |= np.abs(q - change.input) < change.reach
+        for at, reach in self.change_points:
+            near |= np.abs(q - at) < reach
         return near
 
     def cover(self, low: float, high: float) -> None:

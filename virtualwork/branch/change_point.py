@@ -19,7 +19,7 @@ import numpy as np
 from virtualwork.branch.choice import Choice
 from virtualwork.branch.sampling import chebyshev_nodes
 from virtualwork.formulas.numbers import Number, Reals, stack, stack_rows
-from virtualwork.formulas.positions import State
+from virtualwork.formulas.positions import State, tied
 from virtualwork.formulas.rates import Passage, Rates
 from virtualwork.plan.steps import Group, Step
 
@@ -184,7 +184,7 @@ def _nearest(way: Along, group: Group, q0: float, span: float, share: float) -> 
         for j, g in enumerate(group.slides):
             at.slide[g] = slide[j]
         for tie in group.ties:
-            at.turn[tie.body] = at.rotate(tie.angle)
+            tied(tie, at)
         d = Rates(choice.plan, at, [[1.0]], way)
         for k in range(1, ORDER + 2):
             d.advance(before, k)
@@ -273,7 +273,7 @@ def mend(changes: ChangePoints, group: Group, st: State) -> None:
             put(st.slide, g, near, change.slide[j] + move[..., len(group.angles) + j])
         put(st.margin, group.name, near, np.zeros(np.shape(delta)))
         for tie in group.ties:
-            st.turn[tie.body] = st.rotate(tie.angle)
+            tied(tie, st)
 
 
 def mend_rates(changes: ChangePoints, q: Number, k: int, x: list[Number]) -> list[Number]:

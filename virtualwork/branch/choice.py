@@ -79,10 +79,14 @@ class Choice(Record):
 
     @cached_property
     def geared(self) -> set[str]:
-        """Bodies of which a gear of fractional ratio needs the angle itself, with its whole turns, at first or second hand."""
+        """Bodies of which a gear of fractional ratio, or a rack, needs the angle itself, at first or second hand.
+
+        The angle with its whole turns.
+        """
         found: set[str] = set()
         for turn in reversed(list(turns(self.plan.steps))):
-            found |= {b for b, r in turn.angle.bases if turn.body in found or not float(r).is_integer()}
+            needs = turn.slides or turn.body in found
+            found |= {b for b, r in turn.angle.turning if needs or not float(r).is_integer()}
         return found
 
     @cached_property

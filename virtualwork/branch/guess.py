@@ -12,7 +12,8 @@ from dalembert.arithmetic.recorded import bare, squared
 from dalembert.arithmetic.varied import rotation
 from virtualwork.branch.choice import Choice
 from virtualwork.describe import AssemblyError, MechanismError, MobilityError, ParallelGuidesError
-from virtualwork.describe.description import Description, known_by_guess
+from virtualwork.describe.description import Description, known_by_guess, slide_by_guess
+from virtualwork.describe.meshes import Coordinate
 from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.numbers import Number, cross, dot, stack, stack_rows
 from virtualwork.formulas.positions import State, columns, principal, run
@@ -157,8 +158,10 @@ class _Chooser:
         if self.plan.blocks.redundant:
             self._refuse_overdriven(st)
         self.phases = {
-            i: sum(c * float(st.angle[body]) for body, c in gear.shares().items())
-            for i, gear in enumerate(self.m.gears)
+            i: sum(
+                c * float(st.slide[x] if isinstance(x, int) else st.angle[x]) for x, c in mesh.shares.items()
+            )
+            for i, mesh in enumerate(self.m.meshes)
         }
 
     # --- gears --------------------------------------------------------------------------------------------------
@@ -171,18 +174,27 @@ class _Chooser:
         for i, _ in angle.gears[:-1]:
             self.phases.setdefault(i, self._constant(i, st))
         for i, p in angle.gears[-1:]:
-            if i not in self.phases and all(b in st.angle for b, _ in angle.bases):
-                rest = st.affine(angle) + sum(r * st.angle[b] for b, r in angle.bases)
+            rest = st.whole(angle)
+            if i not in self.phases and rest is not None:
                 rest += sum(k * self.phases[g] for g, k in angle.gears[:-1])
-                self.phases[i] = (self.angles.get(step.body, 0.0) - rest) / p
+                self.phases[i] = (self._guessed(step.body) - rest) / p
             self.phases.setdefault(i, self._constant(i, st))
         const = angle.const + sum(p * self.phases[i] for i, p in angle.gears)
         return Turn(step.body, replace(angle, const=const, gears=()))
 
     def _constant(self, gear: int, st: State) -> float:
-        """Σ c·θ of a gear: of angles that are known, and of the guess for the others."""
-        shares = self.m.gears[gear].shares().items()
-        return sum(c * float(st.angle[b] if b in st.angle else self.angles.get(b, 0.0)) for b, c in shares)
+        """Σ c·x of a gear, a belt or a rack: of what is known, and of the guess for the others."""
+        total = 0.0
+        for x, c in self.m.meshes[gear].shares.items():
+            known = st.slide.get(x) if isinstance(x, int) else st.angle.get(x)
+            total += c * float(self._guessed(x) if known is None else known)
+        return total
+
+    def _guessed(self, x: Coordinate) -> float:
+        """An angle or a slide of the guess; zero where it says nothing."""
+        if isinstance(x, int):
+            return slide_by_guess(self.m, x, self.angles, self.points) or 0.0
+        return self.angles.get(x, 0.0)
 
     # --- closed forms -------------------------------------------------------------------------------------------
     def _sign(self, group: Group, case: Case, st: State) -> int:

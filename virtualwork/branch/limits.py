@@ -107,6 +107,9 @@ class Reach:
         if not track.active or track.slides:
             return None
         track.cover(track.start, track.start + track.length)
+        if any(t.slides for t in turns(track.plan.steps)):
+            # what a rack moves runs on and on
+            return None
         if track.settled or track.comes_back or not track.plan.groups:
             return 1
         steps = track.assembly.needed([key for g in track.plan.groups for key in track.plan.writes(g)])

@@ -42,13 +42,17 @@ class Pace:
     def fastest(self, group: Group) -> float:
         """How many times as fast as the input the fastest body turns that a group hangs on, as gears say."""
         if group.name not in self._speeds:
-            factors = [k for t in turns([*self.assembly.before(group), group]) for _, k in t.angle.inputs]
+            steps = [*self.assembly.before(group), group]
+            factors = [k for t in turns(steps) if not t.slides for _, k in t.angle.inputs]
             self._speeds[group.name] = max(map(abs, factors), default=0.0)
         return self._speeds[group.name]
 
     def one_turn(self, group: Group) -> float:
         """The way of the input in which that one turns once."""
-        return self.length / max(1.0, 1.0 if self.slides else self.fastest(group))
+        if self.slides:
+            # of what a rack turns
+            return min(self.length, 2 * np.pi / max(self.fastest(group), 1e-300))
+        return self.length / max(1.0, self.fastest(group))
 
     def driving(self, group: Group) -> dict[str, float]:
         """The bodies of loops that other bodies turn with so many times as fast, among all that a group hangs on."""
@@ -56,7 +60,10 @@ class Pace:
         for step in self.assembly.before(group):
             if isinstance(step, Turn):
                 for body, r in step.angle.bases:
-                    found[body] = max(abs(r), found.get(body, 0.0))
+                    if isinstance(step.body, str):
+                        # what a slide turns is seen itself
+                        body, r = (step.body, 1.0) if isinstance(body, int) else (body, r)
+                        found[body] = max(abs(r), found.get(body, 0.0))
             elif isinstance(step, Group) and step.kind == "RPR":
                 found.setdefault(step.angles[0], 1.0)
         return found
@@ -68,7 +75,10 @@ class Pace:
         rates: list[float] = []
         for step in [*self.assembly.before(group), group]:
             rates += [k for t in turns([step]) for _, k in t.angle.inputs]
-            if any(not float(r).is_integer() for t in turns([step]) for _, r in t.angle.bases):
+            if any(t.slides for t in turns([step])):
+                # it runs on and on
+                return None
+            if any(not float(r).is_integer() for t in turns([step]) for _, r in t.angle.turning):
                 return None
             if isinstance(step, Group) and step is not group and step.kind != "PRP":
                 if step.name not in seen:

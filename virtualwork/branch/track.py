@@ -68,8 +68,9 @@ class Track:
         self._samples: dict[str, Samples] = {}
         # one turn says it all where every turn of a body is a whole number of turns of the input
         angles = [t.angle for t in turns(self.plan.steps)]
-        factors = [k for angle in angles for _, k in (*angle.inputs, *angle.bases)]
-        self.whole = not self.slides and all(float(k).is_integer() for k in factors)
+        factors = [k for angle in angles for _, k in (*angle.inputs, *angle.turning)]
+        runs = any(t.slides for t in turns(self.plan.steps))
+        self.whole = not (self.slides or runs) and all(float(k).is_integer() for k in factors)
         self.repeats = self.whole and all(g.kind != "Newton" for g in self.plan.groups)
         # no body turns with one of a loop, or with a slide's line, any faster than the input
         follows = any(angle.bases for angle in angles) or any(g.kind == "RPR" for g in self.plan.groups)
@@ -246,11 +247,15 @@ class Track:
             return np.array([low])
         loops = [g for g in self.plan.groups if g.members]
         ratios = {body: 1.0 for g in loops for body in g.members}
-        for body, r in (base for t in turns(self.plan.steps) for base in t.angle.bases):
-            ratios[body] = max(abs(r), ratios[body])
-        fast = max((abs(k) for t in turns(self.plan.steps) for _, k in t.angle.inputs), default=0.0)
+        tied = [t for t in turns(self.plan.steps) if isinstance(t.body, str)]
+        for t in tied:
+            if any(isinstance(x, int) for x, _ in t.angle.bases):
+                ratios.setdefault(str(t.body), 1.0)
+        for body, r in (base for t in tied for base in t.angle.turning):
+            ratios[body] = max(abs(r), ratios.get(body, 1.0))
+        fast = max((abs(k) for t in tied for _, k in t.angle.inputs), default=0.0)
         step = (high - low) / count
-        step = step if self.slides else min(step, FINE / max(fast, FINE / step))
+        step = min(step, FINE / max(fast, FINE / step))
         uneven = partial(turns_far, np.array([*ratios.values()], dtype=float))
 
         def look(q: Reals) -> Complexes:
@@ -324,7 +329,8 @@ class Track:
             rate = None if winds else self.pace.rate(group, self.noted.seen)
             period = np.inf if rate is None else 2 * np.pi / rate
         coarse = (b - a) / SAMPLES
-        step = coarse if self.slides or not fast else min(coarse, FINE / fast)
+        plain = not fast or (self.slides and self.even)
+        step = coarse if plain else min(coarse, FINE / fast)
         if step == coarse and (
             (not driving and hardly_moves(case, st)) or not uneven(loop_rows(case, st, [*driving])).any()
         ):

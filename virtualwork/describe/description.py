@@ -7,7 +7,7 @@ of solution, the formulas and the studies work on this.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -16,9 +16,11 @@ from dalembert.arithmetic.records import Record, record
 from virtualwork.describe import DescriptionError, require
 from virtualwork.describe.forms import Form, Free, Pair
 from virtualwork.describe.keys import Key, Keys, Part, check, declared, place_of, table_keys
+from virtualwork.describe.meshes import Mesh
 from virtualwork.describe.parts import (
     GROUND,
     PARTS,
+    Belt,
     Force,
     Friction,
     Gear,
@@ -27,12 +29,14 @@ from virtualwork.describe.parts import (
     Input,
     Link,
     Motor,
+    Rack,
     Rigid,
     Spring,
     Torque,
     TorsionSpring,
 )
 from virtualwork.describe.points import Point, as_point, as_points, by_name
+from virtualwork.describe.units import Decimals
 
 
 @record
@@ -60,11 +64,15 @@ class Description(Record):
     torsion_springs: tuple[TorsionSpring, ...] = ()
     motors: tuple[Motor, ...] = ()
     friction: tuple[Friction, ...] = ()
+    belts: tuple[Belt, ...] = ()
+    racks: tuple[Rack, ...] = ()
     tolerances: Mapping[str, float] = declared(
         Free("tolerances"),
         'limits of dimensions by their paths: "links.crank.B.x" = "0.05 mm" is ± that',
         default=None,
     )
+    # of the file that it was read from
+    decimals: Decimals | None = field(default=None, compare=False)
 
     def __init__(
         self,
@@ -83,6 +91,9 @@ class Description(Record):
         motors: Sequence[Motor] = (),
         friction: Sequence[Friction] = (),
         tolerances: Mapping[str, float] | None = None,
+        belts: Sequence[Belt] = (),
+        racks: Sequence[Rack] = (),
+        decimals: Decimals | None = None,
     ) -> None:
         values = {
             "ground": as_points(ground),
@@ -99,7 +110,10 @@ class Description(Record):
             "torsion_springs": _several("torsion_springs", torsion_springs),
             "motors": _several("motors", motors),
             "friction": _several("friction", friction),
+            "belts": _several("belts", belts),
+            "racks": _several("racks", racks),
             "tolerances": MappingProxyType(dict(tolerances or {})),
+            "decimals": decimals,
         }
         for key, value in values.items():
             object.__setattr__(self, key, value)
@@ -107,7 +121,7 @@ class Description(Record):
         refuse(self)
 
     def __repr__(self) -> str:
-        counts = ((len(self.links), "link"), (len(self.pins) + len(self.guides) + len(self.gears), "joint"))
+        counts = ((len(self.links), "link"), (len(self.pins) + len(self.guides) + len(self.meshes), "joint"))
         sizes = ", ".join(f"{n} {noun}{'' if n == 1 else 's'}" for n, noun in counts)
         driven = ", ".join(e.name for e in self.inputs) or "nothing"
         return f"{type(self).__name__}({self.name!r}: {sizes}, driven: {driven})"
@@ -198,9 +212,28 @@ class Description(Record):
         """A point of a guide's line, in the axes of the body that carries it."""
         return self.place(guide.on, guide.through)
 
+    @cached_property
+    def meshes(self) -> tuple[Mesh, ...]:
+        """The relations of gears, belts and racks, in this order."""
+        racks = [(rack, self.guide_at(rack.slider)) for rack in self.racks]
+        return (
+            *(gear.mesh for gear in self.gears),
+            *(belt.mesh for belt in self.belts),
+            *(rack.mesh_on(i, self.guides[i].on) for rack, i in racks),
+        )
+
+    @property
+    def ratios(self) -> tuple[float, ...]:
+        """The ratios of gears and belts."""
+        return *(gear.ratio for gear in self.gears), *(belt.ratio for belt in self.belts)
+
+    def guide_at(self, point: str | None) -> int:
+        """The guide in which a point runs."""
+        return next(i for i, guide in enumerate(self.guides) if guide.point == point)
+
     def guide_of(self, entry: Input) -> int:
         """The guide along which a slide input drives."""
-        return next(i for i, guide in enumerate(self.guides) if guide.point == entry.slider)
+        return self.guide_at(entry.slider)
 
     def driver_of(self, guide: int) -> int | None:
         """The input that drives along a guide; None where none does."""
@@ -234,6 +267,32 @@ FILE: Keys = {
     "units": Key(Free("units"), "what bare lengths and angles mean"),
 }
 """What stands at the top of the file beside the tables of the parts."""
+
+
+def slide_by_guess(
+    m: Description, i: int, angles: Mapping[str, Any], points: Mapping[str, Any]
+) -> float | None:
+    """The slide of a guide where the guess knows its point and its line; None where it does not.
+
+    Parameters
+    ----------
+    m : Description
+    i : int
+    angles, points : mapping
+        As `known_by_guess` has them.
+    """
+    from dalembert.arithmetic.varied import rotation
+
+    g = m.guides[i]
+    turned = {GROUND: 0.0, **angles}
+    here = next((p for p in m.bodies[g.on] if p in points), None)
+    if g.point not in points or g.on not in turned or (g.on != GROUND and here is None):
+        return None
+    start = m.through(g)
+    if here is not None and g.on != GROUND:
+        start = points[here] + (start - m.bodies[g.on][here]) * rotation(turned[g.on])
+    run = (points[g.point] - start) * rotation(g.angle + turned[g.on]).conjugate()
+    return run.real  # type: ignore[no-any-return]
 
 
 def known_by_guess(m: Description) -> tuple[dict[str, float], dict[str, complex]]:

@@ -67,7 +67,7 @@ def dimensions(m: Description) -> dict[str, Dimension]:
 
 def _all(m: Description) -> Iterator[Dimension]:
     for point in m.ground:
-        yield from _numbers(f"ground.{point}", "length", True, ("ground", point))
+        yield from _numbers(f"ground.{point}", "length", ("x", "y"), ("ground", point))
     for name, link in m.links.items():
         for point in link.points:
             # a point that is called as a key of the link is named by the longer path
@@ -77,7 +77,9 @@ def _all(m: Description) -> Iterator[Dimension]:
                     f"links.{name}.{key}.", ("links", name, "polar", point), link.polar[point]
                 )
             else:
-                yield from _numbers(f"links.{name}.{key}", "length", True, ("links", name, "points", point))
+                yield from _numbers(
+                    f"links.{name}.{key}", "length", ("x", "y"), ("links", name, "points", point)
+                )
         yield from _declared(f"links.{name}.", ("links", name), link)
     yield from _declared("", (), m)
     for i, number, part in listed(m):
@@ -90,15 +92,17 @@ def _declared(prefix: str, where: Where, part: Any, slides: bool = False) -> Ite
     """The numbers of one part, by the keys that it declares."""
     for key in keys_of(type(part)):
         kind, held = key.form.dimension(slides), getattr(part, key.field)
-        number = not isinstance(held, str) and not (held is None and key.form.is_pair)
+        number = not isinstance(held, str) and not (held is None and key.form.parts)
         if kind and number and key.applies(part):
-            yield from _numbers(prefix + key.name, kind, key.form.is_pair, (*where, key.field))
+            yield from _numbers(prefix + key.name, kind, key.form.parts, (*where, key.field))
 
 
-def _numbers(path: str, kind: str, is_pair: bool, where: Where) -> Iterator[Dimension]:
-    if is_pair:
-        yield from (Dimension(f"{path}.{axis}", kind, (*where, axis)) for axis in "xy")
-    else:
+def _numbers(path: str, kind: str, parts: tuple[str | int, ...], where: Where) -> Iterator[Dimension]:
+    for part in parts:
+        # lists count from 1
+        name = part + 1 if isinstance(part, int) else part
+        yield Dimension(f"{path}.{name}", kind, (*where, part))
+    if not parts:
         yield Dimension(path, kind, where)
 
 

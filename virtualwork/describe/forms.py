@@ -48,6 +48,11 @@ class Form:
         return False
 
     @property
+    def parts(self) -> tuple[str | int, ...]:
+        """The numbers that it holds: "x" and "y" of a pair, places in a list; empty where it is one number."""
+        return ("x", "y") if self.is_pair else ()
+
+    @property
     def restricts(self) -> bool:
         """Whether `check` refuses anything."""
         return type(self).check is not Form.check
@@ -137,6 +142,44 @@ class Pair(Form):
 
     def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
         return [whole(units.bare(x, self.of)) for x in (value.real, value.imag)]
+
+
+@dataclass(frozen=True)
+class Lengths(Form):
+    """A list of so many lengths."""
+
+    count: int
+
+    @property
+    def parts(self) -> tuple[str | int, ...]:
+        return tuple(range(self.count))
+
+    def dimension(self, slides: bool) -> str:
+        return "length"
+
+    def schema(self) -> Schema:
+        return {"type": "array", "items": QUANTITY, "minItems": self.count, "maxItems": self.count}
+
+    def read(self, value: Any, where: str, entry: Entry) -> tuple[float, ...]:
+        if not isinstance(value, list) or len(value) != self.count:
+            raise wrong(where, value, f"{self.count} lengths")
+        return tuple(entry.file.units.number(x, "length", where) for x in value)
+
+    def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
+        return [whole(units.bare(x, "length")) for x in value]
+
+
+@dataclass(frozen=True)
+class Flag(Form):
+    """True or false."""
+
+    def schema(self) -> Schema:
+        return {"type": "boolean"}
+
+    def read(self, value: Any, where: str, entry: Entry) -> bool:
+        if not isinstance(value, bool):
+            raise wrong(where, value, "true or false")
+        return value
 
 
 @dataclass(frozen=True)
@@ -261,6 +304,23 @@ class DrivenPoint(Form):
         require(value, points, where, "slot or slider")
         if points.count(value) > 1:
             raise DescriptionError(f"{where}: '{value}' runs in more than one guide")
+
+
+@dataclass(frozen=True)
+class RackPoint(DrivenPoint):
+    """The point of the one slot or slider that moves with a toothed wheel."""
+
+    def check(self, value: Any, where: str, part: Any, names: Names) -> None:
+        super().check(value, where, part, names)
+        guide = next(guide for guide in names.guides if guide.point == value)
+        if guide.on == part.gear:
+            raise DescriptionError(
+                f"{where}: '{value}' slides on the wheel '{part.gear}' itself, expected a guide of another link"
+            )
+        if guide.link == part.gear and guide.is_slider:
+            raise DescriptionError(
+                f"{where}: the wheel '{part.gear}' cannot turn in a slider, expected a slot"
+            )
 
 
 @dataclass(frozen=True)

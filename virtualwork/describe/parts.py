@@ -31,6 +31,9 @@ from virtualwork.describe.forms import (
     TwoBodies,
 )
 from virtualwork.describe.keys import Key, Part, declared
+from virtualwork.describe.meshes import Belt as Belt
+from virtualwork.describe.meshes import Gear as Gear
+from virtualwork.describe.meshes import Rack as Rack
 from virtualwork.describe.points import Point as Point
 from virtualwork.describe.points import Polar as Polar
 from virtualwork.describe.points import as_number, as_points, by_name, placed
@@ -155,34 +158,6 @@ class Guide(Part):
     def check(self, where: str) -> None:
         if self.link == self.on:
             raise DescriptionError(f"{where}: link '{self.link}' cannot be guided by itself")
-
-
-@dataclass(frozen=True)
-class Gear(Part):
-    """Two toothed links: (ω_b − ω_arm) = ratio·(ω_a − ω_arm); an external mesh has a negative ratio."""
-
-    tables: ClassVar = ("gears",)
-    collection: ClassVar = "gears"
-
-    links: tuple[str, str] = declared(TwoBodies(), "the two toothed links")
-    ratio: float = declared(Quantity("number"), "speed of the second over that of the first, against the arm")
-    arm: str = declared(Body(), "the link that carries both", default=GROUND)
-
-    def check(self, where: str) -> None:
-        if self.ratio == 0 or len({*self.links, self.arm}) < 3:
-            raise DescriptionError(
-                f"{where}: expected two links, an arm that is neither, and a ratio other than 0"
-            )
-
-    def shares(self) -> dict[str, float]:
-        """The share c of each body in Σ c·θ = const; the arm has none where the two links turn alike.
-
-        >>> Gear(("sun", "planet"), -0.5, "arm").shares()
-        {'planet': 1.0, 'sun': 0.5, 'arm': -1.5}
-        """
-        a, b = self.links
-        shares = {b: 1.0, a: -self.ratio, self.arm: self.ratio - 1.0}
-        return {body: c for body, c in shares.items() if c != 0}
 
 
 @dataclass(frozen=True)
@@ -417,6 +392,8 @@ PARTS: tuple[type[Part], ...] = (
     Input,
     Guide,
     Gear,
+    Belt,
+    Rack,
     Force,
     Torque,
     Spring,

@@ -81,6 +81,7 @@ def _parts(file: File) -> dict[str, Any]:
         "guess": _guess(file, inputs),
         "name": _name(file),
         "gravity": _gravity(file),
+        "decimals": file.units.decimals,
         **lists,
     }
 

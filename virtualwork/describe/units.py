@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
-from dalembert.quantities import expected, number_in_si
+from dalembert.quantities import decimals, exactly, expected, number_in_si
 from dalembert.units import DIMENSIONS, LARGEST, Factor, composed
 from virtualwork.describe import DescriptionError
 
@@ -12,6 +14,44 @@ from virtualwork.describe import DescriptionError
 def wrong(where: str, value: Any, expected: str) -> DescriptionError:
     """The complaint that something else was expected."""
     return DescriptionError(f"{where}: found {value!r}, expected {expected}")
+
+
+class Decimals:
+    """The numbers of a file as they are written there: what each is exactly, where a float is the nearest to it.
+
+    Examples
+    --------
+    >>> units = Units({"length": "mm"})
+    >>> units.decimals.rest("length", units.number(120.1, "length", "A"))
+    1.5765166949677224e-18
+    """
+
+    def __init__(
+        self, written: Mapping[tuple[str, float], tuple[Any, Factor]] = MappingProxyType({})
+    ) -> None:
+        self._written = dict(written)
+
+    def note(self, dimension: str, number: float, value: Any, factor: Factor) -> None:
+        """Note what a number is written as: a value of TOML, bare in the unit with this factor."""
+        self._written[dimension, number] = value, factor
+
+    def and_also(self, read: Iterable[tuple[str, float, Any, Factor]]) -> Decimals:
+        """These and further numbers, each as `note` takes it."""
+        more = Decimals(self._written)
+        for each in read:
+            more.note(*each)
+        return more
+
+    def rest(self, dimension: str, number: float) -> float:
+        """What a number is exactly, less the float itself: 0 where it does not stand in the file."""
+        if (dimension, number) not in self._written:
+            return 0.0
+        value, factor = self._written[dimension, number]
+        parts = decimals(value, dimension, factor)
+        if parts is None or not number:
+            return 0.0
+        exact = exactly(*parts)
+        return float(exact - type(exact)(number))
 
 
 class Units:
@@ -26,6 +66,7 @@ class Units:
 
     def __init__(self, bare: dict[str, Any]) -> None:
         self.factors: dict[str, Factor] = {}
+        self.decimals = Decimals()
         for dimension, text in bare.items():
             unit = composed(str(text))
             if unit is None or unit[1] != DIMENSIONS[dimension].exponents:
@@ -41,6 +82,7 @@ class Units:
         number = number_in_si(value, dimension, self.factors.get(dimension, (1, 1)))
         if number is None or not abs(number) <= LARGEST:
             raise wrong(where, value, expected(dimension))
+        self.decimals.note(dimension, number, value, self.factors.get(dimension, (1, 1)))
         return number
 
     def bare(self, si: float, dimension: str) -> float:

@@ -407,7 +407,7 @@ def _free(m: Description, free: Mapping[str, tuple[float, float]]) -> dict[Dimen
             raise DescriptionError(f"'{path}' names two numbers: expected {dimension.path} or {both[0].path}")
         of, last = dimension.where[0], dimension.where[-1]
         weight = of == "links" and (last in ("mass", "inertia") or dimension.where[2] == "center")
-        if of not in ("ground", "links", "guides", "gears") or weight:
+        if of not in ("ground", "links", "guides", "gears", "belts", "racks") or weight:
             raise DescriptionError(f"{dimension.path} moves no point: expected a dimension of the geometry")
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
             raise DescriptionError(f"{dimension.path}: found bounds {low:g} to {high:g}, expected low < high")

@@ -20,6 +20,7 @@ from virtualwork.describe.keys import keys_of
 from virtualwork.describe.parts import Link
 from virtualwork.formulas.asked import FORCES, Key, names
 from virtualwork.formulas.closed_forms import Case
+from virtualwork.formulas.newton import put_unknowns
 from virtualwork.formulas.numbers import WRITTEN, Number
 from virtualwork.formulas.positions import State, run
 from virtualwork.formulas.recording import NEAR, Recording
@@ -132,7 +133,9 @@ class Written:
             # zero is allowed
             bounded = (getattr(link, key.field) for key in keys_of(Link) if key.form.restricts)
             yield from (RECORDED.select(-bare(x), -1.0, 1.0) for x in bounded)
-        yield from (abs(bare(gear.ratio)) for gear in m.gears)
+        yield from (abs(bare(ratio)) for ratio in m.ratios)
+        yield from (bare(radius) for belt in m.belts for radius in belt.radii)
+        yield from (abs(bare(rack.radius)) for rack in m.racks)
 
     def told(self, samples: int) -> Tape:
         """The tape of how all closed forms close at the inputs of the guess, and whether that is told plainly.
@@ -222,7 +225,7 @@ class Written:
     def choice(self) -> Tape:
         """The tape of how each closed form's branch is chosen at the inputs of the guess, in the order of solution.
 
-        Of each group: its radicand (`margin`), the distance of both assemblies from what the guess says (`plus`,
+        Of a group without one the unknowns enter. Of each other group: its radicand (`margin`), the distance of both assemblies from what the guess says (`plus`,
         `minus`), the sign that the guessed angles have (`guessed`), and what follows from these (`sign`): the nearer
         assembly, or where there is none the guessed angles' sign. And `allowed`: positive where no description is refused.
         """
@@ -233,6 +236,9 @@ class Written:
         allowed = list(self._allowed())
 
         def close(group: Group, st: State) -> None:
+            if group.kind == "Newton":
+                put_unknowns(group, st, self.recording.unknowns(group))
+                return
             case, size, name = Case(group, bare), bare(m.size), group.name
             if group not in self.closed:
                 case.solve(st, 1, size)

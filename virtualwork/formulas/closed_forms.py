@@ -15,9 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dalembert.arithmetic.recorded import RECORDED
 from dalembert.arithmetic.varied import rotation
 from virtualwork.formulas.numbers import ONE, Folded, Kind, Number, cross
-from virtualwork.formulas.positions import State
+from virtualwork.formulas.positions import State, tied
 from virtualwork.plan.steps import Angle, Group, Term
 
 
@@ -66,6 +67,28 @@ def gap_of(kind: str, names: tuple[str, ...], w: complex, v: complex, u: complex
         if abs(cross(u, v)) <= 1e-12 * abs(u) * abs(v):
             return Gap(offset, 0.0, "its two guides are parallel, {by} apart, and do not meet")
     return None
+
+
+def missing(kind: str, w: Number, v: Number, u: Number) -> Number:
+    """By how much a closed form does not close, m, of recorded numbers: what `gap_of` says; negative where it does.
+
+    >>> from dalembert.arithmetic.recorded import Recorder
+    >>> recorder = Recorder()
+    >>> short = missing("RRR", RECORDED.join(recorder.input("w"), 0.0), 700 + 0j, 500 + 0j)
+    >>> from dalembert.arithmetic.engines import run
+    >>> run(recorder.tape({"short": short}), {"w": 1264.0})["short"]
+    64.0
+    """
+    if kind == "RRR":
+        d, r1, r2 = abs(w), abs(v), abs(u)
+        far, near = d - (r1 + r2), abs(r1 - r2) - d
+        return RECORDED.select(far - near, far, near)
+    if kind == "RRP":
+        return abs(cross(u, w)) / abs(u) - abs(v)
+    if kind == "RPR":
+        return abs(cross(u, v)) / abs(u) - abs(w)
+    # two guides always cut, unless they are parallel
+    return -1.0
 
 
 def two_angles(
@@ -194,9 +217,10 @@ class Case:
 
     def __init__(self, group: Group, constant: Callable[[Number], Number] | None = None) -> None:
         closure = group.closures[0]
-        tie = {t.body: t.angle for t in group.ties}
+        looped = {t.body for t in closure.terms}
+        tie = {str(t.body): t.angle for t in group.ties if t.body in looped}
         owner = {b: b for b in group.angles} | {
-            b: next(base for base, _ in a.bases if base in group.angles) for b, a in tie.items()
+            b: next(str(base) for base, _ in a.bases if base in group.angles) for b, a in tie.items()
         }
         members = set(owner)
         self.closure, self.group = closure, group
@@ -290,4 +314,4 @@ class Case:
         if folded:
             st.folded.add(group.name)
         for tie in group.ties:
-            st.turn[tie.body] = st.rotate(tie.angle)
+            tied(tie, st)

@@ -1,7 +1,7 @@
 """All joints of a mechanism at once in the coordinates (θ, x, y) of every link, and what their rank says of its freedom.
 
 No loops, no groups, no order of solution: Φ(x) = 0 with two rows for a pin, one for a slot, two for a slider, one for a
-gear. A motion that every row of Φ_x and every input leaves free, at poses all around, is a freedom that no input holds,
+gear, a belt or a rack. A motion that every row of Φ_x and every input leaves free, at poses all around, is a freedom that no input holds,
 whatever Grübler's count says (J. García de Jalón, E. Bayo, Kinematic and Dynamic Simulation of Multibody Systems,
 1994, §2.2 and §3.5).
 """
@@ -82,15 +82,19 @@ class Constraints:
             along(joint.label, joint.guide, 1j)
             if ("guide", joint.guide) in tied:
                 slider = tied["guide", joint.guide]
-                rows.turn(slider.label, slider.shares, slider.right.const)
-        for i in range(len(m.gears)):
-            rows.turn(tied["gear", i].label, tied["gear", i].shares, phases.get(i, 0.0))
+                rows.turn(slider.label, slider.torques, slider.right.const)
+        for i, mesh in enumerate(m.meshes):
+            if mesh.guide is not None:
+                along(mesh.label, mesh.guide, 1 + 0j)
+                rows.tie({body: c / m.size for body, c in mesh.torques.items()}, phases.get(i, 0.0) / m.size)
+            else:
+                rows.turn(mesh.label, mesh.torques, phases.get(i, 0.0))
         count = len(rows.labels)
         for j, e in enumerate(m.inputs):
             if e.is_slide:
                 along("", m.guide_of(e), 1 + 0j)
             else:
-                rows.turn("", tied["input", j].shares, 0.0)
+                rows.turn("", tied["input", j].torques, 0.0)
         every = np.array(rows.rows).reshape(-1, len(x))
         values = np.array(rows.values)
         return cls(rows.labels[:count], values[:count], every[:count], every[count:], values[count:])
@@ -141,6 +145,14 @@ class _Rows:
                 row[self.column[body]] += c
         self._add(label, float(row @ self.x) - const, row)
 
+    def tie(self, shares: Mapping[str, float], const: float) -> None:
+        """Add Σ c·θ − const to the last row: a distance that goes with angles."""
+        for body, c in shares.items():
+            if body != GROUND:
+                self.rows[-1][self.column[body]] += c
+                self.values[-1] += c * float(self.x[self.column[body]])
+        self.values[-1] -= const
+
     def _add(self, label: str, value: float, row: Reals) -> None:
         self.labels.append(label)
         self.values.append(value)
@@ -169,10 +181,7 @@ def hidden_freedom(m: Description, x: Reals) -> tuple[tuple[str, ...], tuple[str
     -------
     (links, joints), or None where nothing is free, or free only where the mechanism stands.
     """
-    phases = {
-        i: sum(c * x[3 * list(m.links).index(b)] for b, c in gear.shares().items() if b != GROUND)
-        for i, gear in enumerate(m.gears)
-    }
+    phases = _phases(m, x)
     start = _settled(m, x, phases)
     if start is None:
         return None
@@ -204,6 +213,16 @@ def hidden_freedom(m: Description, x: Reals) -> tuple[tuple[str, ...], tuple[str
         labels = [*here.labels, *(f"input {e.name}" for e in m.inputs)]
         found = links, dependent(labels, here.driven)[1]
     return found
+
+
+def _phases(m: Description, x: Reals) -> dict[int, float]:
+    """The constants of gears, belts and racks that a pose has."""
+    left = Constraints.at(m, x, {})
+    values = dict(zip(left.labels, left.values, strict=True))
+    return {
+        i: float(values[mesh.label]) * (1.0 if mesh.guide is None else m.size)
+        for i, mesh in enumerate(m.meshes)
+    }
 
 
 def _free(jacobian: Reals) -> Reals | None:

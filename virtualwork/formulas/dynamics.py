@@ -172,7 +172,7 @@ class Dynamics:
             if self.statics is None:
                 (found,) = r.over(partial(r.guide_moment, guide=joint.guide, body=body))
             elif g.is_slider:
-                value = self.statics.get(("moment", joint.key, ""))
+                value = self.statics.guide_moment(joint)
                 found = value if body == g.link else -value
         for load in self.scene.friction:
             if load.path is None and load.joint == joint.key and load.body == body:

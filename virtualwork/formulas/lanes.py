@@ -68,6 +68,14 @@ class Turning(Branch, Protocol):
     def sign(self, group: str, q: Reals) -> Number:
         """The sign of a closed form at inputs."""
 
+    @property
+    def change_points(self) -> list[tuple[float, float]]:
+        """Where two branches meet, each with how far off poses are close to it, in what was covered."""
+
+    @property
+    def phases(self) -> Mapping[int, float]:
+        """The constants of gears, by their numbers."""
+
     def close_to_change(self, q: Reals) -> NDArray[np.bool_]:
         """Which inputs are close to a change point."""
 
@@ -250,9 +258,9 @@ class Lanes:
         """What a table gives."""
         case: LoadCase = self.recording.forces[0].case
         table = [load for load in case.loads if isinstance(load, Tabled)][number]
-        return table.over(self._place(table), True)
+        return table.over(self.place(table), True)
 
-    def _place(self, table: Tabled) -> Reals:
+    def place(self, table: Tabled) -> Reals:
         """What a table is over."""
         poses = self.poses
         if table.axis == "input":

@@ -26,13 +26,14 @@ from typing import Any
 
 import numpy as np
 
+from virtualwork.describe.meshes import Coordinate
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.load_case import LoadCase
-from virtualwork.formulas.numbers import Number
+from virtualwork.formulas.numbers import Number, dot
 from virtualwork.formulas.quantities import Combination, Quantity, Transmitted, in_order
 from virtualwork.plan.joint_forces import Order, Side
-from virtualwork.plan.steps import Group, Place, Term, Turn
+from virtualwork.plan.steps import Group, Place, Term, Turn, key_of
 
 # lever (None: the point itself), sign, source of the force
 Hung = tuple[Term | None, float, tuple[str, Any]]
@@ -56,7 +57,7 @@ class LoadPaths:
         self._first: dict[Quantity, list[Quantity]] = {}
         self._sides: dict[Side, Combination] = {}
         self._hung: dict[str, list[Hung]] = {}
-        self._tied: dict[str, list[tuple[str, float]]] = {}
+        self._tied: dict[str, list[tuple[Coordinate, float]]] = {}
         self._hang()
         # from the last link inward, or long chains would nest the calls
         for step in reversed(self.plan.steps):
@@ -102,7 +103,7 @@ class LoadPaths:
             ties = step.ties if isinstance(step, Group) else (step,) if isinstance(step, Turn) else ()
             for tie in ties:
                 for base, r in tie.angle.bases:
-                    self._tied.setdefault(f"angle:{base}", []).append((tie.body, r))
+                    self._tied.setdefault(key_of(base), []).append((tie.body, r))
             if isinstance(step, Place):
                 bear(step.base, step.terms, ("point", step.node))
             elif isinstance(step, Group):
@@ -156,7 +157,7 @@ class LoadPaths:
         """Q of an angle or a slide, of all that is tied to it too, `without` the loops of one group."""
         total = Combination(self.own(key, without))
         for body, r in self._tied.get(key, ()):
-            total.add(self.with_ties(f"angle:{body}", without), r)
+            total.add(self.with_ties(key_of(body), without), r)
         return total
 
     def on_group(self, group: Group) -> list[Combination]:
@@ -297,8 +298,21 @@ class LoadPaths:
                     about, sides = z, [s for s in sides if s != side]
                     break
             acts = [(*self.place(side), self.side(side)) for side in sides]
-            self._known[key] = self.quantities.total(self.moment(body, about, acts))
+            total = self.moment(body, about, acts)
+            for guide, mesh in self.order.along.items():
+                share = self.mechanism.meshes[mesh].torques.get(body, 0.0)
+                if share:
+                    total.add(Combination({self.quantities(ToothForce, self, guide): share}))
+            self._known[key] = self.quantities.total(total)
         return self._known[key]
+
+    def tooth(self, mesh: int) -> Combination:
+        """The tooth force of a rack along its slide: that on the link of the guide is positive, N."""
+        rack = self.mechanism.meshes[mesh]
+        assert rack.guide is not None
+        if self.order.along.get(rack.guide) == mesh:
+            return Combination({self.quantities(ToothForce, self, rack.guide): 1.0})
+        return self.couple("rack", mesh)
 
     def couple(self, kind: str, i: int) -> Combination:
         """The torque of a guide, a gear or an input, from the bodies' ΣM = 0."""
@@ -376,6 +390,30 @@ class SideForce(Quantity):
 
     def reads(self) -> Iterable[Quantity | None]:
         return self.paths.balance(self.side)
+
+
+@dataclass(frozen=True, eq=False)
+class ToothForce(Quantity):
+    """The tooth force of a rack, as the force along the guide of its slide."""
+
+    paths: LoadPaths
+    guide: int
+    lasts = True
+
+    def form(self, block: Block) -> tuple[float, Number]:
+        m, plan = self.paths.mechanism, self.paths.plan
+        g = m.guides[self.guide]
+        # the ground has no forces of its own: it feels the reverse of the link's
+        body, sign = (g.link, 1.0) if g.link != GROUND else (g.on, -1.0)
+        force = self.paths.side((f"guide:{self.guide}", body)).value(block)
+        if force is None:
+            return 1.0, None
+        rail = plan.directions[self.guide]
+        return sign, dot(force, rail if g.on == GROUND else rail * block.st.turn[g.on])
+
+    def reads(self) -> Iterable[Quantity | None]:
+        g = self.paths.mechanism.guides[self.guide]
+        return self.paths.side((f"guide:{self.guide}", g.link if g.link != GROUND else g.on))
 
 
 @dataclass(frozen=True, eq=False)

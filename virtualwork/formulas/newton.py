@@ -28,7 +28,7 @@ from virtualwork.formulas.numbers import (
     stack,
     stack_rows,
 )
-from virtualwork.formulas.positions import State, columns, loop, ratio
+from virtualwork.formulas.positions import State, columns, loop, turn
 from virtualwork.plan.steps import Group
 
 # of Gauss-Newton to a double root, from half of the digits
@@ -55,14 +55,7 @@ def put_unknowns(group: Group, st: State, x: Sequence[Number]) -> None:
     for g, slide in zip(group.slides, x[len(group.angles) :], strict=True):
         st.slide[g] = slide
     for tie in group.ties:
-        angle = st.affine(tie.angle)
-        for base, r in tie.angle.bases:
-            if base not in st.angle:
-                break
-            angle = angle + r * st.angle[base]
-        else:
-            st.angle[tie.body] = angle
-        st.turn[tie.body] = st.rotate(tie.angle)
+        turn(tie, st)
 
 
 def gaps(group: Group, st: State) -> list[Number]:
@@ -156,22 +149,20 @@ def newton(
 
 def bent(group: Group, st: State, v: Reals) -> Reals:
     """The derivative of J·v along each unknown, (n, 2·loops, unknowns), for directions v (n, unknowns)."""
-    angles = len(group.angles)
     rows = []
     for closure in group.closures:
         row = [np.zeros(len(v), complex) for _ in range(v.shape[1])]
         for t in closure.terms:
-            r = [ratio(group, t.body, a) for a in group.angles]
-            own = angles + group.slides.index(t.slide) if t.slide in group.slides else None
-            turned = sum(f * v[:, j] for j, f in enumerate(r))
-            moved = 0.0 if own is None else v[:, own]
+            turns = group.shares.get(t.body, {})
+            slides = group.shares.get(t.slide, {}) if t.slide is not None else {}
+            turned = sum((f * v[:, j] for j, f in turns.items()), 0.0)
+            moved = sum((f * v[:, j] for j, f in slides.items()), 0.0)
             length = 1.0 if t.slide is None else st.slide[t.slide]
             e = t.z * st.turn[t.body]
-            for j, f in enumerate(r):
-                if f:
-                    row[j] = row[j] + f * (1j * moved - turned * length) * e
-            if own is not None:
-                row[own] = row[own] + 1j * turned * e
+            for j, f in turns.items():
+                row[j] = row[j] + f * (1j * moved - turned * length) * e
+            for j, f in slides.items():
+                row[j] = row[j] + f * 1j * turned * e
         rows.append(row)
     return stack(rows, len(v))
 

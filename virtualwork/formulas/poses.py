@@ -108,6 +108,8 @@ class Poses:
         The sweep that these inputs are `BLOCK` poses of: they have the digits of the sweep solved whole.
     input_error : float or array (n, k)
         Bound of the inputs' own errors, for the estimates of rounding errors: 0 where they are exact as given.
+    input_rest : float or array (n, k), or a function that gives them, optional
+        What the inputs are exactly, less the floats: where they stand in degrees or in decimals.
     solved : list of (step, order)
         What has been worked out so far; order 0 is position.
     """
@@ -144,6 +146,7 @@ class Poses:
             for name, value in (("speed", speed), ("acceleration", acceleration), ("jerk", jerk))
         ]
         self.input_error: ArrayLike = 0.0
+        self.input_rest: ArrayLike | Callable[[], Reals] | None = None
         # (n,) s, where the poses are those of a motion in time
         self.time: Reals | None = None
         self.solved: list[tuple[Step, int]] = []

@@ -101,6 +101,16 @@ class State:
             and all(t.body in self.turn and (t.slide is None or t.slide in self.slide) for t in terms)
         }
 
+    def whole(self, angle: Angle) -> Number:
+        """An angle with its whole turns, or a slide, tied to others; None where the angle of one of them is not known."""
+        value = self.affine(angle)
+        for base, r in angle.bases:
+            known = self.slide if isinstance(base, int) else self.angle
+            if base not in known:
+                return None
+            value = value + r * known[base]  # type: ignore[index]
+        return value
+
     def affine(self, angle: Angle) -> Number:
         """const + Σ k·input, the part of an angle that needs no other angle."""
         value: Number = angle.const or None
@@ -119,6 +129,10 @@ class State:
         elif angle.inputs or angle.const:
             value = self.kind.exp(self.affine(angle))
         for base, r in angle.bases:
+            if isinstance(base, int):
+                factor = self.kind.exp(r * self.slide[base])
+                value = factor if value is None else value * factor
+                continue
             e = self.turn[base]
             if r == 1.0:
                 factor = e
@@ -225,14 +239,22 @@ def run(
 
 
 def turn(step: Turn, st: State) -> None:
-    """A body's rotation; its angle too, where a gear's ratio will need it."""
+    """A body's rotation, and its angle where a gear's ratio will need it; or a slide."""
+    if isinstance(step.body, int):
+        st.slide[step.body] = st.whole(step.angle)
+        return
     st.turn[step.body] = st.rotate(step.angle)
-    angle = st.affine(step.angle)
-    for base, r in step.angle.bases:
-        if base not in st.angle:
-            return
-        angle = angle + r * st.angle[base]
-    st.angle[step.body] = angle
+    angle = st.whole(step.angle)
+    if angle is not None:
+        st.angle[step.body] = angle
+
+
+def tied(tie: Turn, st: State) -> None:
+    """A rotation or a slide that follows from others; its angle stays as it was."""
+    if isinstance(tie.body, int):
+        st.slide[tie.body] = st.whole(tie.angle)
+    else:
+        st.turn[tie.body] = st.rotate(tie.angle)
 
 
 def loop(closure: Closure, st: State) -> Number:
@@ -246,7 +268,7 @@ def columns(group: Group, st: State) -> list[list[Number]]:
 
     A loop's derivative is Σ column·(unknown's derivative); the real and imaginary parts are its two equations.
     """
-    count, places = len(group.angles), {g: len(group.angles) + j for j, g in enumerate(group.slides)}
+    count = len(group.angles) + len(group.slides)
     rows = []
     for closure in group.closures:
         row: dict[int, Number] = {}
@@ -255,10 +277,10 @@ def columns(group: Group, st: State) -> list[list[Number]]:
                 v = (1j * r * t.z) * st.turn[t.body]
                 v = v if t.slide is None else v * st.slide[t.slide]
                 row[j] = row[j] + v if j in row else v
-            if t.slide in places:
-                j, v = places[t.slide], t.z * st.turn[t.body]
+            for j, r in group.shares.get(t.slide, {}).items() if t.slide is not None else ():
+                v = t.z * st.turn[t.body] if r == 1.0 else (r * t.z) * st.turn[t.body]
                 row[j] = row[j] + v if j in row else v
-        rows.append([row.get(j, 0j) for j in range(count + len(places))])
+        rows.append([row.get(j, 0j) for j in range(count)])
     return rows
 
 

@@ -10,14 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from math import comb
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
 
+from virtualwork.describe.meshes import Coordinate
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.numbers import Number, cross, singular_poses, solve_determined
 from virtualwork.formulas.positions import State, columns
 from virtualwork.plan.steps import Angle, Group, Path, Place, Plan, Step, Term, Turn
+
+NOTHING: Mapping[int, Any] = MappingProxyType({})
 
 
 class Passage(Protocol):
@@ -110,35 +114,40 @@ class Rates:
             elif isinstance(step, Group):
                 self._group(step, k)
             elif isinstance(step, Turn):
-                _put(self.angle, step.body, k, self._tied(step.angle, k))
+                self._write_tied(step, k)
             else:
                 _put(self.slide, step.guide, k, self.rate(step.input, k))
 
-    def _tied(self, angle: Angle, k: int, without: tuple[str, ...] = ()) -> Number:
+    def _tied(self, angle: Angle, k: int, without: tuple[Coordinate, ...] = ()) -> Number:
         value: Number = None
         for j, f in angle.inputs:
             value = _plus(value, _times(f, self.rate(j, k)))
         for base, r in angle.bases:
             if base not in without:
-                value = _plus(value, _times(r, self.angle[base][k - 1]))
+                known = self.slide[base] if isinstance(base, int) else self.angle[base]
+                value = _plus(value, _times(r, known[k - 1]))
         return value
 
+    def _write_tied(self, tie: Turn, k: int) -> None:
+        """Store the k-th derivative of an angle or a slide that is tied to others."""
+        store: dict[Any, list[Number]] = self.slide if tie.slides else self.angle
+        _put(store, tie.body, k, self._tied(tie.angle, k))
+
     def _term(
-        self, t: Term, k: int, tops: dict[str, Number] | None = None, unknown: tuple[int, ...] = ()
+        self, t: Term, k: int, tops: dict[str, Number] | None = None, unknown: Mapping[int, Number] = NOTHING
     ) -> Number:
-        """(z·s·e^{iθ})⁽ᵏ⁾; `tops` stand for (e^{iθ})⁽ᵏ⁾, and an unknown slide's k-th derivative is left out."""
+        """(z·s·e^{iθ})⁽ᵏ⁾; `tops` stand for (e^{iθ})⁽ᵏ⁾, and `unknown` for s⁽ᵏ⁾ without what is not known of it."""
         highest = tops[t.body] if tops and t.body in tops else self.turn(t.body, k)
         if t.slide is None:
             return _times(t.z, highest)
         s = self.slide.get(t.slide, [])
         total = None if highest is None else self.st.slide[t.slide] * highest
         for j in range(1, k + 1):
-            if j == k and t.slide in unknown:
-                break
-            if s[j - 1] is not None:
+            rate = unknown[t.slide] if j == k and t.slide in unknown else s[j - 1]
+            if rate is not None:
                 e = self.turn(t.body, k - j)
                 if e is not None:
-                    total = _plus(total, _times(comb(k, j), s[j - 1] * e))
+                    total = _plus(total, _times(comb(k, j), rate * e))
         return _times(t.z, total)
 
     def right_side(self, group: Group, k: int) -> list[Number]:
@@ -147,9 +156,14 @@ class Rates:
         for body in group.angles:
             self.angle.setdefault(body, [])
             tops[body] = self.turn_partial(body, k, None)
+        own: tuple[Coordinate, ...] = (*group.angles, *group.slides)
+        runs: dict[int, Number] = dict.fromkeys(group.slides)
         for tie in group.ties:
+            if isinstance(tie.body, int):
+                runs[tie.body] = self._tied(tie.angle, k, own)
+                continue
             self.angle.setdefault(tie.body, [])
-            tops[tie.body] = self.turn_partial(tie.body, k, self._tied(tie.angle, k, group.angles))
+            tops[tie.body] = self.turn_partial(tie.body, k, self._tied(tie.angle, k, own))
         rows = []
         for closure in group.closures:
             w: Number = None
@@ -158,7 +172,7 @@ class Rates:
             if closure.end is not None:
                 w = _plus(w, _times(-1, self.point[closure.end][k - 1]))
             for t in closure.terms:
-                w = _plus(w, self._term(t, k, tops, group.slides))
+                w = _plus(w, self._term(t, k, tops, runs))
             rows.append(0j if w is None else w)
         return rows
 
@@ -208,7 +222,7 @@ class Rates:
         for g, value in zip(group.slides, x[n:], strict=True):
             _put(self.slide, g, k, value)
         for tie in group.ties:
-            _put(self.angle, tie.body, k, self._tied(tie.angle, k))
+            self._write_tied(tie, k)
 
 
 def _put(store: dict[Any, list[Number]], key: Any, k: int, value: Number) -> None:

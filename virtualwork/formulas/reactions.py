@@ -38,7 +38,7 @@ class JointForces:
 
     def __init__(self, paths: LoadPaths, formed: set[str]) -> None:
         self.paths = paths
-        # the names of what has been formed, for `--explain` and the tests
+        # the names of what has been formed, for `dalembert inspect` and the tests
         self.formed = formed
         self.order = paths.order
         self.plan, self.mechanism = paths.plan, paths.mechanism
@@ -74,11 +74,53 @@ class JointForces:
         """The force of a joint on a body over a block, without the force of an input that drives it."""
         value = self.on_side(block, (joint.key, body))
         guide = joint.guide
-        if guide is not None and value is not None and self.mechanism.driver_of(guide) is not None:
-            # along a driven guide the joint's own equilibrium leaves the effort, which is given apart
+        if guide is not None and value is not None and self.is_pushed(guide):
+            # along a driven guide the joint's own equilibrium leaves the effort, which is given apart, or a tooth force
             rail = self.rail(block, guide)
             value = value - dot(value, rail) * rail
+        value = plus(value, self.borne(block, joint, body))
         return plus(value, self.rubbed(block, joint, body))
+
+    def is_pushed(self, guide: int) -> bool:
+        """Whether another part than the rail pushes along a guide: an input, or the teeth of a wheel that has a bearing."""
+        driven = self.mechanism.driver_of(guide) is not None
+        return driven or any(self.meshing(mesh) is not None for mesh in self.order.racks.get(guide, ()))
+
+    def meshing(self, mesh: int) -> str | None:
+        """Where the teeth of a rack's wheel act.
+
+        The name of the pin on which the wheel turns on the body that carries the rack's guide; "" where the wheel rolls
+        along a rack of that body; None where it is neither, and the tooth force is taken to act along the guide.
+        """
+        of = self.mechanism.meshes[mesh]
+        assert of.guide is not None
+        g = self.mechanism.guides[of.guide]
+        if of.wheel == g.link:
+            return ""
+        wheel, carrier = self.mechanism.bodies[of.wheel], self.mechanism.bodies[g.on]
+        return next((name for name in wheel if name in carrier), None)
+
+    def tooth(self, block: Block, mesh: int) -> Number:
+        """The tooth force of a rack along its slide, positive on the link of the guide."""
+        return self.paths.value(block, self.paths.tooth(mesh))
+
+    def borne(
+        self, block: Block, joint: Joint, body: str, tooth: Callable[[Block, int], Number] | None = None
+    ) -> Number:
+        """What the bearing of a rack's wheel bears of the tooth force (`tooth`), on one body."""
+        tooth = tooth or self.tooth
+        total: Number = None
+        if joint.guide is not None:
+            return total
+        for guide, meshes in self.order.racks.items():
+            for mesh in meshes:
+                if self.meshing(mesh) != joint.name:
+                    continue
+                wheel, carrier = self.mechanism.meshes[mesh].wheel, self.mechanism.guides[guide].on
+                if body in (wheel, carrier):
+                    force = times(self.rail(block, guide), tooth(block, mesh))
+                    total = plus(total, force) if body == wheel else minus(total, force)
+        return total
 
     def rubbed(self, block: Block, joint: Joint, body: str) -> Number:
         """The friction force along a guide belongs to its reaction."""
@@ -105,8 +147,23 @@ class JointForces:
         g = self.mechanism.guides[guide]
         if not g.is_slider:
             return None
-        couple = self.paths.couple("guide", guide)
-        return self.paths.value(block, couple if body == g.link else couple.times(-1.0))
+        value = self.paths.value(block, self.paths.couple("guide", guide))
+        value = plus(value, self.beside(block, guide))
+        return value if value is None or body == g.link else -value
+
+    def beside(self, block: Block, guide: int, tooth: Callable[[Block, int], Number] | None = None) -> Number:
+        """What a guide bears because teeth push its link beside the guide's line: at the pitch point of the wheel."""
+        tooth = tooth or self.tooth
+        g, m = self.mechanism.guides[guide], self.mechanism
+        total: Number = None
+        for mesh in self.order.racks.get(guide, ()):
+            pin, rack = self.meshing(mesh), m.meshes[mesh].rack
+            if pin and rack is not None:
+                across = (
+                    dot(1j * self.plan.directions[guide], m.bodies[g.on][pin] - m.through(g)) - rack.radius
+                )
+                total = plus(total, times(across, tooth(block, mesh)))
+        return total
 
     def effort(self, block: Block, j: int) -> Number:
         """The effort at input j by Newton and Euler: ΣM = 0 of the driven link, or the force along the slide."""
@@ -115,7 +172,10 @@ class JointForces:
             return self.paths.value(block, self.paths.couple("input", j))
         guide = self.mechanism.guide_of(entry)
         value = self.on_side(block, (f"guide:{guide}", self.mechanism.guides[guide].link))
-        return None if value is None else dot(value, self.rail(block, guide))
+        value = None if value is None else dot(value, self.rail(block, guide))
+        for mesh in self.order.racks.get(guide, ()):
+            value = minus(value, self.tooth(block, mesh))
+        return value
 
 
 @guarded
@@ -190,6 +250,7 @@ def settle(scene: Scene) -> tuple[int, NDArray[np.bool_]]:
             fresh: dict[int, Number] = {}
             for number, (joint, body, other, coefficient, radius) in enumerate(scene.case.contacts):
                 force = reactions.on_side(block, (joint.key, body))
+                force = plus(force, reactions.borne(block, joint, body))
                 if force is None:
                     continue
                 if joint.guide is None:

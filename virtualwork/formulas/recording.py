@@ -20,14 +20,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 
 from dalembert.arithmetic.guard import Lock, guarded, own_lock
-from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare
+from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare, squared
 from dalembert.arithmetic.systems import regularity, solved
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND, TorsionSpring
 from virtualwork.formulas.asked import FORCES, JOINTS, Key, names
 from virtualwork.formulas.block import Block, Shared, Table
-from virtualwork.formulas.closed_forms import Case
+from virtualwork.formulas.closed_forms import Case, missing
 from virtualwork.formulas.dynamics import joints_at, resultant, shaking_loads
 from virtualwork.formulas.effort import generalized_force
 from virtualwork.formulas.load_case import LoadCase
@@ -98,6 +98,7 @@ class Recording:
         self._done: set[tuple[int, int, int]] = set()
         self._values: dict[Key, Number] = {}
         self._forces: tuple[LoadPaths, JointForces, Block] | None = None
+        self._open: dict[str, Number] = {}
 
     @property
     def lock(self) -> Lock:
@@ -123,6 +124,7 @@ class Recording:
         if self.enters(group):
             x = self.unknowns(group)
             put_unknowns(group, st, x)
+            self._open[group.name] = WRITTEN.sqrt(sum(map(squared, gaps(group, st)), 0.0))
             step = self.step(group, st)
             if step is not None:
                 put_unknowns(group, st, [a + b for a, b in zip(x, step, strict=True)])
@@ -229,6 +231,9 @@ class Recording:
         ("column", loop, unknown)                    of the Jacobian of all loops (`loops`), complex; as their columns
         ("size",)                                    the mechanism's characteristic length
         ("regularity", group's name)                 of a larger group: how far its Jacobian is from singular, of 1
+        ("short", group's name)                      by how much a closed form does not close, m; negative where it does
+        ("unknown", group's name, i)                 of a group without a closed form, after the step that is on the tape
+        ("open loops", group's name)                   how far its loops are from closing before it, m
         """
         if key not in self._values:
             found = getattr(self, f"_{key[0].replace('-', '_').replace(' ', '_')}")(*key[1:])
@@ -378,6 +383,16 @@ class Recording:
     def _regularity(self, group: str) -> Number:
         cols = columns(self.solved(group), self.st)
         return regularity([[part(c) for c in row] for row in cols for part in PARTS])
+
+    def _short(self, group: str) -> Number:
+        of, case = self.solved(group), self._cases[group]
+        return missing(of.kind, bare(case.offset(self.st)), *map(bare, case.vectors(self.st)))
+
+    def _unknown(self, group: str, i: int) -> Number:
+        return unknowns(self.solved(group), self.st)[i]
+
+    def _open_loops(self, group: str) -> Number:
+        return self._open[self.solved(group).name]
 
     @cached_property
     def loops(self) -> Group | None:

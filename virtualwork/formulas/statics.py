@@ -8,7 +8,7 @@ least norm.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.arithmetic.guard import guarded
+from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.numbers import Number, Reals, cross, imaginary_part, real_part
@@ -41,10 +42,15 @@ def unknowns(of: JointForces) -> list[Column]:
             found.append(("normal", joint.key, ""))
             if of.mechanism.guides[joint.guide].is_slider:
                 found.append(("moment", joint.key, ""))
-    found += [("gear", str(i), "") for i in range(len(of.mechanism.gears))]
+    found += [mesh_column(of.mechanism, i) for i in range(len(of.mechanism.meshes))]
     for j, entry in enumerate(of.mechanism.inputs):
         found.append(("force" if entry.is_slide else "torque", str(j), ""))
     return found
+
+
+def mesh_column(m: Description, mesh: int) -> Column:
+    """The torque of a gear or a belt, or the tooth force of a rack."""
+    return "gear" if m.meshes[mesh].guide is None else "tooth", str(mesh), ""
 
 
 def equations(of: JointForces, block: Block) -> Iterator[tuple[int, int | None, Number]]:
@@ -95,10 +101,18 @@ def equations(of: JointForces, block: Block) -> Iterator[tuple[int, int | None, 
             j = m.driver_of(joint.guide)
             if j is not None:
                 yield from put(body, ("force", str(j), ""), sign * rail, arm)
-    for i, gear in enumerate(m.gears):
-        first, second = gear.links
-        for body, factor in ((second, 1.0), (first, -gear.ratio), (gear.arm, gear.ratio - 1.0)):
-            yield from turn(body, ("gear", str(i), ""), factor)
+    for i, mesh in enumerate(m.meshes):
+        # the tooth force of a rack, or the torque of a gear over the size
+        unit = 1.0 if mesh.guide is None else size
+        for body, factor in mesh.torques.items():
+            yield from turn(body, mesh_column(m, i), factor / unit)
+        if mesh.guide is not None:
+            g = m.guides[mesh.guide]
+            rail = of.rail(block, mesh.guide) + 0j
+            for body, sign in ((g.link, 1.0), (g.on, -1.0)):
+                if body != GROUND:
+                    arm = of.place(block, (f"guide:{mesh.guide}", body)) + 0j
+                    yield from put(body, mesh_column(m, i), sign * rail, arm)
     for j, entry in enumerate(m.inputs):
         if not entry.is_slide:
             yield from turn(str(entry.link), ("torque", str(j), ""), 1.0)
@@ -187,12 +201,14 @@ class Statics:
 
     def joint_force(self, joint: Joint, body: str) -> NDArray[np.complex128]:
         """The force of a joint on a body, (n,) complex."""
+        r = self.reactions
         if joint.guide is None:
             if body == GROUND:
                 others = [self.joint_force(joint, other) for other in joint.bodies if other != GROUND]
                 return np.asarray(-sum(others))
-            return np.asarray(self.get(("fx", joint.key, body)) + 1j * self.get(("fy", joint.key, body)))
-        r = self.reactions
+            force = self.get(("fx", joint.key, body)) + 1j * self.get(("fy", joint.key, body))
+            return np.asarray(force + self._with_teeth(lambda block: r.borne(block, joint, body, self.tooth)))
+
         rail, rub = r.over(
             lambda block: r.rail(block, joint.guide),
             lambda block: r.rubbed(block, joint, body),
@@ -200,6 +216,23 @@ class Statics:
         )
         sign = 1.0 if body == self.mechanism.guides[joint.guide].link else -1.0
         return np.asarray(sign * self.get(("normal", joint.key, "")) * 1j * rail + rub)
+
+    def guide_moment(self, joint: Joint) -> Reals:
+        """The moment of a slider's guide on its link, (n,)."""
+        assert joint.guide is not None
+        guide = joint.guide
+        beside = self._with_teeth(lambda block: self.reactions.beside(block, guide, self.tooth))
+        return np.asarray(self.get(("moment", joint.key, "")) + beside.real)
+
+    def tooth(self, block: Block, mesh: int) -> Number:
+        """The tooth force of a rack over a block."""
+        value = self.get(mesh_column(self.mechanism, mesh))[block.rows]
+        return value if block.st.many else float(value[0])
+
+    def _with_teeth(self, form: Callable[[Block], Number]) -> NDArray[np.complex128]:
+        if not self.reactions.order.racks:
+            return np.zeros(self.n, complex)
+        return np.asarray(self.reactions.over(form, kind=complex)[0])
 
     def undetermined(self) -> list[str]:
         """Which joint forces no statics determines, and which of their sums it does."""
@@ -216,6 +249,8 @@ class Statics:
                 return f"{kind} at {names[key]} on {body}"
             if kind in ("normal", "moment"):
                 return f"the {kind} {'force ' if kind == 'normal' else ''}of guide {names[key]}"
+            if kind == "tooth":
+                return f"the tooth force of {self.mechanism.meshes[int(key)].label}"
             return f"the {kind} of {'input' if kind in ('force', 'torque') else 'gear'} {int(key) + 1}"
 
         by_key = self.reactions.by_key

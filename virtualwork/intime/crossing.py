@@ -24,6 +24,9 @@ NARROWER, NARROWINGS, ENOUGH = 0.75, 12, 1e-12
 # of the gap of poses farther off, what that of nearer ones must come to: a gap of truncation falls so, one of rounding
 # does not, and the nearer the poses are the more of their digits are lost
 BETTER = 0.1
+# of how far off other poses are taken, to see how much hangs on that; where on the inner part they are compared
+OTHER = 0.85
+WITHIN = (-0.9, -0.3, 0.3, 0.9)
 # the gap of a pole is the same from all poses, and larger
 SMOOTH = 1e-3
 
@@ -42,8 +45,12 @@ class Crossing:
 
     def __init__(self, at: float, reach: float) -> None:
         self.at, self.inner = at, INNER * reach
+        # whether quantities are smooth there: at a pole nothing leads through
+        self.smooth = True
         # how far it has been seen to miss each quantity
         self.missed: Floats = []
+        # the quantities at the nodes, where they were asked for
+        self._values: list[Floats] = []
         # Chebyshev's points in the square of the distance: the extrapolation inwards makes least of what is rounded
         middle, half = 0.5 * (1 + INNER**2), 0.5 * (1 - INNER**2)
         turns = (math.pi * (i + 0.5) / NODES for i in range(NODES))
@@ -63,6 +70,23 @@ class Crossing:
         total = sum(shares)
         return [sum(map(mul, shares, of)) / total for of in zip(*values, strict=True)]
 
+    def values(self, f: Callable[[float], Floats]) -> list[Floats]:
+        """The quantities at the nodes."""
+        self._values = self._values or [f(x) for x in self.nodes]
+        return self._values
+
+    def compare(self, f: Callable[[float], Floats], other: Crossing) -> None:
+        """Note as `missed` too how far another crossing, from other poses, lies from this one within both of their inner parts.
+
+        Two ends are few: rounding there may be small by chance.
+        """
+        mine, others = self.values(f), other.values(f)
+        for share in WITHIN:
+            q = self.at + share * min(self.inner, other.inner)
+            pairs = zip(self.interpolated(mine, q), other.interpolated(others, q), strict=True)
+            apart = (abs(x - y) for x, y in pairs)
+            self.missed = [max(x, y if y == y else math.inf) for x, y in zip(self.missed, apart, strict=True)]
+
     def gaps(self, f: Callable[[float], Floats], least: Floats) -> Floats:
         """How far interpolation lies from each quantity at the ends of what it replaces, relative to its size; noted as `missed`.
 
@@ -70,7 +94,7 @@ class Crossing:
         poses too far off interpolation misses, for what is smooth here has an end (a limit, a fast turn) not far away;
         from poses too near they have lost their digits.
         """
-        known, ends = [f(x) for x in self.nodes], (self.at - self.inner, self.at + self.inner)
+        known, ends = self.values(f), (self.at - self.inner, self.at + self.inner)
         found = [(f(q), self.interpolated(known, q)) for q in ends]
         sizes = [
             max(map(abs, of)) for of in zip(least, *known, *(values for values, _ in found), strict=True)
@@ -96,9 +120,10 @@ def narrowed(f: Callable[[float], Floats], at: float, widest: float, least: Floa
         if lowest <= ENOUGH:
             break
     if told:
+        best.compare(f, Crossing(at, OTHER * best.inner / INNER))
         return best
-    # what is not smooth there is left as it is, but for the nearest poses; how far it misses says nothing
-    found.missed = [0.0] * len(least)
+    # what is not smooth there is left as it is, but for the nearest poses
+    found.smooth, found.missed = False, [0.0] * len(least)
     return found
 
 

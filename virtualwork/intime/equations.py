@@ -33,7 +33,7 @@ from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.recording import Recording
 from virtualwork.formulas.scene import Scene
-from virtualwork.intime.crossing import Crossing, crossings, narrowed, nearest
+from virtualwork.intime.crossing import OTHER, Crossing, crossings, narrowed, nearest
 from virtualwork.intime.entering import Placed
 from virtualwork.intime.powers import motion_of, state_names
 from virtualwork.intime.tables import ends, kinks, place, reader
@@ -43,8 +43,6 @@ from virtualwork.intime.watch import Floats, Value, Watch
 AHEAD = 1.0
 # beyond what is known no step looks farther
 FAR = 64.0
-# of the poses from which is interpolated how far off others are taken, to see how much hangs on that
-OTHER = 0.85
 # how near a change point a fold is its own
 NEAR = 0.1
 # rad, or of a slide's size: how far beyond where it ended is asked whether it could not be looked farther
@@ -52,7 +50,7 @@ NEXT = 1e-6
 # a speed of the input, rad/s or m/s, beside whose forces all others are small
 FAST = 1e4
 # of what an interpolation has been seen to miss at two poses, what it may miss
-SEEN = 8.0
+SEEN = 2.0
 TURN = 2 * math.pi
 EVERYWHERE, NOWHERE = (-math.inf, math.inf), (math.inf, -math.inf)
 
@@ -98,6 +96,8 @@ class Equations:
             self._cover(q[0])
         crossing = self._crossing(q[0])
         if crossing is not None:
+            if not crossing.smooth:
+                raise Lost
             found = crossing.interpolated([self._plain(t, [x], v) for x in crossing.nodes], q[0])
         else:
             found = self._plain(t, q, v)
@@ -374,22 +374,25 @@ class Equations:
         found = nearest(self._crossings, q) if self._crossings else None
         return found if found is not None and abs(q - found.at) < found.inner else None
 
-    def blur(self, q: Reals, v: Reals) -> Reals:
-        """How far the acceleration may be wrong over each step between nodes (n,), for interpolation near change points, (n − 1,).
+    def blur(self, t: Reals, q: Reals, v: Reals, stages: Reals, weights: Reals) -> tuple[Reals, Reals]:
+        """How far the speed may be wrong by each step for interpolation near change points, and the point next to each, both (n − 1,).
 
-        What an interpolation has been seen to miss counts for the share of the step that lies on its inner part.
+        Nodes (n,) of a path, where in a step the method's `stages` stand, and their `weights`. What an interpolation
+        has been seen to miss counts at the stages that lie on its inner part, each with its weight over the whole step:
+        the others do not know of it. Beyond that part it falls off, as rounding does there.
         """
-        low, high = np.minimum(q[1:], q[:-1]), np.maximum(q[1:], q[:-1])
+        h, way, c = np.diff(t), np.diff(q), stages[:, None]
+        # Hermite's polynomial through two nodes
+        there = q[:-1] + c * way + c * (1 - c) * ((1 - c) * (h * v[:-1] - way) - c * (h * v[1:] - way))
         speed = np.maximum(np.abs(v[1:]), np.abs(v[:-1])) / FAST
-        found = np.zeros(len(low))
-        for crossing in self._crossings:
-            begin, end = crossing.at - crossing.inner, crossing.at + crossing.inner
-            inside = np.minimum(high, end) - np.maximum(low, begin)
-            whole = np.maximum(high - low, np.finfo(float).tiny)
-            on = np.flatnonzero(inside > 0)
+        found = np.zeros((len(self._crossings), len(h)))
+        for one, crossing in zip(found, self._crossings, strict=True):
+            apart = np.abs(there - crossing.at) / crossing.inner
+            each = weights[:, None] / np.maximum(apart, 1.0) ** 2
+            counts = np.where((apart <= 1).all(axis=0), 1.0, np.sqrt(np.square(each).sum(axis=0)))
             still, fast = crossing.missed
-            found[on] += np.minimum(inside[on] / whole[on], 1.0) * (still + fast * speed[on] ** 2)
-        return SEEN * found
+            one[:] = SEEN * counts * (still + fast * speed**2) * h
+        return found.max(axis=0), found.argmax(axis=0)
 
     def otherwise(self) -> Equations:
         """The same equations, interpolated from other poses near change points."""

@@ -139,6 +139,8 @@ class DormandPrince:
     order = 8
     # h·|λ| beyond which it is not stable (Hairer and Wanner, §IV.2)
     stable = 6.1
+    # where the stages stand in a step, and their weights
+    stages = np.array([0.0, *AT]), np.array(WEIGHTS)
 
     def step(self, f: Equations, t: float, q: Floats, v: Floats, rates: Floats, h: float) -> Step:
         """One step of length h from a state whose rates are known."""

@@ -28,7 +28,7 @@ from dalembert.arithmetic.recorded import Number
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe import MechanismError
 from virtualwork.formulas.block import Block
-from virtualwork.formulas.numbers import Reals, dot, minus
+from virtualwork.formulas.numbers import Reals, dot, minus, plus
 from virtualwork.intime.equations import Equations, Lost
 from virtualwork.intime.powers import motion_of
 from virtualwork.intime.watch import Floats, Rate, Value, Watch, sign
@@ -155,6 +155,7 @@ class Rubbing(Equations):
             recording.value(("force", joint.key, body))
             force = of.on_side(block, (joint.key, body))
             if joint.guide is None:
+                force = plus(force, of.borne(block, joint, body))
                 rate = minus(block.omega(body), block.omega(other))
                 slip = minus(block.alpha(body), block.alpha(other))
             else:

@@ -67,6 +67,11 @@ class Radau:
     order = 9
     stable = np.inf
 
+    @property
+    def stages(self) -> tuple[Reals, Reals]:
+        """Where the stages stand in a step, and their weights."""
+        return nodes().c, nodes().a[-1]
+
     def step(self, f: Equations, t: float, q: Floats, v: Floats, rates: Floats, h: float) -> Step:
         """One step of length h from a state whose rates are known."""
 

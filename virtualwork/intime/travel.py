@@ -95,14 +95,22 @@ class Travel:
 
     def blur(self, times: Reals) -> Reals:
         """How far the coordinate may be wrong for interpolation near change points, at times between nodes too, (n,)."""
-        t, places, speed, place = [self.legs[0].nodes.t[:1]], [np.zeros(1)], 0.0, 0.0
+        t, places, place = [self.legs[0].nodes.t[:1]], [np.zeros(1)], 0.0
+        # the square of the speed's error by all passages before
+        before = 0.0
         for leg in self.legs:
             if leg.steps and leg.equations.crosses:
                 nodes, h = leg.nodes, np.diff(leg.nodes.t)
-                speeds = speed + np.cumsum(leg.equations.blur(nodes.q[:, 0], nodes.v[:, 0]) * h)
+                first = nodes.t, nodes.q[:, 0], nodes.v[:, 0]
+                each, point = leg.equations.blur(*first, *leg.method.stages)
+                # errors of one passage are alike, those of several are not
+                parts = np.split(each, np.flatnonzero(np.diff(point)) + 1)
+                sums = [np.cumsum(part) for part in parts]
+                ends = before + np.cumsum([0.0, *(x[-1] ** 2 for x in sums)])
+                speeds = np.sqrt(np.concatenate([y + x**2 for x, y in zip(sums, ends, strict=False)]))
                 way = place + np.cumsum(speeds * h)
                 t, places = [*t, nodes.t[1:]], [*places, way]
-                speed, place = float(speeds[-1]), float(way[-1])
+                before, place = float(ends[-1]), float(way[-1])
         return np.interp(times, np.concatenate(t), np.concatenate(places))
 
     @property

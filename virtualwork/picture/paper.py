@@ -32,6 +32,8 @@ LINES: dict[str, dict[str, Any]] = {
     "link": {"lw": 2.2, "solid_capstyle": "round"},
     "wheel": {"lw": 1.1, "ls": CHAIN},
     "spoke": {"lw": 1.4},
+    "belt": {"lw": 1.6},
+    "rack": {"lw": 1.4},
     "slot": {"lw": 0.9},
     "block": {"lw": 1.4},
     "spring": {"color": "0.25", "lw": 0.9},
@@ -61,13 +63,17 @@ def on_paper(poses: Poses, points: Sequence[str] | None = None, figure: FigureBa
 
 def shapes_of(*motions: Poses) -> Drawing:
     """Return what a mechanism is drawn as, its guides as long as they are used in the poses of all of its motions."""
-    m = motions[0].mechanism
+    return draw(motions[0].mechanism, travel_of(*motions))
+
+
+def travel_of(*motions: Poses) -> list[tuple[float, float]]:
+    """Return the least and the largest slide of each guide in the poses of all motions, m."""
     spans = []
-    for i in range(len(m.guides)):
+    for i in range(len(motions[0].mechanism.guides)):
         slide = np.concatenate([poses.values([("slide", i, 0)])[0] for poses in motions])
         used = slide[np.isfinite(slide)]
         spans.append((float(used.min()), float(used.max())) if len(used) else (-np.inf, np.inf))
-    return draw(m, spans)
+    return spans
 
 
 class _Paper:

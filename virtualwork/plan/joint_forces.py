@@ -83,11 +83,14 @@ class Order:
     def couples(self) -> tuple[list[tuple[str, int]], list[dict[str, Any]] | None]:
         """The unknown torques (guides, gears, inputs), and how the bodies' ΣM = 0 gives each: body -> factor.
 
-        None in place of the factors where the torques are not all determined.
+        None in place of the factors where the torques are not all determined. The tooth force of a rack is one of them
+        only where its guide does not tell it.
         """
         bodies = list(self.mechanism.links)
-        tied = sorted(relations(self.mechanism), key=lambda r: r.kind == "input")
-        pattern = [[r.shares.get(body, 0.0) for r in tied] for body in bodies]
+        told = set(self.along.values())
+        every = [r for r in relations(self.mechanism) if r.gear is None or r.gear not in told]
+        tied = sorted(every, key=lambda r: r.kind == "input")
+        pattern = [[r.torques.get(body, 0.0) for r in tied] for body in bodies]
         inverse = left_inverse(pattern)
         factors = None
         if inverse is not None:
@@ -95,11 +98,35 @@ class Order:
         return [(r.kind, r.number) for r in tied], factors
 
     @cached_property
+    def racks(self) -> dict[int, list[int]]:
+        """The racks of each guide: the numbers of their meshes."""
+        found: dict[int, list[int]] = {}
+        for i, mesh in enumerate(self.mechanism.meshes):
+            if mesh.guide is not None:
+                found.setdefault(mesh.guide, []).append(i)
+        return found
+
+    @cached_property
+    def along(self) -> dict[int, int]:
+        """The guides whose own force along the rail is the tooth force of one rack: guide -> mesh."""
+        return {
+            guide: meshes[0]
+            for guide, meshes in self.racks.items()
+            if len(meshes) == 1 and self.mechanism.driver_of(guide) is None
+        }
+
+    @cached_property
     def redundant(self) -> bool:
         """Whether statics cannot give every joint force: more unknowns than equations."""
         square = all(2 * len(g.closures) == len(g.angles) + len(g.slides) for g in self.plan.groups)
         every = all(side in self.recipes for sides in self.sides.values() for side in sides)
-        return not square or not every or self.couples[1] is None or bool(self.plan.blocks.redundant)
+        several = any(
+            len(meshes) > 1 and self.mechanism.driver_of(guide) is None
+            for guide, meshes in self.racks.items()
+        )
+        return (
+            several or not square or not every or self.couples[1] is None or bool(self.plan.blocks.redundant)
+        )
 
     def couple(self, kind: str, i: int) -> dict[str, Any]:
         """How the torque of a guide, a gear or an input follows from what the bodies' ΣM leaves: body -> factor."""

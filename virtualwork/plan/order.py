@@ -17,7 +17,8 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from virtualwork.describe.description import Description, known_by_guess
+from virtualwork.describe.description import Description
+from virtualwork.describe.meshes import Coordinate
 from virtualwork.describe.parts import GROUND
 from virtualwork.plan.steps import (
     Angle,
@@ -36,6 +37,7 @@ from virtualwork.plan.steps import (
     Variable,
     relations,
 )
+from virtualwork.plan.ties import eliminated, guessed
 from virtualwork.plan.topology import Topology, decompose
 
 
@@ -128,11 +130,12 @@ class _Planner:
         }
         # a point of each guide's line
         self.throughs: list[Any] = [Vector.of(line) for _, _, _, line, _ in topology.guides]
-        self.guess = known_by_guess(m)[0] if m.gears else {}
+        self.guess: dict[Coordinate, float] = guessed(m) if m.meshes else {}
         self.relations = list(relations(m))
         self.driven = {m.guide_of(e): j for j, e in enumerate(m.inputs) if e.is_slide}
         self.steps: list[Step] = []
-        self.angles: dict[str, Angle] = {GROUND: Angle()}
+        # of angles, and of slides
+        self.angles: dict[Coordinate, Angle] = {GROUND: Angle()}
         self.anchors: dict[str, Path] = {GROUND: (None, ())}
         self.nodes: set[str] = set()
         self.slides_known: set[int] = set()
@@ -163,7 +166,12 @@ class _Planner:
         for i in range(len(self.m.guides)):
             self._guide_node(i)
         return Plan(
-            tuple(self.steps), self.anchors, self.angles, self.directions, self.blocks, self.guide_nodes
+            tuple(self.steps),
+            self.anchors,
+            {body: angle for body, angle in self.angles.items() if isinstance(body, str)},
+            self.directions,
+            self.blocks,
+            self.guide_nodes,
         )
 
     # --- points -------------------------------------------------------------------------------------------
@@ -189,37 +197,51 @@ class _Planner:
             if i in self.driven:
                 self.steps.append(Slide(i, self.driven[i]))
                 self.slides_known.add(i)
-        free, ties = self._eliminate(fresh)
+                self.angles[i] = Angle(inputs=((self.driven[i], 1.0),))
+        open_, ties = self._eliminate([*(i for i in slides if i not in self.slides_known), *fresh])
+        free = [x for x in open_ if isinstance(x, str)]
+        own = tuple(tie for tie in ties if any(base in open_ for base, _ in tie.angle.bases))
         for tie in ties:
-            if not any(base in free for base, _ in tie.angle.bases):
+            if tie not in own:
                 self.steps.append(tie)
-                self.solved.add(tie.body)
-        own = tuple(tie for tie in ties if any(base in free for base, _ in tie.angle.bases))
+                self._known(tie.body)
         self._settle()
         moving = {name for kind, name in block if kind in "xy"} - set(self.anchors)
         closures, trees = self._loops(moving)
-        unknown = tuple(i for i in slides if i not in self.slides_known)
+        unknown = tuple(x for x in open_ if isinstance(x, int))
         if closures or free or unknown:
             held = {*free, *(t.body for t in own), *moving}
             links = tuple(b for b in self.m.links if b in held)
             group = Group(" + ".join(links), links, "Newton", tuple(free), unknown, tuple(closures), own)
             self.steps.append(replace(group, kind=self._kind(group)))
-            self.solved.update(group.members)
-            self.slides_known.update(unknown)
+            found: tuple[Coordinate, ...] = (*group.members, *unknown, *group.tied_slides)
+            for x in found:
+                self._known(x)
         self.anchors.update(trees)
         self._settle()
+
+    def _known(self, x: Coordinate) -> None:
+        """Note that an angle or a slide is known from here on."""
+        if isinstance(x, int):
+            self.slides_known.add(x)
+        else:
+            self.solved.add(x)
 
     def _kind(self, group: Group) -> Kind:
         """Chace's case, where the group is one loop with two unknowns that turn or slide simply."""
         if len(group.closures) != 1 or len(group.angles) + len(group.slides) != 2:
             return "Newton"
+        terms = group.closures[0].terms
+        looped: set[Coordinate | None] = {*(t.body for t in terms), *(t.slide for t in terms)}
         own = {body: body for body in group.angles}
-        for tie in group.ties:
+        # what only turns along with the loop does not hold it
+        for tie in [tie for tie in group.ties if tie.body in looped]:
+            if isinstance(tie.body, int):
+                return "Newton"
             bases = [(b, r) for b, r in tie.angle.bases if b in group.angles]
             if len(bases) != 1 or len(tie.angle.bases) != 1 or bases[0][1] != 1.0 or tie.angle.gears:
                 return "Newton"
-            own[tie.body] = bases[0][0]
-        terms = group.closures[0].terms
+            own[tie.body] = str(bases[0][0])
         held = {own.get(t.body) for t in terms} | {t.slide for t in terms}
         if not held.issuperset((*group.angles, *group.slides)):
             # an unknown that its loop does not hold
@@ -231,8 +253,8 @@ class _Planner:
             return "RRP" if turning == {None} else "RPR"
         return "PRP"
 
-    # --- angles: sliders, gears and inputs are linear relations ----------------------------------------------
-    def _relations(self, fresh: list[str]) -> list[tuple[Relation, Angle]]:
+    # --- angles: sliders, gears, belts, racks and inputs are linear relations --------------------------------
+    def _relations(self, fresh: list[Coordinate]) -> list[tuple[Relation, Angle]]:
         """Σ c·θ = const + Σ k·input, for every relation all of whose angles are known once this block is."""
         new = set(fresh)
         found = []
@@ -246,9 +268,14 @@ class _Planner:
                 found.append((relation, right))
         return found
 
-    def _eliminate(self, fresh: list[str]) -> tuple[list[str], list[Turn]]:
-        """Gauss-Jordan on the linear relations: which angles stay free, and what the others are."""
-        rows: list[tuple[dict[str, float], Angle]] = []
+    def _eliminate(self, fresh: list[Coordinate]) -> tuple[list[Coordinate], list[Turn]]:
+        """Gauss-Jordan on the linear relations: which angles and slides stay free, and what the others are.
+
+        A slide is tied to angles only where it has to be: the wheel of a rack turns with its slide, of which no whole
+        turns have to be known.
+        """
+        rows: list[tuple[dict[Coordinate, float], Angle]] = []
+        wheels = {mesh.rack.gear for mesh in self.m.meshes if mesh.rack is not None}
         for relation, right in self._relations(fresh):
             c = relation.shares
             known = replace(right, gears=())
@@ -256,7 +283,7 @@ class _Planner:
                 if body not in fresh:
                     known = known.plus(self.angles[body], -factor)
             unknown = {body: factor for body, factor in c.items() if body in fresh}
-            if self.m.gears:
+            if self.m.meshes:
                 there = known.at(self.m.at)
                 stands = sum(factor * self.guess.get(body, 0.0) for body, factor in unknown.items())
                 if right.gears:
@@ -267,31 +294,10 @@ class _Planner:
                     whole = round(complex(stands - there).real / (2 * math.pi))
                     known = known.plus(Angle(2 * math.pi * whole)) if whole else known
             rows.append((unknown, known))
-        solved: dict[str, tuple[dict[str, float], Angle]] = {}
-        for unknown, known in rows:
-            for body, (others, value) in solved.items():
-                if body in unknown:
-                    f = unknown.pop(body)
-                    known = known.plus(value, -f)
-                    for other, o in others.items():
-                        unknown[other] = unknown.get(other, 0.0) + f * o
-            unknown = {b: f for b, f in unknown.items() if abs(f) > 1e-13}
-            if not unknown:
-                continue
-            pivot = max(unknown, key=lambda b: (abs(abs(unknown[b]) - 1) < 1e-12, fresh.index(b)))
-            p = unknown.pop(pivot)
-            others = {b: -f / p for b, f in unknown.items()}
-            value = Angle().plus(known, 1 / p)
-            for body, (was, val) in list(solved.items()):
-                if pivot in was:
-                    f = was.pop(pivot)
-                    for other, o in others.items():
-                        was[other] = was.get(other, 0.0) + f * o
-                    solved[body] = (was, val.plus(value, f))
-            solved[pivot] = (others, value)
+        solved = eliminated(rows, fresh, wheels)
         free = [b for b in fresh if b not in solved]
-        for b in free:
-            self.angles[b] = Angle(bases=((b, 1.0),))
+        for x in free:
+            self.angles[x] = Angle(bases=((x, 1.0),))
         turns = []
         for b, (others, value) in solved.items():
             angle = value

@@ -1,11 +1,11 @@
 """The joints of a mechanism, and its order of solution as data: steps that know what they read and what they write.
 
-A pin or a guide holds a point; a slider, a gear and a turning input tie angles, Σ c·θ = const + Σ k·input. The shares c
-are also how the torque of the joint acts on the bodies.
+A pin or a guide holds a point; a slider, a gear, a belt and a turning input tie angles, Σ c·θ = const + Σ k·input, and a
+rack ties a slide to them. The shares c are also how the torque of the joint acts on the bodies.
 
 The list of steps
 -----------------
-`Turn`   the angle of a body from the inputs and from angles already known
+`Turn`   the angle of a body, or a slide, from the inputs and from angles and slides already known
 `Slide`  a slide that is an input
 `Place`  a point from a point already known:  P = P_base + Σ z·s·e^{iθ}
 `Group`  the angles and slides of an Assur group from its loop closures
@@ -22,13 +22,14 @@ from functools import cached_property
 from typing import Literal, TypeVar
 
 from virtualwork.describe.description import Description
+from virtualwork.describe.meshes import Coordinate
 from virtualwork.describe.parts import GROUND
 
 # ("angle", link), ("x", link), ("y", link), ("px", pin), ("py", pin), ("slide", guide)
 Variable = tuple[str, str]
 # a point of a body; the number of a guide and what of it: where its line runs, which way
 Slot = tuple[str, str] | tuple[int, str]
-Key = TypeVar("Key", int, str)
+Key = TypeVar("Key", int, str, "str | int")
 
 
 @dataclass(frozen=True)
@@ -49,19 +50,29 @@ def path_reads(path: Path) -> set[str]:
     return _term_reads(path[1]) | _node(path[0])
 
 
+def key_of(x: Coordinate) -> str:
+    """The key of an angle or a slide: `angle:BODY`, `slide:GUIDE`."""
+    return f"slide:{x}" if isinstance(x, int) else f"angle:{x}"
+
+
 @dataclass(frozen=True)
 class Angle:
-    """θ = const + Σ k·input + Σ r·θ_base + Σ p·K_gear.
+    """θ = const + Σ k·input + Σ r·θ_base + Σ p·K_gear; a base may be a slide too, and so may be what is tied.
 
-    K is the constant of a gear, K = Σ c·θ of its links: the guess gives it once the links before it are placed.
+    K is the constant of a gear, a belt or a rack, K = Σ c·x: the guess gives it once the links before it are placed.
     """
 
     const: float = 0.0
     inputs: tuple[tuple[int, float], ...] = ()
-    bases: tuple[tuple[str, float], ...] = ()
+    bases: tuple[tuple[Coordinate, float], ...] = ()
     gears: tuple[tuple[int, float], ...] = ()
     # of what was added up to const: its rounding is so many times the unit's
     size: float = field(default=0.0, compare=False)
+
+    @property
+    def turning(self) -> tuple[tuple[str, float], ...]:
+        """The bases that are angles of bodies."""
+        return tuple((base, r) for base, r in self.bases if isinstance(base, str))
 
     def at(self, inputs: tuple[float, ...]) -> float | None:
         """The angle at given inputs, or None where it hangs on other angles."""
@@ -93,10 +104,15 @@ def _sums(
 
 @dataclass(frozen=True)
 class Turn:
-    """The angle of a body follows from inputs and known angles."""
+    """The angle of a body, or the slide of a guide, follows from inputs and from known angles and slides."""
 
-    body: str
+    body: Coordinate
     angle: Angle
+
+    @property
+    def slides(self) -> bool:
+        """Whether it is a slide."""
+        return isinstance(self.body, int)
 
 
 @dataclass(frozen=True)
@@ -152,14 +168,20 @@ class Group:
     @cached_property
     def members(self) -> tuple[str, ...]:
         """The bodies whose angle is an unknown of the group or tied to one."""
-        return (*self.angles, *(t.body for t in self.ties))
+        return (*self.angles, *(t.body for t in self.ties if isinstance(t.body, str)))
 
     @cached_property
-    def shares(self) -> dict[str, dict[int, float]]:
-        """Of each body how many times as fast as each of the group's own angles it turns: ∂θ_body/∂θ_j ≠ 0 by j."""
-        places = {angle: j for j, angle in enumerate(self.angles)}
+    def tied_slides(self) -> tuple[int, ...]:
+        """The guides whose slide is tied to the unknowns."""
+        return tuple(t.body for t in self.ties if isinstance(t.body, int))
+
+    @cached_property
+    def shares(self) -> dict[Coordinate, dict[int, float]]:
+        """Of each angle and slide how many times as fast as each unknown it moves: ∂x/∂x_j ≠ 0 by j."""
+        unknowns: tuple[Coordinate, ...] = (*self.angles, *self.slides)
+        places = {x: j for j, x in enumerate(unknowns)}
         tied = {t.body: {places[b]: r for b, r in t.angle.bases if r and b in places} for t in self.ties}
-        return tied | {angle: {j: 1.0} for angle, j in places.items()}
+        return tied | {x: {j: 1.0} for x, j in places.items()}
 
 
 Step = Turn | Slide | Place | Group
@@ -207,28 +229,29 @@ class Plan:
     def reads(self, step: Step) -> set[str]:
         """What a step reads: `angle:BODY`, `point:NODE`, `slide:GUIDE`."""
         if isinstance(step, Turn):
-            return {f"angle:{base}" for base, _ in step.angle.bases}
+            return {key_of(base) for base, _ in step.angle.bases}
         if isinstance(step, Slide):
             return set()
         if isinstance(step, Place):
             return _term_reads(step.terms) | _node(step.base)
-        own = {f"angle:{body}" for body in step.members} | {f"slide:{g}" for g in step.slides}
+        own = set(self.writes(step))
         needs: set[str] = set()
         for closure in step.closures:
             needs |= _term_reads(closure.terms) | _node(closure.start) | _node(closure.end)
         for tie in step.ties:
-            needs |= {f"angle:{base}" for base, _ in tie.angle.bases}
+            needs |= {key_of(base) for base, _ in tie.angle.bases}
         return needs - own
 
     def writes(self, step: Step) -> tuple[str, ...]:
         """What a step makes known."""
         if isinstance(step, Turn):
-            return (f"angle:{step.body}",)
+            return (key_of(step.body),)
         if isinstance(step, Slide):
             return (f"slide:{step.guide}",)
         if isinstance(step, Place):
             return (f"point:{step.node}",)
-        return (*(f"angle:{body}" for body in step.members), *(f"slide:{g}" for g in step.slides))
+        slides = (*step.slides, *step.tied_slides)
+        return (*(f"angle:{body}" for body in step.members), *(f"slide:{g}" for g in slides))
 
     def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
         """The steps that the targets hang on, in order; nothing more."""
@@ -278,25 +301,31 @@ def guide_label(m: Description, i: int) -> str:
 
 @dataclass(frozen=True)
 class Relation:
-    """Angles that a slider, a gear or a turning input ties: Σ share·θ = right.
+    """Angles and slides that a slider, a gear, a belt, a rack or a turning input ties: Σ share·x = right.
 
-    `number` counts the guides, gears or inputs of the file. A gear's constant is that of the guess.
+    `number` counts the guides, the meshes (`Description.meshes`) or the inputs of the file. The constant of a mesh is
+    that of the guess.
     """
 
-    kind: Literal["guide", "gear", "input"]
+    kind: Literal["guide", "gear", "belt", "rack", "input"]
     number: int
     label: str
-    shares: Mapping[str, float]
+    shares: Mapping[Coordinate, float]
     right: Angle = field(default_factory=Angle)
 
     @property
     def gear(self) -> int | None:
-        """The gear's number; None of others."""
-        return self.number if self.kind == "gear" else None
+        """The number of the mesh of a gear, a belt or a rack; None of others."""
+        return None if self.kind in ("guide", "input") else self.number
+
+    @property
+    def torques(self) -> dict[str, float]:
+        """The shares of angles alone: how its torque acts on each body."""
+        return {body: c for body, c in self.shares.items() if isinstance(body, str)}
 
 
 def relations(m: Description) -> Iterator[Relation]:
-    """Every relation between angles: of inputs, sliders and gears."""
+    """Every relation between angles and slides: of inputs, sliders, gears, belts and racks."""
     for j, e in enumerate(m.inputs):
         if e.link is not None:
             yield Relation(
@@ -306,5 +335,5 @@ def relations(m: Description) -> Iterator[Relation]:
         if g.turned is not None:
             right = Angle(g.angle + g.turned)
             yield Relation("guide", i, guide_label(m, i), {g.link: 1.0, g.on: -1.0}, right)
-    for i, gear in enumerate(m.gears):
-        yield Relation("gear", i, f"gear {'-'.join(gear.links)}", gear.shares())
+    for i, mesh in enumerate(m.meshes):
+        yield Relation(mesh.kind, i, mesh.label, mesh.shares)

@@ -99,7 +99,7 @@ class Topology:
     def plan(self, make: Callable[[Topology], Plan]) -> Plan:
         """The order of solution in names: made once, but where a gear's constant, or a constant that varies, is in it."""
         tied = [angle for *_, angles in self.guides if angles for angle in angles]
-        if self.first.gears or any(isinstance(angle, Constant) for angle in tied):
+        if self.first.meshes or any(isinstance(angle, Constant) for angle in tied):
             return make(self)
         return _kept(self, make)
 
@@ -170,7 +170,9 @@ def equations(m: Description, tied: Sequence[Relation]) -> tuple[list[Variable],
         Equation(f"input {e.name}", (("slide", str(m.guide_of(e))),), True) for e in m.inputs if e.is_slide
     ]
     for relation in tied:
-        angles = tuple(("angle", body) for body in relation.shares if body != GROUND)
+        angles = tuple(
+            ("slide", str(x)) if isinstance(x, int) else ("angle", x) for x in relation.shares if x != GROUND
+        )
         rows.append(Equation(relation.label, angles, relation.kind == "input"))
     for pin, bodies in m.pins.items():
         for name in bodies:

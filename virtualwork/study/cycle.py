@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from dalembert.arithmetic.guard import Lock, guarded
-from virtualwork.bounds.forces import ForceErrors
 from virtualwork.branch.limits import TURNS
+from virtualwork.digits.forces import ForceErrors
 from virtualwork.formulas.dynamics import Dynamics, Moving
 from virtualwork.formulas.loads import OWN
 from virtualwork.formulas.numbers import Number, Reals, minus, plus
@@ -121,7 +121,7 @@ class Cycle:
         elif entry.is_slide:
             return (
                 f"one stroke of the slide {entry.name} is no cycle: give its motion there and back as a table over "
-                "time (--inputs with a column time_s)"
+                "time (--cases with a column time_s)"
             )
         if self.turns and self._repeats(self.turns):
             return None
@@ -147,7 +147,7 @@ class Cycle:
         if not np.isfinite(turn).all():
             return (
                 f"the sweep covers {covered}, and the input {name} cannot turn a whole turn: give its motion "
-                "there and back as a table over time (--inputs with a column time_s)"
+                "there and back as a table over time (--cases with a column time_s)"
             )
         for turns in range(1, TURNS + 1):
             if self._alike(self._after(sense * turns)):

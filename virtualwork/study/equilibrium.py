@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from virtualwork.bounds.forces import ForceErrors
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.parts import GROUND
+from virtualwork.digits.forces import ForceErrors
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.numbers import EPS, Number, Reals
 from virtualwork.formulas.poses import Poses

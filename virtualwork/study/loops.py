@@ -44,9 +44,9 @@ def loops(m: Description, plan: Plan) -> list[Loop]:
 
     Examples
     --------
-    >>> from virtualwork import Input, Link, Mechanism
+    >>> from virtualwork import Guess, Input, Link, Mechanism
     >>> m = Mechanism({"A": 0j, "D": 3}, {"crank": Link({"A": 0j, "B": 1}), "coupler": Link({"B": 0j, "C": 3}),
-    ...     "rocker": Link({"D": 0j, "C": 2})}, inputs=Input(link="crank"))
+    ...     "rocker": Link({"D": 0j, "C": 2})}, inputs=Input(link="crank"), guess=Guess(0.0, {"coupler": 0.7, "rocker": 1.4}))
     >>> [loop.text for loop in loops(m, m.assembly.plan)]
     ['A→B→C − A→D→C = 0']
     """

@@ -1,7 +1,6 @@
 """Sine, cosine and arctangent as LLVM code on vectors of lanes: at most two units in the last place off.
 
-Polynomials and reduction are those of W. J. Cody, W. Waite, Software Manual for the Elementary Functions (1980), with
-the coefficients published with FDLIBM (Sun Microsystems, 1993). A vector with a lane that this does not serve (an
+The polynomials and the reduction stand in `polynomials`. A vector with a lane that this does not serve (an
 argument beyond 2²⁰·π/2, or so near to a multiple of π/2 that the reduction cancels; for the arctangent infinities,
 zeros, or sizes near the ends of the range) goes, whole, through the system's own functions; and where even those
 cancel (large arguments next to a multiple of π/2: some lose eight units there) through `circular`, on whole numbers.
@@ -13,42 +12,21 @@ from collections.abc import Sequence
 
 import llvmlite.ir as ir
 
-FARTHEST = 1.6e6  # just below 2²⁰·π/2: the multiple of π/2 has at most 20 bits
-NEAREST = 2.0**-66  # of the multiple: nearer than this the three parts of π/2 do not hold two units
-CANCELLED = 2.0**-30  # a sine or cosine so small, of a large argument, is worked out on whole numbers
-SMALLEST, LARGEST = 2.0**-1000, 2.0**1000  # sizes of the larger coordinate that the arctangent takes itself
-
-HALF_PI = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
-SINE = (
-    -1.66666666666666324348e-01,
-    8.33333333332248946124e-03,
-    -1.98412698298579493134e-04,
-    2.75573137070700676789e-06,
-    -2.50507602534068634195e-08,
-    1.58969099521155010221e-10,
-)
-COSINE = (
-    4.16666666666666019037e-02,
-    -1.38888888888741095749e-03,
-    2.48015872894767294178e-05,
-    -2.75573143513906633035e-07,
-    2.08757232129817482790e-09,
-    -1.13596475577881948265e-11,
-)
-ARCTANGENT_ODD = (
-    3.33333333333329318027e-01,
-    1.42857142725034663711e-01,
-    9.09088713343650656196e-02,
-    6.66107313738753120669e-02,
-    4.97687799461593236017e-02,
-    1.62858201153657823623e-02,
-)
-ARCTANGENT_EVEN = (
-    -1.99999999998764832476e-01,
-    -1.11111104054623557880e-01,
-    -7.69187620504482999495e-02,
-    -5.83357013379057348645e-02,
-    -3.65315727442169155270e-02,
+from dalembert.arithmetic.engines.polynomials import (
+    ARCTANGENT_EVEN,
+    ARCTANGENT_ODD,
+    CANCELLED,
+    COSINE,
+    FARTHEST,
+    HALF_PI,
+    LARGEST,
+    NEAREST,
+    QUARTER,
+    SINE,
+    SMALLEST,
+    STEEP,
+    TWO_OVER_PI,
+    WHOLE,
 )
 
 
@@ -100,8 +78,8 @@ class Vectors:
 
     def sincos(self, b: ir.IRBuilder, x: ir.Value) -> tuple[ir.Value, ir.Value]:
         """(sin x, cos x)."""
-        magic = self.constant(6755399441055744.0)  # 1.5·2⁵²: what is added to it is rounded to a whole number
-        shifted = b.fadd(b.fmul(x, self.constant(0.63661977236758134308)), magic)
+        magic = self.constant(WHOLE)
+        shifted = b.fadd(b.fmul(x, self.constant(TWO_OVER_PI)), magic)
         quadrant, k = b.bitcast(shifted, self.longs), b.fsub(shifted, magic)
         first, second, third = map(self.constant, HALF_PI)
         a = b.fsub(x, b.fmul(k, first))
@@ -139,8 +117,7 @@ class Vectors:
         up, along = self.intrinsic(b, "fabs", y), self.intrinsic(b, "fabs", x)
         steep = b.fcmp_ordered(">", up, along)
         most, least = b.select(steep, up, along), b.select(steep, along, up)
-        # tan 22.5°: beyond it the angle is counted from 45°
-        far = b.fcmp_ordered(">", least, b.fmul(self.constant(0.41421356237309503), most))
+        far = b.fcmp_ordered(">", least, b.fmul(self.constant(STEEP), most))
         above, below = b.select(far, b.fsub(least, most), least), b.select(far, b.fadd(least, most), most)
         inverse = b.fdiv(self.constant(1.0), below)
         t = b.fmul(above, inverse)
@@ -160,8 +137,8 @@ class Vectors:
 
         back = b.fcmp_ordered("<", x, zero)
         quarter, quarter_rest = (
-            among(far, 0.785398163397448279, zero),
-            among(far, 3.06161699786838301793e-17, zero),
+            among(far, QUARTER[0], zero),
+            among(far, QUARTER[1], zero),
         )
         base = among(steep, 1.5707963267948966, among(back, 3.141592653589793, zero))
         base_rest = among(steep, 6.12323399573676603587e-17, among(back, 1.22464679914735317722e-16, zero))

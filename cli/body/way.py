@@ -1,0 +1,205 @@
+"""The worked solution of `dalembert body`: parts and tensor, H, its rate, principal axes, the angle of H to ω, bearings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dalembert.results.columns import Column, Table, names, number, vector
+from dalembert.results.way import Topic, figures
+from rigidbody3d.inertia import free_axes, own_axes
+
+if TYPE_CHECKING:
+    from cli.body.moving import Array, MovingBody
+
+AXES = "xyz"
+
+
+def way(b: MovingBody) -> list[Topic]:
+    """The topics of a body, of its motion where it has one, and of the shaft that it may be."""
+    found = [_inertia(b)]
+    if b.moving:
+        found += [_momentum(b), _rate(b)]
+    found.append(_principal(b))
+    if b.moving and b.motion.omega.any():
+        found.append(_angle(b))
+    if b.request.shaft is not None:
+        found.append(_bearings(b))
+    return found
+
+
+def _list(values: Any) -> list[float]:
+    return [float(v) + 0.0 for v in np.ravel(values)]
+
+
+def _tensor(name: str, tensor: Array) -> Table:
+    """A matrix as it is printed, a row for each axis."""
+    return Table(
+        [names("row", list(AXES), None), *(number(f"{name}_{a}", "inertia", tensor[:, k], place=None) for k, a in enumerate(AXES))],
+        ("row",),
+    )  # fmt: skip
+
+
+def _inertia(b: MovingBody) -> Topic:
+    """The centre of mass as a weighted mean, the tensor by Steiner's theorem."""
+    each, body = b.parts.each, b.parts.whole
+    mass, center, own = (
+        np.atleast_1d(each.mass),
+        np.atleast_2d(each.center),
+        np.reshape(each.inertia, (-1, 3, 3)),
+    )
+    from rigidbody3d.inertia import shift
+
+    moved = own + shift(mass, center - body.center)
+    columns = [
+        names("part", list(b.parts.name)),
+        number("mass", "mass", mass),
+        *vector("center", "length", center, AXES),
+        *(
+            number(f"I{AXES[i]}{AXES[j]}", "inertia", moved[:, i, j] if i == j else 0.0 - moved[:, i, j], place=f"inertia_about_whole.{AXES[i]}{AXES[j]}")
+            for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+        ),
+    ]  # fmt: skip
+    c = body.center
+    text = [
+        "m = Σ m_i, r_G = Σ m_i·r_i/m; each tensor is moved to G by Steiner's theorem, I + m·(r²·E − r·rᵀ), and added; "
+        "I_xy = +∫xy dm, the matrix carries −I_xy (Riul, eqs. 24 to 35).",
+        f"m = {figures(float(body.mass))} kg, r_G = ({', '.join(figures(float(v)) for v in c)}) m",
+    ]
+    return Topic(
+        "inertia",
+        [*text, Table(columns, ("part",), "parts[]"), _tensor("I", body.inertia)],
+        "Mass, centre and tensor",
+        {"inertia_kg_m2": [_list(row) for row in body.inertia]},
+    )
+
+
+def _product(row: Array, omega: Array) -> str:
+    """A component of I·ω with its numbers, and an equals sign; empty where it is zero."""
+    text = " + ".join(
+        f"({figures(float(i))})·({figures(float(w))})" for i, w in zip(row, omega, strict=True) if i and w
+    )
+    return f"{text} = " if text else ""
+
+
+def _momentum(b: MovingBody) -> Topic:
+    w, inertia, h = b.motion.omega, b.motion.inertia, b.motion.momentum
+    text = ["H = I·ω about G (Riul, eqs. 31 to 35):"]
+    text += [f"  H_{a} = {_product(inertia[k], w)}{figures(float(h[k]))} kg·m²/s" for k, a in enumerate(AXES)]
+    head: dict[str, Any] = {
+        "omega_rad_s": _list(w),
+        "inertia_kg_m2": [_list(row) for row in inertia],
+        "momentum_kg_m2_s": _list(h),
+    }
+    return Topic("momentum", text, "Angular momentum", head)
+
+
+def _rate(b: MovingBody) -> Topic:
+    m = b.motion
+    frame = m.omega if m.frame_omega is None else m.frame_omega
+    h, cross, relative, rate = m.momentum, m.transport, m.relative, m.rate
+    text = [
+        "Ḣ = (Ḣ)rel + Ω × H, Ω the rate of the axes"
+        + (", here the body's own ω" if m.frame_omega is None else "")
+        + " (Riul, eqs. 36 to 44):"
+    ]
+    for k, a in enumerate(AXES):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        numbers = f"({figures(float(frame[i]))})·({figures(float(h[j]))}) − ({figures(float(frame[j]))})·({figures(float(h[i]))})"
+        text.append(
+            f"  (Ω × H)_{a} = Ω_{AXES[i]}·H_{AXES[j]} − Ω_{AXES[j]}·H_{AXES[i]} = {numbers} = {figures(float(cross[k]))} N·m"
+        )
+    text += [
+        f"  Ḣ_{a} = {figures(float(relative[k]))} + ({figures(float(cross[k]))}) = {figures(float(rate[k]))} N·m"
+        for k, a in enumerate(AXES)
+    ]
+    force, moment = _list(m.inertia_force), _list(m.inertia_wrench.moment)
+    text.append(
+        f"ΣM_G = Ḣ, ΣF = m·a_G; d'Alembert's inertia force −m·a_G = ({', '.join(map(figures, force))}) N, "
+        f"moment −Ḣ = ({', '.join(map(figures, moment))}) N·m (Riul, eqs. 22, 23)"
+    )
+    head: dict[str, Any] = {
+        "frame_omega_rad_s": _list(frame),
+        "momentum_kg_m2_s": _list(h),
+        "relative_N_m": _list(relative),
+        "transport_N_m": _list(cross),
+        "rate_N_m": _list(rate),
+    }
+    return Topic("rate of momentum", text, "Rate of the angular momentum", head)
+
+
+def _principal(b: MovingBody) -> Topic:
+    found = b.parts.whole.principal
+    free = bool(free_axes(found.moments))
+    axes = own_axes(found)
+    moments = _list(found.moments)
+    head: dict[str, Any] = {
+        "principal_kg_m2": moments,
+        "principal_axes": [_list(axis) for axis in axes],
+        "free": free,
+    }
+    text = [
+        "det(I − λ·E) = 0: the principal moments and, for each, the axis with (I − λ·E)·n = 0 (Riul, eqs. 45 to 47)."
+    ]
+    if free:
+        text.append(
+            "Two moments are equal: any axes across the third will do; those shown lie along the body's own where they can."
+            if moments[2] - moments[0] > 1e-9 * moments[2]
+            else "All three moments are equal: any axes will do; those shown are the body's own."
+        )
+    columns: list[Column] = [names("axis", ["1", "2", "3"], None)]
+    columns.append(number("moment", "inertia", found.moments, place=None))
+    columns += [number(f"n_{a}", "number", axes[:, k], place=None) for k, a in enumerate(AXES)]
+    if b.moving:
+        w, h = axes @ b.motion.omega, axes @ b.motion.momentum
+        head |= {"omega_rad_s": _list(w), "momentum_kg_m2_s": _list(h)}
+        columns += [
+            number("omega", "speed", w, place=None),
+            number("momentum", "angular momentum", h, place=None),
+        ]
+        text.append("In principal axes H′ = (I1·ω1, I2·ω2, I3·ω3).")
+    return Topic("principal axes", [*text, Table(columns, ("axis",))], "Principal axes", head)
+
+
+def _angle(b: MovingBody) -> Topic:
+    w, h = b.motion.omega, b.motion.momentum
+    size, speed = float(np.linalg.norm(h)), float(np.linalg.norm(w))
+    angle = float(np.degrees(np.arctan2(np.linalg.norm(np.cross(w, h)), w @ h)))
+    text = [
+        f"|H| = √({' + '.join(f'({figures(float(v))})²' for v in h)}) = {figures(size)} kg·m²/s",
+        f"cos φ = ω·H/(|ω|·|H|), |ω| = {figures(speed)} rad/s: φ = {figures(angle)}°",
+    ]
+    head = {"momentum_kg_m2_s": size, "omega_rad_s": speed, "angle_deg": angle}
+    return Topic("angle", text, "Size of H, and its angle to ω", head)
+
+
+def _bearings(b: MovingBody) -> Topic:
+    shaft, request = b.shaft, b.request.shaft
+    assert request is not None
+    z1, z2 = request.bearings
+    w, rate = request.speed, request.speed_rate
+    v1, v2 = complex(shaft.moment_unbalance(z1)), complex(shaft.moment_unbalance(z2))
+    text = [
+        "U = ∫(x + iy) dm; about each bearing V = ∫(x + iy)·(z − z_bearing) dm = I_xz + i·I_yz; a moment about the one over the "
+        "span is the force at the other: R2 = (−ω² + i·ω̇)·V1/(z2 − z1), R1 = (−ω² + i·ω̇)·V2/(z1 − z2) (Riul, example 4).",
+        f"  V1 = {_complex(v1)}, V2 = {_complex(v2)} kg·m²; −ω² + i·ω̇ = {_complex(complex(-w * w, rate))} 1/s²",
+    ]
+    for k, (v, span) in enumerate(((v2, z1 - z2), (v1, z2 - z1))):
+        force = shaft.dynamic[k]
+        text.append(
+            f"  R{k + 1} = ({_complex(complex(-w * w, rate))})·({_complex(v)})/({figures(span)}) = "
+            f"{_complex(complex(*force))} N"
+        )
+    if any(request.gravity):
+        text += [f"  static: R{k + 1} = {_complex(complex(*shaft.static[k]))} N" for k in (0, 1)]
+    rows = [number("z", "length", np.array([z1, z2]))]
+    about = np.array([v1, v2])
+    rows += vector("moment_unbalance", "inertia", np.stack([about.real, about.imag], axis=-1), "xy")
+    rows += vector("static", "force", shaft.static, "xy")
+    rows += vector("dynamic", "force", shaft.dynamic, "xy")
+    return Topic("bearings", [*text, Table(rows, (), "bearings[]")], "Forces of the bearings on the shaft")
+
+
+def _complex(z: complex) -> str:
+    return f"{figures(z.real)} + i·({figures(z.imag)})"

@@ -1,0 +1,305 @@
+"""An exercise as its TOML file describes it: the command that solves it, what is drawn, what is asked."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from dalembert.errors import DataError, quote
+from dalembert.hints import nearest
+from dalembert.tables.files import read_bytes
+from dalembert.units import composed
+
+COMMANDS = (
+    "balance", "body", "engine", "field", "flywheel", "forces", "index", "inspect", "mechanism", "place", "signal",
+    "simulate", "spin", "trial", "work",
+)  # fmt: skip
+"""The commands that can solve an exercise."""
+KEYS = ("command", "title", "text", "figure", "source", "draw", "ask")
+ASK = ("quantity", "where", "figures", "points", "unit", "label")
+MOST_FIGURES = 12
+LISTED = 10_000
+"""So many steps a draw may have."""
+
+
+@dataclass(frozen=True)
+class Value:
+    """A drawn value: its number as the file has it, and its unit."""
+
+    number: Decimal
+    unit: str
+
+    def __str__(self) -> str:
+        return f"{self.number:f}{f' {self.unit}' if self.unit else ''}"
+
+    @property
+    def option(self) -> str:
+        """As an option takes it: `55mm`."""
+        return f"{self.number:f}{self.unit}"
+
+
+@dataclass(frozen=True)
+class Draw:
+    """A datum that differs from student to student, and its values."""
+
+    name: str
+    values: tuple[Value, ...]
+
+    @property
+    def cell(self) -> tuple[str, str, str] | None:
+        """File, row and column, where it is a table's cell: `rotor.csv:W1.mass_kg`."""
+        return cell_of(self.name)
+
+
+def cell_of(name: str) -> tuple[str, str, str] | None:
+    """Take the name of a table's cell apart.
+
+    >>> cell_of("rotor.csv:W1.mass_kg"), cell_of("links.crank.B.x")
+    (('rotor.csv', 'W1', 'mass_kg'), None)
+    """
+    file, colon, rest = name.partition(":")
+    row, dot, column = rest.rpartition(".")
+    return (file, row, column) if colon and dot and row else None
+
+
+@dataclass(frozen=True)
+class Ask:
+    """A question: a column of the command's table, the row, the figures."""
+
+    quantity: str
+    where: Mapping[str, str]
+    figures: int
+    points: Fraction
+    unit: str
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Exercise:
+    """An exercise."""
+
+    file: str
+    folder: Path
+    command: tuple[str, ...]
+    title: str
+    text: str
+    figure: str | None
+    source: str
+    draws: tuple[Draw, ...]
+    asks: tuple[Ask, ...]
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def keys(self) -> list[str]:
+        """The key columns that the questions name."""
+        return list(dict.fromkeys(key for ask in self.asks for key in ask.where))
+
+    @property
+    def points(self) -> Fraction:
+        """Of all questions together."""
+        return sum((ask.points for ask in self.asks), Fraction(0))
+
+
+def read_exercise(path: str) -> Exercise:
+    """Read an exercise.
+
+    Raises
+    ------
+    DataError
+        With the place in the file, what stands there and what was expected.
+    """
+    import tomllib
+
+    file, data = read_bytes(path)
+    try:
+        table = tomllib.loads(data.decode("utf-8-sig"))
+    except UnicodeDecodeError:
+        raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
+    except tomllib.TOMLDecodeError as error:
+        raise DataError(f"{file}: this is no TOML: {error}") from None
+    place = _Place(file)
+    place.known(table, KEYS, "")
+    words = _command(place, place.text(table, "command", 'such as "balance rotor.csv --plane A:20mm"'))
+    title = place.text(table, "title", "the exercise's name", otherwise=Path(path).stem)
+    text = place.text(table, "text", "what the student reads", otherwise="")
+    figure = place.text(table, "figure", "the name of a picture", otherwise="") or None
+    source = place.text(table, "source", "where the exercise comes from", otherwise="")
+    folder = Path() if path == "-" else Path(path).parent
+    if figure is not None:
+        if Path(figure).suffix.lower() not in (".svg", ".png"):
+            raise place.error("figure", figure, "a picture, .svg or .png")
+        if not folder.joinpath(figure).is_file():
+            raise place.error("figure", figure, f"a file in the folder of {file}")
+    draws = tuple(_draws(place, table.get("draw", {})))
+    asks = tuple(_asks(place, table.get("ask")))
+    return Exercise(file, folder, words, title, text, figure, source, draws, asks)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """What messages call the file."""
+
+    file: str
+
+    def error(self, where: str, found: object, expected: str) -> DataError:
+        return DataError(f"{self.file}: {where}: found {quote(str(found))}, expected {expected}")
+
+    def known(self, table: object, keys: tuple[str, ...], where: str) -> None:
+        """Refuse a key that means nothing."""
+        assert isinstance(table, dict)
+        for key in table:
+            if key not in keys:
+                at = f"{where}, key {key}" if where else f"key {key}"
+                raise DataError(
+                    f"{self.file}: {at}: unknown key, expected one of {', '.join(keys)}{nearest(key, keys)}"
+                )
+
+    def text(self, table: Mapping[str, Any], key: str, meaning: str, otherwise: str | None = None) -> str:
+        if key not in table:
+            if otherwise is None:
+                raise DataError(f"{self.file}: no key {key}: expected {meaning}")
+            return otherwise
+        value = table[key]
+        if not isinstance(value, str) or (otherwise is None and not value.strip()):
+            raise self.error(f"key {key}", value, f"a text, {meaning}")
+        return value
+
+
+def _command(place: _Place, text: str) -> tuple[str, ...]:
+    try:
+        words = shlex.split(text)
+    except ValueError as error:
+        raise place.error("key command", text, f"words as in a shell ({error})") from None
+    if words and words[0] == "dalembert":
+        words = words[1:]
+    if not words or words[0] not in COMMANDS:
+        name = words[0] if words else ""
+        raise place.error(
+            "key command", name, f"a command that computes: {', '.join(COMMANDS)}{nearest(name, COMMANDS)}"
+        )
+    for word in words[1:]:
+        if word in ("-", "-o", "--output", "--json", "--expect", "--report", "--page", "--plot", "--steps"):
+            raise place.error(
+                "key command", word, "the options that solve the exercise, none that shows or writes"
+            )
+    return tuple(words)
+
+
+def _draws(place: _Place, table: object) -> Iterator[Draw]:
+    if not isinstance(table, dict):
+        raise place.error("[draw]", table, 'a table such as "links.crank.B.x" = "50mm:80mm:5mm"')
+    for name, given in table.items():
+        where = f"[draw], {name}"
+        if isinstance(given, dict):
+            raise place.error(
+                where, given, f'a path with dots stands in quotes: "{name}.…" = "50mm:80mm:5mm"'
+            )
+        if isinstance(given, str):
+            values = _steps(place, where, given)
+        elif isinstance(given, list) and given:
+            values = [_value(place, where, each) for each in given]
+        else:
+            raise place.error(where, given, 'steps such as "50mm:80mm:5mm" or a list such as ["5kg", "6kg"]')
+        if len({(value.number, value.unit) for value in values}) < len(values):
+            raise place.error(where, given, "each value once")
+        yield Draw(name, tuple(values))
+
+
+def _value(place: _Place, where: str, given: object) -> Value:
+    if isinstance(given, (int, float)) and not isinstance(given, bool):
+        text = str(given)
+    elif isinstance(given, str):
+        text = given.strip()
+    else:
+        raise place.error(where, given, 'a number with its unit, such as "5kg"')
+    value = value_of(text)
+    if value is None:
+        raise place.error(where, given, 'a number with its unit, such as "5kg"')
+    return value
+
+
+def value_of(text: str) -> Value | None:
+    """Read a number with its unit; None where it is none, or of a size that cannot be computed with.
+
+    >>> str(value_of("55mm")), str(value_of("-0.50")), value_of("5 furlongs")
+    ('55 mm', '-0.50', None)
+    """
+    match = re.fullmatch(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", text)
+    if match is None or (match[2] and composed(match[2]) is None):
+        return None
+    number = Decimal(match[1])
+    return Value(number, match[2]) if -60 < number.adjusted() < 60 else None
+
+
+def _steps(place: _Place, where: str, text: str) -> list[Value]:
+    parts = text.split(":")
+    if len(parts) != 3:
+        raise place.error(where, text, 'FROM:TO:STEP, such as "50mm:80mm:5mm"')
+    first, last, step = (_value(place, where, part) for part in parts)
+    units = {value.unit for value in (first, last, step) if value.unit}
+    if len(units) > 1:
+        raise place.error(where, text, f"one unit, not {' and '.join(sorted(units))}")
+    unit = units.pop() if units else ""
+    if step.number <= 0 or last.number < first.number:
+        raise place.error(where, text, "a step above zero, from the smaller value to the larger")
+    count = int((last.number - first.number) / step.number) + 1
+    if count > LISTED:
+        raise place.error(where, text, f"at most {LISTED} steps")
+    return [Value(first.number + k * step.number, unit) for k in range(count)]
+
+
+def _asks(place: _Place, given: object) -> Iterator[Ask]:
+    if not isinstance(given, list) or not given:
+        raise DataError(
+            f'{place.file}: no [[ask]]: expected one or more, such as [[ask]] with quantity = "mass_kg", figures = 3'
+        )
+    seen = set()
+    for k, table in enumerate(given, 1):
+        where = f"[[ask]] {k}"
+        place.known(table, ASK, where)
+        quantity = table.get("quantity")
+        if not isinstance(quantity, str) or not quantity.strip():
+            raise place.error(
+                f"{where}, key quantity", quantity, 'a column of the command\'s table, such as "mass_kg"'
+            )
+        figures = table.get("figures", 3)
+        if not isinstance(figures, int) or isinstance(figures, bool) or not 1 <= figures <= MOST_FIGURES:
+            raise place.error(f"{where}, key figures", figures, f"a whole number from 1 to {MOST_FIGURES}")
+        points = table.get("points", 1)
+        if not isinstance(points, (int, float)) or isinstance(points, bool) or not 0 < points < 1e6:
+            raise place.error(f"{where}, key points", points, "a number above 0")
+        unit, label = table.get("unit", ""), table.get("label", "")
+        if not isinstance(unit, str) or (unit and composed(unit) is None):
+            raise place.error(f"{where}, key unit", unit, 'a unit such as "kg"')
+        if not isinstance(label, str):
+            raise place.error(f"{where}, key label", label, "a text, what the sheet calls it")
+        ask = Ask(
+            quantity,
+            _where(place, where, table.get("where", {})),
+            figures,
+            Fraction(str(points)),
+            unit,
+            label,
+        )
+        if (quantity, tuple(ask.where.items())) in seen:
+            raise place.error(where, quantity, "each question once; where tells the rows apart")
+        seen.add((quantity, tuple(ask.where.items())))
+        yield ask
+
+
+def _where(place: _Place, where: str, given: object) -> dict[str, str]:
+    """Read the keys of a row: a table, or `plane=B,rotor=1`."""
+    if isinstance(given, str) and given.strip():
+        pairs = [part.partition("=") for part in given.split(",")]
+        if any(not sign for _, sign, _ in pairs):
+            raise place.error(f"{where}, key where", given, 'a row\'s keys, such as { plane = "B" }')
+        return {name.strip(): value.strip() for name, _, value in pairs}
+    if not isinstance(given, dict) or any(isinstance(value, (dict, list, bool)) for value in given.values()):
+        raise place.error(f"{where}, key where", given, 'a row\'s keys, such as { plane = "B" }')
+    return {key: str(value) for key, value in given.items()}

@@ -1,0 +1,247 @@
+"""The figure of a sheet as SVG: the mechanism in its pose, or the rotor with its masses; nothing of the answers."""
+
+from __future__ import annotations
+
+import base64
+import html
+from collections.abc import Iterator, Sequence
+from math import cos, radians, sin
+from typing import TYPE_CHECKING, Any
+
+from cli.exercise.variants import Variant
+from dalembert.errors import DataError
+
+if TYPE_CHECKING:
+    from virtualwork import Mechanism
+
+WIDTH, EDGE = 430.0, 34.0
+"""Of a figure, in units of its own; the edge leaves room for names."""
+TALLEST = 380.0
+STROKES = {
+    "rail": 'stroke="#555" stroke-width="1.2"', "hatch": 'stroke="#888" stroke-width=".8"',
+    "frame": 'stroke="#444" stroke-width="1.2" fill="#eee"', "link": 'stroke="#1d4f91" stroke-width="3" fill="#1d4f9118"',
+    "wheel": 'stroke="#6a3d9a" stroke-width="1.2" stroke-dasharray="9 3"', "spoke": 'stroke="#6a3d9a" stroke-width="1.2"',
+    "slot": 'stroke="#1d4f91" stroke-width="1" fill="#fff"', "block": 'stroke="#1d4f91" stroke-width="1.6" fill="#dfe8f4"',
+    "spring": 'stroke="#444" stroke-width="1"', "mass": 'stroke="#666" stroke-width="1"',
+    "pin": 'stroke="#000" stroke-width="1.2" fill="#fff"', "tip": 'stroke="#000" stroke-width="1.2" fill="#000"',
+}  # fmt: skip
+"""How a shape of each role is drawn; the roles are those of `virtualwork.drawing`."""
+
+
+def figure(variant: Variant) -> str:
+    """Return the figure of a sheet as HTML; empty where there is none."""
+    exercise = variant.problem.exercise
+    if exercise.figure is not None:
+        return _given(exercise.folder / exercise.figure)
+    if variant.problem.workshop.mechanism is not None:
+        return mechanism(variant)
+    if exercise.command[0] == "balance":
+        return rotor(variant)
+    return ""
+
+
+def _given(path: Any) -> str:
+    """The picture that the exercise names, within the page."""
+    data = path.read_bytes()
+    if path.suffix.lower() == ".svg":
+        text = data.decode("utf-8-sig", "replace")
+        if "<svg" not in text:
+            raise DataError(f"{path}: this is no SVG: expected an element svg")
+        kind = "image/svg+xml"
+    else:
+        kind = "image/png"
+    return f'<img alt="figure" src="data:{kind};base64,{base64.b64encode(data).decode()}">'
+
+
+def _svg(height: float, parts: Sequence[str], label: str) -> str:
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:.0f} {height:.0f}" role="img" '
+        f'aria-label="{html.escape(label)}" font-family="Arial, Liberation Sans, sans-serif" font-size="15" fill="none" '
+        f'stroke-linejoin="round" stroke-linecap="round">{"".join(parts)}</svg>'
+    )
+
+
+def _text(x: float, y: float, text: str, anchor: str = "middle", more: str = "") -> str:
+    # a white rim keeps a name readable upon lines
+    return (
+        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="#111" stroke="#fff" stroke-width="4" '
+        f'paint-order="stroke" {more}>{html.escape(text)}</text>'
+    )
+
+
+# --- mechanisms ---------------------------------------------------------------------------------------------------
+def mechanism(variant: Variant) -> str:
+    """Draw the mechanism of a variant in the pose asked for, to scale."""
+    import numpy as np
+
+    from virtualwork.drawing import Circle, standing
+    from virtualwork.formulas.poses import Poses
+    from virtualwork.picture.paper import shapes_of
+
+    m = _varied(variant)
+    motion = m.motion(np.array([_inputs(variant, m)]))
+    poses: Poses = motion.poses
+    drawing = shapes_of(poses)
+    places = {body: [complex(poses.point(body, z)[0]) for z in (0j, 1 + 0j)] for body in m.bodies}
+
+    def at(body: str, z: complex) -> complex:
+        origin, unit = places[body]
+        return origin + z * (unit - origin)
+
+    shapes = [standing(shape, at) for shape in drawing.shapes]
+    reach = np.array([z for shape in shapes for z in shape.reach])
+    reach = reach[np.isfinite(reach)]
+    low, high = complex(reach.real.min(), reach.imag.min()), complex(reach.real.max(), reach.imag.max())
+    across, up = max(high.real - low.real, 1e-12), max(high.imag - low.imag, 1e-12)
+    scale = min((WIDTH - 2 * EDGE) / across, (TALLEST - 2 * EDGE) / up)
+    height = up * scale + 2 * EDGE
+    left = (WIDTH - across * scale) / 2
+
+    def xy(z: complex) -> tuple[float, float]:
+        return left + (z.real - low.real) * scale, height - EDGE - (z.imag - low.imag) * scale
+
+    parts = []
+    for shape in shapes:
+        look = STROKES[shape.role]
+        if isinstance(shape, Circle):
+            x, y = xy(shape.centre)
+            parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{max(shape.radius * scale, 2):.1f}" {look}/>')
+            continue
+        points = " ".join(f"{x:.1f},{y:.1f}" for x, y in map(xy, shape.points))
+        tag = "polygon" if shape.closed else "polyline"
+        parts.append(f'<{tag} points="{points}" {look if shape.closed else look.split(" fill")[0]}/>')
+    parts += _names(drawing.labels, at, xy, set(m.ground))
+    return _svg(height, parts, f"{m.name or 'mechanism'} in the pose of the exercise")
+
+
+def _names(labels: Any, at: Any, xy: Any, ground: set[str]) -> Iterator[str]:
+    """The names of points and links, each where it meets none of the others."""
+    taken: list[tuple[float, float, float, float]] = [
+        (*xy(at(each.body, each.at)), 5.0, 5.0) for each in labels if each.of == "point"
+    ]
+    ways = [(9, -9), (-9, -9), (9, 19), (-9, 19), (14, 5), (-14, 5), (0, -14), (0, 26), (22, -20), (-22, -20)]
+    for each in sorted(labels, key=lambda label: label.of == "link"):
+        x, y = xy(at(each.body, each.at))
+        half = 4.3 * len(each.text)
+        best, least = (x, y), float("inf")
+        for dx, dy in ways:
+            middle = x + dx + (half if dx > 0 else -half if dx < 0 else 0)
+            box = middle, y + dy - 5, half, 8.0
+            off = max(0.0, half - middle) + max(0.0, middle + half - WIDTH)
+            hits = (
+                sum(abs(box[0] - t[0]) < box[2] + t[2] and abs(box[1] - t[1]) < box[3] + t[3] for t in taken)
+                + off
+            )
+            if hits < least:
+                best, least = (middle, y + dy), hits
+        taken.append((best[0], best[1] - 5, half, 8.0))
+        yield _text(*best, each.text, more="" if each.of == "point" else 'font-style="italic"')
+
+
+def _varied(variant: Variant) -> Mechanism:
+    """The mechanism with the variant's dimensions."""
+    from cli.cases.values import assigned
+
+    described = variant.problem.workshop.described
+    words = variant.problem.command
+    texts = [words[k + 1] for k, word in enumerate(words[:-1]) if word == "--set"]
+    m: Mechanism = assigned(described.mechanism, described.bare, texts) if texts else described.mechanism
+    return m
+
+
+def _inputs(variant: Variant, m: Mechanism) -> Any:
+    """The inputs of the first pose that is solved, SI."""
+    poses = variant.solved.document.get("poses")
+    first: Any = poses[0] if isinstance(poses, list) and poses else {}
+    if "input_deg" in first:
+        return radians(first["input_deg"])
+    if "input_m" in first:
+        return first["input_m"]
+    given = first.get("inputs")
+    if isinstance(given, dict) and len(given) == len(m.inputs):
+        return [
+            radians(each["input_deg"]) if "input_deg" in each else each["input_m"] for each in given.values()
+        ]
+    return m.at[0] if len(m.inputs) == 1 else list(m.at)
+
+
+# --- rotors -------------------------------------------------------------------------------------------------------
+def rotor(variant: Variant) -> str:
+    """Draw a rotor's masses seen along its axis, and from the side where they have axial positions."""
+    import numpy as np
+
+    from cli.balance.rotors import read_rotors
+    from cli.read.planes import from_options, from_table
+
+    words = variant.problem.command
+    planes = [words[k + 1] for k, word in enumerate(words[:-1]) if word == "--plane"]
+    files = [words[k + 1] for k, word in enumerate(words[:-1]) if word == "--planes"]
+    chosen = from_table(files[0]) if files else from_options(planes)
+    read = read_rotors(words[1], 9.80665, needs_z=chosen.several)
+    table = read.table
+    if len(read.names) > 1:
+        return ""
+    names = table.texts.get("name") or [str(k) for k in range(1, table.rows + 1)]
+    radius = table.numbers["radius"].si if "radius" in table.numbers else np.ones(table.rows)
+    angle = np.angle(np.where(read.moment == 0, 1, read.moment))
+    z = read.z if chosen.several else None
+    size = 330.0
+    big = 88.0 if z is not None else 110.0
+    cx, cy, r = (128.0 if z is not None else WIDTH / 2), 178.0, big
+    parts = [
+        f'<circle cx="{cx}" cy="{cy}" r="{r * 1.12:.1f}" stroke="#999" fill="#fafafa"/>',
+        f'<circle cx="{cx}" cy="{cy}" r="7" stroke="#444" fill="#ddd"/>',
+        f'<path d="M{cx - r * 1.2} {cy}H{cx + r * 1.2}M{cx} {cy + r * 1.2}V{cy - r * 1.2}" stroke="#bbb" stroke-dasharray="7 3 1 3"/>',
+        _text(cx + r * 1.2 + 6, cy + 5, "x"),
+        _text(cx + 12, cy - r * 1.2 + 5, "y"),
+    ]
+    far = float(radius.max()) or 1.0
+    taken: list[tuple[float, float]] = []
+    for name, rho, phi in zip(names, radius.tolist(), angle.tolist(), strict=True):
+        x, y = cx + rho / far * r * cos(phi), cy - rho / far * r * sin(phi)
+        parts.append(f'<path d="M{cx} {cy}L{x:.1f} {y:.1f}" stroke="#1d4f91" stroke-width="1.4"/>')
+        parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="8" fill="#1d4f91" stroke="#fff"/>')
+        lx, ly = cx + (rho / far * r + 26) * cos(phi), cy - (rho / far * r + 22) * sin(phi) + 5
+        while any(abs(lx - a) < 34 and abs(ly - b) < 15 for a, b in taken):
+            ly += 15
+        taken.append((lx, ly))
+        parts.append(_text(lx, ly, name))
+    parts.append(_text(cx, 20, "seen against +z", more='font-size="13"'))
+    if z is not None:
+        parts += _side(names, z, radius, angle, chosen, far)
+    return _svg(size, parts, "rotor with its masses")
+
+
+def _side(names: Sequence[str], z: Any, radius: Any, angle: Any, planes: Any, far: float) -> Iterator[str]:
+    """The rotor from the side: masses and correction planes at their axial positions."""
+    import numpy as np
+
+    at = planes.z if planes.z is not None else np.zeros(len(planes.name))
+    low, high = float(min(z.min(), at.min())), float(max(z.max(), at.max()))
+    left, right, cy, r = 285.0, WIDTH - 24, 178.0, 88.0
+    scale = (right - left) / ((high - low) or 1.0)
+
+    def x_of(place: float) -> float:
+        return left + (place - low) * scale
+
+    yield f'<rect x="{left - 14}" y="{cy - 7}" width="{right - left + 28}" height="14" fill="#ddd" stroke="#888"/>'
+    for k, (name, place) in enumerate(zip(planes.name, at.tolist(), strict=True)):
+        x = x_of(place)
+        yield f'<path d="M{x:.1f} {cy - 1.22 * r:.1f}V{cy + 1.22 * r:.1f}" stroke="#b35900" stroke-dasharray="6 4" stroke-width="1.5"/>'
+        yield _text(
+            x, cy - 1.3 * r - (17 if k % 2 and len(planes.name) > 3 else 0), name, more='font-weight="bold"'
+        )
+    drawn: dict[float, int] = {}
+    for name, place, rho, phi in sorted(
+        zip(names, z.tolist(), radius.tolist(), angle.tolist(), strict=True), key=lambda m: m[1]
+    ):
+        x, up = x_of(place), rho / far * r * sin(phi)
+        yield f'<path d="M{x:.1f} {cy}V{cy - up:.1f}" stroke="#1d4f91" stroke-width="1.4"/>'
+        yield f'<circle cx="{x:.1f}" cy="{cy - up:.1f}" r="6" fill="#1d4f91" stroke="#fff"/>'
+        same = drawn.setdefault(round(place, 12), 0)
+        drawn[round(place, 12)] += 1
+        yield _text(
+            x + 12, cy - up + (-8 if up >= 0 else 18) + 15 * same * (1 if up < 0 else -1), name, "start"
+        )
+    yield _text((left + right) / 2, cy + 1.22 * r + 24, "z →", more='font-size="13"')
+    yield _text((left + right) / 2, 20, "from the side", more='font-size="13"')

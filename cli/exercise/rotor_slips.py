@@ -1,0 +1,265 @@
+"""Slips in balancing known masses in one or two planes: terms, angles, radii, weights; and what follows from plane B."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing import correct
+from cli.exercise.slips import Candidates, Change, Pairs, Slip, together
+from cli.exercise.solving import Answer
+from cli.exercise.variants import Variant
+from cli.exercise.work_slips import GRAVITIES
+from dalembert.angles import degrees
+from dalembert.units import parted, unit_name
+
+Complexes = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(eq=False, repr=False)
+class Rotor:
+    """A rotor's unbalances, its planes, and the right corrections; SI."""
+
+    names: Sequence[str]
+    moment: Complexes
+    z: Real
+    planes: Sequence[str]
+    plane_z: Real
+    radius: Real
+    gravity: float
+    weights: bool
+    sign: float
+    """−1 where material is removed."""
+
+    @cached_property
+    def corrections(self) -> Complexes:
+        """The right ones."""
+        return self.sign * correct(self.moment, self.z, self.plane_z).unbalance
+
+    def corrections_of(self, moments: Complexes) -> Complexes:
+        """The corrections of rotors with other unbalances, (n, k) -> (n, p)."""
+        return self.sign * correct(moments, np.broadcast_to(self.z, moments.shape), self.plane_z).unbalance
+
+    def changes(self) -> Iterator[Change]:
+        """What can go wrong with a mass: what the change adds to its unbalance."""
+        for k, (name, u) in enumerate(zip(self.names, self.moment.tolist(), strict=True)):
+            if not u:
+                continue
+            yield Change(k, f"the term of {name} has the wrong sign", -2 * u, is_sign=True)
+            yield Change(k, f"{name} is left out", -u)
+            yield Change(k, f"the term of {name} is ten times too large", 9 * u)
+            yield Change(k, f"the term of {name} is ten times too small", -0.9 * u)
+            yield Change(k, f"sine in place of cosine at {name}", 1j * np.conj(u) - u)
+            turned = abs(u) * np.exp(1j * float(degrees(np.array(u))))
+            yield Change(k, f"the angle of {name}: degrees taken as radians", turned - u)
+            yield Change(k, f"the angle of {name} is counted the other way", np.conj(u) - u)
+            yield Change(k, f"the diameter of {name} in place of its radius", u)
+
+
+def rotor(variant: Variant, answer: Answer) -> Rotor | None:
+    """Return the rotor that a question is about; None with three planes or more, or with rounded corrections."""
+    from cli.balance.rotors import read_rotors
+    from cli.read.planes import from_options, from_table
+
+    words = variant.problem.command
+    if any(word in ("--round-mass", "--round-angle") for word in words):
+        return None
+    options = [words[k + 1] for k, word in enumerate(words[:-1]) if word == "--plane"]
+    files = [words[k + 1] for k, word in enumerate(words[:-1]) if word == "--planes"]
+    g = next((float(words[k + 1]) for k, word in enumerate(words[:-1]) if word == "--gravity"), 9.80665)
+    planes = from_table(files[0]) if files else from_options(options)
+    read = read_rotors(words[1], g, needs_z=planes.several)
+    if len(planes.name) > 2 or not len(planes.name) >= 1:
+        return None
+    if len(read.names) > 1 and "rotor" not in answer.ask.where:
+        return None
+    which = read.names.index(answer.ask.where["rotor"]) if "rotor" in answer.ask.where else 0
+    rows = np.flatnonzero(read.rotor == which)
+    names = read.table.texts.get("name") or [f"mass {k}" for k in range(1, read.table.rows + 1)]
+    z = read.z if read.z is not None else np.zeros(len(read.moment))
+    plane_z = planes.z if planes.z is not None else np.zeros(len(planes.name))
+    return Rotor(
+        [names[k] for k in rows], read.moment[rows], z[rows], planes.name, np.asarray(plane_z, float),
+        np.asarray(planes.radius, float), g, read.weights, -1.0 if "--remove" in words else 1.0,
+    )  # fmt: skip
+
+
+KINDS = ("mass", "weight", "unbalance", "angle")
+
+
+def kind_of(answer: Answer) -> str:
+    """What a question asks of a correction: mass, weight, unbalance, angle; empty for anything else."""
+    name = parted(answer.ask.quantity)[0].lower()
+    return name if name in KINDS else ""
+
+
+def slips(variant: Variant, number: int) -> Candidates | None:
+    """Return the slips of a correction."""
+    answer = variant.answers[number]
+    kind = kind_of(answer)
+    own = rotor(variant, answer) if kind else None
+    if own is None:
+        return None
+    p = list(own.planes).index(answer.ask.where["plane"]) if "plane" in answer.ask.where else 0
+    right = own.corrections[p]
+
+    def value_of(u: Complexes) -> Real:
+        # in the unit asked for, by the right answer
+        if kind == "angle":
+            return np.asarray(degrees(u)) if unit_name(answer.unit) == "deg" else np.radians(degrees(u))
+        return np.asarray(np.abs(u) * (answer.value / abs(right)))
+
+    changes = list(own.changes())
+    singles: list[Slip] = []
+    pairs = None
+    if changes:
+        by = np.array([change.by for change in changes])
+        term = np.array([change.term for change in changes])
+        changed = np.tile(own.moment, (len(changes), 1))
+        changed[np.arange(len(changes)), term] += by
+        after = own.corrections_of(changed)[:, p]
+        singles += [Slip(c.text, float(v)) for c, v in zip(changes, value_of(after), strict=True)]
+        # in the forces alone, with the other plane right; in the moments alone, carried into the forces
+        if len(own.planes) == 2:
+            forces, other = right - own.sign * by, own.corrections_of(changed)[:, 1 - p]
+            moments = right - (other - own.corrections[1 - p])
+            for where, u in (("forces", forces), ("moments", moments)):
+                singles += [
+                    Slip(f"{c.text} in the sum of the {where}", float(v))
+                    for c, v in zip(changes, value_of(u), strict=True)
+                ]
+        pairs = _pairs(own, p, changes, value_of, answer)
+    singles += _final(own, kind, p, answer, right)
+    return Candidates(answer, singles, (lambda: pairs) if pairs is not None else (lambda: None))
+
+
+def _pairs(own: Rotor, p: int, changes: Sequence[Change], value_of, answer: Answer) -> Pairs | None:  # type: ignore[no-untyped-def]
+    """Two slips at two masses."""
+    i, j = np.triu_indices(len(changes), 1)
+    term = np.array([change.term for change in changes])
+    by = np.array([change.by for change in changes])
+    apart = term[i] != term[j]
+    i, j = i[apart], j[apart]
+    if not len(i) or len(i) > 20_000:
+        return None
+    moments = np.tile(own.moment, (len(i), 1))
+    row = np.arange(len(i))
+    moments[row, term[i]] += by[i]
+    moments[row, term[j]] += by[j]
+    values = value_of(own.corrections_of(moments)[:, p])
+    sign = np.array([change.is_sign for change in changes])
+    good = np.isfinite(values) & (np.abs(values - answer.value) > 1e-9 * abs(answer.value))
+    i, j, values = i[good], j[good], values[good]
+    return Pairs(values, lambda k: together(changes[i[k]], changes[j[k]]), sign[i] | sign[j])
+
+
+def _final(own: Rotor, kind: str, p: int, answer: Answer, right: complex) -> Iterator[Slip]:
+    """Slips of the last step: the angle's quadrant and sense, radius, weight."""
+    value = answer.value
+    if kind == "angle":
+        half, quarter = (180.0, 90.0) if unit_name(answer.unit) == "deg" else (np.pi, np.pi / 2)
+        yield Slip(
+            "180° off: the angle of the unbalance in place of the correction's, or the wrong quadrant",
+            (value + half) % (2 * half),
+        )
+        yield Slip("the angle is counted the other way", -value % (2 * half))
+        yield Slip("sine in place of cosine in the angle", (quarter - value) % (2 * half))
+        yield Slip(
+            "radians in place of degrees" if half == 180.0 else "degrees in place of radians",
+            value * np.pi / 180 if half == 180.0 else value * 180 / np.pi,
+        )
+        return
+    g = own.gravity
+    if kind == "mass":
+        yield Slip("the weight in place of the mass", value * g)
+    if kind == "weight":
+        yield Slip("the mass in place of the weight", value / g)
+    if own.weights or kind == "weight":
+        for other in GRAVITIES:
+            if abs(other - g) > 1e-6 * g and (abs(g - 10) < 1e-9 or abs(other - 10) < 1e-9):
+                yield Slip(
+                    f"g = {other:g} in place of {g:g}", value * (other / g if kind == "weight" else g / other)
+                )
+    if kind != "unbalance":
+        yield Slip("the diameter in place of the radius of the plane", value / 2)
+        yield Slip("the unbalance in place of what stands at the radius", value * float(own.radius[p]))
+    yield Slip("the answer is ten times too large", value * 10)
+    yield Slip("the answer is ten times too small", value / 10)
+
+
+def carried(
+    variant: Variant, number: int, given: Mapping[int, tuple[float, float]]
+) -> tuple[float, float] | None:
+    """Return the range of the answer that follows from earlier answers as they were given, in its unit.
+
+    Parameters
+    ----------
+    given
+        Of earlier questions by their number: the value typed, in the unit asked for, and half a unit of its last digit.
+    """
+    answer = variant.answers[number]
+    kind = kind_of(answer)
+    own = rotor(variant, answer) if kind else None
+    if own is None:
+        return None
+    here = answer.ask.where.get("plane", own.planes[0])
+    p = list(own.planes).index(here)
+    same = {
+        kind_of(variant.answers[k]): pair for k, pair in given.items()
+        if _plane(variant.answers[k], own) == here and _rotor(variant.answers[k]) == _rotor(answer)
+    }  # fmt: skip
+    other = {
+        kind_of(variant.answers[k]): (variant.answers[k], pair) for k, pair in given.items()
+        if _plane(variant.answers[k], own) not in (here, None) and _rotor(variant.answers[k]) == _rotor(answer)
+    }  # fmt: skip
+    right = own.corrections[p]
+    if kind != "angle":
+        # mass, weight and unbalance of one plane are in proportion
+        for earlier in ("unbalance", "mass", "weight"):
+            if earlier != kind and earlier in same:
+                k = next(
+                    k
+                    for k in given
+                    if kind_of(variant.answers[k]) == earlier and _plane(variant.answers[k], own) == here
+                )
+                share = answer.value / variant.answers[k].value
+                value, half = same[earlier]
+                return (value - half) * share, (value + half) * share
+    if len(own.planes) != 2 or not other:
+        return None
+    q = 1 - p
+    sizes, angles = [abs(own.corrections[q])], [float(np.angle(own.corrections[q]))]
+    for earlier, (its, (value, half)) in other.items():
+        if earlier == "angle":
+            unit = np.pi / 180 if unit_name(its.unit) == "deg" else 1.0
+            angles = [(value + share * half) * unit for share in (-1.0, 0.0, 1.0)]
+        elif earlier:
+            scale = abs(own.corrections[q]) / its.value
+            sizes = [(value + share * half) * scale for share in (-1.0, 0.0, 1.0)]
+    u = np.array([size * np.exp(1j * angle) for size in sizes for angle in angles])
+    # what the other plane leaves of the forces
+    made = right - (u - own.corrections[q])
+    if kind == "angle":
+        middle = degrees(made[len(made) // 2 : len(made) // 2 + 1])
+        off = np.remainder(degrees(made) - middle + 180.0, 360.0) - 180.0
+        low, high = float(middle[0] + off.min()), float(middle[0] + off.max())
+        return (
+            (low, high)
+            if unit_name(answer.unit) == "deg"
+            else (float(np.radians(low)), float(np.radians(high)))
+        )
+    values = np.abs(made) * (answer.value / abs(right))
+    return float(values.min()), float(values.max())
+
+
+def _plane(answer: Answer, own: Rotor) -> str | None:
+    return answer.ask.where.get("plane", own.planes[0]) if kind_of(answer) else None
+
+
+def _rotor(answer: Answer) -> str:
+    return answer.ask.where.get("rotor", "")

@@ -1,0 +1,226 @@
+"""Sheets, key, table of answers and solutions of an exercise."""
+
+from __future__ import annotations
+
+import csv
+import html
+import io
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from cli.exercise.description import Ask, Exercise, Value, cell_of
+from cli.exercise.solving import Answer, Sheet, Workshop, unit_text
+from cli.exercise.variants import Variant
+from dalembert.errors import DataError, quote
+from dalembert.figures import written
+from dalembert.units import parted
+from dalembert.units import written as unit_written
+
+STYLE = """
+:root { color-scheme: light }
+body { font: 11pt/1.45 "Helvetica Neue", Arial, "Liberation Sans", sans-serif; color: #111; background: #fff;
+  max-width: 184mm; margin: 8mm auto; padding: 0 4mm; overflow-wrap: anywhere }
+h1 { font-size: 17pt; line-height: 1.2; margin: 0 0 2mm } h2 { font-size: 13pt; margin: 6mm 0 1mm; break-after: avoid }
+h3 { font-size: 11pt; margin: 4mm 0 1mm; break-after: avoid }
+.student { display: flex; flex-wrap: wrap; gap: 1mm 8mm; border-bottom: .4mm solid #111; padding-bottom: 1mm; margin-bottom: 4mm }
+p { margin: 2mm 0 } table { border-collapse: collapse; margin: 2mm 0; font-size: 10pt; max-width: 100% }
+th, td { padding: 1mm 1.6mm; border: .2mm solid #bbb; text-align: left; vertical-align: top; overflow-wrap: normal } th { background: #eee }
+.n { text-align: right; font-variant-numeric: tabular-nums } tr { break-inside: avoid } .wide { overflow-x: auto }
+.dense { font-size: 9pt } .dense th, .dense td { padding: .7mm 1mm } figure { margin: 4mm 0; break-inside: avoid } figure svg, figure img { display: block; width: 100%; max-width: 132mm; height: auto; margin: 0 auto }
+.blank { width: 40mm; min-width: 20mm } .small { font-size: 9pt; color: #444 } pre { font: 9pt/1.35 monospace; white-space: pre-wrap; margin: 1.5mm 0 }
+section + section { break-before: page }
+@page { size: A4; margin: 14mm 13mm } @media print { body { margin: 0; padding: 0; max-width: none } .wide { overflow: visible } }
+"""
+
+
+@dataclass(frozen=True)
+class Student:
+    """A student: the column `student` of the roster, and the other columns."""
+
+    name: str
+    others: Mapping[str, str]
+
+    @property
+    def file(self) -> str:
+        """How a file is named after the student."""
+        return re.sub(r"[^\w.@+-]+", "-", self.name, flags=re.UNICODE).strip("-.") or "student"
+
+
+def page(title: str, body: str, style: str = "") -> bytes:
+    """Return a page of HTML that holds all it needs."""
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{html.escape(title)}</title><style>{STYLE}{style}</style></head>\n<body>\n{body}\n</body></html>\n"
+    ).encode()
+
+
+def spoken(value: Value) -> str:
+    """Return a datum as people write it: `55 mm`, `60°`, `−5 N`."""
+    number = f"{value.number:f}".replace("-", "−")
+    unit = unit_text(value.unit)
+    return f"{number}{unit}" if unit == "°" else f"{number} {unit}".strip()
+
+
+def filled(workshop: Workshop, drawn: Mapping[str, Value], form: Callable[[str], str] = str) -> str:
+    """Return the text with the student's numbers in place of the names in braces.
+
+    Raises
+    ------
+    DataError
+        A name that is no datum of the exercise.
+    """
+    exercise = workshop.exercise
+
+    def put(match: re.Match[str]) -> str:
+        name = match[1].strip()
+        value = workshop.datum(name, drawn)
+        if value is None:
+            raise DataError(
+                f"{exercise.file}: key text: found {quote('{' + name + '}')}, expected a name of [draw], a dimension of the "
+                "mechanism or a table's cell such as {rotor.csv:W1.mass_kg} that holds a number"
+            )
+        return form(spoken(value))
+
+    return re.sub(r"\{([^{}\n]+)\}", put, exercise.text)
+
+
+def paragraphs(workshop: Workshop, drawn: Mapping[str, Value]) -> str:
+    """Return the text as paragraphs of HTML."""
+    text = filled(workshop, drawn).strip()
+    return "".join(
+        f"<p>{html.escape(part.strip())}</p>\n" for part in re.split(r"\n\s*\n", text) if part.strip()
+    )
+
+
+def label(ask: Ask) -> str:
+    """Return what a question asks for, in words."""
+    if ask.label:
+        return ask.label
+    name = parted(ask.quantity, further=("kg_m2_s", "J", "W", "rad_s3", "m_s3"))[0].replace("_", " ")
+    where = ", ".join(
+        f"{key.removesuffix('_deg')} {text}{'°' if key.endswith('_deg') else ''}"
+        for key, text in ask.where.items()
+    )
+    return f"{name} ({where})" if where else name
+
+
+def figures_text(figures: int) -> str:
+    """Return how many figures are asked for, in words."""
+    return "1 significant figure" if figures == 1 else f"{figures} significant figures"
+
+
+def points_text(ask: Ask) -> str:
+    """Return the points of a question."""
+    number = f"{float(ask.points):g}"
+    return f"{number} point" if number == "1" else f"{number} points"
+
+
+def problem_html(variant: Variant, drawing: str) -> str:
+    """Return the problem of a student: text, tables, figure."""
+    workshop = variant.problem.workshop
+    parts = [paragraphs(workshop, variant.drawn)]
+    shown = set(re.findall(r"\{([^{}\n]+)\}", workshop.exercise.text))
+    parts += [sheet_html(sheet) for sheet in variant.problem.sheets.values()]
+    left = [
+        (name, value) for name, value in variant.drawn.items() if name not in shown and cell_of(name) is None
+    ]
+    if left:
+        items = "; ".join(f"{html.escape(name)} = {html.escape(spoken(value))}" for name, value in left)
+        parts.append(f"<p>Given: {items}</p>\n")
+    if drawing:
+        parts.append(f"<figure>{drawing}</figure>\n")
+    return "".join(parts)
+
+
+def sheet_html(sheet: Sheet) -> str:
+    """Return a table of data."""
+
+    def head(title: str) -> str:
+        name, unit = parted(title, further=("kg_m2", "kg_m2_s"))
+        return html.escape(
+            f"{name.replace('_', ' ')} [{unit_written(unit)}]" if unit else title.replace("_", " ")
+        )
+
+    def cell(text: str) -> str:
+        number = re.fullmatch(r"\s*[-−]?[\d.,]+(?:[eE][-+]?\d+)?\s*", text) is not None
+        return (
+            f'<td class="n">{html.escape(text.replace("-", "−"))}</td>'
+            if number
+            else f"<td>{html.escape(text)}</td>"
+        )
+
+    rows = "".join(f"<tr>{''.join(map(cell, row))}</tr>\n" for row in sheet.rows)
+    header = "".join(f"<th>{head(title)}</th>" for title in sheet.header)
+    dense = ' class="dense"' if len(sheet.header) > 8 else ""
+    return f'<div class="wide"><table{dense}><thead><tr>{header}</tr></thead><tbody>{rows}</tbody></table></div>\n'
+
+
+def sheet_page(exercise: Exercise, student: Student, variant: Variant, drawing: str) -> bytes:
+    """Return the sheet of a student."""
+    others = "".join(
+        f"<span>{html.escape(k)}: {html.escape(v)}</span>" for k, v in student.others.items() if v
+    )
+    rows = "".join(
+        f"<tr><td>{html.escape(label(answer.ask))}</td><td>{html.escape(unit_text(answer.unit) or 'number')}</td>"
+        f'<td class="n">{answer.ask.figures}</td><td class="n">{float(answer.ask.points):g}</td><td class="blank"></td></tr>\n'
+        for answer in variant.answers
+    )
+    angles = (
+        " Angles count counter-clockwise from x; a whole turn more or less is the same angle."
+        if any(answer.is_angle for answer in variant.answers)
+        else ""
+    )
+    body = (
+        f"<h1>{html.escape(exercise.title)}</h1>\n"
+        f'<div class="student"><span>student: <b>{html.escape(student.name)}</b></span>{others}</div>\n'
+        f"{problem_html(variant, drawing)}<h2>Find</h2>\n"
+        '<div class="wide"><table><thead><tr><th>quantity</th><th>unit</th><th>figures</th><th>points</th><th>answer</th></tr></thead>'
+        f"<tbody>{rows}</tbody></table></div>\n"
+        f'<p class="small">“Figures” says how many significant figures the answer has. The numbers of this sheet count as exact.{angles}</p>'
+        + (f'<p class="small">After {html.escape(exercise.source)}</p>' if exercise.source else "")
+    )
+    return page(f"{exercise.title}: {student.name}", body)
+
+
+def table_text(header: Sequence[str], rows: Iterable[Sequence[str]]) -> bytes:
+    """Return a CSV file."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(rows)
+    return stream.getvalue().encode()
+
+
+def answers_csv(exercise: Exercise, students: Sequence[Student], variants: Sequence[Variant]) -> bytes:
+    """Return the table of answers to be filled in."""
+    others, keys = list(students[0].others), exercise.keys
+    header = ["student", *others, *keys, "quantity", "unit", "answer"]
+    rows = [
+        [student.name, *student.others.values(), *_question(answer, keys), ""]
+        for student, variant in zip(students, variants, strict=True)
+        for answer in variant.answers
+    ]
+    return table_text(header, rows)
+
+
+def _question(answer: Answer, keys: Sequence[str]) -> list[str]:
+    return [*(answer.ask.where.get(key, "") for key in keys), answer.ask.quantity, answer.unit]
+
+
+def key_csv(exercise: Exercise, students: Sequence[Student], variants: Sequence[Variant]) -> bytes:
+    """Return the key: the right answers rounded and whole, and the numbers of each student."""
+    others, keys = list(students[0].others), exercise.keys
+    drawn = [draw.name for draw in exercise.draws]
+    header = ["student", *others, *keys, "quantity", "unit", "answer", "value", "figures", "points", *drawn]
+    rows = [
+        [
+            student.name, *student.others.values(), *_question(answer, keys), written(answer.value, answer.ask.figures),
+            repr(answer.value), str(answer.ask.figures), f"{float(answer.ask.points):g}",
+            *(str(variant.drawn[name]) for name in drawn),
+        ]
+        for student, variant in zip(students, variants, strict=True)
+        for answer in variant.answers
+    ]  # fmt: skip
+    return table_text(header, rows)

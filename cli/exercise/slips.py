@@ -1,0 +1,187 @@
+"""The likely mistake behind a wrong answer: what one slip of a list, or two, make of the right answer.
+
+A slip is named where it reproduces the answer to its digits. Two slips are named only where the answer has four digits or
+more, and where there are so few pairs about the answer that a random number would hardly meet one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from functools import cached_property
+from math import isfinite, remainder
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cli.exercise.solving import Answer
+from dalembert.figures import Right, Typed
+from dalembert.units import unit_name
+
+Real = NDArray[np.float64]
+
+DIGITS = 4
+"""From so many digits on two slips may be named."""
+CHANCE = 0.012
+"""Two slips are named where less than this share of random numbers about the answer would meet a pair."""
+ABOUT = 0.2
+"""What is about the answer: within this share of it."""
+
+
+@dataclass(frozen=True)
+class Slip:
+    """What one slip makes of an answer, in the unit asked for."""
+
+    text: str
+    value: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Pairs:
+    """What two slips make of an answer: values, and which two slips; the likelier kind first."""
+
+    values: Real
+    texts: Callable[[int], str]
+    likely: NDArray[np.bool_]
+    """Where one of the two is a sign."""
+
+
+@dataclass(eq=False, repr=False)
+class Candidates:
+    """The slips of one question."""
+
+    answer: Answer
+    singles: list[Slip]
+    pairs: Callable[[], Pairs | None] = lambda: None
+
+    @cached_property
+    def right(self) -> Right:
+        """The judge of the right answer."""
+        return Right(self.answer.value, self.answer.ask.figures)
+
+    @cached_property
+    def _pairs(self) -> Pairs | None:
+        return self.pairs()
+
+    @cached_property
+    def wrong(self) -> list[Slip]:
+        """The slips that change the answer at the figures asked."""
+        seen, found = set(), []
+        for slip in self.singles:
+            if not isfinite(slip.value) or abs(slip.value) > 1e60:
+                continue
+            exact = Decimal(slip.value)
+            if self.right.verdict(Typed(exact)) == "right" or (
+                self.answer.is_angle and self._off(slip.value) < 1e-9
+            ):
+                continue
+            key = f"{slip.value:.9g}"
+            if key not in seen:
+                seen.add(key)
+                found.append(slip)
+        return found
+
+    def _off(self, value: float) -> float:
+        return abs(self.distance(value, self.answer.value))
+
+    def distance(self, value: float, other: float) -> float:
+        """How far apart two values are; angles modulo a turn."""
+        if not self.answer.is_angle:
+            return value - other
+        return remainder(value - other, self.turn)
+
+    @property
+    def turn(self) -> float:
+        """A turn in the unit of an angle."""
+        return 360.0 if unit_name(self.answer.unit) == "deg" else 2 * np.pi
+
+    def name(self, number: Typed, scale: float = 1.0) -> str | None:
+        """Return the likely mistake behind a wrong answer; None where no slip reproduces it.
+
+        `scale`: the number's unit in the unit asked for.
+        """
+        a, size = float(number.value) * scale, abs(scale)
+        # zeros at the end of a whole number may stand for digits that were rounded
+        most = float(self.right.unit) / 2 * (1 + 1e-9)
+        halves = [float(half) * size for half in number.half_units]
+        halves = [half for half in halves if half <= most] or halves[:1]
+        near = [(abs(self.distance(slip.value, a)), k) for k, slip in enumerate(self.wrong)]
+        for half in halves:
+            hits = [k for off, k in near if off <= half * (1 + 1e-9)]
+            if hits:
+                return self.wrong[hits[0]].text
+        if number.digits < DIGITS or self._pairs is None:
+            return None
+        return self._of_two(a, halves[0])
+
+    def _of_two(self, a: float, half: float) -> str | None:
+        pairs = self._pairs
+        assert pairs is not None
+        off = pairs.values - a
+        if self.answer.is_angle:
+            off = off - self.turn * np.rint(off / self.turn)
+        off = np.abs(off)
+        room = ABOUT * abs(a) if not self.answer.is_angle else ABOUT * self.turn / 4
+        for among in (pairs.likely, np.ones(len(off), dtype=bool)):
+            about = np.count_nonzero(off[among] <= room)
+            if about * half > CHANCE * room:
+                return None
+            hits = np.flatnonzero(among & (off <= half * (1 + 1e-9)))
+            if len(hits):
+                return pairs.texts(int(hits[0]))
+        return None
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of one term of a sum."""
+
+    term: int
+    text: str
+    by: complex
+    """What it adds to the sum."""
+    is_sign: bool = False
+
+
+def together(first: Change, second: Change) -> str:
+    """Say two slips, a sign before the other."""
+    if second.is_sign and not first.is_sign:
+        first, second = second, first
+    return f"{first.text} and {second.text}"
+
+
+def of_sum(
+    answer: Answer,
+    changes: Sequence[Change],
+    total: complex,
+    value_of: Callable[[NDArray[np.complex128]], Real],
+) -> tuple[list[Slip], Callable[[], Pairs | None]]:
+    """Return the slips of an answer that follows from a sum of terms: each change, and pairs of changes of two terms.
+
+    `value_of`: the answer that follows from sums, in the unit asked for.
+    """
+    by = np.array([change.by for change in changes], dtype=complex)
+    singles = (
+        [Slip(c.text, float(v)) for c, v in zip(changes, value_of(total + by), strict=True)]
+        if len(by)
+        else []
+    )
+
+    def pairs() -> Pairs | None:
+        if len(by) < 2:
+            return None
+        i, j = np.triu_indices(len(by), 1)
+        term = np.array([change.term for change in changes])
+        apart = (term[i] != term[j]) & (term[i] >= 0) & (term[j] >= 0)
+        i, j = i[apart], j[apart]
+        if not len(i):
+            return None
+        sign = np.array([change.is_sign for change in changes])
+        values = value_of(total + by[i] + by[j])
+        right = abs(answer.value) or 1.0
+        good = np.isfinite(values) & (np.abs(values - answer.value) > 1e-9 * right)
+        i, j, values = i[good], j[good], values[good]
+        return Pairs(values, lambda k: together(changes[i[k]], changes[j[k]]), sign[i] | sign[j])
+
+    return singles, pairs

@@ -1,0 +1,459 @@
+"""A student's numbers put into the exercise's files, and the command run on them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from decimal import Decimal
+from fractions import Fraction
+from functools import cached_property
+from math import isfinite, isnan
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cli.exercise.description import Ask, Exercise, Value
+from cli.show.taking import result_of
+from dalembert.errors import DataError, quote
+from dalembert.hints import nearest
+from dalembert.quantities import is_number
+from dalembert.tables.files import SUFFIXES, split_sheet
+from dalembert.tables.sources import open_source
+from dalembert.units import composed, parted, unit_name, written
+
+if TYPE_CHECKING:
+    from dalembert.results.columns import Column, Document, Table
+
+MECHANISM = ("mechanism", "forces", "inspect", "equilibrium", "simulate", "tolerance")
+"""Commands on a mechanism's file: they take --set."""
+_FILES = (".csv", ".toml", ".txt", *SUFFIXES)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The right answer to a question, in the unit asked for."""
+
+    ask: Ask
+    value: float
+    unit: str
+    is_angle: bool = False
+
+
+@dataclass(eq=False, repr=False)
+class Sheet:
+    """A table of the exercise as its file has it: header and cells."""
+
+    file: str
+    header: list[str]
+    rows: list[list[str]]
+
+    def row(self, name: str) -> int | None:
+        """Return the row of a name: of a column that names rows, else the row's number."""
+        for title in ("name", "link", "part", "rotor", "plane", "cylinder", "run", "step"):
+            column = self.column(title)
+            if column is None:
+                continue
+            cells = [row[column] for row in self.rows]
+            if cells.count(name) == 1:
+                return cells.index(name)
+        if name.isdecimal() and 1 <= int(name) <= len(self.rows):
+            return int(name) - 1
+        return None
+
+    def column(self, title: str) -> int | None:
+        """Return the place of a column."""
+        same = [k for k, each in enumerate(self.header) if each.strip().lower() == title.lower()]
+        return same[0] if same else None
+
+    def names(self) -> list[str]:
+        """Return what rows are called."""
+        for title in ("name", "link", "part", "rotor", "cylinder", "run"):
+            column = self.column(title)
+            if column is not None and len({row[column] for row in self.rows}) == len(self.rows):
+                return [row[column] for row in self.rows]
+        return [str(k) for k in range(1, len(self.rows) + 1)]
+
+
+@dataclass(eq=False, repr=False)
+class Workshop:
+    """A folder for the tables of variants, and what all variants have in common."""
+
+    exercise: Exercise
+    folder: Path
+    sheets: dict[str, Sheet] = field(default_factory=dict)
+
+    def sheet(self, name: str) -> Sheet:
+        """Return a table of the exercise."""
+        if name not in self.sheets:
+            path = str(self.exercise.folder / name)
+            source = open_source(path, {}, None)
+            self.sheets[name] = Sheet(name, list(source.header), [list(cells) for _, cells in source.rows()])
+        return self.sheets[name]
+
+    @cached_property
+    def tables(self) -> list[str]:
+        """The tables that the command names."""
+        words = [
+            word
+            for word in self.exercise.command[1:]
+            if split_sheet(word)[0].lower().endswith((".csv", *SUFFIXES))
+        ]
+        return [word for word in words if not word.startswith("-")]
+
+    @cached_property
+    def mechanism(self) -> str | None:
+        """The mechanism's file, where the command has one."""
+        words = self.exercise.command
+        if words[0] not in MECHANISM:
+            return None
+        return next((word for word in words[1:] if word.lower().endswith(".toml")), None)
+
+    @cached_property
+    def described(self) -> Any:
+        """The mechanism as its file describes it."""
+        from cli.cases.call import load
+
+        assert self.mechanism is not None
+        return load(str(self.exercise.folder / self.mechanism))
+
+    @cached_property
+    def dimensions(self) -> Mapping[str, Any]:
+        """The dimensions of the mechanism by their paths."""
+        from virtualwork.describe.dimensions import dimensions
+
+        return {} if self.mechanism is None else dimensions(self.described.mechanism)
+
+    def check(self) -> None:
+        """Refuse names of [draw] that the exercise's files do not have, before anything is drawn."""
+        place = self.exercise.file
+        placeholders = {part for word in self.exercise.command for part in _placeholders(word)}
+        for draw in self.exercise.draws:
+            where = f"{place}: [draw], {draw.name}"
+            if draw.cell is not None:
+                self._check_cell(where, draw.cell, draw.values)
+                continue
+            if draw.name in placeholders:
+                continue
+            if self.mechanism is None:
+                raise DataError(
+                    f"{where}: no such datum: expected a table's cell such as 'rotor.csv:W1.mass_kg', or a name that stands "
+                    f"in braces in the command, such as {{{draw.name}}}"
+                )
+            if draw.name not in self.dimensions:
+                raise DataError(
+                    f"{where}: the mechanism has no such dimension{nearest(draw.name, self.dimensions)}"
+                )
+            self._check_unit(where, draw.values, self.dimensions[draw.name].kind)
+        for name in placeholders - {draw.name for draw in self.exercise.draws}:
+            raise DataError(f"{place}: key command: found {{{name}}}, expected a name of [draw]")
+
+    def _check_cell(self, where: str, cell: tuple[str, str, str], values: Sequence[Value]) -> None:
+        file, row, column = cell
+        if file not in self.tables:
+            raise DataError(
+                f"{where}: found the file {quote(file)}, expected one that the command reads: "
+                f"{', '.join(self.tables) or 'it reads no table'}{nearest(file, self.tables)}"
+            )
+        sheet = self.sheet(file)
+        if sheet.row(row) is None:
+            raise DataError(
+                f"{where}: no row {quote(row)} in {file}: expected one of {', '.join(sheet.names())}"
+            )
+        if sheet.column(column) is None:
+            raise DataError(
+                f"{where}: no column {quote(column)} in {file}: expected one of {', '.join(sheet.header)}"
+                f"{nearest(column, sheet.header)}"
+            )
+        unit = parted(column)[1]
+        for value in values:
+            if value.unit and converted(value, unit) is None:
+                raise DataError(
+                    f"{where}: found {quote(str(value))}, expected a value in the unit of the column {column}"
+                )
+
+    def _check_unit(self, where: str, values: Sequence[Value], kind: str) -> None:
+        from dalembert.quantities import expected, number_in_si
+
+        for value in values:
+            if value.unit and number_in_si(str(value), kind) is None:
+                raise DataError(f"{where}: found {quote(str(value))}, expected {expected(kind)}")
+
+    def problem(self, drawn: Mapping[str, Value]) -> Problem:
+        """Return the exercise with a student's numbers."""
+        return Problem(self, dict(drawn))
+
+    def datum(self, name: str, drawn: Mapping[str, Value]) -> Value | None:
+        """Return a datum by the name that stands in braces in the text; None where there is none."""
+        if name in drawn:
+            value = drawn[name]
+            cell = _cell(name)
+            return value if value.unit or cell is None else Value(value.number, _unit(cell[2]))
+        cell = _cell(name)
+        if cell is not None and cell[0] in self.tables:
+            sheet = self.sheet(cell[0])
+            row, column = sheet.row(cell[1]), sheet.column(cell[2])
+            if row is None or column is None:
+                return None
+            text = sheet.rows[row][column].strip().replace(",", ".")
+            return Value(Decimal(text), _unit(cell[2])) if is_number(text) else None
+        if name in self.dimensions:
+            return self._dimension(name)
+        return None
+
+    def _dimension(self, name: str) -> Value:
+        from dalembert.units import LISTED, from_si
+        from virtualwork.describe.dimensions import value
+
+        m, bare, *_ = self.described
+        kind = self.dimensions[name].kind
+        unit = {"length": bare.get("length", "m"), "angle": bare.get("angle", "deg")}.get(kind)
+        unit = unit or (LISTED[kind][0] if LISTED.get(kind) else "")
+        number = float(value(m, name))  # type: ignore[arg-type]
+        shown = from_si(number, kind, unit) if unit else number
+        return Value(Decimal(f"{shown:.12g}"), unit)
+
+
+def _cell(name: str) -> tuple[str, str, str] | None:
+    from cli.exercise.description import cell_of
+
+    return cell_of(name)
+
+
+def _unit(column: str) -> str:
+    return parted(column)[1]
+
+
+def _placeholders(word: str) -> list[str]:
+    import re
+
+    return re.findall(r"\{([A-Za-z_]\w*)\}", word)
+
+
+@contextmanager
+def workshop(exercise: Exercise) -> Iterator[Workshop]:
+    """A folder for the tables of variants, which goes when the work is done."""
+    folder = Path(tempfile.mkdtemp(prefix="dalembert-"))
+    try:
+        made = Workshop(exercise, folder)
+        made.check()
+        yield made
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def converted(value: Value, unit: str) -> str | None:
+    """Return a drawn value as a cell in a column's unit, exactly; None where the units do not fit."""
+    if not value.unit:
+        return f"{value.number:f}"
+    own, wanted = composed(value.unit), composed(unit) if unit else None
+    if own is None or wanted is None or own[1] != wanted[1]:
+        return None
+    if own[0] == wanted[0]:
+        return f"{value.number:f}"
+    (n, d), (wn, wd) = own[0], wanted[0]
+    if isinstance(n, int) and isinstance(d, int) and isinstance(wn, int) and isinstance(wd, int):
+        number = Fraction(value.number) * Fraction(n, d) / Fraction(wn, wd)
+        exact = Decimal(number.numerator) / Decimal(number.denominator)
+        return f"{exact:f}"
+    return repr(float(value.number) * n / d * wd / wn)
+
+
+@dataclass(eq=False, repr=False)
+class Problem:
+    """The exercise with the numbers of one student, perhaps with a slip in them."""
+
+    workshop: Workshop
+    drawn: dict[str, Value]
+    cells: dict[tuple[str, int, int], str] = field(default_factory=dict)
+    """Further cells of tables: file, row, column -> text."""
+    words: Sequence[str] = ()
+    """The command's words, where they are not the exercise's own."""
+    further: Sequence[str] = ()
+    """Words behind the command's."""
+
+    @property
+    def exercise(self) -> Exercise:
+        """The exercise."""
+        return self.workshop.exercise
+
+    @cached_property
+    def place(self) -> Path:
+        """The folder of its tables."""
+        return Path(tempfile.mkdtemp(dir=self.workshop.folder))
+
+    @cached_property
+    def sheets(self) -> dict[str, Sheet]:
+        """The tables with this student's numbers."""
+        found = {}
+        for name in self.workshop.tables:
+            own = self.workshop.sheet(name)
+            found[name] = Sheet(name, own.header, [list(row) for row in own.rows])
+        for name, value in self.drawn.items():
+            cell = _cell(name)
+            if cell is None:
+                continue
+            sheet = found[cell[0]]
+            row, column = sheet.row(cell[1]), sheet.column(cell[2])
+            assert row is not None
+            assert column is not None
+            text = converted(value, _unit(cell[2]))
+            assert text is not None
+            sheet.rows[row][column] = text
+        for (name, r, c), text in self.cells.items():
+            found[name].rows[r][c] = text
+        return found
+
+    @cached_property
+    def command(self) -> list[str]:
+        """The words of the command, files in place."""
+        changed = {cell[0] for name in self.drawn if (cell := _cell(name))} | {
+            name for name, *_ in self.cells
+        }
+        words = []
+        for word in self.words or self.exercise.command:
+            for name in _placeholders(word):
+                if name in self.drawn:
+                    word = word.replace(f"{{{name}}}", self.drawn[name].option)
+            if word in changed:
+                # a folder of its own: the tables of other students and slips stay as they are
+                path = self.place / Path(word).with_suffix(".csv").name
+                path.write_text(_csv(self.sheets[word]), encoding="utf-8")
+                words.append(str(path))
+            elif (
+                split_sheet(word)[0].lower().endswith(_FILES) and not word.startswith("-") and "=" not in word
+            ):
+                words.append(str(self.exercise.folder / word))
+            else:
+                words.append(word)
+        for name, value in self.drawn.items():
+            if _cell(name) is None and name in self.workshop.dimensions:
+                words += ["--set", f"{name}={value.option}"]
+        return [*words, *self.further]
+
+    def result(self, *further: str) -> Solved:
+        """Run the command.
+
+        Raises
+        ------
+        DataError
+            Named after the exercise: files in the temporary folder are none that the user knows.
+        """
+        words = [*self.command, *further]
+        try:
+            result = result_of(words)
+            with result.within():
+                tables = [table() for table in result.tables.values()]
+                document = result.documented()
+                failed = result.failed()
+        except DataError as error:
+            text = str(error).replace(f"{self.place}/", "")
+            raise DataError(f"{self.exercise.file}: key command: {text}") from None
+        if failed:
+            said = f": {result.warnings[0]}" if result.warnings else ""
+            raise DataError(f"{self.exercise.file}: key command: no case of it can be solved{said}")
+        return Solved(self.exercise, tables, document, result)
+
+
+def _csv(sheet: Sheet) -> str:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(sheet.header)
+    writer.writerows(sheet.rows)
+    return stream.getvalue()
+
+
+@dataclass(eq=False, repr=False)
+class Solved:
+    """What the command computes of a student's numbers."""
+
+    exercise: Exercise
+    tables: list[Table]
+    document: Document
+    result: Any
+
+    @cached_property
+    def answers(self) -> list[Answer]:
+        """The right answers, in the order of the questions.
+
+        Raises
+        ------
+        DataError
+            A quantity or a row that the result does not have, or one without a number.
+        """
+        return [self.answer(k, ask) for k, ask in enumerate(self.exercise.asks, 1)]
+
+    def answer(self, number: int, ask: Ask) -> Answer:
+        place = f"{self.exercise.file}: [[ask]] {number}"
+        table, column, scale = self._column(place, ask)
+        row = self._row(place, ask, table)
+        value = column.values[row]
+        if value is None or isinstance(value, str) or isnan(value) or not isfinite(value):
+            raise DataError(f"{place}, key quantity: {ask.quantity} has no number in that row")
+        unit = column.unit
+        number_asked = float(value)
+        if scale is not None:
+            unit, factor = scale
+            number_asked = float(Fraction(number_asked) * factor)
+        angle = unit_name(unit) in ("deg", "rad") and composed(unit) is not None
+        return Answer(ask, number_asked, unit, angle)
+
+    def _column(self, place: str, ask: Ask) -> tuple[Table, Column, tuple[str, Fraction] | None]:
+        """Return the table and column asked for, and what turns its numbers into the unit asked for."""
+        for table in self.tables:
+            for column in table.columns:
+                if ask.quantity.lower() in (column.header.lower(), column.name.lower()):
+                    return table, column, self._scale(place, ask, column, ask.unit)
+        base, unit = parted(ask.quantity)
+        for table in self.tables:
+            for column in table.columns:
+                if unit and column.unit and column.name.lower() == base.lower():
+                    return table, column, self._scale(place, ask, column, ask.unit or unit)
+        every = [column.header for table in self.tables for column in table.columns if column.unit]
+        raise DataError(
+            f"{place}, key quantity: found {quote(ask.quantity)}, expected a column of the result: "
+            f"{', '.join(dict.fromkeys(every))}{nearest(ask.quantity, every)}"
+        )
+
+    def _scale(self, place: str, ask: Ask, column: Column, unit: str) -> tuple[str, Fraction] | None:
+        if not unit or unit_name(unit) == column.unit:
+            return None
+        own, wanted = composed(column.unit), composed(unit)
+        if own is None or wanted is None or own[1] != wanted[1]:
+            raise DataError(f"{place}, key unit: found {quote(unit)}, expected a unit of {column.header}")
+        (n, d), (wn, wd) = own[0], wanted[0]
+        return unit, Fraction(n) / Fraction(d) * Fraction(wd) / Fraction(wn)
+
+    def _row(self, place: str, ask: Ask, table: Table) -> int:
+        cells = table.cells
+        for key in ask.where:
+            if key not in cells:
+                raise DataError(
+                    f"{place}, key where: found {quote(key)}, expected some of {', '.join(table.keys)}{nearest(key, table.keys)}"
+                )
+        rows = [
+            row
+            for row in range(table.length)
+            if all(_same(cells[key][row], text) for key, text in ask.where.items())
+        ]
+        if len(rows) == 1:
+            return rows[0]
+        named = ", ".join(f"{key} {text}" for key, text in ask.where.items()) or "no key"
+        keys = ", ".join(key for key in table.keys if key in cells) or "none"
+        raise DataError(
+            f"{place}, key where: found {named}, which {len(rows)} rows of the result have, expected one row (keys: {keys})"
+        )
+
+
+def _same(cell: object, text: str) -> bool:
+    if isinstance(cell, str) or not is_number(text):
+        return str(cell) == text
+    return cell is not None and abs(float(cell) - float(text)) <= 1e-9 * max(1.0, abs(float(text)))  # type: ignore[arg-type]
+
+
+def unit_text(unit: str) -> str:
+    """Return a unit as people write it."""
+    return written(unit_name(unit)) if unit else ""

@@ -1,0 +1,182 @@
+"""Variants of an exercise: drawn from steps, only such as assemble, lie away from limits and are well conditioned."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from math import isfinite, prod, radians, remainder
+from random import Random
+from typing import Any
+
+from cli.exercise.description import Exercise, Value
+from cli.exercise.solving import Answer, Problem, Solved, Workshop
+from dalembert.errors import DataError
+from dalembert.figures import Right
+from dalembert.units import unit_name
+
+MOST_CONDITION = 25.0
+"""Of the constraint Jacobian with lengths divided by the mechanism's size."""
+MOST_GROWTH = 60.0
+"""An answer changes by at most so many times the share that a datum does."""
+STEP = Decimal("1e-6")
+NEAR_TIE = Decimal("0.02")
+"""An answer lies at least this share of a unit of its last figure away from where the rounding turns."""
+TRIES = 400
+"""So many variants are tried for each that is wanted."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Variant:
+    """The numbers of one student, and the right answers."""
+
+    problem: Problem
+    solved: Solved
+
+    @property
+    def drawn(self) -> Mapping[str, Value]:
+        """The drawn values by name."""
+        return self.problem.drawn
+
+    @property
+    def answers(self) -> list[Answer]:
+        """The right answers, in the order of the questions."""
+        return self.solved.answers
+
+
+def variants(workshop: Workshop, count: int, seed: int, warnings: list[str]) -> list[Variant]:
+    """Draw so many variants; each once, as long as there are enough.
+
+    Raises
+    ------
+    DataError
+        Where no variant can be used; why the last one cannot.
+    """
+    exercise = workshop.exercise
+    if not exercise.draws:
+        problem = workshop.problem({})
+        solved = problem.result()
+        solved.answers  # noqa: B018 - what cannot be asked is an error here
+        warnings.extend(solved.result.warnings)
+        one = Variant(problem, solved)
+        return [one] * count
+    found: list[Variant] = []
+    reason: str = ""
+    tried = refused = 0
+    for drawn in _orders(exercise, Random(seed)):
+        tried += 1
+        variant, why = _usable(workshop, drawn)
+        if variant is not None:
+            found.append(variant)
+            if len(found) == count:
+                break
+        else:
+            refused, reason = refused + 1, why
+        if tried >= TRIES * (len(found) + 1):
+            break
+    if not found:
+        raise DataError(
+            f"{exercise.file}: [draw]: no variant can be used: of {tried} none has answers that can be asked; the last: {reason}"
+        )
+    if len(found) < count:
+        warnings.append(
+            f"{exercise.file}: [draw]: {len(found)} variants for {count} students: some have the same numbers"
+            + (f" ({refused} variants cannot be used; the last: {reason})" if refused else "")
+        )
+    return [found[k % len(found)] for k in range(count)]
+
+
+def _orders(exercise: Exercise, random: Random) -> Iterator[dict[str, Value]]:
+    """Yield every combination once, in random order."""
+    sizes = [len(draw.values) for draw in exercise.draws]
+    every = prod(sizes)
+    if every <= 200_000:
+        numbers: Iterator[int] = iter(random.sample(range(every), every))
+    else:
+        numbers = _without_repeats(random, every)
+    for number in numbers:
+        drawn = {}
+        for draw, size in zip(exercise.draws, sizes, strict=True):
+            number, k = divmod(number, size)
+            drawn[draw.name] = draw.values[k]
+        yield drawn
+
+
+def _without_repeats(random: Random, every: int) -> Iterator[int]:
+    seen: set[int] = set()
+    while len(seen) < 200_000:
+        number = random.randrange(every)
+        if number not in seen:
+            seen.add(number)
+            yield number
+
+
+def _usable(workshop: Workshop, drawn: dict[str, Value]) -> tuple[Variant | None, str]:
+    """Return the variant, or why it cannot be used."""
+    problem = workshop.problem(drawn)
+    numbers = ", ".join(f"{name} {value}" for name, value in drawn.items())
+    try:
+        solved = problem.result()
+    except DataError as error:
+        return None, f"{numbers}: {str(error).removeprefix(f'{workshop.exercise.file}: ')}"
+    why = _pose_trouble(solved.document)
+    answers = solved.answers
+    why = why or next(filter(None, map(_trouble, answers)), "") or _growth(workshop, drawn, answers)
+    return (None, f"{numbers}: {why}") if why else (Variant(problem, solved), "")
+
+
+def _pose_trouble(document: Mapping[str, Any]) -> str:
+    """What is wrong with the poses of a mechanism: at a limit, close to one."""
+    poses = document.get("poses")
+    for pose in poses if isinstance(poses, Sequence) else ():
+        if not isinstance(pose, Mapping):
+            continue
+        if pose.get("assembled") is False:
+            return "the mechanism cannot be assembled"
+        if pose.get("marks"):
+            return f"the mechanism stands at a {pose['marks'][0]}"
+        condition = pose.get("condition")
+        if isinstance(condition, (int, float)) and not condition <= MOST_CONDITION:
+            return f"the mechanism is close to a limit (condition {condition:.3g})"
+    return ""
+
+
+def _trouble(answer: Answer) -> str:
+    """What is wrong with an answer for a question of figures."""
+    what = answer.ask.quantity
+    if not answer.is_angle and abs(answer.value) < 1e-12:
+        return f"{what} is zero: it has no figures"
+    right = Right(answer.value, answer.ask.figures)
+    if not right.answer:
+        return f"{what} is zero: it has no figures"
+    share = (abs(right.value) / right.unit) % 1
+    if abs(share - Decimal("0.5")) < NEAR_TIE:
+        return f"{what} = {answer.value:.8g} lies where its rounding turns"
+    return ""
+
+
+def _growth(workshop: Workshop, drawn: Mapping[str, Value], answers: Sequence[Answer]) -> str:
+    """What is wrong with the condition: an answer that hangs on the last digit of a datum."""
+    for name, value in drawn.items():
+        if not value.number:
+            continue
+        beside = {**drawn, name: Value(value.number * (1 + STEP), value.unit)}
+        try:
+            others = workshop.problem(beside).result().answers
+        except DataError:
+            return f"{name}: the mechanism is at a limit"
+        for answer, other in zip(answers, others, strict=True):
+            if not change(answer, other) <= MOST_GROWTH * float(STEP):
+                return f"{answer.ask.quantity} is badly conditioned: it depends on the last digits of {name}"
+    return ""
+
+
+def change(answer: Answer, other: Answer) -> float:
+    """The share of itself by which an answer changes; an angle in radians, modulo a turn."""
+    if answer.is_angle:
+        turn = 360.0 if unit_name(answer.unit) == "deg" else radians(360.0)
+        off = abs(remainder(other.value - answer.value, turn))
+        return radians(off) if turn == 360.0 else off
+    size = abs(answer.value)
+    off = abs(other.value - answer.value)
+    return off / size if size and isfinite(off) else float("inf")

@@ -1,0 +1,1 @@
+"""`dalembert grade`: the marks of answers to an exercise."""

@@ -1,0 +1,217 @@
+"""The verdict on every answer: right, rounding, figures, carried, wrong, blank; and its likely mistake."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from functools import cached_property
+from math import pi
+
+from cli.exercise import rotor_slips
+from cli.exercise.description import Exercise
+from cli.exercise.mistakes import candidates
+from cli.exercise.slips import Candidates
+from cli.exercise.solving import Answer, Workshop
+from cli.exercise.variants import Variant
+from cli.grade.answers import Student
+from dalembert.errors import DataError, quote
+from dalembert.figures import Right, Typed, typed
+from dalembert.units import composed
+
+SHARES = {"right": Fraction(1), "carried": Fraction(1), "rounding": Fraction(1, 2), "figures": Fraction(1, 2)}
+"""Of the points, by verdict."""
+RANK = ("right", "rounding", "figures", "carried", "wrong")
+TURNS = {"deg": Decimal(360), "rad": Decimal("6.28318530717958647692528676655900576839")}
+JOINED = {"Nm": "N*m", "kNm": "kN*m", "Nmm": "N*mm", "mNm": "mN*m", "kgm": "kg*m", "gmm": "g*mm", "kgmm": "kg*mm", "kgm2": "kg*m2",
+          "kgm²": "kg*m2", "degree": "deg", "degrees": "deg", "º": "deg", "rads": "rad", "radians": "rad"}  # fmt: skip
+"""Units as people run them together."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Mark:
+    """What is said of an answer."""
+
+    student: Student
+    answer: Answer
+    given: str
+    verdict: str
+    mistake: str | None = None
+
+    @property
+    def points(self) -> float:
+        """The points that it gets."""
+        return float(self.answer.ask.points * SHARES.get(self.verdict, Fraction(0)))
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """A typed number in its unit, and the verdict on it."""
+
+    number: Typed
+    scale: Fraction
+    """Of its unit in the unit asked for."""
+    verdict: str
+
+    @property
+    def value(self) -> float:
+        """In the unit asked for."""
+        return float(Fraction(self.number.value) * self.scale)
+
+    @property
+    def half(self) -> float:
+        """Half a unit of its last figure, in the unit asked for."""
+        return float(Fraction(self.number.half_unit) * abs(self.scale))
+
+
+@dataclass(eq=False, repr=False)
+class Judge:
+    """Marks the answers of students who were given the same numbers."""
+
+    variant: Variant
+
+    @cached_property
+    def slips(self) -> list[Candidates]:
+        """The slips of each question, found where an answer is wrong."""
+        return candidates(self.variant)
+
+    def marks(self, student: Student) -> list[Mark]:
+        """Return the marks of a student, in the order of the questions."""
+        marks: list[Mark] = []
+        earlier: dict[int, _Reading] = {}
+        for k, answer in enumerate(self.variant.answers):
+            text, unit = student.given.get(k, ("", ""))
+            mark, reading = self._mark(student, k, answer, text.strip(), unit.strip(), earlier)
+            marks.append(mark)
+            if reading is not None:
+                earlier[k] = (
+                    reading
+                    if reading.verdict == mark.verdict
+                    else _Reading(reading.number, reading.scale, mark.verdict)
+                )
+        return marks
+
+    def _mark(
+        self, student: Student, k: int, answer: Answer, text: str, unit: str, earlier: Mapping[int, _Reading]
+    ) -> tuple[Mark, _Reading | None]:
+        if text in ("", "-", "–", "—", "?"):
+            return Mark(student, answer, text, "blank"), None
+        numbers = typed(text)
+        if not numbers:
+            return Mark(student, answer, text, "wrong", f"{quote(text)} is no number"), None
+        readings = []
+        for number in numbers:
+            scale = scale_of(number.unit or unit or answer.unit, answer.unit)
+            if scale is None:
+                return Mark(
+                    student, answer, text, "wrong", f"the unit {quote(number.unit or unit)} does not fit"
+                ), None
+            readings.append(_Reading(number, scale, judge(answer, number, scale)))
+        best = min(readings, key=lambda reading: RANK.index(reading.verdict))
+        if best.verdict != "wrong":
+            return Mark(student, answer, text, best.verdict), best
+        for reading in readings:
+            if self._follows(k, reading, earlier):
+                return Mark(student, answer, text, "carried"), reading
+        for reading in readings:
+            mistake = self.slips[k].name(reading.number, float(reading.scale))
+            if mistake is not None:
+                return Mark(student, answer, text, "wrong", mistake), reading
+        return Mark(student, answer, text, "wrong"), best
+
+    def _follows(self, k: int, reading: _Reading, earlier: Mapping[int, _Reading]) -> bool:
+        """Whether an answer follows from earlier ones, of which one at least is not right."""
+        if all(each.verdict == "right" for each in earlier.values()):
+            return False
+        if self.variant.problem.exercise.command[0] != "balance":
+            return False
+        follows = rotor_slips.carried(
+            self.variant, k, {j: (each.value, each.half) for j, each in earlier.items()}
+        )
+        if follows is None:
+            return False
+        low, high = follows
+        answer = self.variant.answers[k]
+        middle, spread = (low + high) / 2, (high - low) / 2
+        if not middle:
+            return False
+        right = Right(middle, answer.ask.figures)
+        # what the earlier answers' own rounding leaves open, and that of this one
+        room = spread * (1 + 1e-9) + max(reading.half, float(right.unit) / 2)
+        off = self.slips[k].distance(reading.value, middle)
+        return abs(off) <= room and reading.number.digits >= min(2, answer.ask.figures)
+
+
+def scale_of(unit: str, asked: str) -> Fraction | None:
+    """Return a unit in another one, 1 kJ = 1000 J; None where they do not measure the same.
+
+    >>> scale_of("kJ", "J"), scale_of("Nm", "N_m"), scale_of("kg", "N_m"), scale_of("", "")
+    (Fraction(1000, 1), Fraction(1, 1), None, Fraction(1, 1))
+    """
+    if unit == asked or not asked:
+        return Fraction(1) if unit == asked or not unit else None
+    unit = JOINED.get(unit, "k*J" if unit == "" else unit)
+    own, wanted = _measure(unit), _measure(asked)
+    if own is None or wanted is None or own[1] != wanted[1]:
+        return None
+    return own[0] / wanted[0]
+
+
+def _measure(unit: str) -> tuple[Fraction, object] | None:
+    found = composed(unit)
+    if found is None and unit[:1] in "kM" and unit[1:]:
+        # kJ, MW: a thousand or a million of a unit that is known
+        bare = composed(unit[1:])
+        if bare is not None:
+            (n, d), exponents = bare
+            return Fraction(n) / Fraction(d) * (1000 if unit[0] == "k" else 10**6), exponents
+    if found is None:
+        return None
+    (n, d), exponents = found
+    return Fraction(n) / Fraction(d), exponents
+
+
+def judge(answer: Answer, number: Typed, scale: Fraction) -> str:
+    """Judge a number in its own unit; an angle counts modulo a turn."""
+    right = Right(Fraction(answer.value) / scale, answer.ask.figures)
+    verdict = right.verdict(number)
+    if verdict == "right" or not answer.is_angle:
+        return verdict
+    turn = Decimal(360) if _is_degrees(answer, scale) else TURNS["rad"]
+    turns = ((right.value - number.value) / turn).to_integral_value()
+    verdicts = [verdict, right.verdict(Typed(number.value + turns * turn))]
+    if turns:
+        verdicts.append(
+            Right(Fraction(right.value - turns * turn), answer.ask.figures).verdict(number)
+            if right.value != turns * turn
+            else "wrong"
+        )
+    return min(verdicts, key=RANK.index)
+
+
+def _is_degrees(answer: Answer, scale: Fraction) -> bool:
+    """Whether a number of an angle is in degrees."""
+    found = composed(answer.unit)
+    assert found is not None
+    (n, d), _ = found
+    return abs(float(scale) * n / d - pi / 180) < 1e-9
+
+
+def mark_all(exercise: Exercise, shop: Workshop, students: Sequence[Student]) -> list[Mark]:
+    """Mark all students; those with the same numbers share a judge."""
+    judges: dict[tuple[str, ...], Judge] = {}
+    marks: list[Mark] = []
+    for student in students:
+        numbers = tuple(str(student.drawn[draw.name]) for draw in exercise.draws)
+        if numbers not in judges:
+            problem = shop.problem(student.drawn)
+            try:
+                solved = problem.result()
+                solved.answers  # noqa: B018 - what cannot be solved is an error here, not in the middle of the marks
+            except DataError as error:
+                of = f" (student {student.name}: {', '.join(numbers)})" if numbers else ""
+                raise DataError(f"{error}{of}") from None
+            judges[numbers] = Judge(Variant(problem, solved))
+        marks += judges[numbers].marks(student)
+    return marks

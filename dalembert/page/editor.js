@@ -1,0 +1,367 @@
+// A mechanism whose dimensions are dragged and typed: handles, fields, undo, what is given back. `window.dalembert` is the same for scripts.
+const { model } = data;
+const main = document.querySelector("main");
+
+// --- what can be set ------------------------------------------------------------------------------------------------------
+const inputNames = model.inputs.map((input) => (machine.one ? "input" : input.name));
+const unitOf = (kind) => model.bare[kind] ?? { length: "m", angle: "deg" }[kind] ?? Object.keys(model.units[kind] ?? {})[0] ?? "";
+const inputKind = (j) => (model.inputs[j].slides ? "length" : "angle");
+const kindOf = (name) => (inputNames.includes(name) ? inputKind(inputNames.indexOf(name)) : machine.kinds.get(name));
+const shownInput = (j) => (shown < n ? machine.sweep[j][shown] : freePose[j]);
+const present = (name) => (inputNames.includes(name) ? shownInput(inputNames.indexOf(name)) : numbers[name]);
+const isName = (name) => inputNames.includes(name) || machine.kinds.has(name);
+
+const past = []; // [numbers, freePose, shown] before each change
+function remember() {
+  past.push([{ ...numbers }, freePose.slice(), shown]);
+  if (past.length > 500) past.shift();
+}
+// put numbers by name, SI and radians; the free pose is shown where an input is among them
+function put_(changed) {
+  let moved = false;
+  for (const [name, x] of Object.entries(changed)) {
+    const j = inputNames.indexOf(name);
+    if (j < 0) numbers[name] = x;
+    else {
+      if (!moved && shown < n) freePose = model.inputs.map((_, k) => shownInput(k));
+      freePose[j] = x;
+      moved = true;
+    }
+  }
+  if (moved) shown = n;
+}
+function nearestPose() {
+  let near = 0;
+  for (let i = 1; i < n; i++) if (Math.abs(machine.sweep[0][i] - freePose[0]) < Math.abs(machine.sweep[0][near] - freePose[0])) near = i;
+  return near;
+}
+let errors = [null, -1, null]; // state, pose, how far its rows are from 32 digits
+function errorAt(column, i) {
+  if (!state.rows || "input" in column || "zero" in column) return 0;
+  if (errors[0] !== state || errors[1] !== i) errors = [state, i, Number.isFinite(state.closed[i]) ? machine.errors(state, i) : null];
+  const found = errors[2];
+  if (!found) return undefined;
+  return (found[column.row] + (column.less === undefined ? 0 : found[column.less])) / (column.si ?? 1);
+}
+function fillHeld(cell, k, i, every) {
+  const x = k === null ? NaN : whole.columns[k].values[i];
+  const error = k === null ? 0 : errorAt(whole.columns[k], i);
+  if (k === null) cell.textContent = "";
+  else if (!every) cell.textContent = short(Number(held(x, error) === "–" ? NaN : held(x, error)));
+  else if (error === 0) fill(cell, x);
+  else cell.textContent = held(x, error);
+}
+
+// --- all anew -------------------------------------------------------------------------------------------------------------
+let due = 0;
+function update() {
+  cancelAnimationFrame(due);
+  due = 0;
+  recompute(whole);
+  for (const { series, parts } of figures) {
+    for (const [k, shape] of series.shapes.entries()) if (shape.s !== undefined) parts[k].setAttribute("r", Math.max(shape.s * scale, LEAST[shape.r] ?? 0).toFixed(2));
+  }
+  if (shown === n && n > 1) $("slider").value = nearestPose();
+  refresh();
+  listFields();
+  tell();
+  clearTimeout(waiting);
+  waiting = setTimeout(listLimits, 150);
+}
+function soon() {
+  if (!due) due = requestAnimationFrame(update);
+}
+const lengthText = (x) => `${Number((x / (model.units.length[unitOf("length")][0] / model.units.length[unitOf("length")][1])).toPrecision(3))} ${unitOf("length")}`;
+function whyNot() {
+  if (wrong.size) return "";
+  if (!state.chosen) return TEXTS.impossible;
+  if (Number.isFinite(state.closed[shown])) return "";
+  const found = machine.short(state, shown);
+  return found ? TEXTS.short(found[0], lengthText(found[1])) : TEXTS.open;
+}
+function tell(text = "") {
+  say(text || [...wrong.values()].map((name) => complaints.get(name)).join("; ") || whyNot());
+  missing.textContent = whyNot() || TEXTS.open;
+}
+const complaints = new Map();
+let waiting = 0;
+function listLimits() {
+  const found = wrong.size ? [] : machine.limits(numbers).map(([q]) => q);
+  const unit = unitOf(inputKind(0));
+  $("limits").textContent = !machine.one ? "" : found.length ? TEXTS.limits(found.map((q) => `${short(Number(shortest(q, model.units[inputKind(0)], unit)))} ${unit}`).join(", ")) : TEXTS.noLimits;
+}
+
+// --- buttons --------------------------------------------------------------------------------------------------------------
+const tools = make("div", { id: "tools", role: "group" });
+const alertLine = make("p", { id: "alert", role: "alert" });
+$("toggles").before(alertLine);
+$("legend").after(tools);
+function tool(text, act) {
+  const button = put(tools, "button", { type: "button" }, text);
+  button.addEventListener("click", act);
+  return button;
+}
+const undoButton = tool(TEXTS.undo, () => {
+  if (!past.length) return;
+  const [before, inputs, pose] = past.pop();
+  [numbers, freePose, shown] = [before, inputs, pose];
+  wrong.clear();
+  update();
+});
+tool(TEXTS.reset, () => {
+  remember();
+  [numbers, freePose] = [{ ...machine.own }, model.first.slice()];
+  wrong.clear();
+  update();
+  fit();
+  show(shown);
+});
+tool(TEXTS.fitDrawing, () => {
+  fit();
+  show(shown);
+});
+const given = make("textarea", { id: "given", readonly: "", rows: "3", "aria-label": "text to copy", hidden: "" });
+function handOver(text) {
+  given.hidden = false;
+  given.value = text;
+  given.select();
+  navigator.clipboard?.writeText(text).then(() => say(TEXTS.copied), () => {});
+}
+tool(TEXTS.copyOptions, () => handOver(options()));
+tool(TEXTS.copyFile, () => handOver(toml() || TEXTS.noFile));
+tool(TEXTS.saveFile, () => {
+  const text = toml();
+  if (!text) return say(TEXTS.noFile);
+  const link = make("a", { href: URL.createObjectURL(new Blob([text], { type: "application/toml" })), download: `${document.title.replace(/[^\w-]+/g, "-") || "mechanism"}.toml` });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+});
+tools.after(given);
+given.after(make("p", { id: "limits" }));
+
+// --- what is given back ---------------------------------------------------------------------------------------------------
+const quoted = (text) => (/^[\w@%+=:,./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
+function optionText(name, x) {
+  const kind = kindOf(name);
+  if (kind === "length") return `${shortest(x, model.units.length, "m")}m`;
+  if (kind === "angle") return `${shortest(x, model.units.angle, "deg")}deg`;
+  return String(x);
+}
+function options() {
+  const sets = changes().map((path) => `--set ${quoted(`${path}=${optionText(path, numbers[path])}`)}`);
+  const at = inputNames.map((name, j) => (machine.one ? "" : `${name}=`) + optionText(name, shownInput(j)));
+  return [...sets, `--at ${quoted(at.join(","))}`].join(" ");
+}
+function toml() {
+  if (!model.toml) return "";
+  const lines = model.toml.filter(({ of, needed }) => needed || of.some((piece) => Array.isArray(piece) && numbers[piece[0]] !== machine.own[piece[0]]));
+  return `${lines.map(({ of }) => of.map((piece) => (Array.isArray(piece) ? tomlNumber(numbers[piece[0]]) : piece)).join("")).join("\n")}\n`;
+}
+const tomlNumber = (x) => (Number.isInteger(x) ? `${x + 0}.0` : String(x).replace(/^(-?\d+)e/, "$1.0e"));
+
+// --- fields ---------------------------------------------------------------------------------------------------------------
+const fields = new Map();
+const panel = make("section", { id: "numbers" });
+main.append(panel);
+put(panel, "h2", {}, TEXTS.numbers);
+put(panel, "p", { class: "soft" }, `${TEXTS.howTo} ${TEXTS.digits}`);
+const positive = new Set(["mass", "inertia"]);
+function change(name, x, text) {
+  const kind = kindOf(name);
+  const refused = Number.isNaN(x) ? TEXTS.wrong(name, text, `${shortest(present(name), model.units[kind], unitOf(kind))} ${unitOf(kind)}`) : x < 0 && positive.has(kind) ? TEXTS.negative(name, text) : "";
+  if (refused) {
+    complaints.set(name, refused);
+    wrong.add(name);
+  } else {
+    if (!wrong.delete(name) || !Object.is(present(name), x)) remember();
+    put_({ [name]: x });
+  }
+  update();
+}
+function numberRow(body, name) {
+  const kind = kindOf(name);
+  const [units, unit] = [model.units[kind], unitOf(kind)];
+  const line = put(body, "div", { class: "number" });
+  put(line, "label", {}, name);
+  const input = numberField(line, name, name, units, unit, (x, text) => change(name, x, text));
+  input.addEventListener("blur", listFields);
+  put(line, "span", { class: "soft" }, unit);
+  const range = put(line, "input", { type: "range", min: "0", max: "400", step: "1", "aria-label": TEXTS.slider(name) });
+  // from half to one and a half of the first number; of what is zero some part of the size
+  const first = present(name);
+  const span = kind === "angle" && inputNames.includes(name) ? Math.PI : Math.abs(first) / 2 || (kind === "length" ? model.size / 4 : kind === "angle" ? 0.5 : 1);
+  const low = positive.has(kind) || kind !== "length" ? (first || !positive.has(kind) ? first - span : 0) : first - span;
+  range.addEventListener("input", () => {
+    if (!range.dataset.held) remember();
+    range.dataset.held = "1";
+    wrong.delete(name);
+    put_({ [name]: Number((low + (2 * span * Number(range.value)) / 400).toPrecision(6)) });
+    soon();
+  });
+  range.addEventListener("change", () => delete range.dataset.held);
+  range.addEventListener("keydown", (event) => event.stopPropagation());
+  fields.set(name, { input, range, units, unit, place: (x) => Math.round((400 * (x - low)) / (2 * span)) });
+}
+function listFields() {
+  for (const [name, { input, range, units, unit, place }] of fields) {
+    if (input === document.activeElement || wrong.has(name)) continue;
+    const text = shortest(present(name), units, unit);
+    if (input.value !== text) input.value = text;
+    input.removeAttribute("aria-invalid");
+    range.value = place(present(name));
+    input.parentNode.classList.toggle("changed", machine.kinds.has(name) && !Object.is(numbers[name], machine.own[name]));
+  }
+  undoButton.disabled = !past.length;
+}
+const groupsOf = new Map([[TEXTS.inputs, [...inputNames]]]);
+for (const path of machine.kinds.keys()) {
+  const parts = path.split(".");
+  const head = parts[0] === "links" ? parts.slice(0, 2).join(".") : parts[0];
+  groupsOf.set(head, [...(groupsOf.get(head) ?? []), path]);
+}
+for (const [head, names] of groupsOf) {
+  const box = put(panel, "details", head === TEXTS.inputs || names.length < 7 ? { open: "" } : {});
+  put(box, "summary", {}, head);
+  // rows are made when they are looked at
+  const fillBox = () => {
+    if (box.dataset.made || !box.open) return;
+    box.dataset.made = "1";
+    for (const name of names) numberRow(box, name);
+    listFields();
+  };
+  box.addEventListener("toggle", fillBox);
+  for (const name of names) numberRow(box, name);
+  box.dataset.made = "1";
+}
+
+// --- handles ----------------------------------------------------------------------------------------------------------------
+const handleLayer = put(svg, "g", { id: "handles" });
+const bodyIndex = (name) => whole.bodies.findIndex((b) => b.name === name);
+function local(path, body, point, origin) {
+  if (origin === null) return [numbers[`${path}.x`], numbers[`${path}.y`]];
+  const [x, y] = localOf(body, origin);
+  const [length, angle] = [numbers[`${path}.length`], numbers[`${path}.angle`]];
+  return [x + length * Math.cos(angle), y + length * Math.sin(angle)];
+}
+function localOf(body, point) {
+  return local(...model.handles.find(([, b, p]) => b === body && p === point));
+}
+let lastStands = null;
+const handleParts = model.handles.map((handle) => {
+  const [path, body] = handle;
+  const group = put(handleLayer, "g", { class: `handle ${classOf(bodyIndex(body))}`, tabindex: "0", role: "button", "data-name": path, "aria-label": TEXTS.handle(path) });
+  put(group, "circle", { class: "grip", r: 16 });
+  put(group, "circle", { class: "knob", r: 5 });
+  put(group, "title", {}, path);
+  const move = (x, y) => {
+    // a place in the picture in the axes of the body, with the digits of a pixel
+    const [ox, oy, c, s] = lastStands[bodyIndex(body)];
+    const [dx, dy] = [x - ox, y - oy];
+    const digit = 10 ** Math.floor(Math.log10(0.5 / scale));
+    const round = (value) => Number((Math.round(value / digit) * digit).toPrecision(12));
+    const [u, v] = [c * dx + s * dy, c * dy - s * dx];
+    if (handle[3] === null) put_({ [`${path}.x`]: round(u), [`${path}.y`]: round(v) });
+    else {
+      const [a, b] = localOf(body, handle[3]);
+      put_({ [`${path}.length`]: round(Math.hypot(u - a, v - b)), [`${path}.angle`]: Number(Math.atan2(v - b, u - a).toPrecision(6)) });
+    }
+    soon();
+  };
+  const place = () => carried(lastStands[bodyIndex(body)], ...local(...handle));
+  let grip = null;
+  group.addEventListener("pointerdown", (event) => {
+    if (!lastStands) return;
+    group.setPointerCapture(event.pointerId);
+    remember();
+    play(false);
+    const [x, y] = place();
+    grip = [px(x) - event.clientX, py(y) - event.clientY];
+    event.preventDefault();
+    group.focus();
+  });
+  group.addEventListener("pointermove", (event) => {
+    if (!grip) return;
+    const [u, v] = [event.clientX + grip[0], event.clientY + grip[1]];
+    move((left + right) / 2 + (u - width / 2) / scale, (low + high) / 2 - (v - height / 2) / scale);
+  });
+  for (const end of ["pointerup", "pointercancel"]) group.addEventListener(end, () => (grip = null));
+  group.addEventListener("keydown", (event) => {
+    const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    if (!way || !lastStands) return;
+    event.preventDefault();
+    event.stopPropagation();
+    remember();
+    const step = 10 ** Math.floor(Math.log10(model.size / 50)) * (event.shiftKey ? 10 : 1);
+    const [x, y] = place();
+    move(x + way[0] * step, y + way[1] * step);
+    update();
+  });
+  return { handle, group, place };
+});
+let gripped = true;
+drawHandles = (stands) => {
+  if (stands) lastStands = stands;
+  if (!lastStands) return;
+  for (const { handle, group, place } of handleParts) {
+    const body = bodyIndex(handle[1]);
+    let [u, v] = (([x, y]) => [px(x), py(y)])(place());
+    // beside a joint, towards the middle of the link, so that each link's own point can be taken
+    const others = model.handles.filter(([, b]) => b === handle[1]).map((one) => carried(lastStands[body], ...local(...one)));
+    const middle = [0, 1].map((axis) => others.reduce((sum, z) => sum + z[axis], 0) / others.length);
+    const way = body ? [px(middle[0]) - u, py(middle[1]) - v] : [0, 20];
+    const far = Math.hypot(...way);
+    const gap = Math.min(20, far);
+    if (far > 1) [u, v] = [u + (gap * way[0]) / far, v + (gap * way[1]) / far];
+    group.setAttribute("transform", `translate(${u.toFixed(1)} ${v.toFixed(1)})`);
+    group.style.display = gripped && Number.isFinite(u + v) ? "" : "none";
+  }
+};
+toggle("h", TEXTS.handles, true, (on) => (gripped = on));
+
+// --- for scripts ------------------------------------------------------------------------------------------------------------
+window.dalembert = {
+  names: [...inputNames, ...machine.kinds.keys()],
+  set(changed) {
+    const unknown = Object.keys(changed).find((name) => !isName(name));
+    if (unknown !== undefined) {
+      tell(TEXTS.unknown(unknown));
+      return false;
+    }
+    remember();
+    for (const [name, x] of Object.entries(changed)) {
+      wrong.delete(name);
+      const kind = kindOf(name);
+      if (typeof x !== "number" || !Number.isFinite(x) || (x < 0 && positive.has(kind))) {
+        wrong.add(name);
+        complaints.set(name, TEXTS.wrong(name, String(x), ""));
+      } else put_({ [name]: x });
+    }
+    update();
+    return Boolean(state.rows && Number.isFinite(state.closed[shown]));
+  },
+  get(name) {
+    if (isName(name)) return wrong.has(name) ? NaN : present(name);
+    const quantity = model.quantities[name];
+    return quantity ? machine.value(state, quantity, shown) : NaN;
+  },
+  curve(name) {
+    const quantity = model.quantities[name];
+    const j = inputNames.indexOf(name);
+    return Array.from({ length: n }, (_, l) => (j >= 0 ? machine.sweep[j][l] : quantity ? machine.value(state, quantity, l) : NaN));
+  },
+  limits: () => machine.limits(numbers).map(([q]) => q),
+  options,
+  toml,
+};
+
+// the pose that is shown at first: of the sweep where it is one of these
+{
+  const first = Array.from({ length: n }, (_, i) => i).find((i) => model.first.every((x, j) => machine.sweep[j][i] === x));
+  shown = first ?? n;
+}
+watchers.push(() => {
+  listFields();
+  tell();
+});
+start({ resize });
+listLimits();

@@ -1,0 +1,250 @@
+"""`dalembert exercise`: variants, sheets, key, solutions and Moodle's questions."""
+
+from __future__ import annotations
+
+import csv
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import Dalembert
+
+ROTOR = """name,weight_N,radius_mm,angle_deg,z_mm
+W1,90,30,60,20
+W2,60,50,210,65
+"""
+EXERCISE = """
+command = "balance rotor.csv --plane A:0mm:20mm --plane B:90mm:20mm --gravity 10"
+title = "A rotor"
+text = "W1 = {rotor.csv:W1.weight_N} at {rotor.csv:W1.radius_mm}, W2 at {rotor.csv:W2.angle_deg}."
+[draw]
+"rotor.csv:W1.weight_N" = "60N:120N:5N"
+"rotor.csv:W2.angle_deg" = [200, 210, 220]
+[[ask]]
+quantity = "mass_kg"
+where = { plane = "B" }
+figures = 3
+points = 2
+[[ask]]
+quantity = "angle_deg"
+where = { plane = "B" }
+[[ask]]
+quantity = "mass_kg"
+where = { plane = "A" }
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with an exercise."""
+    (tmp_path / "rotor.csv").write_text(ROTOR)
+    (tmp_path / "e.toml").write_text(EXERCISE)
+    return tmp_path
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_what_a_class_gets(dalembert: Dalembert, folder: Path) -> None:
+    done = dalembert("exercise", "e.toml", "--students", 4, "--seed", 7, "-o", "out")
+    assert done.returncode == 0, done.stderr
+    out = folder / "out"
+    names = {path.name for path in out.iterdir()}
+    assert names == {
+        "answers.csv",
+        "key.csv",
+        "solutions.html",
+        "moodle.xml",
+        *(f"sheet-{k}.html" for k in range(1, 5)),
+    }
+    answers, key = rows(out / "answers.csv"), rows(out / "key.csv")
+    assert list(answers[0]) == ["student", "plane", "quantity", "unit", "answer"]
+    assert len(answers) == 12
+    assert {row["answer"] for row in answers} == {""}
+    assert len({row["rotor.csv:W1.weight_N"] + row["rotor.csv:W2.angle_deg"] for row in key}) == 4
+    for k in range(1, 5):
+        sheet = (out / f"sheet-{k}.html").read_text()
+        own = next(row for row in key if row["student"] == str(k))
+        assert f"W1 = {own['rotor.csv:W1.weight_N']} at 30 mm" in sheet
+        assert "<svg" in sheet
+        # nothing of the answers
+        assert not any(
+            row["answer"] in re.sub(r"<svg.*?</svg>", "", sheet) for row in key if len(row["answer"]) > 3
+        )
+
+
+def test_the_key_is_what_the_command_says_of_each_students_numbers(
+    dalembert: Dalembert, folder: Path
+) -> None:
+    dalembert("exercise", "e.toml", "--students", 3, "-o", "out")
+    for student in ("1", "2", "3"):
+        own = [row for row in rows(folder / "out" / "key.csv") if row["student"] == student]
+        weight, angle = own[0]["rotor.csv:W1.weight_N"].removesuffix(" N"), own[0]["rotor.csv:W2.angle_deg"]
+        (folder / "mine.csv").write_text(
+            ROTOR.replace("W1,90", f"W1,{weight}").replace("50,210", f"50,{angle}")
+        )
+        done = dalembert(
+            "balance", "mine.csv", "--plane", "A:0mm:20mm", "--plane", "B:90mm:20mm", "--gravity", 10
+        )
+        found = {row["plane"]: row for row in csv.DictReader(done.stdout.splitlines())}
+        for row in own:
+            assert float(row["value"]) == pytest.approx(
+                float(found[row["plane"]][row["quantity"]]), rel=1e-14
+            )
+
+
+def test_the_same_seed_is_the_same_folder_and_another_is_not(dalembert: Dalembert, folder: Path) -> None:
+    for name, seed in (("one", 5), ("two", 5), ("three", 6)):
+        assert dalembert("exercise", "e.toml", "--students", 3, "--seed", seed, "-o", name).returncode == 0
+    one, two, three = (
+        {p.name: p.read_bytes() for p in (folder / name).iterdir()} for name in ("one", "two", "three")
+    )
+    assert one == two
+    assert one["key.csv"] != three["key.csv"]
+
+
+def test_a_roster_names_the_sheets_and_keeps_its_columns(dalembert: Dalembert, folder: Path) -> None:
+    (folder / "class.csv").write_text("student,group\nAna Sá,1\n07,2\n7,2\n")
+    done = dalembert("exercise", "e.toml", "--students", "class.csv", "-o", "out")
+    assert done.returncode == 0, done.stderr
+    assert (folder / "out" / "sheet-Ana-Sá.html").exists()
+    assert [(row["student"], row["group"]) for row in rows(folder / "out" / "answers.csv")][::3] == [
+        ("Ana Sá", "1"),
+        ("07", "2"),
+        ("7", "2"),
+    ]
+
+
+def test_variants_keep_away_from_what_cannot_be_assembled(dalembert: Dalembert, folder: Path) -> None:
+    (folder / "bar.toml").write_text(
+        '[units]\nlength = "mm"\nangle = "deg"\n[ground]\nA = [0, 0]\nD = [300, 0]\n[links.crank]\npoints = { A = [0, 0], B = [100, 0] }\n'
+        "[links.bar]\npoints = { B = [0, 0], C = [250, 0] }\n[links.rocker]\npoints = { D = [0, 0], C = [150, 0] }\n"
+        '[input]\nlink = "crank"\nangle = 60\n[guess]\nat = 60\nbar = 20\nrocker = 80\n'
+    )
+    (folder / "m.toml").write_text(
+        'command = "mechanism bar.toml --at 60deg"\ntitle = "m"\n[draw]\n"links.bar.C.x" = "20mm:400mm:20mm"\n'
+        '[[ask]]\nquantity = "rocker_angle_deg"\n'
+    )
+    done = dalembert("exercise", "m.toml", "--students", 8, "-o", "out")
+    assert done.returncode == 0, done.stderr
+    lengths = {float(row["links.bar.C.x"].removesuffix(" mm")) for row in rows(folder / "out" / "key.csv")}
+    # B stands at (50, 86.6), D at (300, 0): 264.6 apart; the bar and the rocker of 150 reach from 114.6 to 414.6
+    assert len(lengths) == 8
+    assert all(120 < length < 410 for length in lengths)
+
+
+def moodle_takes(question: ET.Element, value: float) -> tuple[float, str]:
+    """Moodle's rule: the first answer that is at most its tolerance away gives fraction and feedback (nominal tolerance)."""
+    for answer in question.findall("answer"):
+        nominal, tolerance = float(answer.findtext("text", "")), abs(float(answer.findtext("tolerance", "")))
+        slack = 1e-14 * max(1.0, abs(nominal))
+        if nominal - tolerance - slack <= value <= nominal + tolerance + slack:
+            return float(answer.get("fraction", "")), answer.findtext("feedback/text") or ""
+    return 0.0, ""
+
+
+def test_moodles_questions(dalembert: Dalembert, folder: Path) -> None:
+    """Elements and their meaning as question/format/xml of Moodle reads them."""
+    dalembert("exercise", "e.toml", "--students", 3, "-o", "out")
+    quiz = ET.parse(folder / "out" / "moodle.xml").getroot()
+    assert quiz.tag == "quiz"
+    kinds = [question.get("type") for question in quiz]
+    assert kinds.count("category") == 3
+    assert kinds.count("numerical") == 9
+    key = {(row["student"], row["plane"], row["quantity"]): row for row in rows(folder / "out" / "key.csv")}
+    for question in quiz.findall("question[@type='numerical']"):
+        for name in (
+            "name/text",
+            "questiontext/text",
+            "defaultgrade",
+            "penalty",
+            "hidden",
+            "unitgradingtype",
+            "unitpenalty",
+            "showunits",
+            "unitsleft",
+        ):
+            assert question.find(name) is not None, name
+        assert question.find("questiontext").get("format") == "html"  # type: ignore[union-attr]
+        # 3: no unit is typed, the number alone is graded
+        assert question.findtext("showunits") == "3"
+        name = question.findtext("name/text", "")
+        student = re.search(r"\((\d+)\)$", name)[1]  # type: ignore[index]
+        plane = re.search(r"plane ([AB])", name)[1]  # type: ignore[index]
+        row = key[student, plane, "angle_deg" if "angle" in name else "mass_kg"]
+        right = float(row["answer"])
+        assert question.findtext("defaultgrade") == row["points"]
+        half = 0.5 * 10.0 ** -len(row["answer"].partition(".")[2])
+        assert moodle_takes(question, right)[0] == 100
+        assert moodle_takes(question, float(row["value"]))[0] == 100
+        for side in (-1, 1):
+            assert moodle_takes(question, right + side * 0.999 * half)[0] == 100
+            assert moodle_takes(question, right + side * 2 * half)[0] == 0
+        if "angle" in name:
+            assert moodle_takes(question, right - 360)[0] == 100
+        feedbacks = [
+            answer.findtext("feedback/text") or "" for answer in question.findall("answer[@fraction='0']")
+        ]
+        assert len(feedbacks) > 3
+        assert all(text.startswith("Likely mistake: ") for text in feedbacks)
+        for answer in question.findall("answer[@fraction='0']"):
+            assert moodle_takes(question, float(answer.findtext("text", "")))[1] == answer.findtext(
+                "feedback/text"
+            )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('title = "A rotor"', 'titel = "A rotor"', ["key titel", "did you mean 'title'"]),
+        ("quantity = \"angle_deg\"", "quantity = \"angel_deg\"", ["[[ask]] 2", "'angel_deg'", "did you mean 'angle_deg'"]),
+        ("figures = 3", "figures = 0", ["[[ask]] 1", "figures", "'0'", "a whole number from 1"]),
+        ('plane = "B" }\nfigures', 'plane = "C" }\nfigures', ["[[ask]] 1", "where", "plane C"]),
+        ('"60N:120N:5N"', '"60N:120N"', ["[draw]", "FROM:TO:STEP"]),
+        ('"60N:120N:5N"', '"60kg:120kg:5kg"', ["[draw]", "weight_N"]),
+        ('"60N:120N:5N"', '"120N:60N:5N"', ["[draw]", "a step above zero"]),
+        ("rotor.csv:W1.weight_N\" =", "rotor.csv:W9.weight_N\" =", ["[draw]", "'W9'", "W1, W2"]),
+        ("rotor.csv:W1.weight_N\" =", "rotors.csv:W1.weight_N\" =", ["[draw]", "'rotors.csv'", "did you mean 'rotor.csv'"]),
+        ("rotor.csv:W1.weight_N\" =", "rotor.csv:W1.wieght_N\" =", ["[draw]", "'wieght_N'", "did you mean 'weight_N'"]),
+        ("{rotor.csv:W1.radius_mm}", "{rotor.csv:W1.radius}", ["text", "'{rotor.csv:W1.radius}'"]),
+        ("balance rotor.csv", "balanse rotor.csv", ["command", "'balanse'", "did you mean 'balance'"]),
+        ("balance rotor.csv", "balance nothing.csv", ["nothing.csv"]),
+        ("--gravity 10", "--gravety 10", ["command", "--gravety"]),
+        ("[[ask]]", "[[asked]]", ["asked", "did you mean 'ask'"]),
+        ('command = "', 'command = "\n', ["e.toml", "TOML"]),
+    ],
+)  # fmt: skip
+def test_a_bad_exercise_is_one_line_and_writes_nothing(
+    dalembert: Dalembert, folder: Path, old: str, new: str, said: list[str]
+) -> None:
+    (folder / "e.toml").write_text(EXERCISE.replace(old, new))
+    done = dalembert("exercise", "e.toml", "--students", 2, "-o", "out")
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert done.stderr.startswith("dalembert: e.toml")
+    for part in said:
+        assert part in done.stderr
+    assert {path.name for path in folder.iterdir()} == {"rotor.csv", "e.toml"}
+
+
+def test_wrong_usage_is_status_2(dalembert: Dalembert, folder: Path) -> None:
+    assert dalembert("exercise", "e.toml").returncode == 2
+    assert dalembert("exercise", "e.toml", "--students", "0", "-o", "out").returncode == 2
+    assert dalembert("exercise", "e.toml", "--students", "2.5", "-o", "out").returncode == 2
+    assert not (folder / "out").exists()
+
+
+def test_answers_that_are_filled_in_are_never_lost(dalembert: Dalembert, folder: Path) -> None:
+    assert dalembert("exercise", "e.toml", "-o", "out").returncode == 0
+    assert dalembert("exercise", "e.toml", "-o", "out").returncode == 0
+    answers = folder / "out" / "answers.csv"
+    answers.write_text(answers.read_text().replace("kg,\n", "kg,8.55\n", 1))
+    before = {path.name: path.read_bytes() for path in (folder / "out").iterdir()}
+    done = dalembert("exercise", "e.toml", "--seed", 9, "-o", "out")
+    assert done.returncode == 1
+    assert "answers.csv" in done.stderr
+    assert before == {path.name: path.read_bytes() for path in (folder / "out").iterdir()}

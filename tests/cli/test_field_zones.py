@@ -1,0 +1,46 @@
+"""`dalembert field --zone-class`: zones of vibration severity, for velocities alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from balancing import ZONE_BOUNDARIES, severity_zone
+from tests.cli.measured import FAN, document
+from tests.conftest import Dalembert
+
+
+def zones(dalembert: Dalembert, unit: str, machine: str) -> list[str]:
+    text = FAN.replace("amplitude_um", f"amplitude_{unit}")
+    (rotor,) = document(dalembert("field", "-", "--json", "--zone-class", machine, stdin=text))["rotors"]
+    (row,) = rotor["zones"]
+    assert row["sensor"] == "1"
+    return [row["before_zone"], row["predicted_zone"]]
+
+
+def test_the_boundaries_in_every_class() -> None:
+    for machine, ends in ZONE_BOUNDARIES.items():
+        at = np.array(ends)
+        assert severity_zone(at, machine).tolist() == ["A", "B", "C"]
+        assert severity_zone(at * (1 + 1e-12), machine).tolist() == ["B", "C", "D"]
+    assert str(severity_zone(0.0, "1-rigid")) == "A"
+    for wrong in ((-1.0, "1-rigid"), (1.0, "3-rigid")):
+        with pytest.raises(ValueError, match=r"velocity|expected one of"):
+            severity_zone(*wrong)
+
+
+def test_readings_in_every_form(dalembert: Dalembert) -> None:
+    # 3.4 mm/s: r.m.s.; as a peak 2.40, peak to peak 1.20; inches are larger
+    assert zones(dalembert, "mm_s", "2-rigid") == ["C", "A"]
+    assert zones(dalembert, "mm_s_rms", "1-rigid") == ["B", "A"]
+    assert zones(dalembert, "mm_s_pk", "2-rigid") == ["B", "A"]
+    assert zones(dalembert, "mm_s_pp", "2-rigid") == ["A", "A"]
+    assert zones(dalembert, "in_s", "1-flexible") == ["D", "A"]
+
+
+def test_what_is_no_velocity_is_refused(dalembert: Dalembert) -> None:
+    for machine in ("2-rigid", "3-rigid"):
+        done = dalembert("field", "-", "--zone-class", machine, stdin=FAN)
+        assert done.returncode == 2
+        assert done.stdout == ""
+    assert "the readings are in um" in dalembert("field", "-", "--zone-class", "2-rigid", stdin=FAN).stderr

@@ -1,1 +1,0 @@
-"""Bounds of the rounding errors of motions and forces."""

@@ -1,0 +1,1 @@
+"""The digits that hold: motions and forces computed a second time, in numbers of 32 digits."""

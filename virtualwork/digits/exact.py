@@ -1,0 +1,214 @@
+"""The formulas of an assembly with every number of its description as an input, for a second run in 32 digits.
+
+What the plan forms of dimensions, differences of coordinates and sums of angles, is then on the tape too, and rounds in
+the second run as little as all the rest. A file's decimals enter as they are written there; numbers that were given as
+floats are exactly these.
+
+Further inputs of the tape
+--------------------------
+`sign GROUP`         of every closed form that has two assemblies
+`links.crank.B.x`    a dimension, by its path
+`guess crank`        an angle of the guess, and `at 0`, an input there: of gears, belts and racks, whose constant is that of the guess
+`phase 0`            the constant of one of these that the guess fixes by way of other links
+`f 0`                the first unknown of redundant statics
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+from dalembert.arithmetic.doubled import PI, Doubled
+from dalembert.arithmetic.guard import guarded
+from dalembert.arithmetic.recorded import Number, Recorder, bare
+from dalembert.arithmetic.varied import Varied
+from virtualwork.describe.description import Description
+from virtualwork.describe.dimensions import Dimension, changed, dimensions, value
+from virtualwork.formulas.dynamics import applied_loads, reduced
+from virtualwork.formulas.effort import generalized_force
+from virtualwork.formulas.lanes import Turning
+from virtualwork.formulas.newton import gaps
+from virtualwork.formulas.numbers import Written
+from virtualwork.formulas.positions import State
+from virtualwork.formulas.recording import Recording
+from virtualwork.formulas.statics import equations
+from virtualwork.plan.order import plan
+from virtualwork.plan.steps import Group, turns
+
+# of 1e-15 of a quarter turn a guide stands at it, as in `plan.topology.direction`
+QUARTER = PI * 0.5
+
+
+class Meeting(Written):
+    """Recorded numbers, of two assemblies that meet in every pose."""
+
+    def sqrt(self, x: Number) -> Number:
+        """The root of the size."""
+        return super().sqrt(abs(bare(x)))
+
+
+MEETING = Meeting()
+
+
+class Numbers:
+    """A description whose numbers are inputs of the tape, called by their paths.
+
+    Attributes
+    ----------
+    mechanism : Description
+    known : dict of an input's name to its value
+    """
+
+    def __init__(self, m: Description, recorder: Recorder) -> None:
+        self._of, self._recorder = m, recorder
+        self.known: dict[str, Doubled] = {}
+        numbers: dict[str, Any] = {}
+        for path, dimension in dimensions(m).items():
+            if dimension.where[0] != "inputs":
+                number = self._number(dimension)
+                if isinstance(number, Varied):
+                    numbers[path] = number
+        self.mechanism = changed(m, numbers)
+        if m.meshes:
+            self.mechanism = replace(self.mechanism, guess=self._guess())
+
+    def _number(self, dimension: Dimension) -> Any:
+        x = float(complex(value(self._of, dimension.path)).real)
+        exact = Doubled(x, self.rest(dimension.kind, x))
+        if dimension.where[0] == "guides" and dimension.where[-1] == "angle":
+            quarters = round(x / (math.pi / 2))
+            if abs(x / (math.pi / 2) - quarters) <= 1e-15 * max(1.0, abs(quarters)):
+                exact = QUARTER * float(quarters)
+        whole = dimension.kind == "number" and x.is_integer()
+        if dimension.where[0] == "belts":
+            # a ratio in whole numbers turns without the angle itself
+            first, second = self._of.belts[int(dimension.where[1])].radii
+            whole = (first / second).is_integer()
+            exact = Doubled(x) if whole else exact
+        if not exact.low and (x == 0 or whole or (dimension.kind != "angle" and abs(x) == 1)):
+            # it is as exact as it stands, and costs nothing
+            return x
+        return self.enter(dimension.path, x, exact)
+
+    def enter(self, name: str, x: float, exact: Doubled) -> Varied:
+        """A number as an input of the tape."""
+        self.known[name] = exact
+        return Varied(x, self._recorder.input(name))
+
+    def rest(self, kind: str, x: float) -> float:
+        """What a number of the description is exactly, less the float."""
+        decimals = self._of.decimals
+        return 0.0 if decimals is None else decimals.rest(kind, x)
+
+    def _guess(self) -> Any:
+        m = self._of
+        angles: Mapping[str, Any] = {
+            name: self.enter(f"guess {name}", x, Doubled(x, self.rest("angle", x))) if x else x
+            for name, x in m.guess.angles.items()
+        }
+        at: list[Any] = []
+        for j, (x, entry) in enumerate(zip(m.at, m.inputs, strict=True)):
+            exact = Doubled(x, self.rest("length" if entry.is_slide else "angle", x))
+            at.append(self.enter(f"at {j}", x, exact) if x else x)
+        return type(m.guess)(at, angles, m.guess.points)
+
+
+@guarded
+class Exact(Recording):
+    """The formulas of an assembly, with its numbers as inputs.
+
+    Further keys of `value`
+    -----------------------
+    ("generalized", j)          the effort as if every motor sat on the body that its angle is measured from
+    ("applied", link)           complex: what acts on a link but its weight and inertia
+    ("applied moment", link)    about its centre of mass
+    ("gap", group, loop)        complex: what the unknowns of a group leave open of a loop
+    ("balance", row)            what the forces that enter leave of an equation of redundant statics
+
+    Parameters
+    ----------
+    branch : Turning
+        The assembly.
+    plain : Recording
+        The formulas as they are.
+    """
+
+    def __init__(self, branch: Turning, plain: Recording) -> None:
+        recorder = Recorder()
+        numbers = Numbers(branch.mechanism, recorder)
+        self.known, self.folded = numbers.known, frozenset(branch.folded)
+        order = plan(numbers.mechanism)
+        self.phases: dict[str, float] = {}
+        open_gears = {g for turn in turns(order.steps) for g, _ in turn.angle.gears}
+        if open_gears:
+            # found by placing the links as the guess has them
+            self.phases = {f"phase {g}": branch.phases[g] for g in open_gears}
+            phases: dict[int, Any] = {
+                g: numbers.enter(f"phase {g}", branch.phases[g], Doubled(branch.phases[g]))
+                for g in open_gears
+            }
+            order = plan(numbers.mechanism, phases=phases)
+        super().__init__(
+            numbers.mechanism,
+            order,
+            branch.signs,
+            plain.moves,
+            [g.name for g in order.groups if g.kind != "Newton"],
+            branch.geared,
+            settled=False,
+            recorder=recorder,
+        )
+
+    @cached_property
+    def closed(self) -> list[Group]:
+        """The groups with a closed form that has two assemblies."""
+        return [g for g in self.plan.groups if g.kind not in ("Newton", "PRP")]
+
+    def _close(self, group: Group, st: State) -> None:
+        if group.name in self.folded and not self.enters(group):
+            # where the numbers as given do not quite meet, the root says how far off the assemblies are
+            kind, st.kind = st.kind, MEETING
+            self._cases[group.name].solve(st, 1.0, bare(self.mechanism.size))
+            st.kind = kind
+            return
+        super()._close(group, st)
+
+    def step(self, group: Group, st: State) -> list[Number] | None:
+        return None if group.name in self.folded else super().step(group, st)
+
+    def _gap(self, group: str, loop: int) -> Number:
+        return gaps(self.solved(group), self.st)[loop]
+
+    def _generalized(self, j: int) -> Number:
+        paths, _, block = self.forces
+        return self._negative(generalized_force(paths, block, j))
+
+    def _applied(self, link: str) -> Number:
+        return self._reduced(link)[0]
+
+    def _applied_moment(self, link: str) -> Number:
+        return self._reduced(link)[1]
+
+    def _reduced(self, link: str) -> tuple[Number, Number]:
+        self.solve([f"angle:{link}"], 0)
+        paths, _, block = self.forces
+        return reduced(applied_loads(paths.case.loads, link), block, self.mechanism.rigid[link].center)
+
+    def _balance(self, row: int) -> Number:
+        return self._balances.get(row, 0.0)
+
+    @cached_property
+    def _balances(self) -> dict[int, Number]:
+        """What the unknown forces that enter leave of every equation."""
+        self._places()
+        _, of, block = self.forces
+        left: dict[int, Number] = {}
+        for row, column, part in equations(of, block):
+            part = bare(part)
+            if column is not None:
+                part = part * self.recorder.input(f"f {column}")
+            left[row] = left.get(row, 0.0) + part
+        return left

@@ -1,0 +1,158 @@
+"""Estimates of the rounding errors of forces: effort, joint forces, shaking force.
+
+Each is that of a quantity on the tape (`virtualwork.digits.estimates`), but for joint forces where statics is
+redundant. Those solve the equilibrium of all links, A f + b = 0, by singular values: what the computed f leave there in
+32 digits, A⁺ times that, is what they are off by, one step of iterative refinement (N. J. Higham, Accuracy and
+Stability of Numerical Algorithms, 2nd ed., §12.1).
+
+Joint friction exchanges loads and forces until neither changes; its poses have no estimate (infinite).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from dalembert.arithmetic.doubled import Doubled
+from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.guard import guarded
+from virtualwork.describe.parts import GROUND
+from virtualwork.digits.estimates import OWN, Estimates
+from virtualwork.formulas.asked import Key, over_blocks
+from virtualwork.formulas.dynamics import Dynamics, joints_at
+from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.statics import NULL, Column
+from virtualwork.plan.steps import Joint
+
+
+@guarded
+class ForceErrors:
+    """Estimates of the rounding errors of forces, under the names of these; each is formed when first asked for."""
+
+    def __init__(self, dynamics: Dynamics) -> None:
+        self.dynamics, self.n, self.lock = dynamics, dynamics.poses.n, dynamics.lock
+        self.mechanism = dynamics.poses.mechanism
+        self.estimates = Estimates(dynamics.poses, self._values)
+
+    def _values(self, keys: Sequence[Key]) -> list[Any]:
+        """The forces as they were handed out."""
+        return [over_blocks(self.dynamics.poses, key, self.dynamics) for key in keys]
+
+    def together(self, reactions: Iterable[Key] | None = None) -> None:
+        """Form the estimates of some joints' forces, or of all: they have most of the second run in common."""
+        if reactions is not None:
+            if self._redundant is None:
+                self.estimates.together(reactions)
+            return
+        inputs, joints = range(len(self.mechanism.inputs)), self.dynamics.reactions.joints
+        keys: list[Key] = [("shaking",), ("shaking moment",), *(("effort", j) for j in inputs)]
+        if self._redundant is None:
+            keys += [("newton-euler", j) for j in inputs]
+            sides = [(joint, body) for joint in joints for body in joint.bodies]
+            keys += [("force", joint.key, body) for joint, body in sides]
+            keys += [("moment", joint.key, body) for joint, body in sides if self._holds(joint)]
+        self.estimates.together(keys)
+
+    def _holds(self, joint: Joint) -> bool:
+        """Whether a joint keeps its bodies from turning against each other."""
+        return joint.guide is not None and self.mechanism.guides[joint.guide].is_slider
+
+    def _each(self, kind: str) -> Reals:
+        """Of a quantity of every input, (n, k)."""
+        keys: list[Key] = [(kind, j) for j in range(len(self.mechanism.inputs))]
+        self.estimates.together(keys)
+        return np.stack([self.estimates.of(key) for key in keys], axis=1)
+
+    @cached_property
+    def effort(self) -> Reals:
+        """Of `Dynamics.effort`, (n, k)."""
+        return self._each("effort")
+
+    @cached_property
+    def generalized(self) -> Reals:
+        """Of the generalized forces Σ F·K_j, (n, k): the effort, but for motors that sit on another body than `on`."""
+        return self._each("generalized")
+
+    @cached_property
+    def newton_euler(self) -> Reals:
+        """Of `Dynamics.newton_euler`, (n, k)."""
+        if self._redundant is None:
+            return self._each("newton-euler")
+        kinds = ["force" if entry.is_slide else "torque" for entry in self.mechanism.inputs]
+        return np.stack([self._of((kind, str(j), "")) for j, kind in enumerate(kinds)], axis=1)
+
+    def joint_force(self, joint: Joint, body: str) -> Reals:
+        """Of `Dynamics.joint_force`, (n,): the length of the error."""
+        if self._redundant is None:
+            return self.estimates.of(("force", joint.key, body))
+        if joint.guide is None:
+            if body == GROUND:
+                others = [self.joint_force(joint, other) for other in joint.bodies if other != GROUND]
+                return np.asarray(sum(others))
+            return np.hypot(self._of(("fx", joint.key, body)), self._of(("fy", joint.key, body)))
+        # along the rail's normal, whose direction rounds too
+        assert self.dynamics.statics is not None
+        normal: Column = ("normal", joint.key, "")
+        turned = self.estimates.of(("turn", self.mechanism.guides[joint.guide].on))
+        return np.asarray(self._of(normal) + (turned + EPS) * np.abs(self.dynamics.statics.get(normal)))
+
+    def joint_moment(self, joint: Joint, body: str) -> Reals:
+        """Of `Dynamics.joint_moment`, (n,)."""
+        if not self._holds(joint):
+            return np.zeros(self.n)
+        if self._redundant is None:
+            return self.estimates.of(("moment", joint.key, body))
+        return self._of(("moment", joint.key, ""))
+
+    def reaction(self, joint: str, on: str) -> Reals:
+        """Of `Dynamics.reaction`, (n,): the length of the error."""
+        if self._redundant is None:
+            return self.estimates.of(("reaction", joint, on))
+        here = joints_at(self.dynamics.reactions.joints, joint, on)
+        return np.asarray(sum(self.joint_force(found, on) for found in here))
+
+    @cached_property
+    def shaking(self) -> tuple[Reals, Reals]:
+        """Of `Dynamics.shaking`: the length of the force's error (n,), and the moment's (n,)."""
+        self.estimates.together([("shaking",), ("shaking moment",)])
+        return self.estimates.of(("shaking",)), self.estimates.of(("shaking moment",))
+
+    def applied(self, link: str) -> tuple[Reals, Reals]:
+        """Of `Dynamics.applied`: the length of the force's error (n,), and the moment's (n,)."""
+        self.estimates.together([("applied", link), ("applied moment", link)])
+        return self.estimates.of(("applied", link)), self.estimates.of(("applied moment", link))
+
+    # --- redundant statics ------------------------------------------------------------------------------------------
+    @cached_property
+    def _redundant(self) -> tuple[list[Column], Reals] | None:
+        """The unknown forces of all links and their estimates, (n, unknowns); torques divided by the size."""
+        statics = self.dynamics.statics
+        if statics is None:
+            return None
+        value, least = statics.solved[0], statics.least[0]
+        if self.dynamics.scene.friction:
+            return statics.unknowns, np.full(value.shape, np.inf)
+        # what statics does not determine has a part in the balance too
+        known = {f"f {i}": Doubled(column) for i, column in enumerate(np.nan_to_num(least).T)}
+        keys: list[Key] = [("balance", row) for row in range(statics.rows)]
+        left = self.estimates.second.doubled(keys, known)
+        rest = np.stack([np.broadcast_to(left[key][0].value, self.n) for key in keys], axis=1)
+        off = np.full(value.shape, np.inf)
+        system = statics.system()[0]
+        good = np.isfinite(system).all(axis=(1, 2)) & np.isfinite(rest).all(axis=1)
+        back = np.linalg.pinv(system[good], rcond=NULL)
+        off[good] = OWN * np.abs(back @ rest[good][..., None])[..., 0]
+        return statics.unknowns, off
+
+    def _of(self, unknown: Column) -> Reals:
+        """One of the unknowns of redundant statics, (n,)."""
+        assert self._redundant is not None
+        assert self.dynamics.statics is not None
+        names, errors = self._redundant
+        scaled = unknown[0] in ("moment", "gear", "torque")
+        own = 0.5 * EPS * np.abs(self.dynamics.statics.get(unknown)) if scaled else 0.0
+        scale = self.mechanism.size if scaled else 1.0
+        return np.asarray(scale * errors[:, names.index(unknown)] + own)
