@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from balancing.influence import influence_coefficients
     from balancing.limited import Doubtful, Infeasible, NotConverged
     from balancing.log_balance import LogBalance, region_factor, spread
+    from balancing.modal import ModalCorrection, UnreachedMode, modal_corrections, shapes_at
     from balancing.next_run import NextRun, suggest_run
     from balancing.placement import Placement, drill_depth, place, place_from_stock, transfer
     from balancing.prior import Prior, fit_with_prior, pooled_prior, stored_prior
@@ -66,6 +67,7 @@ _HOMES = {
     "balancing.run_log": "JointFit Undetermined determined initial_alone joint_fit",
     "balancing.limited": "Doubtful Infeasible NotConverged",
     "balancing.severity": "ZONE_BOUNDARIES severity_zone",
+    "balancing.modal": "ModalCorrection UnreachedMode modal_corrections shapes_at",
     "balancing.log_balance": "LogBalance region_factor spread",
     "balancing.next_run": "NextRun suggest_run",
     "balancing.synchronous": "OncePerTurn once_per_turn",
@@ -107,6 +109,7 @@ __all__ = [
     "Infeasible",
     "JointFit",
     "LogBalance",
+    "ModalCorrection",
     "NextRun",
     "NotConverged",
     "OncePerTurn",
@@ -116,6 +119,7 @@ __all__ = [
     "TrialEffect",
     "Unbalances",
     "Undetermined",
+    "UnreachedMode",
     "allocate",
     "api_unbalance",
     "by_size",
@@ -138,6 +142,7 @@ __all__ = [
     "least_squares",
     "mil_unbalance",
     "minimax",
+    "modal_corrections",
     "once_per_turn",
     "outlier_probability",
     "permissible_unbalance",
@@ -151,6 +156,7 @@ __all__ = [
     "repeats",
     "robust_fit",
     "severity_zone",
+    "shapes_at",
     "spread",
     "stored_prior",
     "suggest_run",

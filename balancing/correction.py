@@ -375,7 +375,7 @@ def correct(
     if executor is not None and fix.moment.ndim == 2:
         rows = (slice(i, i + PART) for i in range(0, len(fix.moment), PART))
         parts = ((fix.moment[i], fix.z[i], fix.planes[i]) for i in rows)
-        # what is worked out when it is first asked for
+        # what is worked out on the first request
         unbalance = np.concatenate(list(in_parts(_unbalance, parts, executor)))
         object.__setattr__(fix, "unbalance", unbalance)
     return fix

@@ -88,9 +88,9 @@ class Forces(NamedTuple):
         ahead, back = (lever * self.with_crank).sum(axis=0), (lever * self.against).sum(axis=0).conj()
         # F_x = Re(C_x e^{ikθ})
         both = np.stack([ahead + back, -1j * (ahead - back)], axis=-1)
-        found = np.stack([both.real, -both.imag], axis=-1)
+        result = np.stack([both.real, -both.imag], axis=-1)
         # what rounding leaves of zero
-        return np.where(np.abs(found) > self.rounding(couple)[:, None, None], found, 0.0)
+        return np.where(np.abs(result) > self.rounding(couple)[:, None, None], result, 0.0)
 
     def largest(self, couple: bool = False) -> Real:
         """Return the largest size of each order over a turn, (K,): the half-axis of its ellipse."""

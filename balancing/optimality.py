@@ -8,7 +8,7 @@ the minimax problem, of the readings, ρ_k their values and u_k = ρ_k/|ρ_k|, �
 the first sum for least squares, t and the last condition for minimax. Their values F at the corrections as given out,
 with the errors that evaluating them has, and the inverse of their Jacobian K, bound the distance from the true
 optimum: |δ| ≤ |K⁻¹F| + |K⁻¹| δF. Where K is singular, or the active rows are not sure, nothing is bounded: the optimum
-is not unique, or not a smooth function of the data. The reason is said.
+is not unique, or not a smooth function of the data. The reason is given.
 """
 
 from __future__ import annotations

@@ -145,7 +145,7 @@ class _PutOff(FreeBody):
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class FreeState(AtTimes):
-    """The state of a free body at given times; each quantity is computed when it is first asked for."""
+    """The state of a free body at given times; each quantity is computed on the first request."""
 
     body: FreeBody
     time: Array

@@ -140,7 +140,7 @@ class _Formulas:
 class Motion(_Formulas):
     """A rigid body in motion, one state or many: what its momentum is and what forces the motion asks for.
 
-    Each quantity is computed when it is first asked for. All components are along one set of axes, in which the
+    Each quantity is computed on the first request. All components are along one set of axes, in which the
     tensor is given: the fixed axes at the instant looked at, or axes turning with the body.
 
     Parameters

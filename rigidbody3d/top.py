@@ -138,7 +138,7 @@ class Top:
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class TopState(AtTimes):
-    """The state of a top at given times; each quantity is computed when it is first asked for."""
+    """The state of a top at given times; each quantity is computed on the first request."""
 
     top: Top
     time: Array

@@ -47,7 +47,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("balance", "correction", "run_log"),
         ("optimality",),
         ("limited", "loads", "rounding"),
-        ("influence", "propagation", "qr"),
+        ("influence", "modal", "propagation", "qr"),
         (
             "cone_problem",
             "dependence",

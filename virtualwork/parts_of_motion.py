@@ -1,4 +1,4 @@
-"""Points, links and slides of a motion: each quantity is asked of the whole when it is first asked for."""
+"""Points, links and slides of a motion: each quantity is asked of the whole on the first request."""
 
 from __future__ import annotations
 

@@ -29,18 +29,18 @@ def draw(found: Balancing, *, polygons: bool = False) -> Figure:
     return figure
 
 
-def _dials(found: Balancing, figure: FigureBase) -> None:
-    unit = found.rotors.unbalance_unit.replace("_", "·")
-    known_masses(list(_rotors(found)), unit, remove=found.request.remove, figure=figure)
+def _dials(balancing: Balancing, figure: FigureBase) -> None:
+    unit = balancing.rotors.unbalance_unit.replace("_", "·")
+    known_masses(list(_rotors(balancing)), unit, remove=balancing.request.remove, figure=figure)
 
 
-def _rotors(found: Balancing) -> Iterator[KnownMasses]:
-    rotors, planes = found.rotors, found.planes
+def _rotors(balancing: Balancing) -> Iterator[KnownMasses]:
+    rotors, planes = balancing.rotors, balancing.planes
     mass_names = rotors.table.texts.get("name") or [str(i + 1) for i in range(rotors.table.rows)]
     for r, name in enumerate(rotors.names[:MOST]):
         mine = np.flatnonzero(rotors.rotor == r)
-        rows = found.rows_of(r)
-        here = found.plane_of_row[rows]
+        rows = balancing.rows_of(r)
+        here = balancing.plane_of_row[rows]
         at = rotors.z[mine, None] if rotors.z is not None else np.zeros((len(mine), 1))
         plane_z = planes.z[here] if planes.z is not None else np.zeros(len(here))
         # each mass alone, carried to the planes as they will balance it
@@ -50,5 +50,5 @@ def _rotors(found: Balancing) -> Iterator[KnownMasses]:
             [mass_names[i] for i in mine],
             [planes.name[p] for p in here],
             from_si(shares, "unbalance", rotors.unbalance_unit),
-            from_si(found.made[rows], "unbalance", rotors.unbalance_unit),
+            from_si(balancing.made[rows], "unbalance", rotors.unbalance_unit),
         )

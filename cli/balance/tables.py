@@ -14,7 +14,7 @@ from cli.balance.rotors import Balancing
 from cli.read.rounding import angle_error, size_error
 from cli.read.tolerance import verdict_table
 from dalembert.angles import degrees
-from dalembert.results.columns import Column, Table, names, number, read_number
+from dalembert.results.columns import Column, Table, names, number, read_number, vector
 from dalembert.units import from_si
 
 if TYPE_CHECKING:
@@ -22,6 +22,11 @@ if TYPE_CHECKING:
 
 NEAR = 20.0  # from this growth of errors on the planes are named as near each other
 
+MODAL = (
+    "Modal balancing: the corrections of least sum of squares with which the modal sums ΣU·φ of the modes vanish (R. E. D. "
+    "Bishop, G. M. L. Gladwell 1959), with --rigid also ΣU and ΣU·z (W. Kellenberger 1972, N + 2 planes). Angles are "
+    "counter-clockwise as seen against +z."
+)
 METHOD = (
     "Each mass is an unbalance U = m·r·e^{iθ}. The corrections are those with the least sum of squares whose resultant and "
     "moment about the planes are opposite to ΣU and ΣU·z (J. A. Riul, Dinâmica das Máquinas, unit II, eqs. 6–21); "
@@ -35,7 +40,43 @@ def tables(b: Balancing) -> dict[str, Callable[[], Table]]:
         "corrections": cache(lambda: corrections(b)),
         "rotors": lambda: states(b),
     }
+    if b.request.carried is not None:
+        found["bearings"] = lambda: bearings(b)
+    if b.modal:
+        found["modes"] = lambda: modes(b)
     return found | ({} if b.request.tolerance is None else {"tolerance": lambda: verdicts(b)})
+
+
+def modes(b: Balancing) -> Table:
+    """One row per rotor and mode: the modal sum ΣU·φ before and with the corrections as given out."""
+    shapes = b.request.modes
+    assert shapes is not None
+    first, unit = len(shapes.conditions) - len(shapes.names), b.rotors.unbalance_unit
+    order = np.argsort(np.concatenate([group for group, _, _ in b.modal]), kind="stable")
+    before = np.concatenate([fix.modal[:, first:] for _, _, fix in b.modal])[order]
+    after = np.concatenate([fix.residual_of(b.made[rows])[:, first:] for _, rows, fix in b.modal])[order]
+    # rounding of nothing is shown as nothing
+    size = np.concatenate(
+        [np.abs(fix.at_planes) @ np.abs(b.made[rows])[..., None] for _, rows, fix in b.modal]
+    )[order]
+    left = np.where(np.abs(after) > 1e-12 * size[:, first:, 0], np.abs(after), 0.0)
+    count = len(shapes.names)
+    return Table(
+        [
+            names("rotor", [name for name in b.rotors.names for _ in range(count)]),
+            names("mode", shapes.names * len(b.rotors.names)),
+            number(
+                "modal_unbalance", "unbalance", np.abs(before).ravel(), unit, place="initial.modal_unbalance"
+            ),
+            number("angle", "angle", degrees(before).ravel(), place="initial.angle"),
+            number(
+                "residual_modal_unbalance", "unbalance", left.ravel(), unit, place="residual.modal_unbalance"
+            ),
+        ],
+        ("rotor", "mode"),
+        "rotors[].modes[]",
+        "modal sums of unbalances times shape, before and with the corrections",
+    )
 
 
 def corrections(b: Balancing) -> Table:
@@ -117,6 +158,41 @@ def states(b: Balancing) -> Table:
     )
 
 
+def bearings(b: Balancing) -> Table:
+    """One row per rotor and bearing: the forces of the bearings on the rotor, at rest, and as it turns before and after."""
+    carried = b.request.carried
+    assert carried is not None
+    z1, z2 = carried.bearings
+    before, after = b.in_planes(carried.bearings)
+    n = len(b.rotors.names)
+    square = carried.speed**2
+
+    def across(force: Complex) -> Real:
+        return np.stack([force.real, force.imag], axis=-1).reshape(-1, 2) + 0.0
+
+    columns = [
+        names("rotor", np.repeat(b.rotors.names, 2).tolist()),
+        names("bearing", ["1", "2"] * n),
+        number("z", "length", np.tile([z1, z2], n), b.length_unit),
+    ]
+    if carried.mass is not None and b.request.center is not None:
+        share = np.array([z2 - b.request.center, b.request.center - z1]) / (z2 - z1)
+        weight = share * complex(0.0, carried.mass * b.request.gravity)
+        static = np.asarray(np.tile(weight, (n, 1)), dtype=np.complex128)
+        columns += vector("static", "force", across(static), "xy")
+    # rounding of nothing is shown as nothing
+    left = np.where(np.abs(after) > 1e-12 * np.abs(before).max(axis=-1, keepdims=True), after, 0)
+    turning: dict[str, Complex] = {
+        "dynamic": np.asarray(-square * before, dtype=np.complex128),
+        "corrected": np.asarray(-square * left, dtype=np.complex128),
+    }
+    for name, force in turning.items():
+        columns += vector(name, "force", across(force), "xy")
+        columns.append(number(f"{name}_size", "force", np.abs(force).ravel(), place=f"{name}_size"))
+    above = "forces of the bearings on the rotor: static ones carry its weight (gravity along -y), dynamic ones turn with it"
+    return Table(columns, ("rotor", "bearing"), "rotors[].bearings[]", above=above)
+
+
 def verdicts(b: Balancing) -> Table:
     """One row per rotor and tolerance plane: what is permissible, what it was and is."""
     limit, unit = b.request.tolerance, b.rotors.unbalance_unit
@@ -142,14 +218,22 @@ def verdicts(b: Balancing) -> Table:
 def warnings(b: Balancing) -> list[str]:
     """What a reader of the corrections has to know."""
     near = np.flatnonzero(b.growth > NEAR)
+    why = "hardly tell the modes apart" if b.modal else "are close to each other and far from the masses"
     lines = [
-        f"rotor {b.rotors.names[r]}: the correction planes are close to each other and far from the masses: "
-        f"errors grow by a factor of {b.growth[r]:.3g}"
+        f"rotor {b.rotors.names[r]}: the correction planes {why}: errors grow by a factor of {b.growth[r]:.3g}"
         for r in near[:5]
     ]
     if len(near) > 5:
         lines.append(f"… and of {len(near) - 5} further rotors")
-    limit = b.request.tolerance
+    limit, carried = b.request.tolerance, b.request.carried
+    if limit is None and carried is not None and (carried.mass is None) != (b.request.center is None):
+        lines.append("no static forces in the bearings: they need --rotor-mass and --center-z")
+    fixed = ~np.isnan(b.given_mass) & ~b.sought
+    if fixed.any():
+        named = ", ".join(dict.fromkeys(b.planes.name[p] for p in b.plane_of_row[fixed]))
+        lines.append(
+            f"mass and radius are given in plane {named}: the angle alone is found, the residual is what that leaves"
+        )
     if limit is None:
         return lines
     if limit.grade is not None and limit.iso and float(limit.grade[1:]) not in GRADES:

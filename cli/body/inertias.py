@@ -106,25 +106,25 @@ class Check:
         return made
 
     def _signs(self) -> list[Guess]:
-        found = []
+        signs = []
         for entry in ("ixx", "iyy", "izz"):
             value = self.held.tensor[PLACES[entry]]
             changed = self._with(entry, -value)
             if value < 0 and _can_be(changed):
-                found.append(Guess("a stray minus sign", entry, _spread(changed)))
-        return found
+                signs.append(Guess("a stray minus sign", entry, _spread(changed)))
+        return signs
 
     def _decimals(self) -> list[Guess]:
         """One entry off by a power of ten, the smallest that mends it."""
         for power, what in SLIPS.items():
-            found = []
+            decimals = []
             for entry, factor in product(PLACES, (10.0**-power, 10.0**power)):
                 value = self.held.tensor[PLACES[entry]]
                 changed = self._with(entry, value * factor)
                 if value != 0 and _can_be(changed):
-                    found.append(Guess(what, entry, _spread(changed)))
-            if found:
-                return found
+                    decimals.append(Guess(what, entry, _spread(changed)))
+            if decimals:
+                return decimals
         return []
 
     def _reordered(self) -> Array:
@@ -171,7 +171,7 @@ def _spread(tensor: Array) -> float:
 
 def checks(robot: Robot) -> list[Check]:
     """Return the check of every link whose tensor the file gives."""
-    found = []
+    checks = []
     places = [end for j in robot.joints.values() for end in j.ends]
     for link in robot.links.values():
         held = link.inertial
@@ -192,8 +192,8 @@ def checks(robot: Robot) -> list[Check]:
             at = held.pose[:3, 3]
             reach = max(float(np.linalg.norm(c - at)) + r for c, r in link.shapes)
             spans = max(float(r) for _, r in link.shapes)
-        found.append(Check(link, held, reach or None, spans))
-    return found
+        checks.append(Check(link, held, reach or None, spans))
+    return checks
 
 
 def table(every: Sequence[Check]) -> Table:
@@ -219,17 +219,17 @@ def warnings(robot: Robot, found: Sequence[Check]) -> list[str]:
     """Name what is broken, and what looks wrong though a body can have it."""
     if not found:
         raise DataError(f"{robot.file}: no link has an inertia: nothing to check")
-    said = []
+    lines = []
     for c in found:
         hint = f"; likely: {c.likely}" if c.likely else ""
         if not c.valid:
             I1, I2, I3 = c.moments
             why = "is negative" if I1 < 0 else f"{I1:.6g} + {I2:.6g} < {I3:.6g}"
             moments = f"principal moments {I1:.6g}, {I2:.6g}, {I3:.6g} kg·m²"
-            said.append(
+            lines.append(
                 f"link '{c.link.name}': no body has it: {moments}: {'the first ' if I1 < 0 else ''}{why}{hint}"
             )
         elif hint:
             off = "smaller than its span suggests" if c.too_small else "larger than the link's reach allows"
-            said.append(f"link '{c.link.name}': a body can have it, but it is {off}{hint}")
-    return said
+            lines.append(f"link '{c.link.name}': a body can have it, but it is {off}{hint}")
+    return lines

@@ -61,7 +61,7 @@ class CorrectionMass(NamedTuple):
 
 @dataclass(frozen=True)
 class MovingBody:
-    """A body and its motion; each quantity is computed when it is first asked for."""
+    """A body and its motion; each quantity is computed on the first request."""
 
     parts: Parts
     request: Request

@@ -18,15 +18,15 @@ AXES = "xyz"
 
 def way(b: MovingBody) -> list[Topic]:
     """The topics of a body, of its motion where it has one, and of the shaft that it may be."""
-    found = [_inertia(b)]
+    result = [_inertia(b)]
     if b.moving:
-        found += [_momentum(b), _rate(b)]
-    found.append(_principal(b))
+        result += [_momentum(b), _rate(b)]
+    result.append(_principal(b))
     if b.moving and b.motion.omega.any():
-        found.append(_angle(b))
+        result.append(_angle(b))
     if b.request.shaft is not None:
-        found.append(_bearings(b))
-    return found
+        result.append(_bearings(b))
+    return result
 
 
 def _list(values: Any) -> list[float]:

@@ -57,10 +57,10 @@ def names(
     """Names between commas."""
     if text is None:
         return None
-    found = [name.strip() for name in text.split(",") if name.strip()]
-    if not found:
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    if not names:
         raise options.bad(flag, f"expected {example}")
-    return found
+    return names
 
 
 def branch(text: str | None) -> str | None:
@@ -139,17 +139,17 @@ class Analysis:
         from virtualwork.motion import Motion
 
         q = self.inputs
-        found = tuple(Motion(a, q.values, q.speed, q.acceleration) for a in self.assemblies)
-        for motion in found:
+        result = tuple(Motion(a, q.values, q.speed, q.acceleration) for a in self.assemblies)
+        for motion in result:
             motion.poses.input_rest = q.rest
             motion.poses.time = q.time
-        return found
+        return result
 
     # --- quantities -----------------------------------------------------------------------------------------------
     @cached_property
     def places(self) -> list[Quantity]:
         """The places and rates that are requested."""
-        every = quantities.places(self.mechanism, 3)
+        every = quantities.places(self.mechanism, 3, self.request.only or ())
         return quantities.chosen(every, self.request.only, self.order)
 
     @cached_property
@@ -198,7 +198,7 @@ class Analysis:
         only = self.request.only
         if only is None:
             return
-        moving = quantities.places(self.mechanism, 3)
+        moving = quantities.places(self.mechanism, 3, only)
         forces = quantities.forces(self.mechanism, self.pairs)
         here = [*moving, *forces] if self.request.forces else moving
         word = quantities.unknown(here, only)
@@ -262,10 +262,10 @@ class Analysis:
         """Which poses are assembled, as far as the requested names go: with --only the rest is not solved."""
         if self.whole:
             return motion.assembled
-        found = np.ones(motion.n, dtype=bool)
+        result = np.ones(motion.n, dtype=bool)
         for values in motion.values(self.named):
-            found &= np.isfinite(values)
-        return found
+            result &= np.isfinite(values)
+        return result
 
     @property
     def whole(self) -> bool:
@@ -276,7 +276,7 @@ class Analysis:
     def named(self) -> list[Key]:
         """Places of the points, links and slides that are requested, as a motion computes them."""
         homes = self.mechanism.points
-        found: list[Key] = [("point", homes[name][0], 0j, name, 0) for name in self.points]
-        found += [("angle", name, 0) for name in self.links]
+        result: list[Key] = [("point", homes[name][0], 0j, name, 0) for name in self.points]
+        result += [("angle", name, 0) for name in self.links]
         slides = [each.key for each in self.places if each.path[0] == "slides"]
-        return [*found, *dict.fromkeys((*key[:2], 0) for key in slides)]
+        return [*result, *dict.fromkeys((*key[:2], 0) for key in slides)]

@@ -117,7 +117,7 @@ def at_axis(m: Mechanism, texts: Sequence[str], bare: Mapping[str, str]) -> Axis
 def input_values(m: Mechanism, text: str, flag: str, bare: Mapping[str, str]) -> dict[int, float]:
     """`crank=60deg,arm=30deg` as it is shown, by input; a bare value is the only input's."""
     names = [e.name for e in m.inputs]
-    found: dict[int, float] = {}
+    result: dict[int, float] = {}
     for part in text.split(","):
         name, equals, value = part.partition("=")
         if not equals:
@@ -127,10 +127,10 @@ def input_values(m: Mechanism, text: str, flag: str, bare: Mapping[str, str]) ->
                 )
             name, value = names[0], part
         j = driven(m, name.strip(), text, flag)
-        if j in found:
+        if j in result:
             raise options.bad(flag, f"'{text}': {name.strip()} is given twice")
-        found[j] = quantity(Driven.of(m, j), value.strip(), flag, bare)
-    return found
+        result[j] = quantity(Driven.of(m, j), value.strip(), flag, bare)
+    return result
 
 
 def over_axis(m: Mechanism, text: str, bare: Mapping[str, str]) -> Axis:

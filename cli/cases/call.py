@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from cli.cases.case import Case
     from cli.cases.options import Asked
+    from cli.cases.sought import Found
     from cli.show.commands import ShowOptions
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
@@ -144,6 +145,8 @@ class Call:
     varied: Grid | None
     moved: Grid | None
     workers: int
+    found: Found | None = None
+    """The number that --find asked for."""
 
     @classmethod
     def of(cls, asked: Asked, show: ShowOptions, request: Request) -> Call:
@@ -153,8 +156,21 @@ class Call:
             if asked.set:
                 mechanism = assigned(mechanism, bare, asked.set)
             varied, moved = grids(mechanism, asked.at, asked.over, asked.cases, bare, remarks)
+            found = None
+            name, wanted = getattr(asked, "find", None), getattr(asked, "so_that", None)
+            if (name is None) != (wanted is None):
+                raise bad(
+                    "--find" if name is None else "--so-that", "expected --find NAME --so-that QUANTITY=VALUE"
+                )
+            if name is not None and wanted is not None:
+                from cli.cases.sought import find
+
+                if varied is not None or (moved is not None and moved.n > 1):
+                    raise bad("--find", "expected one pose of one mechanism, such as --at 60deg")
+                found = find(mechanism, bare, request, moved, name, wanted)
+                mechanism = found.mechanism
         workers = getattr(asked, "workers", None) or 1
-        return cls(request, show, mechanism, bare, remarks, about, varied, moved, workers)
+        return cls(request, show, mechanism, bare, remarks, about, varied, moved, workers, found)
 
     def refuse_inputs(self, message: str) -> None:
         """Refuse options that move inputs, where these mean nothing."""
@@ -242,6 +258,8 @@ class Call:
             result = self._alone(study, loop) if self.varied is None else self._of_variants(loop)
         if page is not None and drawn is not None:
             result = replace(result, beside={**result.beside, page: lambda: drawn(loop.every_case())})
+        if self.found is not None:
+            result = _with_found(result, self.found)
         title = {"title": self.mechanism.name or "Mechanism"}
         if self.show.steps:
             result = replace(result, way=lambda: self._way(loop))
@@ -249,14 +267,14 @@ class Call:
 
     def _way(self, loop: Loop) -> list[Topic]:
         """The worked solution of every mechanism; of variants each topic says which."""
-        found = []
+        result = []
         for name, case in loop.every_case():
             for topic in case.way():
                 if name:
                     title = f"Variant {name}: {topic.heading}"
                     topic = replace(topic, head={"variant": name, **topic.head}, title=title)
-                found.append(topic)
-        return found
+                result.append(topic)
+        return result
 
     def _alone(self, study: Study, loop: Loop) -> Result:
         """The mechanism itself: as one table, written part by part, or in every form."""
@@ -300,3 +318,14 @@ class Call:
             notes=lambda: name,
             warnings=[*self.remarks, *loop.remarks.lines()],
         )
+
+
+def _with_found(result: Result, found: Found) -> Result:
+    """The result with the number that --find asked for: above the table, in JSON, beside a table alone."""
+    notes, document = result.notes, result.documented
+    return replace(
+        result,
+        notes=lambda: "\n".join(filter(None, (notes(), f"found: {found.text}"))),
+        document=lambda: {**document(), "found": {found.header: found.value}},
+        aside=lambda: [*result.aside(), f"found: {found.text}"],
+    )

@@ -16,6 +16,7 @@ from cli.cases.rows import joined
 from cli.cases.values import Driven, Varied, with_numbers
 from cli.show.result import Result
 from dalembert.results.columns import Table
+from dalembert.results.columns import document as result_document
 from virtualwork import MechanismError
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ class Case:
         raise NotImplementedError
 
     def warnings(self) -> list[str]:
-        """What there is to warn of, once all is worked out."""
+        """What to warn of, once all is worked out."""
         return []
 
     def way(self) -> list[Topic]:
@@ -125,7 +126,7 @@ class Study:
         raise NotImplementedError
 
     def warnings(self) -> list[str]:
-        """What there is to remark on the request itself, whatever the variant."""
+        """What to remark on the request itself, whatever the variant."""
         return []
 
     def together(self, row: Rows, json: bool) -> Together | None:
@@ -204,6 +205,10 @@ class TableCase(Case):
     def tables(self) -> Iterator[Table]:
         """The one table."""
         yield self.table()
+
+    def document(self) -> Document:
+        """What the JSON document has of it: the table, where that has a place."""
+        return result_document([self.table()])
 
     def words(self) -> str:
         """What a terminal shows below the table."""

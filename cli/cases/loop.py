@@ -159,11 +159,11 @@ class Loop:
         """Each variant that can be assembled, by its name."""
         if self.varied is None:
             return [("", self.study.case())]
-        found = []
+        result = []
         for i in range(self.count):
             with suppress(MechanismError):
-                found.append((str(i + 1), self.study.case(self.rows(i, i + 1)[0])))
-        return found
+                result.append((str(i + 1), self.study.case(self.rows(i, i + 1)[0])))
+        return result
 
 
 class Solved(NamedTuple):

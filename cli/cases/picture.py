@@ -163,12 +163,12 @@ def counted(m: Mechanism) -> str:
         "place of friction": m.friction,
     }
     many = {"gear mesh": "gear meshes", "place of friction": "places of friction"}
-    said = [
+    lines = [
         f"{len(of)} {what if len(of) == 1 else many.get(what, what + 's')}"
         for what, of in kinds.items()
         if of
     ]
-    return f"{', '.join(said)}, driven by {' and '.join(e.name for e in m.inputs)}"
+    return f"{', '.join(lines)}, driven by {' and '.join(e.name for e in m.inputs)}"
 
 
 def at_inputs(m: Mechanism, inputs: tuple[float, ...], length: str) -> str:

@@ -67,11 +67,15 @@ def table(analysis: Analysis, found: Sequence[Mapping[Key, Any]] = ()) -> Table:
 
     def error(each: Quantity) -> list[float]:
         formed()
-        return [
-            b
-            for motion in analysis.motions
-            for b in bounds_of(sum(bound(motion, key, given) for key in keys_of([each])))  # type: ignore[arg-type]
-        ]
+        bounds = [sum(bound(motion, key, given) for key in keys_of([each])) for motion in analysis.motions]
+        if each.polar == "angle":
+            # across the vector, over its length
+            lengths = [np.abs(of[each.key] - of[each.less]) for of in every]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                bounds = [
+                    np.degrees(b / size) + TURNED * 360 for b, size in zip(bounds, lengths, strict=True)
+                ]
+        return [b for each in bounds for b in bounds_of(each)]  # type: ignore[arg-type]
 
     columns = [Column("step", "", [*analysis.inputs.steps] * times)]
     if analysis.several:
@@ -153,7 +157,9 @@ def in_json(analysis: Analysis) -> list[Quantity]:
 
 
 def _moving(analysis: Analysis) -> list[Quantity]:
-    return sorted(analysis.places, key=lambda each: ("links", "points", "slides").index(each.path[0]))
+    return sorted(
+        analysis.places, key=lambda each: ("links", "points", "slides", "vectors").index(each.path[0])
+    )
 
 
 def poses_of(
@@ -199,22 +205,22 @@ def over_poses(analysis: Analysis, entries: list[Document]) -> Document:
 
 def marks_of(analysis: Analysis, motion: Motion) -> list[list[str]]:
     """What is special about each pose: a change point, a limit of the input, a dead point."""
-    found: list[list[str]] = [[] for _ in range(motion.n)]
+    result: list[list[str]] = [[] for _ in range(motion.n)]
     track = motion.assembly.track
     if not track.active:
-        return found
+        return result
     near = 1e-9 * track.length
     q = motion.inputs[:, 0]
     for at in track.crossings:
         for i in np.flatnonzero(np.abs(q - at) <= near):
-            if "change point" not in found[i]:
-                found[i].append("change point")
+            if "change point" not in result[i]:
+                result[i].append("change point")
     if track.has_limits:
         reach = motion.assembly.reach
         for limit in reach.limits():
             for i in np.flatnonzero(np.abs(reach.apart(q, limit.input)) <= near):
-                found[i] += [word for word in ("limit", "dead point") if word not in found[i]]
-    return found
+                result[i] += [word for word in ("limit", "dead point") if word not in result[i]]
+    return result
 
 
 # --- tables of what stands beside the poses ---------------------------------------------------------------------------

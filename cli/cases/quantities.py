@@ -101,12 +101,12 @@ def keys_of(wanted: Iterable[Quantity]) -> list[Key]:
 def solved(motion: Motion, keys: Sequence[Key]) -> dict[Key, Any]:
     """Quantities of a motion by their keys, (n,): places in one pass, forces in another."""
     moving = [key for key in keys if key[0] not in FORCES]
-    found = dict(zip(moving, motion.values(moving), strict=True)) if moving else {}
+    result = dict(zip(moving, motion.values(moving), strict=True)) if moving else {}
     if len(moving) < len(keys):
         d = motion.dynamics
         d.solve([(d.reactions.by_key[key[1]], key[2]) for key in keys if key[0] == "force"])
-        found |= {key: over_blocks(motion.poses, key, d) for key in keys if key[0] in FORCES}
-    return found
+        result |= {key: over_blocks(motion.poses, key, d) for key in keys if key[0] in FORCES}
+    return result
 
 
 def cells(values: Reals, known: NDArray[np.bool_] | None = None) -> Numbers:
@@ -130,9 +130,9 @@ def cells_of(
     Parameters
     ----------
     found : mapping
-        What the motion has been asked for.
+        What the motion has computed.
     given : mapping
-        Of driven links the angles as they were asked for, degrees.
+        Of driven links the angles as requested, degrees.
     where : array (n,) of bool, optional
         The poses that have any.
     """
@@ -151,6 +151,7 @@ def cells_of(
             part = exact_degrees(given[name]) if name in given else degrees(np.exp(1j * value))
         else:
             part = each.of(value)
+            known = known & np.isfinite(part)
         shown[each] = cells(part, known if where is None else known & where)
     return shown
 
@@ -206,19 +207,19 @@ def bounds_of(bounds: Reals) -> list[float]:
 # --- in JSON ----------------------------------------------------------------------------------------------------------
 def nested(numbers: Mapping[Quantity, Numbers], n: int) -> dict[str, Any]:
     """Columns of n poses where they stand in JSON."""
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for each, values in numbers.items():
         if each.path:
-            of = found
+            of = result
             for name in each.path[:-1]:
                 of = of.setdefault(name, {})
             of[each.path[-1]] = values
-    if "reactions" in found:
-        found["reactions"] = tuple(
+    if "reactions" in result:
+        result["reactions"] = tuple(
             {"joint": [joint] * n, "on": [on] * n, "from": [of] * n} | force
-            for (joint, on, of), force in found["reactions"].items()
+            for (joint, on, of), force in result["reactions"].items()
         )
-    return found
+    return result
 
 
 def in_rows(tree: Any, n: int) -> Iterator[Any]:

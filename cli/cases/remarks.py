@@ -1,4 +1,4 @@
-"""What is said of a mechanism as warnings: limits, branches, forces that have no value."""
+"""Warnings about a mechanism: limits, branches, forces that have no value."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _on_branch(analysis: Analysis, assembly: Assembly, found: list[float], digit
 
 
 def _listed(values: list[float], digits: int) -> str:
-    """Name numbers, of very many the first ones.
+    """Name numbers, of many numbers the first ones.
 
     >>> _listed([0.5, 90.0], 10), _listed([float(v) for v in range(2000)], 10)
     ('0.5, 90', '0, 1, 2, 3, 4, 5, 6, 7, 8, 9 … (2000 in all)')
@@ -118,17 +118,17 @@ def _branch_lines(analysis: Analysis, assembly: Assembly) -> list[str]:
 
 def of_forces(analysis: Analysis) -> list[str]:
     """What the forces cannot say, pose by pose: dead points, change points, locked friction, redundant joints."""
-    found = [listed(analysis, what, places, len(places)) for what, places in troubles(analysis)]
-    return list(dict.fromkeys([*found, *statements(analysis)]))
+    result = [listed(analysis, what, places, len(places)) for what, places in troubles(analysis)]
+    return list(dict.fromkeys([*result, *statements(analysis)]))
 
 
 def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
     """What the forces cannot say, and the inputs where they cannot."""
-    found: list[tuple[str, list[float]]] = []
+    troubles: list[tuple[str, list[float]]] = []
 
     def note(bad: NDArray[np.bool_], what: str) -> None:
         if bad.any():
-            found.append((what, analysis.inputs.shown[bad, 0].tolist()))
+            troubles.append((what, analysis.inputs.shown[bad, 0].tolist()))
 
     for motion in analysis.motions:
         d = motion.dynamics
@@ -150,20 +150,20 @@ def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
                 "the joint forces have no finite value: loads in line with the links at a dead or change point",
             ),
         ):
-            if not motion.assembly.track.folded:  # singular in every pose: that is said once
+            if not motion.assembly.track.folded:  # singular in every pose: that is warned of once
                 note(there & ~np.isfinite(values).all(axis=1) & ~d.locked, what)
         if d.scene.friction:
             note(there & d.locked, "friction locks the mechanism: no reaction balances its own friction")
-    return found
+    return troubles
 
 
 def statements(analysis: Analysis) -> list[str]:
     """What is to be said of the forces whatever the pose."""
-    found: list[str] = []
+    result: list[str] = []
     for motion in analysis.motions:
         d = motion.dynamics
         if d.statics is not None:
-            found += d.statics.undetermined()
+            result += d.statics.undetermined()
     for motion in analysis.motions[:1]:
         for body, r in motion.mechanism.rigid.items():
             if (
@@ -172,14 +172,14 @@ def statements(analysis: Analysis) -> list[str]:
                 and motion.dynamics.scene.moves
                 and not pinned(analysis.mechanism, body, r.center)
             ):
-                found.append(
+                result.append(
                     f"[links.{body}]: an inertia and no mass, though its centre moves: no inertia force from it"
                 )
     if analysis.mechanism.friction and not any(motion.dynamics.scene.moves for motion in analysis.motions):
-        found.append(
+        result.append(
             "friction: nothing moves (speed zero), so that its direction and size are not determined: left out"
         )
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(result))
 
 
 def pinned(m: Description, body: str, center: complex) -> bool:

@@ -18,7 +18,7 @@ EXPLAINED, KINDS, NAMED = 50, 10, 5
 
 @dataclass
 class Remarks:
-    """What there is to remark on variants: each remark once, with the variants that it is about.
+    """What to remark on variants: each remark once, with the variants that it is about.
 
     Attributes
     ----------

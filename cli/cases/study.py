@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from cli.cases.rows import like
 from cli.show.result import Result, Section, Sheet
 from cli.show.terminal import progress
 from dalembert.results.columns import Table
+from dalembert.results.columns import document as result_document
 from dalembert.results.text import heading
 from virtualwork.formulas.positions import BLOCK, EvenSweep
 from virtualwork.motion import Motion
@@ -45,16 +46,22 @@ class Further:
 
     Attributes
     ----------
-    document : dict
-        Beside `poses` in JSON.
-    tables : dict of name to a function
+    tables : dict of name to table
+        Those with a place in JSON stand in the document and on the terminal, below the poses.
     words : str
-        Below the table on a terminal.
+        What the terminal shows below them.
+    others : dict
+        What the document has in addition to the tables.
     """
 
-    document: dict[str, Any] = field(default_factory=dict)
-    tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)
+    tables: Mapping[str, Table] = field(default_factory=dict)
     words: str = ""
+    others: Document = field(default_factory=dict)
+
+    @property
+    def document(self) -> Document:
+        """Beside `poses` in JSON."""
+        return result_document(self.tables.values()) | self.others
 
 
 @dataclass
@@ -237,11 +244,14 @@ class PoseStudy(Study):
         """The poses of one mechanism, in every form."""
         assert isinstance(case, PoseCase)
         a, further = case.analysis, case.further
-        tables = {"poses": lambda: poses.table(a), **further.tables}
+        beside: dict[str, Callable[[], Table]] = {
+            name: partial(replace, table) for name, table in further.tables.items()
+        }
+        tables: dict[str, Callable[[], Table]] = {"poses": lambda: poses.table(a), **beside}
         return Result(
             document=lambda: {"name": a.mechanism.name, **case.document()},
             tables=tables,
-            expected=(*further.tables.values(), lambda: poses.by_link(a)),
+            expected=(*beside.values(), lambda: poses.by_link(a)),
             notes=lambda: a.mechanism.name,
             afterword=lambda: further.words,
             figure=lambda: self.figure(a),
@@ -254,4 +264,6 @@ class PoseStudy(Study):
 
     def sections(self, analysis: Analysis, tables: Mapping[str, Callable[[], Table]]) -> list[Section]:
         """What a report shows: every table."""
-        return [Section(heading(name), [table()]) for name, table in tables.items()]
+        made = {name: table() for name, table in tables.items()}
+        # a table without columns is of the JSON document alone
+        return [Section(heading(name), [table]) for name, table in made.items() if table.columns]

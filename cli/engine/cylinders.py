@@ -207,12 +207,12 @@ class Engine:
     @cached_property
     def shaft_unbalances(self) -> Complex:
         """Of each shaft at θ = 0, kg·m."""
-        found = np.zeros(len(self.shafts), dtype=complex)
+        result = np.zeros(len(self.shafts), dtype=complex)
         for order, against in {(s.order, s.against) for s in self.shafts}:
             alike = [i for i, s in enumerate(self.shafts) if (s.order, s.against) == (order, against)]
             z = [self.shafts[i].z for i in alike]
-            found[alike] = shaft_unbalances(self.on_the_crank, z, self.speed, order, against)
-        return found
+            result[alike] = shaft_unbalances(self.on_the_crank, z, self.speed, order, against)
+        return result
 
     @cached_property
     def residual(self) -> Forces:

@@ -1,4 +1,4 @@
-"""What is computed of an engine: orders, rotating part, counterweights, shafts, what is left."""
+"""Results of an engine: orders, rotating part, counterweights, shafts, residuals."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ METHOD = (
 
 def tables(e: Engine) -> dict[str, Callable[[], Table]]:
     """The tables of a result, the CSV's first."""
-    found: dict[str, Callable[[], Table]] = {"orders": lambda: orders(e), "rotating": lambda: rotating(e)}
-    found |= {"counterweights": lambda: counterweights(e), "shafts": lambda: shafts(e)}
-    found["residual_orders"] = lambda: residual(e)
+    result: dict[str, Callable[[], Table]] = {"orders": lambda: orders(e), "rotating": lambda: rotating(e)}
+    result |= {"counterweights": lambda: counterweights(e), "shafts": lambda: shafts(e)}
+    result["residual_orders"] = lambda: residual(e)
     weights = e.counterweights
-    return found | (
+    return result | (
         {"locomotive": lambda: locomotive(e, weights)}
         if weights is not None and e.cylinders.horizontal
         else {}

@@ -39,7 +39,7 @@ def way(e: Engine) -> list[Topic]:
             "cylinders[]",
         )
     )
-    found = [Topic("orders", text, "Orders of each piston")]
+    result = [Topic("orders", text, "Orders of each piston")]
     rows: list[tuple[Any, ...]] = []
     for i, name in enumerate(names_of):
         one = slice(i, i + 1)
@@ -71,12 +71,12 @@ def way(e: Engine) -> list[Topic]:
         ("cylinder", "order"),
         "shares[]",
     )
-    found.append(
+    result.append(
         Topic("forces", ["Coefficients of cos kθ and sin kθ of each cylinder's force, and their sums:", table], "Shares and sums")
     )  # fmt: skip
     if e.rotating.any():
         u = complex(e.rotating.sum())
-        found.append(
+        result.append(
             Topic(
                 "rotating",
                 [f"Rotating masses: Σ m·r·e^(i·crank) = ({figures(u.real)}, {figures(u.imag)}) kg·m"],
@@ -90,7 +90,7 @@ def way(e: Engine) -> list[Topic]:
             f"  {name}: ({figures(w.real)}, {figures(w.imag)}) kg·m at z = {figures(z)} m"
             for name, w, z in zip(weights.names, weights.unbalance.tolist(), weights.z.tolist(), strict=True)
         ]
-        found.append(
+        result.append(
             Topic(
                 "counterweights",
                 ["Against the rotating masses and the share of the reciprocating ones:", *lines],
@@ -102,7 +102,7 @@ def way(e: Engine) -> list[Topic]:
         for k in used
     ]
     if e.balanced:
-        found.append(
-            Topic("residual", ["What is left with counterweights and balance shafts:", *lines], "Residual")
+        result.append(
+            Topic("residual", ["Residual forces with counterweights and balance shafts:", *lines], "Residual")
         )
-    return found
+    return result

@@ -5,23 +5,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cli.cases.analysis import Analysis
 from cli.cases.case import TableCase, TableStudy
 from cli.cases.inputs import Inputs
-from cli.cases.poses import listed
-from dalembert.results.columns import Table
+from cli.cases.poses import column
+from dalembert.results.columns import Table, names, number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.cases.case import Rows
     from virtualwork.study.equilibrium import Equilibria as Found
-
-Document = dict[str, Any]
 
 
 @dataclass
@@ -52,41 +50,19 @@ class Rest(TableCase):
                 spans = None
         return self.analysis.mechanism.equilibria(spans)
 
-    @cached_property
-    def rows(self) -> list[Document]:
-        """As JSON has them."""
-        m = self.analysis.mechanism
-        rows: list[Document] = []
-        for e in self.equilibria.found:
-            values = {
-                entry.name: {
-                    self.analysis.input_names[entry.name]: value
-                    if entry.is_slide
-                    else math.degrees(value) % 360.0
-                }
-                for entry, value in zip(m.inputs, e.inputs, strict=True)
-            }
-            place: Document = next(iter(values.values())) if len(m.inputs) == 1 else {"inputs": values}
-            rows.append({**place, "stable": e.stable, "potential_J": e.potential})
-        return rows
-
-    def document(self) -> Document:
-        """What the JSON document has of it."""
-        return {"equilibria": self.rows}
-
     def table(self) -> Table:
         """A row for each position."""
-        inputs = self.analysis.input_names
-        one = len(inputs) == 1
-        rows = [
-            (
-                *((row if one else row["inputs"][name])[key] for name, key in inputs.items()),
-                row["stable"],
-                row["potential_J"],
-            )
-            for row in self.rows
-        ]
-        return listed((*self.analysis.input_columns, "stable", "potential_J"), rows)
+        m, found = self.analysis.mechanism, self.equilibria.found
+        one = len(m.inputs) == 1
+        columns = []
+        for j, (entry, header) in enumerate(zip(m.inputs, self.analysis.input_columns, strict=True)):
+            values = [e.inputs[j] if entry.is_slide else math.degrees(e.inputs[j]) % 360.0 for e in found]
+            place = self.analysis.input_names[entry.name]
+            columns.append(column(header, values))
+            columns[-1].place = place if one else f"inputs.{entry.name}.{place}"
+        columns.append(names("stable", [e.stable for e in found]))
+        columns.append(number("potential", "energy", np.array([e.potential for e in found], dtype=float)))
+        return Table(columns, place="equilibria[]")
 
     def warnings(self) -> list[str]:
         """What the table cannot tell."""
@@ -99,9 +75,9 @@ class Rest(TableCase):
             lines.append(
                 "the loads balance in every position: equilibrium everywhere, neither stable nor unstable"
             )
-        elif not self.rows:
+        elif not found.found:
             lines.append("no equilibrium: the loads balance at no position of the range")
-        if any(row["stable"] is None for row in self.rows):
+        if any(e.stable is None for e in found.found):
             lines.append(
                 "stable null: the second variation of the potential vanishes there and does not decide"
             )

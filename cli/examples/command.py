@@ -64,7 +64,7 @@ def _here(name: str) -> dict[Path, tuple[bytes, str]]:
     DataError
         A file of the user's own has that name.
     """
-    found = {}
+    result = {}
     own = [
         *EXAMPLES.joinpath(name).iterdir(),
         *(EXAMPLES / each for each in describe(name).get("beside", ())),
@@ -79,8 +79,8 @@ def _here(name: str) -> dict[Path, tuple[bytes, str]]:
         known = _is_an_examples(here) or (here.is_file() and here.read_bytes() == data)
         if here.exists() and not known:
             raise DataError(f"{here}: there is another file of this name here: nothing was overwritten")
-        found[here] = data, "" if here.name == file.name else f" ({file.name} is another example's)"
-    return found
+        result[here] = data, "" if here.name == file.name else f" ({file.name} is another example's)"
+    return result
 
 
 def _section(name: str, said: Mapping[str, str], files: Mapping[Path, tuple[bytes, str]]) -> Section:

@@ -21,5 +21,5 @@ def _each(variant: Variant) -> Iterator[Candidates]:
     provider = PROVIDERS.get(variant.problem.exercise.command[0])
     again = Recomputed(variant)
     for k, answer in enumerate(variant.answers):
-        found = None if provider is None else provider(variant, k)
-        yield Candidates(answer, again.slips(k)) if found is None else found
+        result = None if provider is None else provider(variant, k)
+        yield Candidates(answer, again.slips(k)) if result is None else result

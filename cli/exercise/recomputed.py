@@ -54,12 +54,12 @@ class Recomputed:
     def slips(self, k: int) -> list[Slip]:
         """Return the slips of a question: of its answer alone, of other assemblies, of the data."""
         answer = self.variant.answers[k]
-        found = [*_final(answer), *self._siblings(k), *self._assemblies(k)]
+        slips = [*_final(answer), *self._siblings(k), *self._assemblies(k)]
         for text, values in self._runs:
             value = values[k]
             if value is not None:
-                found.append(Slip(text, value))
-        return found
+                slips.append(Slip(text, value))
+        return slips
 
     def _siblings(self, k: int) -> Iterator[Slip]:
         """The other component of a vector: sine for cosine."""
@@ -263,7 +263,7 @@ def _trials_left_on(problem: Problem, file: str) -> list[tuple[str, Problem]]:
     column = sheet.column("trial_kept")
     if column is None:
         return []
-    found = []
+    result = []
     for r, row in enumerate(sheet.rows):
         text = row[column].strip().lower()
         if text in ("yes", "no"):
@@ -273,7 +273,7 @@ def _trials_left_on(problem: Problem, file: str) -> list[tuple[str, Problem]]:
                 else ("yes", "a trial mass that was removed is taken as left on")
             )
             cells = {**problem.cells, (file, r, column): other}
-            found.append(
+            result.append(
                 (said, Problem(problem.workshop, problem.drawn, cells, problem.words, problem.further))
             )
-    return found
+    return result

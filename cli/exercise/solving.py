@@ -288,15 +288,15 @@ class Problem:
     @cached_property
     def sheets(self) -> dict[str, Sheet]:
         """The tables with this student's numbers."""
-        found = {}
+        sheets = {}
         for name in self.workshop.tables:
             own = self.workshop.sheet(name)
-            found[name] = Sheet(name, own.header, [list(row) for row in own.rows])
+            sheets[name] = Sheet(name, own.header, [list(row) for row in own.rows])
         for name, value in self.drawn.items():
             cell = _cell(name)
             if cell is None:
                 continue
-            sheet = found[cell[0]]
+            sheet = sheets[cell[0]]
             row, column = sheet.row(cell[1]), sheet.column(cell[2])
             assert row is not None
             assert column is not None
@@ -304,8 +304,8 @@ class Problem:
             assert text is not None
             sheet.rows[row][column] = text
         for (name, r, c), text in self.cells.items():
-            found[name].rows[r][c] = text
-        return found
+            sheets[name].rows[r][c] = text
+        return sheets
 
     @cached_property
     def command(self) -> list[str]:

@@ -60,30 +60,30 @@ def variants(workshop: Workshop, count: int, seed: int, warnings: list[str]) -> 
         warnings.extend(solved.result.warnings)
         one = Variant(problem, solved)
         return [one] * count
-    found: list[Variant] = []
+    result: list[Variant] = []
     reason: str = ""
     tried = refused = 0
     for drawn in _orders(exercise, Random(seed)):
         tried += 1
         variant, why = _usable(workshop, drawn)
         if variant is not None:
-            found.append(variant)
-            if len(found) == count:
+            result.append(variant)
+            if len(result) == count:
                 break
         else:
             refused, reason = refused + 1, why
-        if tried >= TRIES * (len(found) + 1):
+        if tried >= TRIES * (len(result) + 1):
             break
-    if not found:
+    if not result:
         raise DataError(
             f"{exercise.file}: [draw]: no variant can be used: of {tried} none has answers that can be asked; the last: {reason}"
         )
-    if len(found) < count:
+    if len(result) < count:
         warnings.append(
-            f"{exercise.file}: [draw]: {len(found)} variants for {count} students: some have the same numbers"
+            f"{exercise.file}: [draw]: {len(result)} variants for {count} students: some have the same numbers"
             + (f" ({refused} variants cannot be used; the last: {reason})" if refused else "")
         )
-    return [found[k % len(found)] for k in range(count)]
+    return [result[k % len(result)] for k in range(count)]
 
 
 def _orders(exercise: Exercise, random: Random) -> Iterator[dict[str, Value]]:
@@ -156,7 +156,7 @@ def _trouble(answer: Answer) -> str:
 
 
 def _growth(workshop: Workshop, drawn: Mapping[str, Value], answers: Sequence[Answer]) -> str:
-    """What is wrong with the condition: an answer that hangs on the last digit of a datum."""
+    """What is wrong with the condition: an answer that depends on the last digit of a datum."""
     for name, value in drawn.items():
         if not value.number:
             continue

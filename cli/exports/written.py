@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def written(
     m: Mechanism, inputs: tuple[float, ...], suffix: str, file: str, bare: Mapping[str, str]
 ) -> tuple[bytes, list[str]]:
-    """Return the file of a mechanism that starts at the inputs, rad or m, and what is left out of it.
+    """Return the file of a mechanism that starts at the inputs, rad or m, and what is omitted.
 
     `bare` are the units that the mechanism's own file uses.
     """
@@ -86,7 +86,7 @@ def _curves(travel: Travel, length: str, factor: float, angle: str) -> bytes:
 def _left_out(s: Skeleton, suffix: str) -> list[str]:
     """Name what a robot's format cannot hold."""
     m = s.m
-    found = []
+    result = []
     for what, loads in (
         ("forces", m.forces),
         ("torques", m.torques),
@@ -95,12 +95,12 @@ def _left_out(s: Skeleton, suffix: str) -> list[str]:
         ("friction", m.friction),
     ):
         if loads and not (suffix == ".xml" and "springs" in what):
-            found.append(f"{what} are left out: {len(loads)}")
+            result.append(f"{what} are left out: {len(loads)}")
     if m.racks and suffix == ".sdf":
-        found.append(f"racks are left out: {len(m.racks)}: the format has no such joint")
+        result.append(f"racks are left out: {len(m.racks)}: the format has no such joint")
     light = [name for name, part in s.parts.items() if part.mass <= 0 and name in m.links]
     if light and suffix != ".urdf":
-        found.append(
+        result.append(
             f"without mass: {', '.join(light)}: the format takes none: a millionth of the heaviest is given"
         )
     for k, e in enumerate(m.inputs):
@@ -108,7 +108,7 @@ def _left_out(s: Skeleton, suffix: str) -> list[str]:
         if suffix == ".xml" or (j is not None and j.input == k):
             continue
         instead = f": {j.link} is driven against {j.on} instead" if j is not None else ""
-        found.append(f"input {e.name} is left out: no pin joins {e.link} and {e.on}{instead}")
+        result.append(f"input {e.name} is left out: no pin joins {e.link} and {e.on}{instead}")
     if suffix == ".urdf" and m.gravity:
-        found.append("gravity is left out: the format has none")
-    return found
+        result.append("gravity is left out: the format has none")
+    return result

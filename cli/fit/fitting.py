@@ -143,12 +143,12 @@ def aims(
 
 def bounds(m: Mechanism, free: Sequence[str], bare: Mapping[str, str]) -> dict[str, tuple[float, float]]:
     """Every `--free NAME=LOW:HIGH` in SI."""
-    found: dict[str, tuple[float, float]] = {}
+    bounds: dict[str, tuple[float, float]] = {}
     for text in free:
         (first, *both), span = assigned_paths(m, text, "--free", "LOW:HIGH")
         if both:
             raise options.bad("--free", f"'{text}': two numbers: expected {first.path} or {both[0].path}")
-        if first.path in found:
+        if first.path in bounds:
             raise options.bad("--free", f"'{text}': {first.path} is given twice")
         ends = span.split(":")
         if len(ends) != 2:
@@ -159,25 +159,25 @@ def bounds(m: Mechanism, free: Sequence[str], bare: Mapping[str, str]) -> dict[s
             raise options.bad(
                 "--free", f"'{text}': expected the lower bound first, and a higher one after it"
             )
-        found[first.path] = low, high
-    return found
+        bounds[first.path] = low, high
+    return bounds
 
 
-def _drawn(found: Fit[Mechanism]) -> Figure:
+def _drawn(fit: Fit[Mechanism]) -> Figure:
     figure = blank()
-    found.plot(figure)
-    if found.mechanism.name:
-        figure.suptitle(found.mechanism.name, fontsize=10)
+    fit.plot(figure)
+    if fit.mechanism.name:
+        figure.suptitle(fit.mechanism.name, fontsize=10)
     return figure
 
 
-def _sentence(found: Fit[Mechanism]) -> str:
+def _sentence(fit: Fit[Mechanism]) -> str:
     parts = [
         f"{_name(each)} comes within {_size(each, each.max):.3g} {_unit(each)} of all {len(each.target)} rows of its "
         f"target, {_size(each, each.rms):.3g} {_unit(each)} in the root of the mean square"
-        for each in found.reached
+        for each in fit.reached
     ]
-    return f"{'; '.join(parts)}. The file's own numbers and {found.starts - 1} others were starts."
+    return f"{'; '.join(parts)}. The file's own numbers and {fit.starts - 1} others were starts."
 
 
 def _name(each: Reached) -> str:
@@ -197,22 +197,22 @@ def _shown(dimension: Dimension, si: float) -> float:
     return read_degrees(si) if dimension.unit == "deg" else si
 
 
-def _parameters(found: Fit[Mechanism]) -> dict[str, float]:
-    return {d.header: _shown(d, si) for d, si in zip(found.dimensions, found.values.tolist(), strict=True)}
+def _parameters(fit: Fit[Mechanism]) -> dict[str, float]:
+    return {d.header: _shown(d, si) for d, si in zip(fit.dimensions, fit.values.tolist(), strict=True)}
 
 
 def _misses(reached: Sequence[Reached]) -> dict[str, float]:
     """Root of the mean square and largest distance of lengths together, and of angles."""
-    found: dict[str, float] = {}
+    misses: dict[str, float] = {}
     for unit in ("m", "deg"):
         parts = [_size(each, each.distances) for each in reached if _unit(each) == unit]
         if parts:
             every = np.concatenate(parts)
-            found |= {
+            misses |= {
                 f"rms_{unit}": float(np.sqrt(np.mean(every**2))),
                 f"max_{unit}": float(every.max()),
             }
-    return found
+    return misses
 
 
 def _document(solutions: Sequence[Fit[Mechanism]]) -> Document:
@@ -243,18 +243,18 @@ def _numbers(solutions: Sequence[Fit[Mechanism]]) -> Table:
     return Table([Column("solution", "", numbers), *columns], keys=("solution",))
 
 
-def _places(found: Fit[Mechanism]) -> dict[str, Callable[[], Table]]:
+def _places(fit: Fit[Mechanism]) -> dict[str, Callable[[], Table]]:
     """A table for each target, a row for each of its rows."""
     by_target: dict[int, list[Reached]] = {}
-    for each in found.reached:
+    for each in fit.reached:
         by_target.setdefault(id(each.inputs), []).append(each)
-    turning = not found.mechanism.inputs[0].is_slide
+    turning = not fit.mechanism.inputs[0].is_slide
 
     def table(reached: Sequence[Reached]) -> Table:
         inputs = reached[0].inputs
         columns = [Column("input", "deg" if turning else "m", np.degrees(inputs) if turning else inputs)]
         for each in reached:
-            name = "" if len(found.reached) == 1 else f"{_name(each)}_"
+            name = "" if len(fit.reached) == 1 else f"{_name(each)}_"
             for title, values in (("", each.values), ("target_", each.target)):
                 if each.kind == "point":
                     columns.append(Column(f"{name}{title}x", "m", values.real))
@@ -269,7 +269,7 @@ def _places(found: Fit[Mechanism]) -> dict[str, Callable[[], Table]]:
     return {name: partial(table, of) for name, of in zip(names, by_target.values(), strict=True)}
 
 
-def _text(file: str, found: Fit[Mechanism], bare: Mapping[str, str]) -> str:
+def _text(file: str, fit: Fit[Mechanism], bare: Mapping[str, str]) -> str:
     """The file's own text with the fitted numbers."""
     import tomlkit
 
@@ -277,12 +277,12 @@ def _text(file: str, found: Fit[Mechanism], bare: Mapping[str, str]) -> str:
 
     name, data = read_bytes(file)
     document = tomlkit.parse(data.decode("utf-8-sig"))
-    for dimension, si in zip(found.dimensions, found.values.tolist(), strict=True):
+    for dimension, si in zip(fit.dimensions, fit.values.tolist(), strict=True):
         _write(document, dimension, si, Units(dict(bare)))
     text = tomlkit.dumps(document)
     folder = Path() if file == "-" else Path(file).parent
     again = Mechanism.from_toml_text(text, name, folder, partial(beside, []))
-    for path, si in found.parameters.items():
+    for path, si in fit.parameters.items():
         if not math.isclose(float(value(again, path).real), si, rel_tol=WRITTEN, abs_tol=1e-15):
             raise DataError(
                 f"{name}: {path}: it does not stand in the file as a number that could be replaced"

@@ -64,7 +64,7 @@ def wanted(m: Mechanism, names: Sequence[str]) -> list[Wanted]:
     """What `--want` names: `H`, `coupler.angle`, `B.position`; a name that is not there is an error that names the nearest."""
     every = every_wanted(m)
     known = {name: each for each in reversed(every) for name in each.names}
-    found: list[Wanted] = []
+    result: list[Wanted] = []
     for text in (part.strip() for name in names for part in name.split(",")):
         owner, _, part = text.rpartition(".")
         if text not in known:
@@ -75,15 +75,15 @@ def wanted(m: Mechanism, names: Sequence[str]) -> list[Wanted]:
                 "--want",
                 f"no point, link or slide is named '{text}'{nearest(text, known)}: expected one of {others}",
             )
-        if known[text] in found:
+        if known[text] in result:
             raise options.bad("--want", f"'{text}' is given twice")
-        found.append(known[text])
-    return found
+        result.append(known[text])
+    return result
 
 
 def weights(texts: Sequence[str] | None, aims: Sequence[Wanted]) -> dict[str, float]:
     """Every `--weight NAME=NUMBER`, by the library's name."""
-    found: dict[str, float] = {}
+    weights: dict[str, float] = {}
     for text in texts or ():
         name, equals, number = text.rpartition("=")
         of = [each for each in aims if name.strip() in each.names]
@@ -96,8 +96,8 @@ def weights(texts: Sequence[str] | None, aims: Sequence[Wanted]) -> dict[str, fl
         if not of:
             names = ", ".join(each.names[-1] for each in aims)
             raise options.bad("--weight", f"'{text}': expected one of {names}")
-        found |= dict.fromkeys((each.path for each in of), weight)
-    return found
+        weights |= dict.fromkeys((each.path for each in of), weight)
+    return weights
 
 
 def targets(

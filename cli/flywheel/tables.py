@@ -1,4 +1,4 @@
-"""What is computed of a flywheel: one row of results, and the energy along the turns."""
+"""Results of a flywheel: one row of results, and the energy along the turns."""
 
 from __future__ import annotations
 

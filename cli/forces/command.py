@@ -21,6 +21,8 @@ What:
   only NAME,...  Only these: crank.torque,B.coupler.fx,shaking.fx,H.x.
   flywheel NUMBER  Flywheel inertia for this speed fluctuation: 0.02.
   counterweights LINK,...  Counterweights on these links for the least shaking force.
+  find NAME  Find this dimension: input.speed, links.crank.B.x; the pose is one.
+  so_that QUANTITY=VALUE  What it is to give: B.vx=3m_s, crank.torque=12.
 Output:
   page FILE(.html)  Write a page on which the mechanism moves, with arrows.
   states FILE(.csv)  Write the states of all links: what dalembert work reads.

@@ -11,14 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.cases.case import Case
-from cli.cases.poses import column, records
-from cli.cases.quantities import effort_name
 from cli.cases.study import Further, PoseCase, PoseStudy
 from cli.read.options import bad
 from cli.show.result import Result
 from dalembert.errors import DataError
-from dalembert.results.columns import Table
-from dalembert.units import written
+from dalembert.results.columns import Column, Table, names, number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -85,24 +82,17 @@ class Forces(PoseStudy):
 
     def further(self, analysis: Analysis) -> Further:
         """The cycle, and counterweights."""
-        document: Document = {}
-        tables: dict[str, Callable[[], Table]] = {}
-        words = []
+        tables: dict[str, Table] = {}
+        words = ""
         if self.has_cycle or self.flywheel is not None:
-            document["cycle"], reason = cycle_of(analysis, self.flywheel)
-            if not reason:
-                cycle = document["cycle"]
-                tables["cycle"] = lambda: records([cycle])
-                words.append(cycle_text(cycle))
-            elif self.json or self.flywheel is not None:
+            tables["cycle"], reason = cycle_of(analysis, self.flywheel)
+            if reason and (self.json or self.flywheel is not None):
                 analysis.warnings.append(f"no cycle, so no mean, peak, work or flywheel: {reason}")
-            else:
-                words.append(f"no cycle: {reason}")
+            elif reason:
+                words = f"no cycle: {reason}"
         if self.counterweights is not None:
-            weights = document["counterweights"] = counterweights(analysis, self.counterweights)
-            tables["counterweights"] = lambda: of_counterweights(weights)
-            words.append(counterweights_text(weights))
-        return Further(document, tables, "\n\n".join(words))
+            tables |= counterweights(analysis, self.counterweights)
+        return Further(tables, words)
 
     def way(self, analysis: Analysis) -> list[Topic]:
         """The ledger of every pose, free-body diagrams."""
@@ -160,7 +150,7 @@ def _csv_parts(case: PoseCase, digits: bool) -> Iterator[bytes]:
         yield csv_text(shown.cells, header=i == 0).encode()
 
 
-def cycle_of(analysis: Analysis, coefficient: float | None) -> tuple[Document, str]:
+def cycle_of(analysis: Analysis, coefficient: float | None) -> tuple[Table, str]:
     """Mean, peak and r.m.s. effort over the cycle, work, energy error, flywheel; why the sweep is none, else empty."""
     from virtualwork.study.cycle import Cycle
 
@@ -169,12 +159,6 @@ def cycle_of(analysis: Analysis, coefficient: float | None) -> tuple[Document, s
     if len(m.inputs) != 1:
         raise DataError(f"{analysis.file}: a cycle has one input, found {len(m.inputs)}")
     slide = m.inputs[0].is_slide
-    name = effort_name(slide)
-    keys = (
-        f"mean_{name}", f"peak_{name}", f"peak_at_{analysis.unit}", f"rms_{name}", "peak_power_W", "work_J",
-        "energy_closure_J",
-    )  # fmt: skip
-    result: Document = dict.fromkeys((*keys, "flywheel_inertia_kg_m2"))
     swept = Cycle(motion)
     if not np.isfinite(motion.effort).all():
         reason = "the effort is not finite at every pose of the sweep"
@@ -183,67 +167,68 @@ def cycle_of(analysis: Analysis, coefficient: float | None) -> tuple[Document, s
     c = swept if reason else swept.refined()
     if not reason and not np.isfinite(c.effort).all():
         reason = "the effort is not finite at every pose between those of the sweep"
-    if reason:
-        return result, reason
-    at = c.peak_at if slide else math.degrees(c.peak_at) % (360.0 * max(1, abs(c.turns or 1)))
-    result |= zip(keys, (c.mean, c.peak, at, c.rms, c.peak_power, c.work, c.closure), strict=True)
-    if coefficient is not None:
+    effort, place = ("force", "length") if slide else ("torque", "angle")
+    quantities: dict[str, tuple[str, Callable[[], float | None]]] = {
+        f"mean_{effort}": (effort, lambda: c.mean),
+        f"peak_{effort}": (effort, lambda: c.peak),
+        "peak_at": (place, lambda: c.peak_at if slide else _in_turns(c.peak_at, c.turns)),
+        f"rms_{effort}": (effort, lambda: c.rms),
+        "peak_power": ("power", lambda: c.peak_power),
+        "work": ("energy", lambda: c.work),
+        "energy_closure": ("energy", lambda: c.closure),
+    }
+    values = {name: None if reason else value() for name, (_, value) in quantities.items()}
+    columns = [
+        number(name, dimension, np.array([values[name]], dtype=float))
+        for name, (dimension, _) in quantities.items()
+    ]
+    wheel = math.nan
+    if coefficient is not None and not reason:
         if slide:
             raise DataError(f"{analysis.file}: --flywheel: the input is a slide: a flywheel turns")
         try:
-            result["flywheel_inertia_kg_m2"] = c.flywheel(coefficient)
+            wheel = c.flywheel(coefficient)
         except ValueError as error:
             raise DataError(f"{analysis.file}: --flywheel: {error}") from None
-        result["energy_fluctuation_J"] = c.fluctuation
-    return result, ""
+    flywheel = [number("flywheel_inertia", "inertia", [wheel])]
+    if coefficient is not None and not reason:
+        columns += [*flywheel, number("energy_fluctuation", "energy", [c.fluctuation])]
+        flywheel = []
+    if reason:
+        return Table([], place="cycle", documented=[*columns, *flywheel]), reason
+    return Table(columns, place="cycle", documented=flywheel), ""
 
 
-def cycle_text(part: Document) -> str:
-    """The cycle below the table."""
-    lines = ["cycle:"]
-    for key, value in part.items():
-        if value is not None:
-            its = column(key, [value])
-            lines.append(f"  {its.name.replace('_', ' '):<18} {value:.6g} {written(its.unit)}")
-    return "\n".join(lines)
+def _in_turns(angle: float, turns: int | None) -> float:
+    """An angle in degrees, within the whole turns of a cycle."""
+    return math.degrees(angle) % (360.0 * max(1, abs(turns or 1)))
 
 
-def counterweights(analysis: Analysis, links: list[str]) -> Document:
-    """Counterweights on links that leave the least r.m.s. shaking force over the sweep."""
+def counterweights(analysis: Analysis, links: list[str]) -> dict[str, Table]:
+    """Counterweights on links that leave the least r.m.s. shaking force over the sweep, a row each."""
     from virtualwork.study.counterweights import least_squares
 
     weights, before, after = least_squares(analysis.motions[0], links)
 
-    def rms(force: NDArray[np.complex128]) -> float:
-        return float(np.sqrt(np.nanmean(np.abs(force) ** 2)))
+    def rms(name: str, force: NDArray[np.complex128], rows: int) -> Column:
+        value = float(np.sqrt(np.nanmean(np.abs(force) ** 2)))
+        return number(f"shaking_rms_{name}", "force", [value] * rows)
 
-    return {
-        "weights": [
-            {
-                "link": link,
-                "mass_radius_kg_m": abs(w),
-                "angle_deg": math.degrees(math.atan2(w.imag, w.real)) % 360.0,
-            }
-            for link, w in weights.items()
-        ],
-        "shaking_rms_before_N": rms(before),
-        "shaking_rms_after_N": rms(after),
-    }
-
-
-def of_counterweights(part: Document) -> Table:
-    """A counterweight a row, with the shaking force before and after all of them."""
-    rms = {key: value for key, value in part.items() if key != "weights"}
-    return records([w | rms for w in part["weights"]])
-
-
-def counterweights_text(part: Document) -> str:
-    """The counterweights below the table."""
-    lines = ["counterweights (mass times radius from the link's pivot, angle from the link's x-axis):"]
-    lines += [
-        f"  {w['link']}: {w['mass_radius_kg_m']:.6g} kg·m at {w['angle_deg']:.4g}°" for w in part["weights"]
+    shaking = {"before": before, "after": after}
+    rows = [replace(rms(name, force, len(weights)), place=None) for name, force in shaking.items()]
+    columns = [
+        names("link", list(weights)),
+        number("mass_radius", "unbalance", [abs(w) for w in weights.values()]),
+        number(
+            "angle", "angle", [math.degrees(math.atan2(w.imag, w.real)) % 360.0 for w in weights.values()]
+        ),
+        *rows,
     ]
-    lines.append(
-        f"  RMS shaking force of inertia {part['shaking_rms_before_N']:.6g} N -> {part['shaking_rms_after_N']:.6g} N"
-    )
-    return "\n".join(lines)
+    above = "mass times radius from the pivot of the link, angle from its x-axis; shaking force of inertia"
+    return {
+        "counterweights": Table(columns, ("link",), "counterweights.weights[]", above=above),
+        # these once in the document
+        "shaking force": Table(
+            [], place="counterweights", documented=[rms(name, force, 1) for name, force in shaking.items()]
+        ),
+    }

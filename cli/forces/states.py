@@ -91,15 +91,15 @@ def table(analysis: Analysis) -> Table:
         return bounds_of(bound(along if key[-1] == 1 else motion, key, analysis.set_angles))
 
     def error(key: str) -> list[float]:
-        found = []
+        result = []
         for place, row in listed:
             guide = None if place.mark is None else place.mark.guide
             value = row.get(key)
             number = isinstance(value, float) and value != 0
-            found.append(
+            result.append(
                 bounds(place.motion, place.link, place.field, guide, key)[place.pose] if number else 0.0
             )
-        return found
+        return result
 
     columns = [
         column(key, [row.get(key) for _, row in listed], None if key in EXACT else partial(error, key))
@@ -111,7 +111,7 @@ def table(analysis: Analysis) -> Table:
 
 def rows(analysis: Analysis) -> list[tuple[Place, Row]]:
     """The table's rows, each with what it holds."""
-    found: list[tuple[Place, Row]] = []
+    rows: list[tuple[Place, Row]] = []
     several = analysis.several
     for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
         order = analysis.order
@@ -151,12 +151,12 @@ def rows(analysis: Analysis) -> list[tuple[Place, Row]]:
                         extra.append((place, {**lead, "link": mark.link, **wanted}))
                     else:
                         row |= wanted
-                found += [
+                rows += [
                     (Place(motion, i, name, of, None), {**lead, "link": name, **row})
                     for name, row in here.items()
                 ]
-                found += extra
-    return found
+                rows += extra
+    return rows
 
 
 def _part(analysis: Analysis, motion: Motion, name: str, order: int) -> Part:
@@ -194,7 +194,7 @@ def _virtual(motion: Motion, name: str, j: int) -> Part:
 def _marks(motion: Motion, field: int | None) -> list[Mark]:
     """The marks of every input's effort, with the velocities of one field (None: the motion's own)."""
     m, n = motion.mechanism, motion.n
-    found: list[Mark] = []
+    marks: list[Mark] = []
 
     def turning(link: str) -> NDArray[np.float64]:
         of = motion.link(link)
@@ -212,7 +212,7 @@ def _marks(motion: Motion, field: int | None) -> list[Mark]:
             for link, mark in ((str(entry.link), "?" if plain else name), (reacts, f"{name}*-1")):
                 if link != GROUND:
                     its = {"torque_N_m": [mark] * n, "omega_rad_s": cells(turning(link))}
-                    found.append(Mark(link, its))
+                    marks.append(Mark(link, its))
             continue
         i = next(i for i, g in enumerate(m.guides) if g.point == entry.slider)
         g = m.guides[i]
@@ -230,8 +230,8 @@ def _marks(motion: Motion, field: int | None) -> list[Mark]:
             share: Part = {**_vector(("fvx_m_s", "fvy_m_s"), at)}
             share["fx_N"] = [_share(name, sign * float(c)) for c in rail.real]
             share["fy_N"] = [_share(name, sign * float(c)) for c in rail.imag]
-            found.append(Mark(link, share, i))
-    return found
+            marks.append(Mark(link, share, i))
+    return marks
 
 
 def _share(name: str, factor: float) -> str:

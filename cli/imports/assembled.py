@@ -346,8 +346,8 @@ def _seek(d: Drawing, source: str) -> None:
 
 
 def pages(title: str, taken: list[str], made: str) -> list[Sheet]:
-    """Return the sheets of a mechanism, and of its file; `taken` says from what it was taken over."""
-    first = Section("Taken over", taken)
+    """Return the sheets of a mechanism, and of its file; `taken`: the file that it was imported from."""
+    first = Section("Imported", taken)
     file = Sheet("", [Section("The file for dalembert mechanism", [CODE + made.rstrip("\n")])])
     try:
         m = Mechanism.from_toml_text(made)

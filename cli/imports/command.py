@@ -23,7 +23,7 @@ Kind = StrEnum("Kind", {name.replace("-", "_"): name for name in KINDS})  # type
 LINK = re.compile(r"[a-z]+://", re.IGNORECASE)
 
 METHOD = (
-    "Lengths are differences of the file's own decimals, rounded once. What was taken over is put together anew and compared "
+    "Lengths are differences of the file's own decimals, rounded once. The imported mechanism is assembled again and compared "
     "with the drawing, point by point."
 )
 
@@ -42,7 +42,7 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
     """Read a mechanism of another program: PMKS text and links, PMKS+ links, MotionGen, Linkage, linkage_sim, planar robots (URDF, SDF, MJCF).
 
     What is written is a file for `dalembert mechanism`. The links' axes are parallel to the ground's in the drawn pose,
-    which is that of input 0; a robot's keep their own. All that is not taken over is named on standard error. Several mechanisms in one file
+    which is that of input 0; a robot's keep their own. What is not imported is named on standard error. Several mechanisms in one file
     become FILE-1.toml, FILE-2.toml and so on.
     """
     from cli.imports.assembled import described
@@ -57,7 +57,7 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
     folder = None if link or file == "-" else Path(file).parent
     told, drawings = read(name, data, None if kind is None else str(kind.value), folder)
     stem = "" if folder is None else Path(file).stem
-    found: list[tuple[str, list[str]]] = []
+    result: list[tuple[str, list[str]]] = []
     lost: list[str] = []
     for d in drawings:
         d.name = d.name or stem
@@ -65,18 +65,20 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
         lost += d.notes
         for k, part in enumerate(parts, 1):
             part.name = part.name if len(parts) == 1 else f"{part.name} {k}".strip()
-            found.append((described(part, f"imported from {told}"), part.notes))
-    if not found:
+            result.append((described(part, f"imported from {told}"), part.notes))
+    if not result:
         raise DataError("; ".join([f"{name}: no mechanism: nothing in it is driven by an input", *lost]))
-    several = len(found) > 1
+    several = len(result) > 1
     if several and output is None:
-        raise bad("-o", f"{name} holds {len(found)} mechanisms: expected a file, which becomes FILE-1.toml …")
-    ends = [f"-{k}" for k in range(1, len(found) + 1)] if several else [""]
+        raise bad(
+            "-o", f"{name} holds {len(result)} mechanisms: expected a file, which becomes FILE-1.toml …"
+        )
+    ends = [f"-{k}" for k in range(1, len(result) + 1)] if several else [""]
     paths = [output.with_name(f"{output.stem}{end}{output.suffix}") for end in ends] if output else []
     titles = [path.name for path in paths] if several else [""]
-    said = [
+    lines = [
         f"{title}: {note}" if several else note
-        for title, (_, notes) in zip(titles, found, strict=True)
+        for title, (_, notes) in zip(titles, result, strict=True)
         for note in notes
     ]
 
@@ -86,16 +88,16 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
         taken = [f"{name}: {KINDS[told].partition(' (')[0]}, {len(data)} bytes"]
         return [
             sheet
-            for title, (made, its) in zip(titles, found, strict=True)
-            for sheet in pages(title, taken if lost or its else [*taken, "All of it is taken over."], made)
+            for title, (made, its) in zip(titles, result, strict=True)
+            for sheet in pages(title, taken if lost or its else [*taken, "All of it is imported."], made)
         ]
 
     return Result(
-        notes=lambda: f"wrote {', '.join(map(str, paths))}\n" if several else "" if paths else found[0][0],
-        beside={path: made.encode for path, (made, _) in zip(paths, found, strict=False)},
-        warnings=[*lost, *said],
+        notes=lambda: f"wrote {', '.join(map(str, paths))}\n" if several else "" if paths else result[0][0],
+        beside={path: made.encode for path, (made, _) in zip(paths, result, strict=False)},
+        warnings=[*lost, *lines],
         sheets=sheets,
         shows_input=True,
         method=METHOD,
-        about={"title": drawings[0].name or "Mechanism taken over"},
+        about={"title": drawings[0].name or "Imported mechanism"},
     )

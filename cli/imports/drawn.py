@@ -171,11 +171,11 @@ class Drawing:
 
     def pins(self) -> dict[str, list[str]]:
         """Return the bodies of each point that more than one body has."""
-        found: dict[str, list[str]] = {}
+        result: dict[str, list[str]] = {}
         for name, body in self.bodies.items():
             for point in body.points:
-                found.setdefault(point, []).append(name)
-        return {point: names for point, names in found.items() if len(names) > 1}
+                result.setdefault(point, []).append(name)
+        return {point: names for point, names in result.items() if len(names) > 1}
 
     def size(self) -> float:
         """Return the largest extent of the drawing, or of a body of it."""
@@ -278,13 +278,13 @@ def centers(d: Drawing, a: str, b: str) -> Iterator[tuple[str, str, str]]:
 
 def _turning_at(d: Drawing, pins: dict[str, list[str]], point: str) -> list[str]:
     """Return the bodies that turn about a pin: those of other pins in the same place of one of its bodies too."""
-    found = dict.fromkeys(pins[point])
+    result = dict.fromkeys(pins[point])
     for body in pins[point]:
         held = d.bodies[body].points
         for other, names in pins.items():
             if other in held and held[other] == held[point]:
-                found |= dict.fromkeys(names)
-    return list(found)
+                result |= dict.fromkeys(names)
+    return list(result)
 
 
 def merge(d: Drawing, keep: str, gone: str) -> None:
@@ -414,14 +414,14 @@ def _parts(d: Drawing) -> list[Drawing]:
     groups = Groups(d.bodies)
     for names in (*(names for names, _ in d.ties()), *(dict(load.ends) for load in d.loads)):
         groups.join(*(name for name in names if name != GROUND))
-    found = []
+    parts = []
     for group in groups.all():
         drives = [e for e in d.drives if e.pair[0] in group]
         if drives:
-            found.append(_part(d, set(group), drives))
+            parts.append(_part(d, set(group), drives))
         elif group != [GROUND]:
             d.leave(", ".join(group), f"nothing drives {'it' if len(group) == 1 else 'them'}")
-    return found
+    return parts
 
 
 def _part(d: Drawing, names: set[str], drives: list[Drive]) -> Drawing:

@@ -95,7 +95,7 @@ DEFAULT_CPM = 15.0
 
 
 def read(file: str, text: str) -> list[Drawing]:
-    """Read the document; what has nothing but the ground in common is told apart later."""
+    """Read the document; what has nothing but the ground in common is distinguished later."""
     return [_Reader(file, parse(file, text)).drawing()]
 
 
@@ -120,10 +120,10 @@ class _Reader:
 
     def number(self, e: Element, key: str, default: float | None = None) -> float:
         """Return a finite number of an attribute."""
-        found = e.attributes.get(key)
-        if found is None and default is not None:
+        result = e.attributes.get(key)
+        if result is None and default is not None:
             return default
-        return finite(self.file, f"line {e.line}: <{e.tag}> {key}", found)
+        return finite(self.file, f"line {e.line}: <{e.tag}> {key}", result)
 
     def drawing(self) -> Drawing:
         d, file = self.d, self.file

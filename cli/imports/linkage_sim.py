@@ -143,7 +143,7 @@ class _Reader:
 
     def _ends(self, name: str, e: dict[str, Any]) -> tuple[str, str, str, str]:
         """Return (body, point, body, point) of a joint; where a body is fixed to another, that one's."""
-        found = []
+        result = []
         for side in "ij":
             where = f"joint {name}"
             body = str(self.get(where, e, f"body_{side}"))
@@ -157,8 +157,8 @@ class _Reader:
                 z = self._carried(self.points[body][point], turn, shift)
                 point = f"{body}.{point}"
                 self.points[held].setdefault(point, z)
-            found += [held, point]
-        return found[0], found[1], found[2], found[3]
+            result += [held, point]
+        return result[0], result[1], result[2], result[3]
 
     def whole(self, body: str) -> tuple[str, float, complex]:
         """Return the body that one is fixed to, the turn of its axes there and where their origin stands."""
@@ -171,10 +171,10 @@ class _Reader:
 
     def named_body(self, where: str, e: dict[str, Any], key: str) -> tuple[str, float, complex]:
         """Return the same of the body that an entry names; it must be there."""
-        found = self.whole(str(self.get(where, e, key)))
-        if found[0] not in self.d.bodies:
-            raise damaged(self.file, where, found[0], "one of the bodies")
-        return found
+        result = self.whole(str(self.get(where, e, key)))
+        if result[0] not in self.d.bodies:
+            raise damaged(self.file, where, result[0], "one of the bodies")
+        return result
 
     def held(self, where: str, e: dict[str, Any], key: str, point: str) -> tuple[str, Place]:
         """Return the body that an entry names, and the place of its point there."""

@@ -15,8 +15,8 @@ KEYS = {"mechanism", "units", "joints", "links", "slots", "cylinders", "actuator
 
 def read(file: str, data: Any) -> list[Drawing]:
     """Read every mechanism of a document."""
-    found = data if isinstance(data, list) else data.get("mechanisms", [data])
-    return [_Reader(file, entry).drawing() for entry in found]
+    result = data if isinstance(data, list) else data.get("mechanisms", [data])
+    return [_Reader(file, entry).drawing() for entry in result]
 
 
 def listed(entry: dict[str, Any], *keys: str) -> list[Any]:

@@ -55,17 +55,17 @@ def read(file: str, text: Any) -> list[Drawing]:
     starts = [i for i, line in enumerate(lines) if "mech=" in line]
     if len(starts) <= 1 and not any(line.partition("mech=")[2].strip() for line in lines):
         return [_one(file, "\n".join(lines), 1)]
-    found = []
+    result = []
     titles: list[str] = []
     for i, line in enumerate(lines):
         if i in starts:
             d = _one(file, line, i + 1)
             d.name = titles[-1].strip().rstrip(":") if titles else ""
             titles = []
-            found.append(d)
+            result.append(d)
         elif line.strip():
             titles.append(line)
-    return found
+    return result
 
 
 def _one(file: str, text: str, first: int) -> Drawing:

@@ -241,12 +241,12 @@ class _Layer:
     # --- what ties and what drives ---------------------------------------------------------------------------
     def _turning_alike(self) -> Groups:
         """Return the bodies that slides join, which turn alike. The ground stands for its own, blocks for none."""
-        found = Groups([GROUND, *(g.name for g in self.groups.values())])
+        result = Groups([GROUND, *(g.name for g in self.groups.values())])
         for s in self.slides.values():
-            pair = found.of(s.link), found.of(s.on)
+            pair = result.of(s.link), result.of(s.on)
             keep = min(pair, key=lambda name: (name != GROUND, name.startswith(BLOCK)))
-            found.join(keep, *pair)
-        return found
+            result.join(keep, *pair)
+        return result
 
     def _shares(
         self, terms: list[tuple[str, float]], where: str, wanted: str = ""
@@ -255,7 +255,7 @@ class _Layer:
 
         Of bodies that turn alike the `wanted` one is named, or one that the joints name.
         """
-        found: dict[str, float] = {}
+        result: dict[str, float] = {}
         names: dict[str, str] = {}
         for name, factor in terms:
             j = self.robot.joints.get(name)
@@ -267,13 +267,13 @@ class _Layer:
             for link, c in ((j.child, sense), (j.parent, -sense)):
                 body = self.group(link).name
                 top = self.alike.of(body)
-                found[top] = found.get(top, 0.0) + c
+                result[top] = result.get(top, 0.0) + c
                 if body == wanted or (top not in names and body in self.d.bodies):
                     names[top] = body
-        scale = max(map(abs, found.values()), default=0.0)
+        scale = max(map(abs, result.values()), default=0.0)
         return {
             GROUND if top == GROUND else names.get(top, top): c
-            for top, c in found.items()
+            for top, c in result.items()
             if abs(c) > 1e-12 * scale
         }
 

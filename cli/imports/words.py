@@ -1,4 +1,4 @@
-"""What `dalembert import` says: the kinds it knows, and what was not taken over."""
+"""What `dalembert import` says: the kinds it knows, and what was not imported."""
 
 from __future__ import annotations
 

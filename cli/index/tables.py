@@ -36,23 +36,23 @@ def tables(p: Positions) -> dict[str, Callable[[], Table]]:
 
 def size(p: Positions, name: str, values: ArrayLike, place: str | None, error: bool = False) -> Column:
     """Sizes in the unit of the file; JSON has unbalances in kg·m, amplitudes in the unit of the file."""
-    found = np.asarray(values, dtype=float)
+    result = np.asarray(values, dtype=float)
 
     def bound() -> ArrayLike:
-        return np.broadcast_to(size_error(found, p.bound), found.shape)
+        return np.broadcast_to(size_error(result, p.bound), result.shape)
 
     bounds = bound if error else None
     if p.quantity == "unbalance":
-        return number(name, "unbalance", found, p.unit, bounds, place)
-    return Column(name, p.unit, found, bounds, place)  # type: ignore[arg-type]
+        return number(name, "unbalance", result, p.unit, bounds, place)
+    return Column(name, p.unit, result, bounds, place)  # type: ignore[arg-type]
 
 
 def direction(p: Positions, values: Complex, place: str | None, error: bool = False) -> Column:
     """Directions: of an unbalance its angle, of a vibration its phase."""
     name = "angle" if p.quantity == "unbalance" else "phase"
-    found = degrees(values)
-    bound = (lambda: angle_error(values, p.bound, found)) if error else None
-    return number(name, "angle", found, error=bound, place=place and place.format(name))
+    result = degrees(values)
+    bound = (lambda: angle_error(values, p.bound, result)) if error else None
+    return number(name, "angle", result, error=bound, place=place and place.format(name))
 
 
 def parts(p: Positions) -> Table:

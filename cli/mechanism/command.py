@@ -21,6 +21,8 @@ What:
   only NAME,...  Only these: H.x,coupler.omega; H is all of H.
   order position|velocity|acceleration|jerk  How far to differentiate (default: as the input's rates give).
   newton  Newton-Raphson on all loops at once, with its iterates.
+  find NAME  Find this dimension: input.speed, links.crank.B.x; the pose is one.
+  so_that QUANTITY=VALUE  What it is to give: B.vx=3m_s, crank.torque=12.
 Output:
   page FILE(.html)  Write a page on which the mechanism moves.
 Further options (docs/commands.md describes them):

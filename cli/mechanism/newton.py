@@ -51,8 +51,7 @@ class Poses(PoseStudy):
         if not self.newton:
             return Further()
         document = iterates(analysis)
-        tables = {"newton": lambda: records(document["iterates"])}
-        return Further(document, tables, newton_text(document))
+        return Further({"newton": records(document["iterates"])}, newton_text(document), document)
 
     def way(self, analysis: Analysis) -> list[Topic]:
         """Loops, closed forms, Newton's iterates, parts of motion."""

@@ -54,7 +54,7 @@ KEYS = (
 
 def way(analysis: Analysis, *, newton: bool = False) -> list[Topic]:
     """The topics of one mechanism, of each assembly after the other."""
-    found: list[Topic] = []
+    result: list[Topic] = []
     several = analysis.several
     for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
         topics = [*_loops(analysis, motion), *_groups(analysis, motion)]
@@ -66,8 +66,8 @@ def way(analysis: Analysis, *, newton: bool = False) -> list[Topic]:
             if several:
                 topic.head = {"branch": assembly.number, **topic.head}
                 topic.title = f"Assembly {assembly.number}: {topic.heading}"
-        found += topics
-    return found
+        result += topics
+    return result
 
 
 def _loops(analysis: Analysis, motion: Motion) -> list[Topic]:
@@ -84,7 +84,7 @@ def _groups(analysis: Analysis, motion: Motion) -> list[Topic]:
     from virtualwork.study.loops import CASES, apex, closed_form
 
     assembly, m = motion.assembly, motion.mechanism
-    found = []
+    groups = []
     for group in assembly.plan.groups:
         head: Document = {"links": list(group.links)}
         title = f"Group {', '.join(group.links)}"
@@ -94,7 +94,7 @@ def _groups(analysis: Analysis, motion: Motion) -> list[Topic]:
                 f"No closed form: {len(group.angles)} angles and {len(group.slides)} slides from {len(group.closures)} loops "
                 "by Newton and Raphson, x(k+1) = x(k) − Φ⁻¹·f(x(k)) (Nicoletti, lecture 7); --newton shows iterates."
             )
-            found.append(Topic("group", [text], title, head))
+            groups.append(Topic("group", [text], title, head))
             continue
         case = CASES[group.kind]
         name, _ = apex(m, group)
@@ -112,8 +112,8 @@ def _groups(analysis: Analysis, motion: Motion) -> list[Topic]:
                 parts.append(f"At {figures(analysis.inputs.shown[first][0])}:")
             parts += _root_text(group, its)
         parts.append(_root_table(analysis, m, group, name, at))
-        found.append(Topic("group", parts, title, head))
-    return found
+        groups.append(Topic("group", parts, title, head))
+    return groups
 
 
 def _pair(z: complex) -> list[float]:

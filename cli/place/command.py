@@ -36,7 +36,7 @@ What:
 How: weights as they are:
   stock MASSES  Weights in stock, such as 1g,2g,5g; one a place; the fewest that come within 1 % of the correction, at most three.
   weights MASSES  Weights of fixed mass that stand at any angle, such as 4g,4g: the angle of each.
-  max_pieces N  Least error with so many weights from stock altogether, in place of the fewest within 1 %.
+  max_pieces N  Largest number of weights from stock in all: least error, in place of the fewest within 1 %.
 How: elsewhere:
   at_radius R  Radius the corrections were found for.
   to_radius R  Radius the masses go to.

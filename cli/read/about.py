@@ -18,14 +18,14 @@ def about(file: str, document: Mapping[str, object]) -> dict[str, str]:
     DataError
         No table, an unknown key, or a value that is no text.
     """
-    found = document.get("report", {})
-    if not isinstance(found, dict):
+    result = document.get("report", {})
+    if not isinstance(result, dict):
         raise DataError(f"{file}: [report]: expected a table with some of {', '.join(HEAD)}")
-    for key, value in found.items():
+    for key, value in result.items():
         if key not in HEAD:
             raise DataError(
                 f"{file}: [report]: unknown key '{key}': expected {', '.join(HEAD)}{nearest(key, HEAD)}"
             )
         if isinstance(value, (dict, list)):
             raise DataError(f"{file}: [report] {key}: expected text")
-    return {key: str(value) for key, value in found.items()}
+    return {key: str(value) for key, value in result.items()}

@@ -45,7 +45,7 @@ class Groups:
 
     def all(self) -> list[list[str]]:
         """Return the groups, in the order in which their first things were named."""
-        found: dict[str, list[str]] = {}
+        result: dict[str, list[str]] = {}
         for name in self._above:
-            found.setdefault(self.of(name), []).append(name)
-        return list(found.values())
+            result.setdefault(self.of(name), []).append(name)
+        return list(result.values())

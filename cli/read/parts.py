@@ -112,15 +112,15 @@ class _Unturned:
         """Return what they look like."""
         from rigidbody3d.solids import Solid, of_tensor
 
-        found = []
+        solids = []
         for i, (shape, row) in enumerate(zip(self.shapes, self.rows, strict=True)):
             if shape == TENSOR:
-                found += of_tensor(self.mass[i : i + 1], self.center[i : i + 1], self.inertia[i : i + 1])
+                solids += of_tensor(self.mass[i : i + 1], self.center[i : i + 1], self.inertia[i : i + 1])
             else:
                 drawn = (self.meshes[i].triangles,) if i in self.meshes else ()
                 looks = {} if drawn else row
-                found.append(Solid(shape, looks, float(self.mass[i]), self.center[i], np.eye(3), *drawn))
-        return found
+                solids.append(Solid(shape, looks, float(self.mass[i]), self.center[i], np.eye(3), *drawn))
+        return solids
 
 
 def read_parts(path: str) -> Parts:

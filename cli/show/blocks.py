@@ -105,8 +105,8 @@ def _document(result: Result, parts: Iterator[bytes]) -> Iterator[bytes]:
     yield f'{{{json_members(result.documented())},\n "{result.blocks_name}": ['.encode()
     yield from parts
     # what there is to say is known by now
-    said = [*result.warnings, *result.late_warnings()]
-    yield f"\n ],{json_members({'warnings': said})}\n}}\n".encode()
+    lines = [*result.warnings, *result.late_warnings()]
+    yield f"\n ],{json_members({'warnings': lines})}\n}}\n".encode()
 
 
 @contextmanager

@@ -88,14 +88,14 @@ class ShowOptions:
     @property
     def head(self) -> dict[str, str]:
         """The head of the report, as --about has it."""
-        found = {}
+        result = {}
         for text in self.about or ():
             key, equals, value = text.partition("=")
             if not equals or key.strip() not in HEAD:
                 keys = ", ".join(f"{name}=" for name in HEAD)
                 raise typer.BadParameter(f"'{text}': expected one of {keys} and a text", param_hint="--about")
-            found[key.strip()] = value.strip()
-        return found
+            result[key.strip()] = value.strip()
+        return result
 
     @property
     def form(self) -> str:
@@ -149,9 +149,9 @@ def told(options: str) -> dict[str, Told]:
     """Read what a command's help is to say of its parameters.
 
     Below each heading a line is a parameter's name as the function has it, its flags where they are others than that
-    name, what stands for its value, and behind two blanks what is said of it.
+    name, what stands for its value, and after two blanks its help.
     """
-    found = {}
+    result = {}
     heading = ""
     for line in filter(str.strip, options.splitlines()):
         if not line.startswith(" "):
@@ -161,8 +161,8 @@ def told(options: str) -> dict[str, Told]:
         name, *others = head.split(" ")
         flags = [word for word in others if word.startswith("-")]
         metavar = " ".join(others[len(flags) :])
-        found[name] = Told(heading, flags or [f"--{name.replace('_', '-')}"], metavar or None, words)
-    return found
+        result[name] = Told(heading, flags or [f"--{name.replace('_', '-')}"], metavar or None, words)
+    return result
 
 
 def with_options(
@@ -342,7 +342,7 @@ def parameters(
     complete : mapping of name to function
         What a shell completes an option's value with.
     """
-    found = {}
+    parameters = {}
     for name, line in told(text).items():
         kind, default, more = _kind(line.metavar or "", line.heading == "Arguments")
         shown = line.metavar
@@ -360,10 +360,10 @@ def parameters(
             # typer shows the words of a choice itself
             words = "|" in (shown or "") and (shown or "").islower()
             info = typer.Option(*line.flags, metavar=None if words else shown, help=line.help, **more)
-        found[name] = Parameter(
+        parameters[name] = Parameter(
             name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, info]
         )
-    return found
+    return parameters
 
 
 def _kind(metavar: str, argument: bool) -> tuple[Any, Any, dict[str, Any]]:

@@ -54,7 +54,7 @@ def declared_command(
 
 
 def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:
-    """Write the files asked for, print the result; status 1 if an expectation is not met, or nothing was found."""
+    """Write the requested files, print the result; status 1 if an expectation is not met, or nothing was found."""
     from dalembert.tables.headers import check_renamed
 
     if options.form == ".toml" and result.toml is None:
@@ -132,7 +132,7 @@ def _with_check(result: Result, checked: Comparison) -> Result:
 
 
 def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> None:
-    """Print what was asked for, in the form that standard output asks for."""
+    """Print what was requested, in the form that standard output asks for."""
     from dalembert.results.text import csv_text, paragraphs, table_text
 
     verdict = "" if checked is None else f"{table_text(checked.table.cells)}\n{checked.summary}"
@@ -178,12 +178,10 @@ def _tables_text(result: Result, width: int | None) -> Iterator[str]:
     first, *others = result.tables.items()
     table = (result.screen or first[1])()
     yield _below_each_other(table.above, table_text(table.cells, table.keys, width), table.below)
-    if result.document is not None:
-        return
     for name, of in others:
         table = of()
-        if not table.columns:
-            # of the document alone
+        # without columns it is of the document alone; of a result whose document has another form it is told in words
+        if not table.columns or (result.document is not None and table.place is None):
             continue
         if table.length == 1:
             table = as_list(table)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from cli.show.bars import Bars
     from dalembert.results.columns import Document, Json
     from dalembert.results.way import Topic
 
@@ -36,7 +37,7 @@ class Section:
     """A part of a report below a heading of its own: paragraphs and tables."""
 
     title: str
-    parts: Sequence[str | Table]
+    parts: Sequence[str | Table | Bars]
 
 
 @dataclass(eq=False, repr=False)
@@ -50,7 +51,7 @@ class Sheet:
 
 @dataclass(eq=False, repr=False)
 class Result:
-    """What a command has found, in every form it can be shown in; each is formed when it is asked for."""
+    """The result of a command, in every form it can be shown in; each is formed on request."""
 
     document: Callable[[], Document] | None = None
     """The JSON document without its warnings, where it is not that of the tables."""
@@ -83,7 +84,7 @@ class Result:
     """Files that options of the command itself ask for."""
     warnings: list[str] = field(default_factory=list)
     failed: Callable[[], bool] = lambda: False
-    """Whether nothing that was asked for could be found: status 1, once all is shown."""
+    """Whether nothing that was requested could be computed: status 1, once all is shown."""
     blocks: Callable[[Form], Iterator[Written]] | None = None
     """The table or the JSON's list in parts, where it is too long to be held: nothing else is written then.
 
@@ -94,7 +95,7 @@ class Result:
     blocks_name: str = "poses"
     """What the table in parts is called, or the list in JSON, which stands behind what else is in the document."""
     within: Callable[[], AbstractContextManager[None]] = nullcontext
-    """What the forms are made within: it turns errors of a library into those that a user is told."""
+    """What the forms are made within: it turns errors of a library into messages for the user."""
     way: Callable[[], Sequence[Topic]] | None = None
     """The worked solution, formed with --steps alone."""
     shows_way: bool = False

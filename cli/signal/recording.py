@@ -74,11 +74,11 @@ def read_signal(path: str, pulses: int) -> Recording:
     if pulses > 1:
         table.warnings.append(
             f"{table.file}: phases count from the first of {pulses} pulses in the recording, which may be another one each time: "
-            "a column mark, once in a turn, beside the tacho would tell"
+            "a column mark, once in a turn, in addition to the tacho makes them certain"
         )
     if vectors.phase_resolution:
         table.warnings.append(
             f"{table.file}: the mark rises between two samples, in the middle as taken: phases hold to "
-            f"± {np.degrees(vectors.phase_resolution):.2g}°; more samples in a turn would tell them finer"
+            f"± {np.degrees(vectors.phase_resolution):.2g}°; more samples in a turn makes them more exact"
         )
     return Recording(sensors, next(iter(units.values())), vectors, table.warnings)

@@ -157,7 +157,7 @@ EQUAL = 1e-12
 
 @dataclass(frozen=True)
 class Rotation:
-    """A body in time; each quantity is computed when it is first asked for."""
+    """A body in time; each quantity is computed on the first request."""
 
     body: TurningBody
     time: Array
@@ -263,12 +263,12 @@ class Rotation:
             return None
         pole = 2 if oblate else 0
         order = [(pole + 1) % 3, (pole + 2) % 3, pole]
-        found = cones_of(moments[order[0]], moments[pole], (axes @ g.omega)[order])
+        result = cones_of(moments[order[0]], moments[pole], (axes @ g.omega)[order])
         return {
-            "space_half_angle_deg": float(np.degrees(found.space)),
-            "body_half_angle_deg": float(np.degrees(found.body)),
-            "precession_rad_s": float(found.precession),
-            "spin_rad_s": float(found.spin),
+            "space_half_angle_deg": float(np.degrees(result.space)),
+            "body_half_angle_deg": float(np.degrees(result.body)),
+            "precession_rad_s": float(result.precession),
+            "spin_rad_s": float(result.spin),
         }
 
     def steady(self) -> dict[str, float | None] | None:

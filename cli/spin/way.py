@@ -32,7 +32,7 @@ def way(r: Rotation) -> list[Topic]:
         "momentum_kg_m2_s": [float(v) + 0.0 for v in space],
         "kinetic_energy_J": energy,
     }
-    found = [Topic("start", start, "At time zero", head)]
+    result = [Topic("start", start, "At time zero", head)]
     if g.torque is not None:
         law = ["Ḣ = M: momentum and energy change with the torque; I·ω̇ = M − ω × I·ω (Euler)."]
     elif g.mgl is not None:
@@ -42,19 +42,19 @@ def way(r: Rotation) -> list[Topic]:
     else:
         law = ["No torque: H in space and T stay; I·ω̇ = −ω × I·ω (Euler), so that ω moves on the polhode."]
     law += [f"  drift of {of}: {figures(value)}" for of, value in r.drift.items() if value is not None]
-    found.append(Topic("constants", law, "What stays constant", {"drift": dict(r.drift)}))
+    result.append(Topic("constants", law, "What stays constant", {"drift": dict(r.drift)}))
     cones = r.cones()
     if cones is not None:
         text = [
             "A body of revolution: ω and its axis turn about H with H/I_t (precession), the body about its axis with the spin.",
             *(f"  {key.rpartition('_')[0] if key.endswith('_deg') else key[:-6]}: {figures(value)} {'°' if key.endswith('_deg') else 'rad/s'}" for key, value in cones.items() if value is not None),
         ]  # fmt: skip
-        found.append(Topic("cones", text, "Cones", dict(cones)))
+        result.append(Topic("cones", text, "Cones", dict(cones)))
     steady = r.steady()
     if steady is not None:
         text = ["Steady precession at the present tilt: (I_t·cos θ)·ψ̇² − I_a·ω_z·ψ̇ + mgl = 0 has two roots."]
         text += [
             f"  {key[:-6]}: {figures(value)} rad/s" for key, value in steady.items() if value is not None
         ]
-        found.append(Topic("steady precession", text, "Steady precession", dict(steady)))
-    return found
+        result.append(Topic("steady precession", text, "Steady precession", dict(steady)))
+    return result

@@ -40,7 +40,7 @@ def run(asked: Asked, show: ShowOptions) -> Result:
     order = None if asked.order is None else ORDERS.index(asked.order)
     call = Call.of(asked, show, Request(asked.file, names(asked.only), order))
     only = call.request.only
-    if only is not None and quantities.unknown(quantities.places(call.mechanism, 3), only) is not None:
+    if only is not None and quantities.unknown(quantities.places(call.mechanism, 3, only), only) is not None:
         call.request = call.request._replace(forces=True)
     call.check_names()
     workers = 1 if call.varied is not None else call.workers

@@ -77,8 +77,8 @@ class Tolerances(TableCase):
     @cached_property
     def slopes(self) -> dict[Key, list[Any]]:
         """Of each quantity to each dimension."""
-        found = self.analysis.motions[0].sensitivities.of(self.keys, list(self.limits))
-        return dict(zip(self.keys, found, strict=True))
+        result = self.analysis.motions[0].sensitivities.of(self.keys, list(self.limits))
+        return dict(zip(self.keys, result, strict=True))
 
     @cached_property
     def linear(self) -> dict[str, Spread]:
@@ -160,7 +160,7 @@ class Tolerances(TableCase):
 
     def spreads(self) -> dict[str, Any]:
         """What `tolerance` holds."""
-        found: dict[str, Any] = {
+        spreads: dict[str, Any] = {
             "columns": {
                 header: {"worst": cells(its.worst), "sd": cells(its.sd)}
                 for header, its in self.linear.items()
@@ -173,7 +173,7 @@ class Tolerances(TableCase):
         }
         if self.draws:
             drawn, whole = self.drawn
-            found["drawn"] = {
+            spreads["drawn"] = {
                 "columns": {
                     header: _sample(its)
                     | {f"{name}_error": cells(e) for name, e in zip(NAMES, its.errors, strict=True)}
@@ -184,23 +184,25 @@ class Tolerances(TableCase):
                 "distribution": self.study.distribution,
                 "assembled": whole,
             }
-        return found
+        return spreads
 
     def table(self) -> Table:
         """The table of poses, each number with its worst case and its standard deviation."""
         base = poses.table(self.analysis)
-        found: list[Column] = []
+        result: list[Column] = []
         for column in base.columns:
-            found.append(column)
+            result.append(column)
             if column.header not in self.linear:
                 continue
             its = self.linear[column.header]
-            found.append(Column(f"{column.name}_worst", column.unit, cells(its.worst)))
-            found.append(Column(f"{column.name}_sd", column.unit, cells(its.sd)))
+            result.append(Column(f"{column.name}_worst", column.unit, cells(its.worst)))
+            result.append(Column(f"{column.name}_sd", column.unit, cells(its.sd)))
             if self.draws:
                 sample = _sample(self.drawn[0][column.header])
-                found += [Column(f"{column.name}_drawn_{name}", column.unit, sample[name]) for name in sample]
-        return Table(found, base.keys)
+                result += [
+                    Column(f"{column.name}_drawn_{name}", column.unit, sample[name]) for name in sample
+                ]
+        return Table(result, base.keys)
 
     def assembled(self, table: Table) -> list[bool] | bool:
         """Of each row of a table whether its pose is assembled, or whether any is."""
@@ -313,18 +315,18 @@ def draw(found: Tolerances) -> Figure:
     return figure
 
 
-def _paths(axes: Axes, found: Tolerances, points: list[Key]) -> None:
+def _paths(axes: Axes, tolerances: Tolerances, points: list[Key]) -> None:
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import to_rgb
 
-    analysis = found.analysis
+    analysis = tolerances.analysis
     scale, unit = (1e3, "mm") if analysis.mechanism.size < 2 else (1.0, "m")
-    sizes = np.array(list(found.limits.values()))
+    sizes = np.array(list(tolerances.limits.values()))
     paths = {key: analysis.motions[0].point(key[3]).complex(0) * scale for key in points}
     width = max((np.nanmax(abs(z - np.nanmean(z)), initial=0.0) for z in paths.values()), default=1.0) or 1.0
     bands = {}
     for key, z in paths.items():
-        slopes = np.array(found.slopes[key]) * scale
+        slopes = np.array(tolerances.slopes[key]) * scale
         along = np.gradient(z) if len(z) > 1 else np.ones(1, complex)
         with np.errstate(invalid="ignore", divide="ignore"):
             normal = 1j * along / np.abs(along)
@@ -355,29 +357,31 @@ def _paths(axes: Axes, found: Tolerances, points: list[Key]) -> None:
     axes.legend(fontsize=8)
 
 
-def _over_input(axes: Axes, found: Tolerances, header: str) -> None:
+def _over_input(axes: Axes, tolerances: Tolerances, header: str) -> None:
     """A number over the input, with its worst case."""
-    base = next(c for c in found.table().columns if c.header == header)
-    q = found.analysis.inputs.shown[:, 0]
+    base = next(c for c in tolerances.table().columns if c.header == header)
+    q = tolerances.analysis.inputs.shown[:, 0]
     values = np.array([np.nan if v is None else float(v) for v in base.values])
-    worst = found.linear[header].worst
+    worst = tolerances.linear[header].worst
     axes.fill_between(q, values - worst, values + worst, color="C0", alpha=0.3, lw=0)
     axes.plot(q, values, color="C0", lw=1.2)
-    axes.set_xlabel(found.analysis.input_columns[0])
+    axes.set_xlabel(tolerances.analysis.input_columns[0])
     axes.set_ylabel(header)
     axes.set_title("with its worst case", fontsize=9)
     axes.grid(color="0.9", lw=0.6)
 
 
-def _shares(axes: Axes, found: Tolerances, keys: list[Key], of: str) -> None:
+def _shares(axes: Axes, tolerances: Tolerances, keys: list[Key], of: str) -> None:
     """Bars of the shares, means over the poses."""
-    variances = np.zeros(len(found.limits))
+    variances = np.zeros(len(tolerances.limits))
     for key in keys:
-        slopes = np.abs(np.array(found.slopes[key])) * np.array(list(found.limits.values()))[:, None]
+        slopes = (
+            np.abs(np.array(tolerances.slopes[key])) * np.array(list(tolerances.limits.values()))[:, None]
+        )
         variances += np.nansum(slopes**2, axis=1)
     shares = variances / variances.sum() if variances.sum() > 0 else variances
     order = np.argsort(shares, kind="stable")[-BARS:]
-    names = [list(found.limits)[i].path for i in order]
+    names = [list(tolerances.limits)[i].path for i in order]
     bars = axes.barh(range(len(order)), shares[order] * 100, color="0.45")
     axes.bar_label(bars, [f"{shares[i] * 100:.3g} %" for i in order], padding=3, fontsize=8)
     axes.set_yticks(range(len(order)), names, fontsize=8)

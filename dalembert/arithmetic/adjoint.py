@@ -47,7 +47,7 @@ def handed_on(kind: Kind, name: str, i: int, own: Number, operands: list[Number]
 
 
 def _adjoints(tape: Tape, values: list[Number], output: int) -> dict[str, Number]:
-    """v̄ of every input that the output hangs on, by its name."""
+    """v̄ of every input that the output depends on, by its name."""
     bar: dict[int, Number] = {output: 1.0}
     adjoints: dict[str, Number] = {}
     for number in range(output, -1, -1):

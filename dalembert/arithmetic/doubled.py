@@ -7,12 +7,13 @@ and floats agree in are the digits that hold.
 from __future__ import annotations
 
 from fractions import Fraction
+from math import frexp
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.exact import halves, two_sum
+from dalembert.arithmetic.exact import halves
 
 Array = NDArray[np.float64]
 
@@ -64,30 +65,55 @@ class Doubled:
         return self._halves  # type: ignore[no-any-return]
 
     def __add__(self, other: Any) -> Doubled:
+        # Knuth's sum with its rounding error, in place where arrays are long
         b = doubled(other)
-        total, rest = two_sum(self.high, b.high)
+        total = self.high + b.high
+        back = total - self.high
+        rest = b.high - back
+        back -= total
+        back += self.high
+        rest += back
         if not _none(self.low):
-            rest = rest + self.low
+            rest += self.low
         if not _none(b.low):
-            rest = rest + b.low
+            rest += b.low
         return settled(total, rest)
 
     def __mul__(self, other: Any) -> Doubled:
         b = doubled(other)
+        if _binary(b):
+            return Doubled(self.high * b.high, self.low * b.high)
+        if _binary(self):
+            return Doubled(b.high * self.high, b.low * self.high)
         product = self.high * b.high
-        (a1, a2), (b1, b2) = self.halves, b.halves
-        rest = ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2
+        rest = self.left(b, product)
         if not _none(b.low):
-            rest = rest + self.high * b.low
+            rest += self.high * b.low
         if not _none(self.low):
-            rest = rest + self.low * b.high
+            rest += self.low * b.high
         return settled(product, rest)
+
+    def left(self, b: Doubled, product: Any) -> Any:
+        """The rounding error of a product of the upper parts (Dekker)."""
+        (a1, a2), (b1, b2) = self.halves, b.halves
+        rest = a1 * b1
+        rest -= product
+        rest += a1 * b2
+        rest += a2 * b1
+        rest += a2 * b2
+        return rest
 
     def __truediv__(self, other: Any) -> Doubled:
         b = doubled(other)
-        first = _quotient(self.high, b.high)
-        left = self - b * first
-        return settled(first, _quotient(left.high, b.high))
+        first = Doubled(_quotient(self.high, b.high))
+        product = b.high * first.high
+        rest = self.high - product
+        rest -= b.left(first, product)
+        if not _none(self.low):
+            rest += self.low
+        if not _none(b.low):
+            rest -= b.low * first.high
+        return settled(first.high, _quotient(rest, b.high))
 
     def __rtruediv__(self, other: Any) -> Doubled:
         return doubled(other).__truediv__(self)
@@ -115,6 +141,11 @@ def _none(low: Any) -> bool:
     return isinstance(low, float) and low == 0.0
 
 
+def _binary(x: Doubled) -> bool:
+    """Whether it is a power of two, with which a product is exact."""
+    return isinstance(x.high, float) and _none(x.low) and abs(frexp(x.high)[0]) == 0.5
+
+
 def _quotient(a: Any, b: Any) -> Any:
     """a/b, as numpy has it where b is zero."""
     return (
@@ -125,7 +156,9 @@ def _quotient(a: Any, b: Any) -> Any:
 def settled(high: Any, low: Any) -> Doubled:
     """The same number with low below half a unit in the last place of high: a cancellation leaves it above."""
     total = high + low
-    return Doubled(total, low - (total - high))
+    rest = high - total
+    rest += low
+    return Doubled(total, rest)
 
 
 def doubled(x: Any) -> Doubled:

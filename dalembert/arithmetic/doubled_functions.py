@@ -76,11 +76,15 @@ class DoubledKind:
                 settled(first, (x - Doubled(first) * first).high / (2 * first)) if first else Doubled(first)
             )
         with np.errstate(divide="ignore", invalid="ignore"):
-            first = np.sqrt(x.high)
+            root = Doubled(np.sqrt(x.high))
+            square = root.high * root.high
+            rest = x.high - square
+            rest -= root.left(root, square)
+            rest += x.low
+            rest /= 2 * root.high
             # the root of zero is zero, and has no correction
-            root = Doubled(first)
-            rest = np.where(first == 0, 0.0, (x - root * root).high / (2 * first))
-        return settled(first, rest)
+            rest[root.high == 0] = 0.0
+        return settled(root.high, rest)
 
     @staticmethod
     def sincos(x: Doubled) -> tuple[Doubled, Doubled]:

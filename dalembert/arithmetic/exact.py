@@ -31,8 +31,8 @@ def two_product(a: Array, b: Array) -> tuple[Array, Array]:
 def halves(a: Array) -> tuple[Array, Array]:
     """Return the upper and the lower digits of a number, 26 bits each: products of two such parts are exact."""
     # 2²⁷ + 1
-    c = 134217729.0 * a
-    high = c - (c - a)
+    high = 134217729.0 * a
+    high -= high - a
     return high, a - high
 
 

@@ -1,4 +1,4 @@
-"""One thread at a time in results that work out a quantity when it is first asked for.
+"""One thread at a time in results that work out a quantity on the first request.
 
 While a quantity is worked out, what a result keeps is in pieces. `guarded` puts a lock around all that a class offers:
 its `lock`, which parts of one whole share (poses, their loads and forces have that of their assembly), so that no two

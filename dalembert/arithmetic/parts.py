@@ -1,6 +1,6 @@
 """Work in self-contained parts, here or on any executor: results in the order of the parts, whoever comes first.
 
-A part knows all that it needs, so that no number hangs on who works it out. One whose worker died is done again once.
+A part knows all that it needs, so that no number depends on who works it out. One whose worker died is done again once.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ sizes are the same for many outputs (`_Pattern`).
 A root of what may cancel is not smooth where its argument a is no more than the argument's own error κ. There the
 first order is not enough. The true argument is within κ of a, and that of the engine whose answer is judged within κ of
 the true one: no step between the two is steeper than the chord from a to a − 3κ, which has it in its middle. That is the
-root's slope here. Where a < 3κ it is 4/√κ: the sign of √a may be the other then, and √3κ + √4κ < 4√κ. What hangs on 1/√a
+root's slope here. Where a < 3κ it is 4/√κ: the sign of √a may be the other then, and √3κ + √4κ < 4√κ. What depends on 1/√a
 needs τ = 3κ/2a too, the share of the second order in the first.
 """
 
@@ -73,7 +73,7 @@ def rounding_bounds(
     -------
     Tape
         The outputs themselves, the bounds, `error(output)`, and of each `tau(output)`, the largest share of the second
-        order in the first, of the roots that it hangs on.
+        order in the first, of the roots that it depends on.
 
     Examples
     --------

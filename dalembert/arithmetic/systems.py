@@ -1,6 +1,6 @@
 """Small linear systems of any kind of number, recorded ones above all: Householder's QR, which needs no pivoting.
 
-Which row an elimination should take first hangs on the numbers; a recorded elimination must do without looking at
+Which row an elimination should take first depends on the numbers; a recorded elimination must do without looking at
 them. Reflections are stable for any (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM 2002,
 §19.3), and what is exactly nothing costs nothing.
 """

@@ -2,7 +2,7 @@
 
 A tape is a list of operations in the order in which they can be done; the number of an operation is its place in the
 list, and its arguments are the numbers of earlier ones. Nothing is done twice, and nothing is on it that no output
-hangs on. It is made by `recorded.Recorder`, transformed by `adjoint`, and run by `engines`, or by `Tape.on` with any
+depends on. It is made by `recorded.Recorder`, transformed by `adjoint`, and run by `engines`, or by `Tape.on` with any
 kind of number: floats, arrays, recorded numbers, many digits.
 """
 
@@ -136,7 +136,7 @@ class Tape:
         return "\n".join([*lines, *(f"{name}: {names[number]}" for name, number in self.outputs)])
 
     def hang(self, on: Mapping[str, int]) -> list[int]:
-        """What each operation hangs on, as bits that its inputs have by their names.
+        """What each operation depends on, as bits that its inputs have by their names.
 
         >>> from dalembert.arithmetic.recorded import Recorder
         >>> recorder = Recorder()
@@ -152,7 +152,7 @@ class Tape:
         return hangs
 
     def pruned(self, names: Iterable[str]) -> Tape:
-        """The tape of some of the outputs, in the order asked for, with only what they hang on.
+        """The tape of some of the outputs, in the requested order, with only what they depend on.
 
         Raises
         ------
@@ -202,7 +202,7 @@ def performed(name: str, values: list[Any], kind: Kind) -> Any:
 def reached(
     operations: Sequence[Operation], outputs: Iterable[int], inputs: Container[int] = frozenset()
 ) -> list[int]:
-    """The operations that some hang on, in order, they too; what is known hangs on nothing."""
+    """The operations that some depend on, in order, they too; what is known depends on nothing."""
     wanted = set(outputs)
     for number in range(max(wanted, default=-1), -1, -1):
         if number in wanted and number not in inputs:
@@ -215,7 +215,7 @@ def reached(
 def shortened(
     operations: Sequence[Operation], outputs: Sequence[tuple[str, int]], inputs: Mapping[int, str] = EMPTY
 ) -> Tape:
-    """The tape of outputs: what they do not hang on is left out, and the rest numbered anew.
+    """The tape of outputs: what they do not depend on is left out, and the rest numbered anew.
 
     The values of operations that are known enter, by name.
     """

@@ -1,4 +1,4 @@
-"""Curves over one variable: told apart by dash and shade, named at their ends; equal ones are said once, as equal."""
+"""Curves over one variable: distinguished by dash and shade, named at their ends; equal ones are named once."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ ROOM = 1.3
 
 
 class Look(NamedTuple):
-    """How vectors of a kind look: told apart by colour, by dash and by width."""
+    """How vectors of a kind look: distinguished by colour, by dash and by width."""
 
     color: str
     width: float

@@ -71,10 +71,10 @@ def heading(written: str) -> Heading:
 def _parted(written: str) -> tuple[str, str]:
     """Split a header into name and unit, both as the suffixes spell them."""
     base, unit = written, ""
-    if written.endswith(("]", ")")) and (found := re.match(_BRACKETS, written)):
-        base, unit = found.group(1), found.group(2) or found.group(3) or ""
-    elif re.search(r"[,\s]", written) and (found := re.match(_PARTED, written)) and is_unit(found.group(2)):
-        base, unit = found.groups()
+    if written.endswith(("]", ")")) and (match := re.match(_BRACKETS, written)):
+        base, unit = match.group(1), match.group(2) or match.group(3) or ""
+    elif re.search(r"[,\s]", written) and (match := re.match(_PARTED, written)) and is_unit(match.group(2)):
+        base, unit = match.groups()
     base = re.sub(r"\s+", "_", base.strip().replace("°", "deg")).translate(str.maketrans("µμ", "uu"))
     return base, "" if unit.strip() in NO_UNIT else unit_name(unit)
 
@@ -146,14 +146,14 @@ def find_columns(
     file: str, headings: Sequence[Heading], known: Mapping[str, str], texts: Sequence[str]
 ) -> dict[str, tuple[int, str]]:
     """Find each quantity's column: its place in the row and its unit."""
-    found: dict[str, tuple[int, str]] = {}
+    result: dict[str, tuple[int, str]] = {}
     lower = [each.name.lower() for each in headings]
     for name in texts:
         places = [index for index, header in enumerate(lower) if header == name.lower()]
         if len(places) > 1:
             raise DataError(f"{file}: the column {name} stands twice: expected it once")
         if places:
-            found[name] = (places[0], "")
+            result[name] = (places[0], "")
     for name, dimension in known.items():
         good: list[tuple[int, str]] = []
         bad: list[tuple[int, str]] = []
@@ -168,7 +168,7 @@ def find_columns(
                 f"{file}: {name} is given more than once, by the columns {both}: expected one of them"
             )
         if good:
-            found[name] = good[0]
+            result[name] = good[0]
         elif bad:
             # a column that another quantity claims (`z_rotation` beside `z`) is not an unknown unit
             others = [other for other in (*known, *texts) if other.startswith(name + "_")]
@@ -185,7 +185,7 @@ def find_columns(
                     f"{file}: the column {headings[index].written} has {problem}: "
                     f"expected {spellings(name, dimension)}{hint}"
                 )
-    return found
+    return result
 
 
 def likeness(headings: Iterable[Heading], known: Mapping[str, str], texts: Sequence[str]) -> int:

@@ -1,4 +1,4 @@
-"""The text of a table, and how its cells are told apart: CSV as spreadsheets write it, or a sheet of a workbook."""
+"""The text of a table, and how its cells are distinguished: CSV as spreadsheets write it, or a sheet of a workbook."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ class Table:
     marks: dict[tuple[int, str], str] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     told: str = ""
-    """What is said of the file where a column is missed: its header, and which columns may be meant."""
+    """Description of the file where a column is missing: its header, and which columns may be meant."""
     _source: Source | None = None
     _numbered: dict[str, tuple[list[str], NDArray[np.intp]]] = field(default_factory=dict)
 

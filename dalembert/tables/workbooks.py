@@ -52,13 +52,13 @@ def letters(column: int) -> str:
 
 def place_of(written: str) -> Place | None:
     """Return the place of a cell by its name; None where it is none."""
-    found = re.fullmatch(r"([A-Z]+)(\d+)", written)
-    if found is None:
+    match = re.fullmatch(r"([A-Z]+)(\d+)", written)
+    if match is None:
         return None
     column = 0
-    for letter in found.group(1):
+    for letter in match.group(1):
         column = 26 * column + ord(letter) - ord("A") + 1
-    return int(found.group(2)) - 1, column - 1
+    return int(match.group(2)) - 1, column - 1
 
 
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+\s*")

@@ -105,7 +105,9 @@ def test_two_planes(apart: float, options: tuple[str, ...], fewest: int, dalembe
             a, b = a2, b2
         w = mp.lu_solve(a.H * a, -(a.H * b))
         if kept:
+            # every mass of the last run stands
             w[0] -= t[0]
+            w[1] -= t[1]
         for row, exact in zip(found, w, strict=True):
             check(row, exact, fewest)
 

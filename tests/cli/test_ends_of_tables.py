@@ -24,7 +24,7 @@ def test_cycle_and_flywheel(dalembert: Dalembert) -> None:
     options = ("--over", "0deg:360deg:1deg", "--flywheel", "0.1", "--text")
     found = dalembert("forces", "press.toml", *options)
     assert found.returncode == 0, found.stderr
-    assert below(found.stdout).startswith("cycle:\n")
+    assert below(found.stdout).startswith("Cycle:\n")
     assert "flywheel inertia" in below(found.stdout)
 
 

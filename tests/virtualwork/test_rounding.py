@@ -18,6 +18,7 @@ from benchmarks.stress.groups import compare
 from benchmarks.truth.four_bar import circles, two_rates
 from benchmarks.truth.mechanism import Exact, along
 from tests.virtualwork.judged import judge
+from tests.virtualwork.mechanisms import slider_crank
 from virtualwork import Force, Friction, Guess, Input, Link, Mechanism, Motor, Spring, Torque, TorsionSpring
 
 EXAMPLES = files("cli") / "examples"
@@ -100,7 +101,7 @@ def test_forces_of_every_kind(name: str) -> None:
     pairs = []
     for k in range(5):
         pairs += pairs_of_forces(m, m.at[0] + 0.05 * k, 3.0, -2.0)
-    judge(pairs, 200)
+    judge(pairs, 2)
 
 
 def test_springs_dampers_and_forces_that_turn() -> None:
@@ -111,7 +112,7 @@ def test_springs_dampers_and_forces_that_turn() -> None:
         torques=(Torque("rocker", 2.5),),
         forces=(Force("coupler", 0.2j, 4 - 3j, "link"),),
     )
-    judge([p for q in (0.8, 0.85, 0.9) for p in pairs_of_forces(m, q, 2.0, 1.0)], 200)
+    judge([p for q in (0.8, 0.85, 0.9) for p in pairs_of_forces(m, q, 2.0, 1.0)], 2)
 
 
 def test_forces_of_a_gear_train() -> None:
@@ -123,7 +124,7 @@ def test_forces_of_a_gear_train() -> None:
         m = random_linkages.geared_five_bar(rng, at, 1.0)
         if m is not None:
             found += pairs_of_forces(heavy(m), at, 2.0, 1.0)
-    judge(found, 200)
+    judge(found, 2)
 
 
 def test_a_torsion_spring_and_a_motor_on_a_moving_link() -> None:
@@ -170,7 +171,7 @@ def test_what_redundant_statics_determines() -> None:
             true = 3 * mp.mpf(9.81) * mp.cos(mp.mpf(at)) / 2
             for value, bound in ((d.newton_euler, bounds.newton_euler), (d.effort, bounds.effort)):
                 pairs.append((float(abs(true - mp.mpf(float(value[i, 0])))), float(bound[i, 0])))
-    judge(pairs, 300)
+    judge(pairs, 2)
 
 
 @pytest.mark.slow
@@ -204,7 +205,7 @@ def test_a_chain_of_a_hundred_links() -> None:
             for order, value in enumerate((link.angle, link.omega, link.alpha)):
                 error = abs(rates[i][order] - mp.mpf(float(value[0])))
                 pairs.append((float(error), float(link.error_estimate(order)[0])))
-    judge(pairs, 300)
+    judge(pairs, 2)
 
 
 def test_a_sweep_has_the_estimates_of_its_poses() -> None:
@@ -226,15 +227,31 @@ def test_a_sweep_has_the_estimates_of_its_poses() -> None:
         assert one[i, 0] == pytest.approx(other[0, 0], rel=0.9)
 
 
-def test_no_estimate_for_a_pose_that_is_not_assembled_and_none_for_friction() -> None:
+def test_no_estimate_for_a_pose_that_is_not_assembled() -> None:
     m = random_linkages.four_bar(np.random.default_rng(5), 1e-3, 1.0, limit=True)[0]
     limit = m.assembly.reach.limits()[0]
     outside = m.motion(limit.input - 0.01 * limit.side)
     assert not outside.assembled[0]
     assert np.isnan(outside.link("rocker").error_estimate()[0])
-    rubbing = replace(example("crank-press"), friction=(Friction("B", 0.1),))
-    assert np.isinf(rubbing.motion(1.0, 2.0).dynamics.error_estimate().effort).all()
-    assert np.isfinite(example("crank-press").motion(1.0, 2.0).dynamics.error_estimate().effort).all()
+
+
+@pytest.mark.parametrize("speed", [2.0, -2.0])
+def test_friction_of_a_guide_in_closed_form(speed: float) -> None:
+    """A rod without mass at φ to the guide: S cos φ = P + μN and N = S sin φ, so that τ = P r sin(θ + φ)/(cos φ − μ sin φ)."""
+    m = slider_crank(forces=[Force("piston", 0j, 50 + 0j)], friction=[Friction("B", 0.3)])
+    q, pairs = np.array([0.4, 0.9, 1.6, 2.3, 2.9]), []
+    forces = m.motion(q, speed).dynamics
+    errors = forces.error_estimate()
+    with mp.workdps(40):
+        for i, at in enumerate(q):
+            turn = mp.asin(mp.mpf(0.1) * mp.sin(mp.mpf(at)) / mp.mpf(0.3))
+            # the piston goes against its load as the crank turns forwards
+            way = -1 if speed > 0 else 1
+            rod = 50 / (mp.cos(turn) + way * mp.mpf(0.3) * mp.sin(turn))
+            true = rod * mp.mpf(0.1) * mp.sin(mp.mpf(at) + turn)
+            for value, error in ((forces.effort, errors.effort), (forces.newton_euler, errors.newton_euler)):
+                pairs.append((float(abs(true - mp.mpf(float(value[i, 0])))), float(error[i, 0])))
+    judge(pairs)
 
 
 def test_a_group_that_cannot_be_assembled_leaves_those_before_it_their_estimates() -> None:

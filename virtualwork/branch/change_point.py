@@ -79,7 +79,7 @@ def branches(group: Group, start: Callable[[], Rates], order: int) -> list[list[
     Parameters
     ----------
     start : callable
-        Gives fresh `Rates` at the change point, with everything the group hangs on known to order + 1.
+        Gives fresh `Rates` at the change point, with everything the group depends on known to order + 1.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def branches(group: Group, start: Callable[[], Rates], order: int) -> list[list[
     d = start()
     jacobian = stack(d.columns(group), 1)[0]
     if not np.isfinite(jacobian).all():
-        # what the group hangs on is not assembled here
+        # what the group depends on is not assembled here
         return []
     u, s, vt = np.linalg.svd(jacobian)
     left, null = u[:, -1], vt[-1]
@@ -112,7 +112,7 @@ def branches(group: Group, start: Callable[[], Rates], order: int) -> list[list[
 
     c, plus, minus = second(0.0), second(1.0), second(-1.0)
     a, b = (plus + minus) / 2 - c, (plus - minus) / 2
-    found = []
+    branches = []
     for rate in _roots(a, b, c):
         trial = start()
         trial.right_side(group, 1)
@@ -128,8 +128,8 @@ def branches(group: Group, start: Callable[[], Rates], order: int) -> list[list[
             x = x + mu * null
             trial.write(group, k, list(x))
             series.append(x)
-        found.append(series)
-    return found
+        branches.append(series)
+    return branches
 
 
 def _roots(a: float, b: float, c: float) -> list[float]:
@@ -193,7 +193,7 @@ def _nearest(way: Along, group: Group, q0: float, span: float, share: float) -> 
     try:
         found = branches(group, start, ORDER)
     except ZeroDivisionError:
-        # a group that this one hangs on has no direction here
+        # a group that this one depends on has no direction here
         found = []
     best, nearest = None, np.inf
     probe = int(np.argmax(nodes))

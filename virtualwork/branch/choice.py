@@ -67,7 +67,7 @@ class Choice(Record):
     def seeds(self) -> dict[str, tuple[Reals, Reals]]:
         """Nodes (inputs, unknowns) of groups without a closed form, of a mechanism much like this one, by their names.
 
-        A `Continuation` begins with what they lead to, as far as that goes on from the guess: no number hangs on them.
+        A `Continuation` begins with what they lead to, as far as that goes on from the guess: no number depends on them.
         """
         return {}
 
@@ -83,11 +83,11 @@ class Choice(Record):
 
         The angle with its whole turns.
         """
-        found: set[str] = set()
+        result: set[str] = set()
         for turn in reversed(list(turns(self.plan.steps))):
-            needs = turn.slides or turn.body in found
-            found |= {b for b, r in turn.angle.turning if needs or not float(r).is_integer()}
-        return found
+            needs = turn.slides or turn.body in result
+            result |= {b for b, r in turn.angle.turning if needs or not float(r).is_integer()}
+        return result
 
     @cached_property
     def plain(self) -> dict[str, Callable[[State], None]]:
@@ -100,18 +100,18 @@ class Choice(Record):
 
     @cached_property
     def known_steps(self) -> dict[tuple[str, ...], tuple[Step, ...]]:
-        """What targets hang on, as far as it was asked for."""
+        """What targets depend on, as far as requested."""
         return {}
 
     def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
-        """The steps that targets hang on; worked out once for each set of targets."""
+        """The steps that targets depend on; worked out once for each set of targets."""
         key = tuple(targets)
         if key not in self.known_steps:
             self.known_steps[key] = self.plan.needed(key)
         return self.known_steps[key]
 
     def before(self, group: Group) -> list[Step]:
-        """The steps that a group hangs on."""
+        """The steps that a group depends on."""
         return [step for step in self.needed(self.plan.writes(group)) if step is not group]
 
     def run_untracked(self, steps: Iterable[Step], st: State) -> None:

@@ -56,7 +56,7 @@ class Continuation:
         self._begin_upright()
 
     def _state(self, q: float, x: Reals | None = None) -> State:
-        """What the group hangs on at one input; its own unknowns too, where they are given."""
+        """What the group depends on at one input; its own unknowns too, where they are given."""
         st = State([np.array([q])], many=True)
         with np.errstate(all="ignore"):
             self.track.run(self.before, st)
@@ -201,7 +201,7 @@ class Continuation:
         return (defect <= 0.05 * np.maximum(change, 1e-6)) & ((change < 0.5) | even)
 
     def _advance(self, side: int, h: float) -> None:
-        """Lay down one more node, at most h away: what the group hangs on is known no farther."""
+        """Lay down one more node, at most h away: what the group depends on is known no farther."""
         end = -1 if side > 0 else 0
         q, x, rate = self.q[end], self.x[end], self.rate[end]
         if not np.isfinite(rate).all():

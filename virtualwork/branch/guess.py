@@ -76,9 +76,9 @@ class _Chooser:
 
     def _made(self, make: Callable[..., C], warnings: tuple[str, ...] = ()) -> C:
         """What is chosen so far."""
-        found = make(self.m, self.plan, self.signs, self.starts, 1, warnings, self.phases)
-        found.cases.update(self.cases)
-        return found
+        result = make(self.m, self.plan, self.signs, self.starts, 1, warnings, self.phases)
+        result.cases.update(self.cases)
+        return result
 
     def _singular(self, st: State) -> bool:
         """Whether a group has a singular Jacobian at the guess, or none at all."""
@@ -239,7 +239,7 @@ class _Chooser:
 
     def _solutions(self, group: Group, case: Case, st: State) -> list[tuple[int, State]]:
         """The signs of which a closed form has a solution, each with that."""
-        found = []
+        solutions = []
         for sign in (1, -1):
             trial = st.copy()
             try:
@@ -248,11 +248,11 @@ class _Chooser:
                 continue
             unknowns = [*(trial.turn[b] for b in group.members), *(trial.slide[g] for g in group.slides)]
             if all(map(np.isfinite, unknowns)):
-                found.append((sign, trial))
-        return found
+                solutions.append((sign, trial))
+        return solutions
 
     def _beside(self, group: Group, apart: float) -> State:
-        """What a group hangs on, with the one input as far beside the guess, rad or m."""
+        """What a group depends on, with the one input as far beside the guess, rad or m."""
         st = State([self.m.at[0] + apart])
         chosen = self._made(Choice)
         chosen.run_untracked(chosen.before(group), st)
@@ -338,27 +338,27 @@ class _Chooser:
                 return x[0]
             left = float(np.linalg.norm(stack_rows(gaps(group, many), 1)))
             why = f": from the guess on its loops stay {left:.6g} m apart"
-        found = every_solution(group, many, self.m.size)
-        if len(found) == 0 and len(group.angles) + len(group.slides) < 2 * len(group.closures):
+        result = every_solution(group, many, self.m.size)
+        if len(result) == 0 and len(group.angles) + len(group.slides) < 2 * len(group.closures):
             raise MobilityError(
                 f"{group.name}: more constraints than unknowns, and they contradict each other: a structure, or lengths "
                 f"that do not fit (look at {', '.join(self.plan.blocks.redundant)})"
             )
-        if len(found) == 0:
+        if len(result) == 0:
             raise AssemblyError(
                 f"[guess] at: {group.name} cannot be assembled there{why} (Newton-Raphson from many starts finds no "
                 "closed loop); give an `at` where it can, or check the lengths"
             )
         states = []
-        for x in found:
+        for x in result:
             trial = st.copy()
             write_unknowns(group, trial, x[None])
             states.append(trial)
-        if len(found) > 1 and not informed(self.m, group):
+        if len(result) > 1 and not informed(self.m, group):
             raise AssemblyError(self._choices(group, states))
         best = int(np.argmin([self._distance(group, trial) for trial in states]))
-        write_unknowns(group, st, found[best][None])
-        return found[best]
+        write_unknowns(group, st, result[best][None])
+        return result[best]
 
 
 def distance(

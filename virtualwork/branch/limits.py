@@ -167,7 +167,7 @@ class Reach:
     def limits(self) -> list[Limit]:
         """Where the input can go no further, over one period of the branch or what was covered, to full precision.
 
-        The poses of a branch between two limits are told apart over less than brings them back: ends of other ranges
+        The poses of a branch between two limits are distinguished over less than brings them back: ends of other ranges
         are those of the turns in which its own lies.
         """
         track = self.track

@@ -82,9 +82,9 @@ def wind_along_lines(track: Along, group: Group, st: State, bodies: Collection[s
         track.run(before, trial)
         case.solve(trial, sign, size)
         n = len(inputs[0])
-        found = np.array([np.broadcast_to(trial.turn[body], n) for body in bodies], dtype=complex)
-        found[:, np.broadcast_to(~(np.asarray(trial.margin[group.name]) >= 0), n)] = np.nan
-        return found
+        result = np.array([np.broadcast_to(trial.turn[body], n) for body in bodies], dtype=complex)
+        result[:, np.broadcast_to(~(np.asarray(trial.margin[group.name]) >= 0), n)] = np.nan
+        return result
 
     with np.errstate(all="ignore"):
         totals, reached = counted(rotations, assembly.mechanism, st.inputs)

@@ -1,6 +1,6 @@
 """The change points and limits of the loops of a mechanism along its one input, in what was looked through.
 
-What a group has in one round of all that it hangs on it has in every other: it is looked through once, and carried on.
+What a group has in one round of all that it depends on it has in every other: it is looked through once, and carried on.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Bracket:
 
 @dataclass(frozen=True)
 class Seen:
-    """What a group has from one input on to where everything that it hangs on stands as before."""
+    """What a group has from one input on to where everything that it depends on stands as before."""
 
     period: float
     changes: tuple[ChangePoint, ...]

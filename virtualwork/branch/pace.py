@@ -40,7 +40,7 @@ class Pace:
         return 2 * np.pi if not self.slides else self._travel() if len(m.inputs) == 1 else m.size
 
     def fastest(self, group: Group) -> float:
-        """How many times as fast as the input the fastest body turns that a group hangs on, as gears say."""
+        """How many times as fast as the input the fastest body turns that a group depends on, as gears say."""
         if group.name not in self._speeds:
             steps = [*self.assembly.before(group), group]
             factors = [k for t in turns(steps) if not t.slides for _, k in t.angle.inputs]
@@ -55,21 +55,21 @@ class Pace:
         return self.length / max(1.0, self.fastest(group))
 
     def driving(self, group: Group) -> dict[str, float]:
-        """The bodies of loops that other bodies turn with so many times as fast, among all that a group hangs on."""
-        found: dict[str, float] = {}
+        """The bodies of loops that other bodies turn with so many times as fast, among all that a group depends on."""
+        result: dict[str, float] = {}
         for step in self.assembly.before(group):
             if isinstance(step, Turn):
                 for body, r in step.angle.bases:
                     if isinstance(step.body, str):
                         # what a slide turns is seen itself
                         body, r = (step.body, 1.0) if isinstance(body, int) else (body, r)
-                        found[body] = max(abs(r), found.get(body, 0.0))
+                        result[body] = max(abs(r), result.get(body, 0.0))
             elif isinstance(step, Group) and step.kind == "RPR":
-                found.setdefault(step.angles[0], 1.0)
-        return found
+                result.setdefault(step.angles[0], 1.0)
+        return result
 
     def rate(self, group: Group, seen: Mapping[str, Repeating]) -> float | None:
-        """How often a turn of the input brings all that a group hangs on back to where it stood; None: never."""
+        """How often a turn of the input brings all that a group depends on back to where it stood; None: never."""
         if self.slides:
             return None
         rates: list[float] = []

@@ -163,7 +163,7 @@ def _longest(z: Complexes) -> float:
 def depths(case: Case, st: State, size: float) -> tuple[float, float]:
     """The size of a group's radicand where nothing is special, and its rounding, over the poses of a state.
 
-    Both hang on what the loop itself holds: on its points and arms, and of a slide that turns on how far it reaches.
+    Both depend on what the loop itself holds: on its points and arms, and of a slide that turns on how far it reaches.
     """
     w, (v, u) = case.offset(st), case.vectors(st)
     kind = case.group.kind

@@ -105,15 +105,15 @@ def every_solution(group: Group, st: State, size: float) -> Any:
 
 def all_assemblies(chosen: C) -> tuple[C, ...]:
     """Every assembly at the guess's input: all signs of the closed forms, all solutions found for the others."""
-    found = [chosen]
+    result = [chosen]
     for signs, starts in _combinations(chosen):
         if signs != chosen.signs or any(
             np.abs(np.exp(1j * np.asarray(starts[k])) - np.exp(1j * np.asarray(chosen.starts[k]))).max()
             > 1e-6
             for k in starts
         ):
-            found.append(replace(chosen, signs=signs, starts=starts, number=len(found) + 1, warnings=()))
-    return tuple(found)
+            result.append(replace(chosen, signs=signs, starts=starts, number=len(result) + 1, warnings=()))
+    return tuple(result)
 
 
 def _combinations(chosen: Choice) -> list[tuple[dict[str, int], dict[str, Any]]]:

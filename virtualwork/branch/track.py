@@ -229,17 +229,17 @@ class Track:
 
     def warnings(self) -> tuple[str, ...]:
         """The assembly's warnings, and the groups that are singular in every pose in what was covered."""
-        found = []
+        result = []
         for g in self.plan.groups:
             if g.name in self.folded:
                 guides = self.assembly.mechanism.guides
                 what = ", ".join([*g.members, *(f"the slide at {guides[s].point}" for s in g.slides)])
-                found.append(
+                result.append(
                     f"singular in every pose: the speed of {what} is not determined: the assemblies of {g.name} meet "
-                    "all along. Places are those where they meet; rates and forces that hang on them are left out"
+                    "all along. Places are those where they meet; rates and forces that depend on them are left out"
                 )
         meeting = tuple(f"[guess] at: {name} " for name in self.folded)
-        return (*found, *(w for w in self.assembly.warnings if not (meeting and w.startswith(meeting))))
+        return (*result, *(w for w in self.assembly.warnings if not (meeting and w.startswith(meeting))))
 
     def samples(self, low: float, high: float, count: int) -> Reals:
         """Inputs from low to high, at least so many steps, between which no body turns far."""
@@ -323,7 +323,7 @@ class Track:
         uneven = partial(moves_far, group.kind, np.array([*driving.values()], dtype=float))
         winds = bool(self.assembly.geared.intersection(group.members))
         if self.even and self.repeats and not self.flips and not winds:
-            # nothing that it hangs on has a longer period than the input
+            # nothing that it depends on has a longer period than the input
             period = self.length
         else:
             rate = None if winds else self.pace.rate(group, self.noted.seen)
@@ -421,8 +421,8 @@ class Track:
     @property
     def crossings(self) -> list[float]:
         """Inputs at which two branches cross, in what was covered: of closed forms, and met on the way of the others."""
-        found = [float(q) for flips in self.flips.values() for q in flips]
-        return found + [float(q) for way in self.continuations.values() for q in way.crossings]
+        result = [float(q) for flips in self.flips.values() for q in flips]
+        return result + [float(q) for way in self.continuations.values() for q in way.crossings]
 
     # --- groups with no closed form ------------------------------------------------------------------------------
     def _continued(self, group: Group) -> Continuation:

@@ -183,7 +183,7 @@ def changed(m: D, numbers: Mapping[str, Any]) -> D:
 
     Examples
     --------
-    A point that hangs on another follows it:
+    A point that depends on another follows it:
 
     >>> from virtualwork.describe.parts import Input, Link, Polar
     >>> arm = Link({"O": 0j, "P": (0.5, 0), "Q": Polar("P", 0.25, 0)})

@@ -10,6 +10,8 @@ Further inputs of the tape
 `links.crank.B.x`    a dimension, by its path
 `guess crank`        an angle of the guess, and `at 0`, an input there: of gears, belts and racks, whose constant is that of the guess
 `phase 0`            the constant of one of these that the guess fixes by way of other links
+`friction 0`         of the first contact: the torque of a pin, the force along a guide
+`slip 0`             which way it slips, ±1
 `f 0`                the first unknown of redundant statics
 """
 
@@ -27,12 +29,15 @@ from dalembert.arithmetic.recorded import Number, Recorder, bare
 from dalembert.arithmetic.varied import Varied
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, dimensions, value
+from virtualwork.formulas.block import Block
 from virtualwork.formulas.dynamics import applied_loads, reduced
 from virtualwork.formulas.effort import generalized_force
 from virtualwork.formulas.lanes import Turning
+from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.newton import gaps
-from virtualwork.formulas.numbers import Written
+from virtualwork.formulas.numbers import Written, dot, plus
 from virtualwork.formulas.positions import State
+from virtualwork.formulas.reactions import JointForces
 from virtualwork.formulas.recording import Recording
 from virtualwork.formulas.statics import equations
 from virtualwork.plan.order import plan
@@ -125,6 +130,7 @@ class Exact(Recording):
     ("generalized", j)          the effort as if every motor sat on the body that its angle is measured from
     ("applied", link)           complex: what acts on a link but its weight and inertia
     ("applied moment", link)    about its centre of mass
+    ("rub", n)                  the friction of the n-th contact by the force that it bears
     ("gap", group, loop)        complex: what the unknowns of a group leave open of a loop
     ("balance", row)            what the forces that enter leave of an equation of redundant statics
 
@@ -182,6 +188,39 @@ class Exact(Recording):
     def _gap(self, group: str, loop: int) -> Number:
         return gaps(self.solved(group), self.st)[loop]
 
+    # --- friction -------------------------------------------------------------------------------------------------
+    @property
+    def forces(self) -> tuple[LoadPaths, JointForces, Block]:
+        """The loads over the recorded pose; the friction of each joint enters."""
+        known = self._forces
+        paths, of, block = super().forces
+        if known is None and paths.case.contacts:
+            self.solve(*paths.case.targets(paths.case.places))
+            for n, (joint, *_) in enumerate(paths.case.contacts):
+                rub = self.recorder.input(f"friction {n}")
+                block.friction[n] = rub if joint.guide is None else rub * of.rail(block, joint.guide)
+        return paths, of, block
+
+    def _rub(self, n: int) -> Number:
+        paths, of, block = self._places()
+        joint, body, _, coefficient, radius = paths.case.contacts[n]
+        force = plus(of.on_side(block, (joint.key, body)), of.borne(block, joint, body))
+        if force is None:
+            return None
+        slip = self.recorder.input(f"slip {n}") * bare(coefficient)
+        if joint.guide is None:
+            return -(slip * bare(radius)) * abs(force)
+        return -slip * abs(dot(force, 1j * of.rail(block, joint.guide)))
+
+    def _moment(self, joint: str, body: str) -> Number:
+        value = super()._moment(joint, body)
+        paths, _, block = self.forces
+        for load in paths.case.friction:
+            if load.path is None and load.joint == joint and load.body == body:
+                value = plus(value, load.form(block))
+        return value
+
+    # --- further forces -------------------------------------------------------------------------------------------
     def _generalized(self, j: int) -> Number:
         paths, _, block = self.forces
         return self._negative(generalized_force(paths, block, j))

@@ -5,7 +5,8 @@ redundant. Those solve the equilibrium of all links, A f + b = 0, by singular va
 32 digits, A⁺ times that, is what they are off by, one step of iterative refinement (N. J. Higham, Accuracy and
 Stability of Numerical Algorithms, 2nd ed., §12.1).
 
-Joint friction exchanges loads and forces until neither changes; its poses have no estimate (infinite).
+With joint friction, loads and forces are exchanged in 32 digits until neither changes; where statics is redundant
+besides there is no estimate (infinite).
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class ForceErrors:
     def __init__(self, dynamics: Dynamics) -> None:
         self.dynamics, self.n, self.lock = dynamics, dynamics.poses.n, dynamics.lock
         self.mechanism = dynamics.poses.mechanism
-        self.estimates = Estimates(dynamics.poses, self._values)
+        self.estimates = Estimates(dynamics.poses, self._values, lambda: dynamics)
 
     def _values(self, keys: Sequence[Key]) -> list[Any]:
         """The forces as they were handed out."""
@@ -57,7 +58,9 @@ class ForceErrors:
         self.estimates.together(keys)
 
     def _holds(self, joint: Joint) -> bool:
-        """Whether a joint keeps its bodies from turning against each other."""
+        """Whether a joint has a moment: it keeps its bodies from turning against each other, or it rubs."""
+        if any(load.path is None and load.joint == joint.key for load in self.dynamics.scene.friction):
+            return True
         return joint.guide is not None and self.mechanism.guides[joint.guide].is_slider
 
     def _each(self, kind: str) -> Reals:

@@ -60,19 +60,19 @@ def chosen(
     tape = written.told(len(way))
     enters = {**_across(given), **_inputs(m)} | {f"way {i}": q[:, None] for i, q in enumerate(way)}
     *table, level = (row[:, 0] for row in run_grid(tape, enters, (n, 1)))
-    found = {group.name: sign for group, sign in zip(written.closed, table, strict=True)}
+    result = {group.name: sign for group, sign in zip(written.closed, table, strict=True)}
     told, clear = level > 0, level > 1
     if not told.all():
         rest = np.flatnonzero(~told)
         again, told[rest] = signs(written, m, _of(given, rest), len(rest))
         for name, sign in again.items():
-            found[name][rest] = sign
+            result[name][rest] = sign
     if one and not (at_once and clear.all()):
         rest = np.flatnonzero(told & ~clear if at_once else told)
-        known = _of(with_signs(given, found), rest)
+        known = _of(with_signs(given, result), rest)
         first, last = (end if len(end) == 1 else end[rest] for end in (low, high))
         told[rest] = ~meet_on_the_way(written, m, known, len(rest), first, last)
-    return found, told
+    return result, told
 
 
 def signs(
@@ -114,8 +114,8 @@ def signs(
 def at_guess(written: Written, m: Description, given: Mapping[str, Any], n: int) -> dict[str, Reals]:
     """The radicand of each closed form of each variant at the input of the guess, (n,), by the group's name."""
     with np.errstate(all="ignore"):
-        found = run(written.choice, {**given, **_inputs(m)})
-    return {g.name: np.broadcast_to(found[f"margin {g.name}"], n) for g in written.closed}
+        result = run(written.choice, {**given, **_inputs(m)})
+    return {g.name: np.broadcast_to(result[f"margin {g.name}"], n) for g in written.closed}
 
 
 def with_signs(given: Mapping[str, Any], signs: Mapping[str, Any]) -> dict[str, Any]:
@@ -135,16 +135,16 @@ def meet_on_the_way(
     Where two branches meet the radicand of a closed form touches zero from above; wherever a sample of it lies lower
     than its neighbours, the dip is followed down.
     """
-    found = np.zeros(n, dtype=bool)
+    result = np.zeros(n, dtype=bool)
     if not written.closed:
-        return found
+        return result
     for here, some, q in _along(written, m, known, n, low, high):
-        count = len(found[here])
+        count = len(result[here])
         for lever in _levers(written):
             # what follows from a lever that turns far between two samples is told by none of them
             turn = np.exp(1j * _sampled(written, ("angle", lever, 0), some, q, count))
             with np.errstate(invalid="ignore"):
-                found[here] |= (np.abs(np.diff(turn, axis=0)) > TURNED).any(axis=0)
+                result[here] |= (np.abs(np.diff(turn, axis=0)) > TURNED).any(axis=0)
         clear = np.empty(count, dtype=bool)
         run_grid(written.clear, _across(some) | {"q0": q.T}, (count, len(q)), [clear])
         left = np.flatnonzero(~clear)
@@ -152,8 +152,8 @@ def meet_on_the_way(
             its, near = _of(some, left), q if q.shape[1] == 1 else q[:, left]
             for group in written.closed:
                 radicand = partial(_sampled, written, ("margin", group.name))
-                found[left + here.start] |= _meets(its, near, radicand, len(left))
-    return found
+                result[left + here.start] |= _meets(its, near, radicand, len(left))
+    return result
 
 
 def stays_within(
@@ -167,10 +167,10 @@ def stays_within(
     high: Reals,
 ) -> Mask:
     """Of which variants a quantity is no larger than a bound over their inputs from low to high, (n,) or (1,)."""
-    found = np.ones(n, dtype=bool)
+    result = np.ones(n, dtype=bool)
     for here, some, q in _along(written, m, known, n, low, high):
-        found[here] = (np.abs(_sampled(written, key, some, q, len(found[here]))) < bound).all(axis=0)
-    return found
+        result[here] = (np.abs(_sampled(written, key, some, q, len(result[here]))) < bound).all(axis=0)
+    return result
 
 
 def samples(written: Written, m: Description, span: float) -> int:

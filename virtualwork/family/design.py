@@ -74,7 +74,7 @@ class Design:
 
     @property
     def exact(self) -> bool:
-        """Whether derivatives are exact: unless a gear's phase hangs on links that have to be placed first."""
+        """Whether derivatives are exact: unless a gear's phase depends on links that have to be placed first."""
         return self._first.written is not None or self._alone.written is not None
 
     def hold(self, numbers: Reals | None) -> bool:
@@ -239,7 +239,7 @@ class Alone:
 
     @cached_property
     def written(self) -> Written | None:
-        """The formulas; None where a gear's phase hangs on links that have to be placed first, or every pose is singular.
+        """The formulas; None where a gear's phase depends on links that have to be placed first, or every pose is singular.
 
         And where the mechanism's own dimensions cannot be put together.
         """
@@ -249,8 +249,8 @@ class Alone:
             return None
         if own.folded:
             return None
-        found = Written(own, self.dimensions, REST, own_signs=True, settled=False)
-        return None if found.open_gears else found
+        result = Written(own, self.dimensions, REST, own_signs=True, settled=False)
+        return None if result.open_gears else result
 
     def values(self, x: Reals, q: Reals) -> Reals:
         """What is asked for of one design, (rows, n); NaN where it cannot be assembled."""
@@ -276,7 +276,7 @@ class Alone:
             found = run(tape, given | Lanes(self._last[1], poses).entering(rest))
         for row, name in enumerate(of):
             for column, to in enumerate(enters):
-                # what does not hang on it has no row
+                # what does not depend on it has no row
                 out[row, :, column] = found.get(f"d({name})/d({to})", 0.0)
         out[:, ~poses.assembled] = np.nan
         return out

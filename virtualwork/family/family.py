@@ -254,7 +254,7 @@ class FamilyMotion:
                 (self._name, number, self.part.some(some), new, [x[some] for x in out] if here else None)
                 for number, some in self.parts()
             )
-            # what others work out hangs on the whole, and not on what each of them did before
+            # what others work out depends on the whole, and not on what each of them did before
             of = answer if here else partial(as_part, math.prod(self.part.shape), answer)
             for some, (values, reasons) in zip(rows, in_parts(of, work, self.executor), strict=True):
                 if not here:
@@ -287,10 +287,10 @@ class FamilyMotion:
             return self._reasons[i]
         q = np.broadcast_to(self.part.inputs, (*self.part.shape, self.part.inputs.shape[2]))[i, bad[0]]
         try:
-            found = Assembly.from_guess(self.part.described(i)).reach.shortfall(tuple(q.tolist()))
+            result = Assembly.from_guess(self.part.described(i)).reach.shortfall(tuple(q.tolist()))
         except MechanismError as error:
             return str(error)
-        return None if found is None else found.text()
+        return None if result is None else result.text()
 
     # --- what moves -----------------------------------------------------------------------------------------------
     def point(self, name: str) -> PointOfFamily:
@@ -336,8 +336,8 @@ class FamilyMotion:
     def effort(self) -> Reals:
         """The effort at the input by virtual work, (v, n) N·m (N at a slide); (v, n, k) for k inputs."""
         k = len(self.part.mechanism.inputs)
-        found = self.values([("effort", j) for j in range(k)])
-        return found[0] if k == 1 else np.stack(found, axis=-1)
+        result = self.values([("effort", j) for j in range(k)])
+        return result[0] if k == 1 else np.stack(result, axis=-1)
 
     def reaction(self, joint: str, on: str) -> Reals:
         """The force of all others on a link at a joint, (v, n, 2) N.

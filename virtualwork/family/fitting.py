@@ -140,9 +140,9 @@ class Fit(Generic[D]):
         return fitted(panels, figure)
 
     def __repr__(self) -> str:
-        found = ", ".join(f"{path}={number:.6g}" for path, number in self.parameters.items())
+        result = ", ".join(f"{path}={number:.6g}" for path, number in self.parameters.items())
         unit = "rad" if all(each.kind == "angle" for each in self.reached) else "m"
-        return f"Fit({found}; rms {self.rms:.3g} {unit})"
+        return f"Fit({result}; rms {self.rms:.3g} {unit})"
 
 
 def fit(
@@ -239,7 +239,7 @@ class _Problem(Generic[D]):
         if all(table is None for table in swept):
             given = tuple(aim.inputs for aim in self.aims if aim.inputs is not None)
             return [(starts[i], given) for i in order[: ROUNDS[0][0]]]
-        found: list[tuple[float, tuple[Reals, tuple[Reals, ...]]]] = []
+        result: list[tuple[float, tuple[Reals, tuple[Reals, ...]]]] = []
         for i in order[:ORDERED]:
             ways = [
                 [(0.0, aim.inputs)] * 2
@@ -249,11 +249,11 @@ class _Problem(Generic[D]):
             ]
             # the better way round of each target, then the other
             for each in zip(*ways, strict=True):
-                found.append((sum(c for c, _ in each), (starts[i], tuple(way for _, way in each))))
-        found.sort(key=lambda each: each[0])
+                result.append((sum(c for c, _ in each), (starts[i], tuple(way for _, way in each))))
+        result.sort(key=lambda each: each[0])
         # what cannot be assembled near every row leads nowhere, while anything else does
         hopeless = AWAY**2
-        return [x for c, x in found if c < hopeless or found[0][0] >= hopeless]
+        return [x for c, x in result if c < hopeless or result[0][0] >= hopeless]
 
     # --- solution ---------------------------------------------------------------------------------------------------
     def solved(self, starts: int, seed: int, best: int, executor: Executor | None) -> Fit[D]:
@@ -323,7 +323,7 @@ class _Problem(Generic[D]):
         way = Descent(self.aims, self.designs, self.values, width, inputs)
         bounds = (0.0, 1.0)
         # dogbox steps along the bounds; trf, which keeps off them, creeps in the long valleys of this problem
-        found = least_squares(
+        result = least_squares(
             way.residuals,
             np.clip(x, *bounds),
             way.jacobian,
@@ -334,7 +334,7 @@ class _Problem(Generic[D]):
             gtol=1e-15,
             max_nfev=steps,
         )
-        return np.asarray(found.x), way.at(found.x).inputs
+        return np.asarray(result.x), way.at(result.x).inputs
 
     def _fit(self, found: _Refined, starts: int, evaluations: int) -> Fit[D] | None:
         """A solution as it is handed out; None where it cannot be assembled at every row."""
@@ -359,15 +359,15 @@ class _Problem(Generic[D]):
 
     def _remarks(self, values: Reals, inputs: Sequence[Reals]) -> list[str]:
         """What is to be said of a solution."""
-        said = []
+        lines = []
         for d, number, low, high in zip(self.dimensions, values, self.low, self.high, strict=True):
             if min(number - low, high - number) < 1e-6 * (high - low):
-                said.append(f"fit: {d.path} ends at its bound")
+                lines.append(f"fit: {d.path} ends at its bound")
         for aim, q in zip(self.aims, inputs, strict=True):
             order = np.diff(q) * np.sign(q[-1] - q[0])
             if aim.inputs is None and (order < 0).any():
                 k = int(np.argmin(order))
-                said.append(
+                lines.append(
                     f"fit: order defect: the input meets target point {k + 2} before target point {k + 1}"
                 )
         every = np.concatenate(inputs)
@@ -376,15 +376,15 @@ class _Problem(Generic[D]):
         gaps = whole[~np.isfinite(there[0])]
         if len(gaps):
             low, high = (self._shown(float(each)) for each in (gaps[0], gaps[-1]))
-            said.append(
+            lines.append(
                 f"fit: branch defect: between the target points it cannot be assembled from {low} to {high} "
                 f"({len(gaps)} of {FINE} poses): it does not pass there without being taken apart"
             )
         if not self.designs[0].exact:
-            said.append(
-                "fit: derivatives are differences: the phase of a gear hangs on links that have to be placed first"
+            lines.append(
+                "fit: derivatives are differences: the phase of a gear depends on links that have to be placed first"
             )
-        return said
+        return lines
 
     def _shown(self, q: float) -> str:
         return f"{q:.6g} m" if self.m.inputs[0].is_slide else f"{np.degrees(q):.6g} deg"
@@ -400,7 +400,7 @@ def _cost(squared: Reals) -> Reals:
 
 def _free(m: Description, free: Mapping[str, tuple[float, float]]) -> dict[Dimension, tuple[float, float]]:
     known = dimensions(m)
-    found: dict[Dimension, tuple[float, float]] = {}
+    result: dict[Dimension, tuple[float, float]] = {}
     for path, (low, high) in free.items():
         (dimension, *both) = named(m, path, known)
         if both:
@@ -411,7 +411,7 @@ def _free(m: Description, free: Mapping[str, tuple[float, float]]) -> dict[Dimen
             raise DescriptionError(f"{dimension.path} moves no point: expected a dimension of the geometry")
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
             raise DescriptionError(f"{dimension.path}: found bounds {low:g} to {high:g}, expected low < high")
-        found[dimension] = (float(low), float(high))
-    if not found:
+        result[dimension] = (float(low), float(high))
+    if not result:
         raise DescriptionError("no dimension is free: expected one or more")
-    return found
+    return result

@@ -92,12 +92,12 @@ class Part:
         n = len(q)
         assembly = Assembly.from_guess(self.described(i))
         assembly.seeds.update(seeds)
-        found = Poses(assembly, q if q.shape[1] > 1 else q[:, 0], 0.0, 0.0, 0.0)
-        found.rates = [
+        result = Poses(assembly, q if q.shape[1] > 1 else q[:, 0], 0.0, 0.0, 0.0)
+        result.rates = [
             [float(np.ravel(r)[0]) if np.size(r) == 1 else np.broadcast_to(r, (1, n))[0] for r in order]
             for order in one.rates
         ]
-        return found
+        return result
 
 
 class Solver:
@@ -122,15 +122,15 @@ class Solver:
     def assembly(self) -> Assembly | None:
         """That of the mechanism itself; None where its own dimensions cannot be put together."""
         try:
-            found = assembled(self.part.mechanism)
-            _ = found.track
+            result = assembled(self.part.mechanism)
+            _ = result.track
         except MechanismError:
             return None
-        return found
+        return result
 
     @cached_property
     def moves(self) -> tuple[bool, ...]:
-        """Whether the inputs have a speed, an acceleration, a jerk: whether one that varies is zero hangs on no variant."""
+        """Whether the inputs have a speed, an acceleration, a jerk: whether one that varies is zero depends on no variant."""
         varied = {d.where[-1] for d in self.part.dimensions if d.where[0] == "inputs"}
         rates = zip(RATES, self.part.rates, strict=True)
         return tuple(name in varied or any(np.any(rate) for rate in order) for name, order in rates)
@@ -150,8 +150,8 @@ class Solver:
         key = "family", fixed, self.moves
         if key not in own.recordings:
             own.recordings[key] = Written(own, fixed, self.moves, own_signs=True)
-        found: Written = own.recordings[key]
-        return None if found.open_gears else found
+        result: Written = own.recordings[key]
+        return None if result.open_gears else result
 
     @cached_property
     def _given(self) -> dict[str, Reals]:
@@ -211,17 +211,17 @@ class Solver:
         v, n = self.part.shape
         there = self._taken(keys) if self.takes(keys) else np.zeros(v, dtype=bool)
         alone = ~there
-        found = list(room(keys, v, n) if out is None else out)
+        result = list(room(keys, v, n) if out is None else out)
         each = max(1, LANES // max(n, 1))
         whole = bool(there.all())
         places = np.arange(0) if whole else np.flatnonzero(there)
         for i in range(0, v if whole else len(places), each):
             rows = slice(i, min(i + each, v)) if whole else places[i : i + each]
-            alone[self._on_tape(keys, rows, found)] = True
+            alone[self._on_tape(keys, rows, result)] = True
         if not whole or alone.any():
-            for to in found:
+            for to in result:
                 leave_out(to, alone)
-        return found, alone
+        return result, alone
 
     def takes(self, keys: Sequence[Key]) -> bool:
         """Whether the tape has such quantities: friction iterates, redundant statics and twists are of each variant."""
@@ -245,9 +245,9 @@ class Solver:
     def _unwound(self) -> Mask:
         """Which variants' torsion springs stay within half a turn of free all the way, (v,)."""
         v, m = self.part.shape[0], self.part.mechanism
-        found = np.ones(v, dtype=bool)
+        result = np.ones(v, dtype=bool)
         if self.written is None:
-            return found
+            return result
         if len(m.inputs) > 1:
             # each counts along lines of its own
             fixed = (not self.written.plan.angles[body].bases for s in m.torsion_springs for body in s.links)
@@ -255,8 +255,8 @@ class Solver:
         low, high = self._span
         for number in range(len(m.torsion_springs)):
             known = with_signs(self._given, self.signs)
-            found &= stays_within(self.written, m, known, ("twist", number), HALF, v, low, high)
-        return found
+            result &= stays_within(self.written, m, known, ("twist", number), HALF, v, low, high)
+        return result
 
     def _on_tape(
         self, keys: Sequence[Key], rows: NDArray[np.intp] | slice, out: list[Any]
@@ -394,12 +394,12 @@ def assembled(mechanism: Description) -> Assembly:
     MechanismError
     """
     with _lock:
-        found = _assembled.get(id(mechanism))
-        if found is None or found.mechanism is not mechanism:
+        result = _assembled.get(id(mechanism))
+        if result is None or result.mechanism is not mechanism:
             while len(_assembled) >= MECHANISMS:
                 _assembled.pop(next(iter(_assembled)), None)
-            found = _assembled[id(mechanism)] = Assembly.from_guess(mechanism)
-        return found
+            result = _assembled[id(mechanism)] = Assembly.from_guess(mechanism)
+        return result
 
 
 _seeding = Lock()

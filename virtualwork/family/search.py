@@ -52,13 +52,13 @@ def along(away: Reals, q: Reals, turning: bool) -> list[tuple[float, Reals]]:
         Evenly spaced; of a turning input over a whole turn.
     """
     span = len(q) * float(q[1] - q[0])
-    found = []
+    result = []
     for sense in (1, -1):
         cost, places = _in_order(away[::sense], turning)
         # past the end of the turn the input goes on
         turns, k = np.divmod(places, len(q))
-        found.append((cost, q[::sense][k] + sense * turns * span))
-    return sorted(found, key=lambda each: each[0])
+        result.append((cost, q[::sense][k] + sense * turns * span))
+    return sorted(result, key=lambda each: each[0])
 
 
 def _in_order(away: Reals, cyclic: bool) -> tuple[float, NDArray[np.intp]]:

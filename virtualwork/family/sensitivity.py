@@ -53,10 +53,12 @@ class Sensitivities:
         DescriptionError
             Where it names none, or two.
         """
-        found = named(self.assembly.mechanism, path)
-        if len(found) > 1:
-            raise DescriptionError(f"'{path}' names two numbers: expected {found[0].path} or {found[1].path}")
-        return found[0]
+        result = named(self.assembly.mechanism, path)
+        if len(result) > 1:
+            raise DescriptionError(
+                f"'{path}' names two numbers: expected {result[0].path} or {result[1].path}"
+            )
+        return result[0]
 
     def of(self, keys: Sequence[Key], dimensions: Sequence[Dimension]) -> list[list[Any]]:
         """The derivative of each quantity (`Recording.value`) to each dimension, (n,), real or complex.
@@ -144,9 +146,9 @@ class Sensitivities:
 
     def _refuse(self, keys: Sequence[Key], written: Written) -> None:
         m = self.assembly.mechanism
-        if written.open_gears:
+        if not written.placed:
             raise MechanismError(
-                "sensitivity: the phase of a gear hangs on links that have to be placed first"
+                "sensitivity: the phase of a gear depends on links that have to be placed first"
             )
         if self.assembly.folded:
             raise MechanismError("sensitivity: the mechanism is singular in every pose")

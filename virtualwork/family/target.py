@@ -172,27 +172,27 @@ class Aim:
 
 def _rows(name: str, is_point: bool, given: ArrayLike, n: int | None) -> Reals:
     """The numbers of one quantity, (1 or 2, n)."""
-    found = np.asarray(given)
+    result = np.asarray(given)
     if is_point:
-        if np.iscomplexobj(found):
-            found = np.stack([found.real, found.imag], axis=-1)
-        found = np.asarray(found, dtype=float)
-        if found.ndim != 2 or found.shape[1] != 2:
-            raise ValueError(f"target of {name}: expected shape (n, 2), found {found.shape}")
-        found = found.T
+        if np.iscomplexobj(result):
+            result = np.stack([result.real, result.imag], axis=-1)
+        result = np.asarray(result, dtype=float)
+        if result.ndim != 2 or result.shape[1] != 2:
+            raise ValueError(f"target of {name}: expected shape (n, 2), found {result.shape}")
+        result = result.T
     else:
-        found = np.asarray(found, dtype=float)
-        if found.ndim != 1:
-            raise ValueError(f"target of {name}: expected shape (n,), found {found.shape}")
-        found = found[None]
-    count = found.shape[1]
+        result = np.asarray(result, dtype=float)
+        if result.ndim != 1:
+            raise ValueError(f"target of {name}: expected shape (n,), found {result.shape}")
+        result = result[None]
+    count = result.shape[1]
     if count < 2:
         raise ValueError(f"target of {name}: found {count} point, expected two or more")
     if n is not None and count != n:
         raise ValueError(f"target of {name}: found {count} rows, and {n} of the one before it")
-    if not np.isfinite(found).all():
+    if not np.isfinite(result).all():
         raise ValueError(f"target of {name}: expected finite numbers")
-    return found
+    return result
 
 
 def _round_turn(angle: Reals) -> Reals:

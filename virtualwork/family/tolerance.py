@@ -70,10 +70,10 @@ def limits(m: Description, given: Mapping[str, float]) -> dict[Dimension, float]
         Where a path names no number.
     """
     known = dimensions(m)
-    found: dict[Dimension, float] = {}
+    limits: dict[Dimension, float] = {}
     for path, limit in given.items():
-        found |= dict.fromkeys(named(m, path, known), limit)
-    return found
+        limits |= dict.fromkeys(named(m, path, known), limit)
+    return limits
 
 
 @dataclass(frozen=True, eq=False)

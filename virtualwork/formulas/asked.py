@@ -98,7 +98,7 @@ def names(key: Key) -> tuple[str, ...]:
 def quantity(rows: Outputs, key: Key, n: int, to: str | None = None) -> Any:
     """A quantity of n lanes from the rows of a run, or its derivative `to` an input: (n,), real or complex.
 
-    What does not hang on the input has no row. A row of the run's own table is not copied.
+    What does not depend on the input has no row. A row of the run's own table is not copied.
     """
     of = [name if to is None else f"d({name})/d({to})" for name in names(key)]
     value = rows.get(of[0], 0.0) if len(of) == 1 else rows.complex(*of)

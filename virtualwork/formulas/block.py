@@ -1,6 +1,6 @@
 """A block of poses as the loads see it: where points lie, how far they move, what has been formed there already.
 
-Whatever hangs on loads, a load's value or a quantity made of several, is formed once in a block, when it is first
+Whatever depends on loads, a load's value or a quantity made of several, is formed once in a block, when it is first
 asked for.
 """
 
@@ -103,11 +103,11 @@ class Setting(Shared):
         leads through places that cannot be assembled.
         """
         if len(st.inputs) > 1:
-            found = self.along_lines(spring, st.inputs, within)
+            result = self.along_lines(spring, st.inputs, within)
         else:
-            found = whole(self._counted(spring), st.inputs[0], within)
-        found = found + 2 * np.pi * spring.turns
-        return found if st.many else float(np.ravel(found)[0])
+            result = whole(self._counted(spring), st.inputs[0], within)
+        result = result + 2 * np.pi * spring.turns
+        return result if st.many else float(np.ravel(result)[0])
 
     def along_lines(
         self,

@@ -28,13 +28,13 @@ STEP = 0.05
 
 def coordinates(m: Description, plan: Plan, st: State) -> Reals:
     """A pose as θ, x/size, y/size of every link's origin, (3·links,)."""
-    found = []
+    coordinates = []
     for link in m.links:
         path = plan.anchors[link]
         origin = complex(np.ravel(st.at(path))[0])
         turn = complex(np.ravel(st.turn[link])[0])
-        found += [float(np.angle(turn)), origin.real / m.size, origin.imag / m.size]
-    return np.array(found)
+        coordinates += [float(np.angle(turn)), origin.real / m.size, origin.imag / m.size]
+    return np.array(coordinates)
 
 
 @dataclass(frozen=True)
@@ -164,8 +164,8 @@ def dependent(labels: list[str], jacobian: Reals) -> tuple[int, tuple[str, ...]]
     u, s, _ = np.linalg.svd(jacobian)
     rank = int((s > RANK * s[0]).sum())
     left = u[:, rank:]
-    found = [label for label, row in zip(labels, left, strict=True) if np.abs(row).max(initial=0) > 1e-6]
-    return rank, tuple(dict.fromkeys(found))
+    result = [label for label, row in zip(labels, left, strict=True) if np.abs(row).max(initial=0) > 1e-6]
+    return rank, tuple(dict.fromkeys(result))
 
 
 def hidden_freedom(m: Description, x: Reals) -> tuple[tuple[str, ...], tuple[str, ...]] | None:
@@ -195,7 +195,7 @@ def hidden_freedom(m: Description, x: Reals) -> tuple[tuple[str, ...], tuple[str
         for k in (1.0, 2.0, 3.0):
             mix = null @ np.cos(k * np.sqrt(np.arange(1, 1 + null.shape[1])))
             there.append(_settled(m, start + STEP * mix, phases))
-    found = None
+    result = None
     for pose in there:
         if pose is None:
             continue
@@ -211,8 +211,8 @@ def hidden_freedom(m: Description, x: Reals) -> tuple[tuple[str, ...], tuple[str
         moves = np.abs(free).max(axis=1).reshape(-1, 3).max(axis=1)
         links = tuple(link for link, size in zip(m.links, moves, strict=True) if size > 1e-6)
         labels = [*here.labels, *(f"input {e.name}" for e in m.inputs)]
-        found = links, dependent(labels, here.driven)[1]
-    return found
+        result = links, dependent(labels, here.driven)[1]
+    return result
 
 
 def _phases(m: Description, x: Reals) -> dict[int, float]:

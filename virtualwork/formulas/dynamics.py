@@ -74,7 +74,7 @@ class Dynamics:
     def effort(self) -> Reals:
         """The effort at each input by virtual work, (n, k)."""
         if self._effort is None:
-            # friction settles first: the loads hang on it
+            # friction settles first: the loads depend on it
             _, settled = self._settled
             self._effort = effort(self.scene)
             self._effort[~settled] = np.nan
@@ -166,18 +166,18 @@ class Dynamics:
     def joint_moment(self, joint: Joint, body: str) -> Reals:
         """The moment of a joint on one of its bodies about the joint's point, (n,): a guide's, or a pin's friction."""
         r = self.reactions
-        found = np.zeros(self.poses.n)
+        result = np.zeros(self.poses.n)
         if joint.guide is not None:
             g = self.poses.mechanism.guides[joint.guide]
             if self.statics is None:
-                (found,) = r.over(partial(r.guide_moment, guide=joint.guide, body=body))
+                (result,) = r.over(partial(r.guide_moment, guide=joint.guide, body=body))
             elif g.is_slider:
                 value = self.statics.guide_moment(joint)
-                found = value if body == g.link else -value
+                result = value if body == g.link else -value
         for load in self.scene.friction:
             if load.path is None and load.joint == joint.key and load.body == body:
-                found = found + r.over(load.form)[0]
-        return found
+                result = result + r.over(load.form)[0]
+        return result
 
     def reaction(self, joint: str, on: str) -> Reals:
         """The force of all others on a link at a joint, (n, 2)."""
@@ -243,10 +243,10 @@ def joints_at(joints: Iterable[Joint], name: str, on: str) -> list[Joint]:
     if not named:
         known = ", ".join(dict.fromkeys(joint.name for joint in joints))
         raise DescriptionError(f"no joint at '{name}': expected one of {known}")
-    found = [joint for joint in named if on in joint.bodies]
-    if not found:
+    result = [joint for joint in named if on in joint.bodies]
+    if not result:
         raise DescriptionError(f"link '{on}' has no joint at '{name}'")
-    return found
+    return result
 
 
 def applied_loads(loads: Iterable[Load], link: str) -> list[Load]:

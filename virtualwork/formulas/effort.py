@@ -76,7 +76,7 @@ def finished(scene: Scene, out: Reals) -> Reals:
 def _singular(scene: Scene, block: Block, j: int) -> Any:
     """Where a link turns more than 10¹³ times as fast as the input: at a dead point to rounding, no number is left."""
     reach = scene.mechanism.size if scene.mechanism.inputs[j].is_slide else 1.0
-    found: Any = False
+    result: Any = False
     for group in scene.plan.groups:
         for body in group.angles:
             known = block.by[j].angle.get(body)
@@ -84,8 +84,8 @@ def _singular(scene: Scene, block: Block, j: int) -> Any:
                 continue
             # the norm over the block is above its largest entry: in most blocks it says that no link is so fast
             if not np.sqrt(np.vdot(known[0], known[0])) * reach < 1e13:
-                found = found | ~(np.abs(known[0]) * reach < 1e13)
-    return found
+                result = result | ~(np.abs(known[0]) * reach < 1e13)
+    return result
 
 
 def through_carriers(scene: Scene, force: Reals) -> Reals:

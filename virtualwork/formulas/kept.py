@@ -1,4 +1,4 @@
-"""What a motion keeps of one request for later ones: values that much hangs on, and that cost more to form than to read.
+"""What a motion keeps of one request for later ones: values that much depends on, and that cost more to form than to read.
 
 The operations of a recording are numbered, whatever is asked of it. A later request's tape begins at the values that
 earlier ones have left: they enter it as `kept 0`, `kept 1`, …
@@ -55,17 +55,17 @@ def later(recording: Recording, keys: Sequence[Key], known: Container[int]) -> L
 def _worth_keeping(recording: Recording, operations: Sequence[Operation]) -> set[int]:
     """The operations whose values are the state of a pose and cost much, with nothing but others of these known."""
     state = {number for value in recording.state() for number in _numbers(value)}
-    found: set[int] = set()
+    result: set[int] = set()
     costs: list[int] = []
     for number, (kind, *arguments) in enumerate(operations):
         cost = 0
         if kind not in ("const", "input"):
             cost = COSTS.get(kind, 1) + sum(costs[a] for a in arguments)
         if number in state and cost >= WORTH:
-            found.add(number)
+            result.add(number)
             cost = 0
         costs.append(min(cost, WORTH))
-    return found
+    return result
 
 
 def _numbers(value: Number) -> Iterator[int]:

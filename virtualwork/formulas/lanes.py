@@ -106,7 +106,7 @@ class Lanes:
         return not self.branch.folded and recording.takes(keys)
 
     def operations(self, keys: Iterable[Key]) -> int:
-        """What quantities of a pose cost, in operations on real numbers, with all that they hang on."""
+        """What quantities of a pose cost, in operations on real numbers, with all that they depend on."""
         return taped(self.branch, self.recording, tuple(keys)).cost
 
     def values(self, keys: Sequence[Key]) -> list[Any]:
@@ -125,7 +125,7 @@ class Lanes:
         return [self.known[key] for key in keys]
 
     def one(self, keys: tuple[Key, ...]) -> bool:
-        """Work out one pose that hangs on nothing but its input, by a function of floats; False where it hangs on more."""
+        """Work out one pose that depends on nothing but its input, by a function of floats; False where it depends on more."""
         given = [self.poses.inputs, *(rates[0] for rates in self.poses.rates)]
         values = [x if isinstance(x, float) else float(np.ravel(x)[0]) for x in given]
         made = ready(self.branch, tuple(x != 0.0 for x in values[1:]), keys)
@@ -184,7 +184,7 @@ class Lanes:
             )
 
     def _closed(self, key: Key) -> list[Key]:
-        """What tells where the groups that a quantity hangs on are not assembled."""
+        """What tells where the groups that a quantity depends on are not assembled."""
         return [("closed", group) for group in self.recording.hangs_on(key)] if self.branch.may_open else []
 
     def _where_bad(self, key: Key, found: Any) -> NDArray[np.bool_] | None:
@@ -213,28 +213,28 @@ class Lanes:
 
     def entering(self, inputs: Iterable[str]) -> dict[str, Any]:
         """The inputs of a tape, by their names."""
-        poses, found = self.poses, {}
+        poses, result = self.poses, {}
         for name in inputs:
             kind, _, of = name.partition(" ")
             if not of:
                 j = int(name[1:])
                 value = poses.inputs[:, j] if name[0] == "q" else poses.rates[NAMES.index(name[0]) - 1][j]
-                found[name] = value
+                result[name] = value
             elif kind == "sign":
-                found[name] = np.asarray(self.branch.sign(of, poses.inputs[:, 0]), dtype=float)
+                result[name] = np.asarray(self.branch.sign(of, poses.inputs[:, 0]), dtype=float)
             elif kind == "x":
-                found[name] = self._unknown(*of.rsplit(" ", 1))
+                result[name] = self._unknown(*of.rsplit(" ", 1))
             elif kind == "table":
                 number, part = of.split()
                 force = self._table(int(number))
-                found[name] = force.real if part == "x" else force.imag
+                result[name] = force.real if part == "x" else force.imag
             elif of.startswith("spring "):
-                found[name] = self.twist(int(of.removeprefix("spring ")))
+                result[name] = self.twist(int(of.removeprefix("spring ")))
             else:
-                found[name] = self._angle(of)
+                result[name] = self._angle(of)
         if poses.n == 1:
-            found = {name: float(np.ravel(value)[0]) for name, value in found.items()}
-        return found
+            result = {name: float(np.ravel(value)[0]) for name, value in result.items()}
+        return result
 
     def _unknown(self, group: str, i: str) -> Reals:
         """An unknown of a group without a closed form, from its own iteration."""
@@ -283,8 +283,8 @@ def recorded(branch: Turning, moves: tuple[bool, ...]) -> Recording:
             branch.recordings[key] = Recording(
                 branch.mechanism, branch.plan, branch.signs, moves, branch.turning_over, branch.geared
             )
-    found: Recording = branch.recordings[key]
-    return found
+    result: Recording = branch.recordings[key]
+    return result
 
 
 def taped(branch: Turning, recording: Recording, keys: tuple[Key, ...]) -> Tape:
@@ -293,8 +293,8 @@ def taped(branch: Turning, recording: Recording, keys: tuple[Key, ...]) -> Tape:
     with branch.lock:
         if key not in branch.recordings:
             branch.recordings[key] = recording.tape(keys)
-    found: Tape = branch.recordings[key]
-    return found
+    result: Tape = branch.recordings[key]
+    return result
 
 
 def _cut(branch: Turning, recording: Recording, keys: tuple[Key, ...], known: frozenset[int] | None) -> Later:
@@ -308,12 +308,12 @@ def _cut(branch: Turning, recording: Recording, keys: tuple[Key, ...], known: fr
             if len(made) >= MANY:
                 del made[next(iter(made))]
             made[key] = later(recording, keys, known)
-        found: Later = made[key]
-        return found
+        result: Later = made[key]
+        return result
 
 
 def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Ready | None:
-    """Quantities of one pose as a function of floats; None where they hang on more than the input and its rates.
+    """Quantities of one pose as a function of floats; None where they depend on more than the input and its rates.
 
     Such a mechanism has one input that turns, no change point, no limit, and a closed form for every group.
     """
@@ -322,8 +322,8 @@ def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Re
     if name not in known:
         with branch.lock:
             known[name] = _made(branch, moves, keys)
-    found: Ready | None = known[name]
-    return found
+    result: Ready | None = known[name]
+    return result
 
 
 def _made(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Ready | None:

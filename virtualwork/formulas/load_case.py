@@ -31,7 +31,7 @@ from virtualwork.plan.steps import Joint, Path, Place, Plan, Term, joints, path_
 class LoadCase:
     """What acts on a mechanism, at rest or moving; a load that is zero throughout is not in the list.
 
-    It hangs on no motion: an assembly makes it once for rest and once for all motions.
+    It depends on no motion: an assembly makes it once for rest and once for all motions.
     """
 
     def __init__(self, mechanism: Description, plan: Plan, moves: bool) -> None:
@@ -51,24 +51,24 @@ class LoadCase:
     def loads(self) -> list[Load]:
         """Every load that is not zero throughout, friction apart."""
         m = self.mechanism
-        found: list[Load] = []
+        loads: list[Load] = []
         for body, r in self.mechanism.rigid.items():
             at = body, self.path(body, r.center), r.center
             if r.mass and m.gravity:
-                found.append(Constant("weight", *at, r.mass * m.gravity))
+                loads.append(Constant("weight", *at, r.mass * m.gravity))
             if r.mass and self.moves:
-                found.append(InertiaForce("inertia force", *at, r.mass, self.acceleration(at[1])))
+                loads.append(InertiaForce("inertia force", *at, r.mass, self.acceleration(at[1])))
             if r.inertia and self.moves:
-                found.append(InertiaTorque("inertia torque", body, None, r.center, r.inertia))
-        found += [self._force(force) for force in m.forces if force.history or force.force]
-        found += [self._torque(torque) for torque in m.torques if torque.history or torque.torque]
+                loads.append(InertiaTorque("inertia torque", body, None, r.center, r.inertia))
+        loads += [self._force(force) for force in m.forces if force.history or force.force]
+        loads += [self._torque(torque) for torque in m.torques if torque.history or torque.torque]
         for spring in m.springs:
             if spring.stiffness or (spring.damping and self.moves):
-                found += self._spring(spring)
+                loads += self._spring(spring)
         for torsion in m.torsion_springs:
             if torsion.stiffness or (torsion.damping and self.moves):
-                found += self._torsion(torsion)
-        return found
+                loads += self._torsion(torsion)
+        return loads
 
     def _force(self, force: Force) -> Load:
         place = self.mechanism.place(force.link, force.point)
@@ -87,21 +87,21 @@ class LoadCase:
     def _spring(self, spring: Spring) -> list[Load]:
         between = [(body, self.mechanism.place(body, point)) for body, point in spring.between]
         ends = [self.path(*end) for end in between]
-        found: list[Load] = []
+        result: list[Load] = []
         for k, (body, z) in enumerate(between):
             if body != GROUND:
                 end = SpringEnd("spring", body, ends[k], z, spring=spring, other=ends[1 - k])
-                found.append(_beside(end, found))
-        return found
+                result.append(_beside(end, result))
+        return result
 
     def _torsion(self, spring: TorsionSpring) -> list[Load]:
-        found: list[Load] = []
+        result: list[Load] = []
         for body, sign in zip(spring.links, (1.0, -1.0), strict=True):
             if body != GROUND:
-                found.append(
-                    _beside(TorsionEnd("torsion spring", body, None, sign=sign, spring=spring), found)
+                result.append(
+                    _beside(TorsionEnd("torsion spring", body, None, sign=sign, spring=spring), result)
                 )
-        return found
+        return result
 
     @cached_property
     def contacts(self) -> list[tuple[Joint, str, str, float, float]]:
@@ -126,16 +126,16 @@ class LoadCase:
     @cached_property
     def friction(self) -> list[FrictionLoad]:
         """The friction loads, two for each contact: what the one side feels and its reaction."""
-        found: list[FrictionLoad] = []
+        result: list[FrictionLoad] = []
         for number, (joint, body, other, _, _) in enumerate(self.contacts):
             for side, sign in ((body, 1.0), (other, -1.0)):
                 if side == GROUND:
                     continue
                 if joint.guide is None:
-                    found.append(FrictionLoad("friction", side, None, 0j, joint.key, number, sign))
+                    result.append(FrictionLoad("friction", side, None, 0j, joint.key, number, sign))
                 else:
-                    found.append(self._along(joint.guide, side, sign, joint.key, number, body == GROUND))
-        return found
+                    result.append(self._along(joint.guide, side, sign, joint.key, number, body == GROUND))
+        return result
 
     def _along(self, i: int, side: str, sign: float, key: str, number: int, alone: bool) -> FrictionLoad:
         """The friction along a guide on the body that slides (sign +1), or on the rail, where the pin stands."""
@@ -154,7 +154,7 @@ class LoadCase:
         return [*self.loads, *self.friction]
 
     def targets(self, keys: Iterable[str] = ()) -> tuple[tuple[str, ...], int]:
-        """What `keys` and the loads hang on, `angle:BODY`, `slide:GUIDE`, `point:NODE`, and to which derivative."""
+        """What `keys` and the loads depend on, `angle:BODY`, `slide:GUIDE`, `point:NODE`, and to which derivative."""
         reads = set(keys).union(*(load.reads() for load in self.everything)) - {f"angle:{GROUND}"}
         if not reads:
             # nothing acts: any one thing that moves will do
@@ -163,7 +163,7 @@ class LoadCase:
 
     @cached_property
     def places(self) -> tuple[str, ...]:
-        """What the places of all joints hang on."""
+        """What the places of all joints depend on."""
         keys = {f"slide:{i}" for i in range(len(self.mechanism.guides))}
         for body, r in self.mechanism.rigid.items():
             keys |= path_reads(self.path(body, r.center)) | {f"angle:{body}"}
@@ -181,7 +181,7 @@ class LoadCase:
         [('turn', 'crank', 0.5j)]
         """
         base, terms = path
-        found = Combination()
+        result = Combination()
         step = None if base is None else self._places[base]
         if step is not None and step.base in self._fixed and len(step.terms) == 1:
             terms = combined(
@@ -189,20 +189,20 @@ class LoadCase:
             )  # as many vectors as with the point, and the turning alone
             base = None
         if base is not None and base not in self._fixed:
-            found.add(Combination({self.quantities.second("node", base): 1.0}))
+            result.add(Combination({self.quantities.second("node", base): 1.0}))
         for t in terms:
             if t.body != GROUND or t.slide is not None:
-                found.add(Combination({self.quantities.second("turn", t.body, t.slide): t.z}))
-        return found
+                result.add(Combination({self.quantities.second("turn", t.body, t.slide): t.z}))
+        return result
 
     @cached_property
     def _fixed(self) -> set[str | None]:
         """The points that do not move."""
-        found: set[str | None] = {None}
+        result: set[str | None] = {None}
         for node, step in self._places.items():
-            if step.base in found and all(t.body == GROUND and t.slide is None for t in step.terms):
-                found.add(node)
-        return found
+            if step.base in result and all(t.body == GROUND and t.slide is None for t in step.terms):
+                result.add(node)
+        return result
 
     @cached_property
     def carried(self) -> list[tuple[str, int, float]]:
@@ -211,10 +211,10 @@ class LoadCase:
         The input's own torque acts between the driven link and `on`; with +T on `on` and −T on the carrier added, the
         motor acts between the driven link and its carrier (Ibrahim §2.3).
         """
-        found = []
+        result = []
         for j in self.mechanism.carried:
-            found += [(self.mechanism.carrier(j), j, -1.0), (self.mechanism.inputs[j].on, j, 1.0)]
-        return [entry for entry in found if entry[0] != GROUND]
+            result += [(self.mechanism.carrier(j), j, -1.0), (self.mechanism.inputs[j].on, j, 1.0)]
+        return [entry for entry in result if entry[0] != GROUND]
 
 
 def _beside(load: Load, before: list[Load]) -> Load:

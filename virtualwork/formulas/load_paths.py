@@ -12,7 +12,7 @@ inertia about the point it hangs on, times α, and its mass times that point's a
       Q_x + Σ_c λ_c·∂C_c/∂x = 0,
 
   the group's own small Jacobian transposed, already formed for the velocities. Q_x gathers the loads and loop forces
-  of all that hangs on the group, which is why groups are taken in reverse.
+  of all that depends on the group, which is why groups are taken in reverse.
 - The other joints follow from ΣF = 0 of one body or one pin after the other (Ibrahim §2.2, d'Alembert), torques from
   ΣM = 0 (Ibrahim §2.3).
 """

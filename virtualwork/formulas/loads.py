@@ -44,7 +44,7 @@ class Load:
     rail: int | None = field(default=None, kw_only=True)
 
     lasts = False
-    # of the derivatives that it hangs on
+    # of the derivatives that it depends on
     order = 1
 
     @property
@@ -63,7 +63,7 @@ class Load:
         return Combination({quantities(Given, self): 1.0})
 
     def reads(self) -> set[str]:
-        """What it hangs on: `angle:BODY`, `slide:GUIDE`, `point:NODE`."""
+        """What it depends on: `angle:BODY`, `slide:GUIDE`, `point:NODE`."""
         return {f"angle:{self.body}"} | (set() if self.path is None else path_reads(self.path))
 
     @property
@@ -227,10 +227,10 @@ class Tabled(Load):
         return values if many else complex(values)
 
     def form(self, block: Block) -> Number:
-        found = block.table(self)
+        result = block.table(self)
         if self.path is None:
-            return found.real
-        return found * block.st.turn[self.body] if self.link_axes else found
+            return result.real
+        return result * block.st.turn[self.body] if self.link_axes else result
 
     def second(self, block: Block, rates: Rates) -> Number:
         total = super().second(block, rates)

@@ -241,8 +241,8 @@ def solve_transposed(cols: list[list[Number]], loads: list[Number]) -> list[Numb
     if jacobian.shape[-1] == jacobian.shape[-2]:
         good &= np.linalg.cond(np.where(good[:, None, None], jacobian, np.eye(len(loads)))) < 1 / PARALLEL
         out[good] = np.linalg.solve(jacobian[good], right[good][..., None])[..., 0]
-    found = out[:, 0::2] + 1j * out[:, 1::2]
-    return [found[:, c] if shape else complex(found[0, c]) for c in range(found.shape[1])]
+    result = out[:, 0::2] + 1j * out[:, 1::2]
+    return [result[:, c] if shape else complex(result[0, c]) for c in range(result.shape[1])]
 
 
 # --- kinds of numbers ------------------------------------------------------------------------------------------------

@@ -56,7 +56,7 @@ class Branch(Protocol):
 
     @property
     def known_steps(self) -> dict[tuple[str, ...], tuple[Step, ...]]:
-        """The steps that targets hang on, as far as they were asked for."""
+        """The steps that targets depend on, as far as requested."""
 
     @property
     def plain(self) -> dict[str, Callable[[State], None]]:
@@ -71,7 +71,7 @@ class Branch(Protocol):
 
 
 class _Asked(NamedTuple):
-    """A quantity: what it hangs on, to which order, over which input; what a state has of it, and its rates."""
+    """A quantity: what it depends on, to which order, over which input; what a state has of it, and its rates."""
 
     targets: tuple[str, ...]
     order: int
@@ -348,7 +348,7 @@ class Poses:
         return np.broadcast_to(np.asarray(self.rates[order - 1][j], dtype=float), (self.n,))
 
     def values(self, keys: Sequence[tuple[Any, ...]]) -> list[Any]:
-        """Quantities of motion by their keys (`asked.Key`), (n,) each; what they hang on is solved in one pass."""
+        """Quantities of motion by their keys (`asked.Key`), (n,) each; what they depend on is solved in one pass."""
         asked = [self._asked(key) for key in keys]
         wanted: dict[tuple[int, int], dict[str, None]] = {}
         for quantity in asked:
@@ -357,7 +357,7 @@ class Poses:
         return [self._formed(quantity, rates[quantity.order, quantity.which]) for quantity in asked]
 
     def _asked(self, key: tuple[Any, ...]) -> _Asked:
-        """What a quantity hangs on, and what the states and their rates have of it."""
+        """What a quantity depends on, and what the states and their rates have of it."""
         kind, of, *more = key
         alone = kind in ("dpoint", "dangle")
         how = more[-1] if more else 0, more[-2] if alone and self.inputs.shape[1] > 1 else -1, alone

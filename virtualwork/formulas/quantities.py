@@ -2,7 +2,7 @@
 
 But for springs and friction, a force on a link is a fixed combination of a few vectors: of 1 (a weight), of e^{iθ} (a
 force that turns with its link), of second derivatives (−m·a_G = −m Σ z (e^{iθ})″) and of other joint forces. Such
-vectors are the quantities; a `Combination` holds their coefficients, which hang on the mechanism alone. Combinations
+vectors are the quantities; a `Combination` holds their coefficients, which depend on the mechanism alone. Combinations
 are added and weighed as numbers, once for each mechanism. An array over the poses is formed of a quantity or a
 combination when its value is asked for, and never twice.
 """
@@ -218,14 +218,14 @@ def in_order(quantity: Quantity) -> list[Quantity]:
     Forming them so keeps the chain of calls short, however long the chain of links.
     """
     done: set[Quantity] = set()
-    found: list[Quantity] = []
+    result: list[Quantity] = []
     stack: list[tuple[Quantity, bool]] = [(quantity, False)]
     while stack:
         here, open_ = stack.pop()
         if open_:
-            found.append(here)
+            result.append(here)
         elif here not in done:
             done.add(here)
             stack.append((here, True))
             stack += [(part, False) for part in here.reads() if part is not None and part not in done]
-    return found
+    return result

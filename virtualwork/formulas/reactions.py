@@ -2,7 +2,7 @@
 
 How they follow from each other is worked out once for a mechanism (`load_paths`); here the combinations become arrays.
 
-Coulomb friction in pins and guides are loads that hang on the reactions they change, found by iteration (`settle`). A
+Coulomb friction in pins and guides are loads that depend on the reactions they change, found by iteration (`settle`). A
 pin of radius r with the reaction R resists its relative turning with μ r |R|; a guide resists sliding with μ |N|, N normal
 to it (Norton, Design of Machinery, §11.9 names the model; the iteration starts without friction). Where nothing slides
 there is no friction: its value at rest is not determined, only bounded.
@@ -180,14 +180,14 @@ class JointForces:
 
 @guarded
 class Reactions(JointForces):
-    """The joint forces over all poses of a scene, each formed when it is first asked for."""
+    """The joint forces over all poses of a scene, each formed on the first request."""
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene.paths, scene.formed)
         self.scene, self.lock = scene, scene.lock
 
     def blocks(self) -> list[Block]:
-        """The scene's blocks, with what all joints' places hang on."""
+        """The scene's blocks, with what all joints' places depend on."""
         self._drive()
         return self.scene.blocks(self.scene.case.places)
 
@@ -208,10 +208,10 @@ class Reactions(JointForces):
         """
         self._drive()
         n = self.scene.poses.n
-        found: list[Any] = [np.empty(n, dtype=kind) for _ in forms]
+        result: list[Any] = [np.empty(n, dtype=kind) for _ in forms]
 
         def work(block: Block) -> None:
-            for out, form in zip(found, forms, strict=True):
+            for out, form in zip(result, forms, strict=True):
                 value = form(block)
                 out[block.rows] = 0.0 if value is None else value
             if also is not None:
@@ -222,9 +222,9 @@ class Reactions(JointForces):
 
         self.scene.each(self.scene.case.places, work)
         if self.scene.lost is not None:
-            for out in found:
+            for out in result:
                 leave_out(out, self.scene.lost)
-        return found
+        return result
 
 
 def settle(scene: Scene) -> tuple[int, NDArray[np.bool_]]:

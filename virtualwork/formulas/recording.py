@@ -1,6 +1,6 @@
 """The formulas of one assembly, written down on a tape: positions, rates, loads, effort, joint forces.
 
-The same formulas as everywhere, handed recorded numbers. What hangs on more than the pose enters as an input of the
+The same formulas as everywhere, handed recorded numbers. What depends on more than the pose enters as an input of the
 tape beside the inputs of the mechanism: the sign of a closed form where it turns over on the way, the unknowns of a
 group that has none, the whole turns of an angle, the force that a table gives.
 
@@ -142,7 +142,7 @@ class Recording:
         return about + WRITTEN.angle(turn * WRITTEN.exp(about).conjugate())
 
     def solve(self, targets: Iterable[str], order: int) -> None:
-        """Write down what targets hang on, up to an order of derivatives."""
+        """Write down what targets depend on, up to an order of derivatives."""
         steps = self.plan.needed(targets)
         for k in range(order + 1):
             ways: list[tuple[int, Rates | None]] = [(-1, None)] if k == 0 else [*enumerate(self._by)]
@@ -173,7 +173,7 @@ class Recording:
     # --- forces ---------------------------------------------------------------------------------------------------
     @property
     def forces(self) -> tuple[LoadPaths, JointForces, Block]:
-        """The loads over the recorded pose, with everything solved that they hang on."""
+        """The loads over the recorded pose, with everything solved that they depend on."""
         if self._forces is None:
             case = LoadCase(self.mechanism, self.plan, any(self.moves[:2]))
             paths = LoadPaths(case)
@@ -182,7 +182,7 @@ class Recording:
         return self._forces
 
     def _places(self) -> tuple[LoadPaths, JointForces, Block]:
-        """The forces, with everything solved that the places of all joints hang on."""
+        """The forces, with everything solved that the places of all joints depend on."""
         case = self.forces[0].case
         self.solve(*case.targets(case.places))
         return self.forces
@@ -265,7 +265,7 @@ class Recording:
         return outputs
 
     def state(self) -> Iterator[Number]:
-        """What is written down that much hangs on: directions, slides, and of forces what blocks keep too."""
+        """What is written down that much depends on: directions, slides, and of forces what blocks keep too."""
         yield from (*self.st.turn.values(), *self.st.slide.values())
         if self._forces:
             yield from (value[1] for of, value in self._forces[2].kept.items() if of.lasts)
@@ -352,7 +352,7 @@ class Recording:
         return self._shaking(1)
 
     def hangs_on(self, key: Key) -> tuple[str, ...]:
-        """The groups that a quantity hangs on, by name: where one of them is not assembled, it has no value.
+        """The groups that a quantity depends on, by name: where one of them is not assembled, it has no value.
 
         What cancels is not on the tape: a platform that stays level has the angle 0 there, whatever carries it.
         """

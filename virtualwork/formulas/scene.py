@@ -52,8 +52,8 @@ class Scene:
         known = self.poses.branch.load_paths
         if self.moves not in known:
             known[self.moves] = LoadPaths(self.case)
-        found: LoadPaths = known[self.moves]
-        return found
+        result: LoadPaths = known[self.moves]
+        return result
 
     @property
     def loads(self) -> list[Load]:
@@ -72,7 +72,7 @@ class Scene:
 
     # --- solving ----------------------------------------------------------------------------------------------
     def blocks(self, keys: Iterable[str] = ()) -> list[Block]:
-        """The blocks of poses, with everything solved that the loads and `keys` hang on."""
+        """The blocks of poses, with everything solved that the loads and `keys` depend on."""
         targets, order = self.case.targets(keys)
         if targets in self._blocks:
             return self._blocks[targets]
@@ -85,15 +85,15 @@ class Scene:
     def _made(
         self, targets: tuple[str, ...], by: list[list[Rates]], along: list[Rates] | None
     ) -> list[Block]:
-        found = [
+        result = [
             Block(self.setting, rows, st, None if along is None else along[i], [rates[i] for rates in by])
             for i, (rows, st) in enumerate(self.poses.rows())
         ]
         for old in self._blocks.values():
-            for block, before in zip(found, old, strict=True):
+            for block, before in zip(result, old, strict=True):
                 block.kept, block.friction = before.kept, before.friction
-        self._blocks = {targets: found}
-        return found
+        self._blocks = {targets: result}
+        return result
 
     def each(self, keys: Iterable[str], form: Callable[[Block], None]) -> None:
         """Form something over every block; of a single input while the block is still in cache from its solution."""

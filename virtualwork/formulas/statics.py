@@ -32,20 +32,20 @@ NULL = 1e-9
 
 def unknowns(of: JointForces) -> list[Column]:
     """The joint forces and torques of a mechanism."""
-    found: list[Column] = []
+    unknowns: list[Column] = []
     for joint in of.joints:
         if joint.guide is None:
-            found += [
+            unknowns += [
                 (axis, joint.key, body) for body in joint.bodies if body != GROUND for axis in ("fx", "fy")
             ]
         else:
-            found.append(("normal", joint.key, ""))
+            unknowns.append(("normal", joint.key, ""))
             if of.mechanism.guides[joint.guide].is_slider:
-                found.append(("moment", joint.key, ""))
-    found += [mesh_column(of.mechanism, i) for i in range(len(of.mechanism.meshes))]
+                unknowns.append(("moment", joint.key, ""))
+    unknowns += [mesh_column(of.mechanism, i) for i in range(len(of.mechanism.meshes))]
     for j, entry in enumerate(of.mechanism.inputs):
-        found.append(("force" if entry.is_slide else "torque", str(j), ""))
-    return found
+        unknowns.append(("force" if entry.is_slide else "torque", str(j), ""))
+    return unknowns
 
 
 def mesh_column(m: Description, mesh: int) -> Column:
@@ -275,7 +275,7 @@ class Statics:
             for what, here in sums
             if len(here) > 1 and np.abs(null[:, :, here].sum(axis=2)).max() <= 1e-7
         ]
-        found = ["statics does not determine " + ", ".join(label(self.unknowns[i]) for i in free)]
+        result = ["statics does not determine " + ", ".join(label(self.unknowns[i]) for i in free)]
         if known:
-            found.append("determined are the sums of " + "; ".join(known))
-        return found
+            result.append("determined are the sums of " + "; ".join(known))
+        return result

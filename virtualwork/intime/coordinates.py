@@ -69,21 +69,21 @@ class Coordinates:
         self, q: Reals, v: Reals | float = 0.0, a: Reals | float = 0.0, t: Reals | None = None
     ) -> Motion:
         """The motion over coordinates (n, k)."""
-        found = Motion(self.equations.assembly, q, v, a)
-        found.poses.time = t
-        return found
+        result = Motion(self.equations.assembly, q, v, a)
+        result.poses.time = t
+        return result
 
     def states(self, q: Reals, v: Reals, a: Reals, near: Reals) -> tuple[Reals, Reals, Reals]:
         """The inputs, their speeds and accelerations (n, k); of the inputs' whole turns those nearest to `near`."""
         if self.own:
             return q, v, a
         motion = self.motion(q, v, a)
-        found = np.empty((3, *q.shape))
+        result = np.empty((3, *q.shape))
         for j, entry in enumerate(self.inputs):
-            found[:, :, j] = [measured(motion, entry, order) for order in range(3)]
+            result[:, :, j] = [measured(motion, entry, order) for order in range(3)]
             if not entry.is_slide:
-                found[0, :, j] = unwound(found[0, :, j], near[:, j])
-        return found[0], found[1], found[2]
+                result[0, :, j] = unwound(result[0, :, j], near[:, j])
+        return result[0], result[1], result[2]
 
     # --- how far from folding -----------------------------------------------------------------------------------
     @cached_property
@@ -92,15 +92,15 @@ class Coordinates:
         a = self.equations.assembly
         groups = [g for g in a.plan.groups if g.kind != "PRP"]
         recording = self.equations.recording(False, False, False)
-        found: dict[str, Number] = {}
+        result: dict[str, Number] = {}
         for g in groups:
             if g.kind == "Newton":
                 # of two links this is the sine, and its square the radicand
                 regular = recording.value(("regularity", g.name))
-                found[g.name] = regular * regular
+                result[g.name] = regular * regular
             else:
-                found[g.name] = recording.value(("margin", g.name))
-        return recording.recorder.tape(found) if found else None
+                result[g.name] = recording.value(("margin", g.name))
+        return recording.recorder.tape(result) if result else None
 
     @cached_property
     def _margin(self) -> Callable[[float, Floats, Floats], tuple[float, ...]] | None:

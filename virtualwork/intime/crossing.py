@@ -1,7 +1,7 @@
 """Through a change point: what is smooth in the input there, from both sides.
 
 Where two branches of a loop cross its Jacobian vanishes, and close by its rates have few digits left. What the motion
-hangs on, M and h, is smooth along the branch, which is known on both sides: close to the point it is interpolated
+depends on, M and h, is smooth along the branch, which is known on both sides: close to the point it is interpolated
 between poses farther off, by Lagrange's polynomial in its barycentric form (J.-P. Berrut, L. N. Trefethen,
 SIAM Review 46, 2004, eq. 4.2).
 """
@@ -24,7 +24,7 @@ NARROWER, NARROWINGS, ENOUGH = 0.75, 12, 1e-12
 # of the gap of poses farther off, what that of nearer ones must come to: a gap of truncation falls so, one of rounding
 # does not, and the nearer the poses are the more of their digits are lost
 BETTER = 0.1
-# of how far off other poses are taken, to see how much hangs on that; where on the inner part they are compared
+# of how far off other poses are taken, to see how much depends on that; where on the inner part they are compared
 OTHER = 0.85
 WITHIN = (-0.9, -0.3, 0.3, 0.9)
 # the gap of a pole is the same from all poses, and larger
@@ -112,19 +112,19 @@ def narrowed(f: Callable[[float], Floats], at: float, widest: float, least: Floa
     """
     best, lowest, told = Crossing(at, widest), math.inf, False
     for j in range(NARROWINGS):
-        found = Crossing(at, widest * NARROWER**j)
-        gaps = found.gaps(f, least)
+        result = Crossing(at, widest * NARROWER**j)
+        gaps = result.gaps(f, least)
         told = told or all(gap < SMOOTH for gap, size in zip(gaps, least, strict=True) if size)
         if max(gaps) < BETTER * lowest:
-            best, lowest = found, max(gaps)
+            best, lowest = result, max(gaps)
         if lowest <= ENOUGH:
             break
     if told:
         best.compare(f, Crossing(at, OTHER * best.inner / INNER))
         return best
     # what is not smooth there is left as it is, but for the nearest poses
-    found.smooth, found.missed = False, [0.0] * len(least)
-    return found
+    result.smooth, result.missed = False, [0.0] * len(least)
+    return result
 
 
 def crossings(
@@ -139,12 +139,12 @@ def crossings(
     for at in sorted(points):
         if not places or at - places[-1] > 1e-6 * unit:
             places.append(at)
-    found = []
+    crossings = []
     for i, at in enumerate(places):
         apart = [abs(at - other) for other in (*places[max(0, i - 1) : i], *places[i + 1 : i + 2])]
         widest = min([REACH * unit, *(0.6 * x for x in apart)])
-        found.append(settled(at, share * widest))
-    return found
+        crossings.append(settled(at, share * widest))
+    return crossings
 
 
 def nearest(found: list[Crossing], q: float) -> Crossing | None:

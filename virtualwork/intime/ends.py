@@ -33,13 +33,13 @@ def sides(node: Nodes, levels: Levels, scale: Reals) -> dict[int, Reals]:
     scale : array (lanes, k)
         What an error of each input is relative to.
     """
-    found = {}
+    sides = {}
     for j, level in levels.items():
         gap = node.q[:, j] - level
         gap = np.where(np.abs(gap) <= noise(level, scale[:, j]), 0.0, gap)
         speed, rate = node.v[:, j], node.rates[:, j]
-        found[j] = np.sign(np.where(gap != 0, gap, np.where(speed != 0, speed, rate)))
-    return found
+        sides[j] = np.sign(np.where(gap != 0, gap, np.where(speed != 0, speed, rate)))
+    return sides
 
 
 def _gaps(nodes: Nodes, j: int, level: float, side: Reals) -> Reals:
@@ -53,11 +53,11 @@ def _gaps(nodes: Nodes, j: int, level: float, side: Reals) -> Reals:
 
 def passed(nodes: Nodes, levels: Levels, sides: Mapping[int, Reals]) -> Mask:
     """Which steps pass a level, or come so near one that it is not sure, (rounds − 1, lanes)."""
-    found = np.zeros(nodes.t[1:].shape, dtype=bool)
+    result = np.zeros(nodes.t[1:].shape, dtype=bool)
     for j, level in levels.items():
         rounds, lanes, *_ = _pieces(_gaps(nodes, j, level, sides[j]))
-        found[rounds, lanes] = True
-    return found
+        result[rounds, lanes] = True
+    return result
 
 
 def _pieces(g: Reals) -> tuple[Any, ...]:

@@ -82,11 +82,11 @@ class Placed:
 
     def _settled(self, q: Floats) -> dict[str, float]:
         """All unknowns at the inputs."""
-        found = self._followed(q) if self._x and not self.crosses() else None
-        if found is None:
+        result = self._followed(q) if self._x and not self.crosses() else None
+        if result is None:
             st = self.state(q)
-            found = {f"x {g.name} {i}": _one(x) for g in self.larger for i, x in enumerate(unknowns(g, st))}
-        return found
+            result = {f"x {g.name} {i}": _one(x) for g in self.larger for i, x in enumerate(unknowns(g, st))}
+        return result
 
     def _followed(self, q: Floats) -> dict[str, float] | None:
         """The same from those of the last pose; None where that does not lead there."""
@@ -133,10 +133,10 @@ class Placed:
         if apart.min() * NODES <= 1:
             return _one(unwound(within, twist))
         own = _one(Setting.within(self.assembly.state(tuple(at)), spring))
-        found = _one(setting.along_lines(spring, state.inputs, within, at) + twist - principal(own))
-        if math.isfinite(found):
-            met.append((list(q), found))
-        return found
+        result = _one(setting.along_lines(spring, state.inputs, within, at) + twist - principal(own))
+        if math.isfinite(result):
+            met.append((list(q), result))
+        return result
 
     def _setting(self, q: float) -> Setting:
         """Poses over all inputs met so far, and a turn further."""

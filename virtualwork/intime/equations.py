@@ -98,14 +98,14 @@ class Equations:
         if crossing is not None:
             if not crossing.smooth:
                 raise Lost
-            found = crossing.interpolated([self._plain(t, [x], v) for x in crossing.nodes], q[0])
+            result = crossing.interpolated([self._plain(t, [x], v) for x in crossing.nodes], q[0])
         else:
-            found = self._plain(t, q, v)
-        for value in found:
+            result = self._plain(t, q, v)
+        for value in result:
             # NaN and infinity
             if value - value != 0.0:
                 raise Lost
-        return found
+        return result
 
     def _plain(self, t: float, q: Floats, v: Floats) -> Floats:
         """The same away from change points."""
@@ -170,14 +170,14 @@ class Equations:
             unit = np.vstack([np.zeros(k), np.eye(k)])
             poses = Poses(self.assembly, np.tile(q, (k + 1, 1)), np.tile(v, (k + 1, 1)), unit)
             poses.time = np.full(k + 1, t)
-            found = effort(Scene(poses)).reshape(k + 1, k)
-        return (found[1:] - found[0]).T, found[0]
+            result = effort(Scene(poses)).reshape(k + 1, k)
+        return (result[1:] - result[0]).T, result[0]
 
     def watches(self) -> list[Watch]:
-        """What a step must not pass: the kinks of tables over what hangs on the inputs alone."""
+        """What a step must not pass: the kinks of tables over what depends on the inputs alone."""
         plan = self.assembly.plan
-        found = (kinks(load, plan, f"table {number}") for number, load in enumerate(self._tables))
-        return [watch for watch in found if watch is not None]
+        result = (kinks(load, plan, f"table {number}") for number, load in enumerate(self._tables))
+        return [watch for watch in result if watch is not None]
 
     @cached_property
     def stops(self) -> list[float]:
@@ -219,7 +219,7 @@ class Equations:
     # --- for steps that are tapes themselves ----------------------------------------------------------------------
     @cached_property
     def plain(self) -> bool:
-        """Whether the tape of the motion hangs on the state alone: on nothing that has to be looked up."""
+        """Whether the tape of the motion depends on the state alone: on nothing that has to be looked up."""
         return set(state_names(self.k)).issuperset(self.rates.inputs)
 
     @property
@@ -278,7 +278,7 @@ class Equations:
         return [self._fillers[name](t, q, v) for name in tape.inputs]
 
     def _filler(self, name: str) -> Value:
-        """How an input of the tape hangs on the state."""
+        """How an input of the tape depends on the state."""
         kind, _, of = name.partition(" ")
         if kind == "sign":
             return self._sign(of)
@@ -299,7 +299,7 @@ class Equations:
         return lambda t, q, v: v[j]
 
     def _followed(self, load: Tabled) -> Value:
-        """The angle or speed of a link that hangs on more than the inputs, by a tape of its own."""
+        """The angle or speed of a link that depends on more than the inputs, by a tape of its own."""
         order = 1 if load.axis == "speed" else 0
         function = self.function(self.recording(True, False, False).tape([("angle", load.body, order)]))
         first = load.table[0][0]
@@ -371,8 +371,8 @@ class Equations:
 
     def _crossing(self, q: float) -> Crossing | None:
         """The change point that an input is close to."""
-        found = nearest(self._crossings, q) if self._crossings else None
-        return found if found is not None and abs(q - found.at) < found.inner else None
+        result = nearest(self._crossings, q) if self._crossings else None
+        return result if result is not None and abs(q - result.at) < result.inner else None
 
     def blur(self, t: Reals, q: Reals, v: Reals, stages: Reals, weights: Reals) -> tuple[Reals, Reals]:
         """How far the speed may be wrong by each step for interpolation near change points, and the point next to each, both (n − 1,).
@@ -385,14 +385,14 @@ class Equations:
         # Hermite's polynomial through two nodes
         there = q[:-1] + c * way + c * (1 - c) * ((1 - c) * (h * v[:-1] - way) - c * (h * v[1:] - way))
         speed = np.maximum(np.abs(v[1:]), np.abs(v[:-1])) / FAST
-        found = np.zeros((len(self._crossings), len(h)))
-        for one, crossing in zip(found, self._crossings, strict=True):
+        result = np.zeros((len(self._crossings), len(h)))
+        for one, crossing in zip(result, self._crossings, strict=True):
             apart = np.abs(there - crossing.at) / crossing.inner
             each = weights[:, None] / np.maximum(apart, 1.0) ** 2
             counts = np.where((apart <= 1).all(axis=0), 1.0, np.sqrt(np.square(each).sum(axis=0)))
             still, fast = crossing.missed
             one[:] = SEEN * counts * (still + fast * speed**2) * h
-        return found.max(axis=0), found.argmax(axis=0)
+        return result.max(axis=0), result.argmax(axis=0)
 
     def otherwise(self) -> Equations:
         """The same equations, interpolated from other poses near change points."""
@@ -412,8 +412,8 @@ class Equations:
 
     def meets(self, q: float) -> bool:
         """Whether an input is at a change point, but for rounding."""
-        found = nearest(self._crossings, q)
-        return found is not None and abs(q - found.at) < 1e-7 * self.scale[0]
+        result = nearest(self._crossings, q)
+        return result is not None and abs(q - result.at) < 1e-7 * self.scale[0]
 
     def clear(self, q: Reals) -> bool:
         """Whether no change point is near any of the values of the first input, as far as can be looked."""
@@ -427,5 +427,5 @@ class Equations:
 
     def passes(self, q: float) -> bool:
         """Whether a change point is near: there every loop folds, in all coordinates, and goes on."""
-        found = nearest(self._crossings, q)
-        return found is not None and abs(q - found.at) < NEAR * self.assembly.track.length
+        result = nearest(self._crossings, q)
+        return result is not None and abs(q - result.at) < NEAR * self.assembly.track.length

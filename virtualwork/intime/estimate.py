@@ -22,7 +22,7 @@ GAIN, SAFETY = 255.0, 10.0
 LEAST = 1e-15
 # roundings of the acceleration that all err the same way
 ROUNDINGS = 8.0
-# an error of the inputs beyond which nothing is known of what hangs on them
+# an error of the inputs beyond which nothing is known of what depends on them
 UNKNOWN = 0.1
 # solutions at most, until the estimate meets the accuracy
 TRIES = 4

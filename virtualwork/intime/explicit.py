@@ -78,13 +78,13 @@ def step(f: Rates, t: Number, q: Numbers, v: Numbers, rates: Numbers, h: Number)
     speeds, others, last = stages(f, t, q, v, rates, h)
     dq, dv, work = _ends(speeds, others, h)
     end = [x + d for x, d in zip(q, dq, strict=True)], [x + d for x, d in zip(v, dv, strict=True)]
-    found = f(t + h, *end)
+    result = f(t + h, *end)
     # the last two evaluations stand at one time: how fast the rates change between them is what is stiff
     apart = sum(((a - b) * (a - b) for a, b in zip(end[1], last, strict=True)), 0.0)
-    steep = sum(((a - s[-1]) * (a - s[-1]) for a, s in zip(found[:k], others, strict=False)), 0.0)
-    every = [[*s, x] for s, x in zip((*speeds, *others[:k]), (*end[1], *found[:k]), strict=True)]
+    steep = sum(((a - s[-1]) * (a - s[-1]) for a, s in zip(result[:k], others, strict=False)), 0.0)
+    every = [[*s, x] for s, x in zip((*speeds, *others[:k]), (*end[1], *result[:k]), strict=True)]
     third, fifth = ([h * combined(weights, s) for s in every] for weights in (THIRD, FIFTH))
-    return Stepped(dq, dv, work, found, third, fifth, steep, apart)
+    return Stepped(dq, dv, work, result, third, fifth, steep, apart)
 
 
 def _ends(speeds: list[Numbers], others: list[Numbers], h: Number) -> tuple[Numbers, Numbers, Number]:

@@ -1,7 +1,7 @@
 """Coulomb friction in time: joints that slide, stick, break away and stick again.
 
 In a pin of radius r the friction torque is −μ r |R| against its turning, in a guide the force −μ |N| against its slide.
-R and N hang on the accelerations and on the friction itself, both linearly: with φ the friction of every joint that
+R and N depend on the accelerations and on the friction itself, both linearly: with φ the friction of every joint that
 rubs, M·q̈ + h = Cᵀφ and R = P + Q φ, where C holds the joints' own rates over the inputs' speeds. What slides is found
 by iteration, as in every pose (`formulas.friction`). What sticks has the φ that keeps it at rest, and breaks away where
 that is more than μ r |R|.
@@ -48,7 +48,7 @@ Mode = tuple[int, ...]
 """For each joint that rubs: the sign of its rate, 0 where it sticks."""
 
 
-# what hangs on the friction of each joint that rubs: its force, the acceleration of its slide; and the speed of it
+# what depends on the friction of each joint that rubs: its force, the acceleration of its slide; and the speed of it
 QUANTITIES = ("x", "y", "slip", "rate")
 
 
@@ -79,10 +79,10 @@ class Values(NamedTuple):
 
     def moved(self, phi: Floats) -> Floats:
         """The accelerations with friction."""
-        found = list(self.a)
+        result = list(self.a)
         for x, per in zip(phi, self.per, strict=True):
-            found = [a + x * b for a, b in zip(found, per, strict=True)]
-        return found
+            result = [a + x * b for a, b in zip(result, per, strict=True)]
+        return result
 
 
 class Rubbing(Equations):
@@ -101,7 +101,7 @@ class Rubbing(Equations):
         if self._contacts[0]:
             raise MechanismError(
                 "friction in time: constraints are redundant, so that statics does not determine the joint forces it "
-                "hangs on"
+                "depends on"
             )
 
     def in_mode(self, mode: Mode, direction: float = 0.0) -> Rubbing:
@@ -150,7 +150,7 @@ class Rubbing(Equations):
         for n, (joint, *_) in enumerate(paths.case.contacts):
             rub = recording.recorder.input(rubs[n])
             block.friction[n] = rub if joint.guide is None else rub * of.rail(block, joint.guide)
-        found: dict[str, Number] = {}
+        result: dict[str, Number] = {}
         for n, (joint, body, other, *_) in enumerate(paths.case.contacts):
             recording.value(("force", joint.key, body))
             force = of.on_side(block, (joint.key, body))
@@ -162,8 +162,8 @@ class Rubbing(Equations):
                 force = dot(force, 1j * of.rail(block, joint.guide))
                 rate, slip = block.slide_rate(joint.guide), _second(block, joint.guide)
             for name, value in zip(QUANTITIES, (force.real, force.imag, slip, rate), strict=True):
-                found[f"{name} {n}"] = 0.0 if value is None else value
-        return motion_of(recording, self.k, rubs, found)
+                result[f"{name} {n}"] = 0.0 if value is None else value
+        return motion_of(recording, self.k, rubs, result)
 
     def values(self, t: float, q: Floats, v: Floats) -> Values:
         """What the tape says at a state.
@@ -217,10 +217,10 @@ class Rubbing(Equations):
             return [0.0] * (self.k + 1)
         values = self.values(t, q, v)
         phi = self.friction(values)
-        found = [*values.moved(phi), values.power + sum(map(mul, phi, values.rate))]
-        if any(value - value != 0.0 for value in found):
+        result = [*values.moved(phi), values.power + sum(map(mul, phi, values.rate))]
+        if any(value - value != 0.0 for value in result):
             raise Lost
-        return found
+        return result
 
     def _careful(self, q: Reals) -> NDArray[np.bool_]:
         return np.ones(len(q), dtype=bool)
@@ -286,12 +286,12 @@ class Rubbing(Equations):
             else:
                 v = [0.0] if ended else v
                 direction = self._decided_alone(t, q, v)
-            found = self.in_mode(self._along(t, q, direction), direction)
-            found.locked = not direction
+            result = self.in_mode(self._along(t, q, direction), direction)
+            result.locked = not direction
             if direction:
                 _, _, size = self._coefficients(t, q, direction)
-                found.noise = [NOISE * size] * len(self.arms)
-            return found, v
+                result.noise = [NOISE * size] * len(self.arms)
+            return result, v
         of, _, broken = of.partition(" ")
         rates = self.values(t, q, v).rate
         still = TOGETHER * max(map(abs, rates))
@@ -304,15 +304,15 @@ class Rubbing(Equations):
         if broken:
             # friction is at its largest and can hold the joint no longer, though it does not yet move
             mode = tuple(int(broken) if str(n) == of else s for n, s in enumerate(mode))
-        found = self.in_mode(mode)
-        v = found._held(t, q, v)
-        values = found.values(t, q, v)
-        fastest, phi = max(map(abs, values.rate)), found.friction(values)
-        found.noise = [
+        result = self.in_mode(mode)
+        v = result._held(t, q, v)
+        values = result.values(t, q, v)
+        fastest, phi = max(map(abs, values.rate)), result.friction(values)
+        result.noise = [
             NOISE * (fastest if s else arm * values.force(n, phi))
             for n, (s, arm) in enumerate(zip(mode, self.arms, strict=True))
         ]
-        return found, v
+        return result, v
 
     def _held(self, t: float, q: Floats, v: Floats) -> Floats:
         """The speeds at the beginning of this mode, without what rounding leaves in joints that stick."""
@@ -405,16 +405,16 @@ class Rubbing(Equations):
         """What ends a path in this mode: a sliding joint at rest, a sticking one that breaks away."""
         if self.locked and self.k == 1:
             return [self._breaking_away(1), self._breaking_away(-1)]
-        found = super().watches()
+        result = super().watches()
         every = range(len(self.mode))
         if self.k > 1:
             for n, s in enumerate(self.mode):
-                found += [self._sliding(n)] if s else [self._sticking(n, way) for way in WAYS]
-            return found
+                result += [self._sliding(n)] if s else [self._sticking(n, way) for way in WAYS]
+            return result
         rest = _watch(
             "rest", lambda t, q, v: self.direction * v[0], lambda t, q, v, a: self.direction * a[0], True
         )
-        return [*found, rest, *(self._turning_back(n) for n in every if self.mode[n])]
+        return [*result, rest, *(self._turning_back(n) for n in every if self.mode[n])]
 
     def _breaking_away(self, direction: int) -> Watch:
         """A mechanism that stands, and would begin to move one way."""

@@ -102,15 +102,15 @@ class Radau:
         self, f: Equations, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals
     ) -> tuple[Reals, Reals, Reals]:
         """Changes of q and q̇ (n, k) and the work (n,) over a step from each of n states, each of its own length."""
-        found = _stages(f.many, t, q, v, rates, h)
+        result = _stages(f.many, t, q, v, rates, h)
         k = q.shape[1]
-        if found is None:
+        if result is None:
             return np.full_like(q, np.nan), np.full_like(v, np.nan), np.full(len(q), np.nan)
         _, a, _ = nodes()
         length = h[:, None]
-        dv = length * np.einsum("s,nsk->nk", a[-1], found[..., :k])
-        dq = length * v + length**2 * np.einsum("s,nsk->nk", (a @ a)[-1], found[..., :k])
-        return dq, dv, h * (found[..., k] @ a[-1])
+        dv = length * np.einsum("s,nsk->nk", a[-1], result[..., :k])
+        dq = length * v + length**2 * np.einsum("s,nsk->nk", (a @ a)[-1], result[..., :k])
+        return dq, dv, h * (result[..., k] @ a[-1])
 
 
 def _stages(f: Many, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals) -> Reals | None:
@@ -135,8 +135,8 @@ def _stages(f: Many, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals) -> Re
         places = (
             q[:, None] + step * c[:, None] * v[:, None] + step**2 * np.einsum("ij,njk->nik", twice, values)
         )
-        found = f(times, places.reshape(-1, k), speeds.reshape(-1, k)).reshape(n, STAGES, k + 1)
-        rest = (found[..., :k] - values).reshape(n, -1, 1)
+        result = f(times, places.reshape(-1, k), speeds.reshape(-1, k)).reshape(n, STAGES, k + 1)
+        rest = (result[..., :k] - values).reshape(n, -1, 1)
         change = (inverse @ rest).reshape(n, STAGES, k)
         values = values + change
         size = np.abs(speeds).max(axis=1) + np.abs(step[:, 0] * values.max(axis=1)) + 1e-300
@@ -144,7 +144,7 @@ def _stages(f: Many, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals) -> Re
         if not much < np.inf:
             return None
         if much <= CLOSE or (much >= before and much < 1e-10):
-            return np.concatenate([values, found[..., k:]], axis=2)
+            return np.concatenate([values, result[..., k:]], axis=2)
         if much > 2 * before and before < 1.0:
             return None
         before = much
@@ -154,12 +154,12 @@ def _stages(f: Many, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals) -> Re
 def _slopes(f: Many, t: Reals, q: Reals, v: Reals, rates: Reals) -> tuple[Reals, Reals]:
     """∂a/∂q and ∂a/∂q̇, (n, k, k), by differences: Newton's method needs them roughly."""
     n, k = q.shape
-    found = np.empty((2, n, k, k))
+    result = np.empty((2, n, k, k))
     for which, x in enumerate((q, v)):
         for j in range(k):
             moved = x.copy()
             size = 1e-7 * (np.abs(x[:, j]) + 1e-3 * np.abs(x).max() + 1e-6)
             moved[:, j] += size
             there = f(t, moved, v) if which == 0 else f(t, q, moved)
-            found[which, :, :, j] = (there - rates)[:, :k] / (moved[:, j] - x[:, j])[:, None]
-    return found[0], found[1]
+            result[which, :, :, j] = (there - rates)[:, :k] / (moved[:, j] - x[:, j])[:, None]
+    return result[0], result[1]

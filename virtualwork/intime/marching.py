@@ -122,7 +122,7 @@ def again(k: int, rates: Tape) -> Loop:
 
 
 def _passed(k: int, rates: Tape) -> tuple[str, ...]:
-    """What of a state the accelerations hang on."""
+    """What of a state the accelerations depend on."""
     return tuple(name for name in rates.inputs if name in state_names(k))
 
 
@@ -220,11 +220,11 @@ def beginning(
     k = node.k
     places, speeds, rates = names(k)
     low = {f"l{name}": 0.0 for name in (*places, *speeds)}
-    found = {"t": node.t, "h": h, "grow": GROW, "stiff": 0.0, "left": 1.0, "work": node.work}
+    result = {"t": node.t, "h": h, "grow": GROW, "stiff": 0.0, "left": 1.0, "work": node.work}
     several = (places, node.q.T), (speeds, node.v.T), (rates, node.rates.T)
     for of, values in (*several, ([f"f{j}" for j in range(k)], [1.0] * k if fastest is None else fastest)):
-        found |= dict(zip(of, values, strict=True))
-    return found | low
+        result |= dict(zip(of, values, strict=True))
+    return result | low
 
 
 def over(rates: Tape, given: Lanes, node: Nodes, h: Reals) -> tuple[Reals, Reals, Reals]:
@@ -233,7 +233,7 @@ def over(rates: Tape, given: Lanes, node: Nodes, h: Reals) -> tuple[Reals, Reals
     # any error will do
     whole = {**given, "end": end, "span": 0.0, "tolerance": 1e100} | {f"scale{j}": 1.0 for j in range(k)}
     state = beginning(node, h) | {"work": 0.0}
-    found = march(k, rates, whole, state, 1).nodes.at(0)
-    there = found.t == end
-    dq, dv = (np.where(there[:, None], x, np.nan) for x in (found.q - node.q, found.v - node.v))
-    return dq, dv, np.where(there, found.work, np.nan)
+    result = march(k, rates, whole, state, 1).nodes.at(0)
+    there = result.t == end
+    dq, dv = (np.where(there[:, None], x, np.nan) for x in (result.q - node.q, result.v - node.v))
+    return dq, dv, np.where(there, result.work, np.nan)

@@ -57,7 +57,7 @@ def reader(load: Tabled, at: Value, *, imaginary: bool) -> Value:
 
 
 def kinks(load: Tabled, plan: Plan, name: str) -> Watch | None:
-    """The rows of a table, that no step may pass; None of a table over the time, or over what hangs on more."""
+    """The rows of a table, that no step may pass; None of a table over the time, or over what depends on more."""
     of = place(load, plan)
     if of is None or load.axis == "time":
         return None

@@ -1,4 +1,4 @@
-"""Variants of a mechanism that are let go together: lanes of one loop of steps, each with steps of its own.
+"""Variants of a mechanism that are simulated together: lanes of one loop of steps, each with steps of its own.
 
 The formulas are recorded once with the varied dimensions as inputs of the tape. What a lane cannot do is done singly,
 as `Mechanism.simulate` does it: loops that fold, change points on the way, stiff dampers, friction, tables, variants
@@ -53,7 +53,7 @@ class Runs:
         The times asked for, s.
     times : array (v, n)
         Those of each variant: where its motion ends before the last, that of its end comes after those before it, and
-        what follows is NaN. So is all of a variant that cannot be let go.
+        what follows is NaN. So is all of a variant that cannot be simulated.
     angle, speed, acceleration : array (v, n, k)
         The inputs (rad, or m of a slide; not wrapped) and their rates.
     error_estimate : array (v, n, k)
@@ -111,7 +111,7 @@ class Runs:
 
 @guarded
 class Variants(Family):
-    """Variants of a mechanism that can be let go; `Mechanism.vary` makes them."""
+    """Variants of a mechanism that can be simulated; `Mechanism.vary` makes them."""
 
     # what is written down once: the formulas, and the tapes of accelerations and energies
     alike: Solver | None = None
@@ -331,12 +331,12 @@ class _Lanes:
         """The nodes of the same ways in steps half as long."""
         t, first = nodes.t, nodes.at(np.s_[:1])
         times = np.stack([0.5 * (t[1:] + t[:-1]), t[1:]], axis=1).reshape(-1, t.shape[1])
-        found = follow(self.k, self.rates, self.some(rows), beginning(first.at(0)), times)
-        return first.then(found.nodes)
+        result = follow(self.k, self.rates, self.some(rows), beginning(first.at(0)), times)
+        return first.then(result.nodes)
 
     def times(self, rows: Rows, nodes: Nodes, alone: Mask) -> Reals:
         """The times up to each lane's event, it the last, (lanes, n); then NaN."""
-        found = np.tile(self.t, (len(rows), 1))
+        result = np.tile(self.t, (len(rows), 1))
         if self.levels:
             ways = sides(nodes.at(0), self.levels, self.scale[rows])
             ends, doubt = events(self.rates, self.some(rows), nodes, self.levels, ways)
@@ -344,19 +344,19 @@ class _Lanes:
             self.late[rows] = np.isnan(ends)
             # the level that the coarser way passed at its very end
             alone[rows[np.isnan(ends) & (nodes.t[-1] < self.t[-1])]] = True
-            for row, end in zip(found, ends, strict=True):
+            for row, end in zip(result, ends, strict=True):
                 if end < self.t[-1]:
                     its = reached(self.t, end)
                     row[: len(its)], row[len(its) :] = its, np.nan
-        return found
+        return result
 
     def _error(self, coarse: Nodes, fine: Nodes, times: Reals, of: float) -> Reals:
         """The error of the inputs at all times, (lanes, n, k): that of the coarser way's next node."""
         q, v, a = (np.swapaxes(x[::2], 0, 1) for x in (fine.q, fine.v, fine.rates[..., :-1]))
-        found = spread(q, np.swapaxes(coarse.q, 0, 1), of) + rounding(coarse.t.T, q, v, a)
+        result = spread(q, np.swapaxes(coarse.q, 0, 1), of) + rounding(coarse.t.T, q, v, a)
         at = np.stack([(coarse.t < x).sum(axis=0) for x in times.T], axis=1)
         at = np.minimum(at, len(coarse.t) - 1)
-        return np.asarray(found[np.arange(len(found))[:, None], at])
+        return np.asarray(result[np.arange(len(result))[:, None], at])
 
     def _folds(self, rows: Rows, nodes: Nodes) -> Mask:
         """In which lanes a loop folds on the way."""
@@ -366,10 +366,10 @@ class _Lanes:
         margins = self.written.margins
         if not margins:
             return np.zeros(len(rows), dtype=bool)
-        found = self._run(
+        result = self._run(
             self.written.tape(margins), np.tile(rows, len(nodes.t)), nodes.q.reshape(-1, self.k)
         )
-        return np.asarray(~(found >= FOLDING).all(axis=1).reshape(-1, len(rows)).all(axis=0))
+        return np.asarray(~(result >= FOLDING).all(axis=1).reshape(-1, len(rows)).all(axis=0))
 
     def meet(self) -> Mask:
         """Which variants may have a change point on their way, (v,)."""
@@ -405,5 +405,5 @@ class _Lanes:
         given = self.some(rows) | {f"q{j}": x for j, x in enumerate(q.T)}
         given |= {} if v is None else {f"v{j}": x for j, x in enumerate(v.T)}
         with np.errstate(all="ignore"):
-            found = run(tape, given)
-        return np.stack([np.broadcast_to(found[name], len(rows)) for name in tape.names], axis=-1)
+            result = run(tape, given)
+        return np.stack([np.broadcast_to(result[name], len(rows)) for name in tape.names], axis=-1)

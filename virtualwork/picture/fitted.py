@@ -59,7 +59,7 @@ def fitted(quantities: Sequence[Fitted], figure: FigureBase | None = None) -> li
     """
     count = len(quantities)
     paper = sheet(5.6 * count, 5.0, figure)
-    found = []
+    result = []
     for i, each in enumerate(quantities):
         axes = paper.add_subplot(1, count, i + 1)
         if each.kind == "point":
@@ -73,8 +73,8 @@ def fitted(quantities: Sequence[Fitted], figure: FigureBase | None = None) -> li
         axes.set_title(f"{each.name}, {unit}", fontsize=9)
         axes.legend(fontsize=8, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.11), ncols=3)
         plain(axes)
-        found.append(axes)
-    return found
+        result.append(axes)
+    return result
 
 
 def _path(axes: Axes, each: Fitted) -> tuple[Reals, Reals, str]:

@@ -89,7 +89,7 @@ def forces(d: Dynamics, rows: Sequence[Row] | None = None, figure: FigureBase | 
     _name_input(bottom, x, label)
     # a force of zero is seen too
     bottom.set_ylim(bottom=-0.03 * bottom.get_ylim()[1])
-    found = [top, bottom]
+    forces = [top, bottom]
     if shakes:
         hodograph, curve = right.subplots(2, 1, height_ratios=(2.6, tall))
         _hodograph(hodograph, shaking, largest)
@@ -97,9 +97,9 @@ def forces(d: Dynamics, rows: Sequence[Row] | None = None, figure: FigureBase | 
             panel(curve, x, [Curve("", moment)], "shaking moment about the origin", "N·m", largest * m.size)
         )
         _name_input(curve, x, label)
-        found += [hodograph, curve]
+        forces += [hodograph, curve]
     spread(ends)
-    return np.array(found, dtype=object)
+    return np.array(forces, dtype=object)
 
 
 def _input(poses: Poses) -> tuple[Reals, str]:

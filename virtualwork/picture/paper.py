@@ -170,12 +170,12 @@ class _Paper:
 
     def _names(self, i: int) -> list[Label]:
         """Return the names of points and links in a pose; a link of one point is named beside it."""
-        found = []
+        names = []
         for label in self.drawing.labels:
             at, point = complex(self._at(label.body, label.at, i)[0]), label.of == "point"
             color, size = ("black", 9.0) if point else (self.colors[label.body], 8.0)
-            found.append(Label(label.text, (at.real, at.imag), color, size))
-        return found
+            names.append(Label(label.text, (at.real, at.imag), color, size))
+        return names
 
     def _paths(self, points: Sequence[str] | None) -> list[Label]:
         """Draw the paths of points over the whole travel, and return their names."""

@@ -70,12 +70,12 @@ def _quantity(poses: Poses, word: str) -> Quantity:
 def pace(poses: Poses) -> float:
     """Return how fast the inputs go, 1/s: the largest of ω, √α and ∛jerk, a slide in the mechanism's sizes."""
     m = poses.mechanism
-    found = 0.0
+    result = 0.0
     for j, entry in enumerate(m.inputs):
         for order in (1, 2, 3):
             rate = np.abs(poses.rate(j, order)).max(initial=0.0) / (m.size if entry.is_slide else 1.0)
-            found = max(found, float(rate) ** (1 / order))
-    return found
+            result = max(result, float(rate) ** (1 / order))
+    return result
 
 
 def unwrapped(angle: Reals) -> Reals:

@@ -17,13 +17,13 @@ Side = tuple[str, str]
 
 def pairs(every: Iterable[Joint]) -> list[tuple[Joint, str, str]]:
     """Every joint force once, as (joint, on, from): of two bodies on the later, of more on each from the pin."""
-    found: list[tuple[Joint, str, str]] = []
+    pairs: list[tuple[Joint, str, str]] = []
     for joint in every:
         if len(joint.bodies) == 2:
-            found.append((joint, joint.bodies[1], joint.bodies[0]))
+            pairs.append((joint, joint.bodies[1], joint.bodies[0]))
         else:
-            found += [(joint, body, "pin") for body in joint.bodies if body != GROUND]
-    return found
+            pairs += [(joint, body, "pin") for body in joint.bodies if body != GROUND]
+    return pairs
 
 
 class Order:
@@ -42,27 +42,27 @@ class Order:
     @cached_property
     def multipliers(self) -> dict[Side, tuple[Group, int]]:
         """Which joint forces are multipliers of a loop: (joint, body) -> (group, loop)."""
-        found: dict[Side, tuple[Group, int]] = {}
+        multipliers: dict[Side, tuple[Group, int]] = {}
         for group in self.plan.groups:
             for c, closure in enumerate(group.closures):
                 key = f"pin:{closure.joint}" if closure.guide is None else f"guide:{closure.guide}"
-                found[key, closure.body] = group, c
-        return found
+                multipliers[key, closure.body] = group, c
+        return multipliers
 
     @cached_property
     def sides(self) -> dict[str, list[Side]]:
         """The joint forces on each body; those on the ground are not unknowns of their own."""
-        found: dict[str, list[Side]] = {body: [] for body in self.mechanism.links}
+        sides: dict[str, list[Side]] = {body: [] for body in self.mechanism.links}
         for joint in self.joints:
             for body in joint.bodies:
                 if body != GROUND:
-                    found[body].append((joint.key, body))
-        return found
+                    sides[body].append((joint.key, body))
+        return sides
 
     @cached_property
     def recipes(self) -> dict[Side, tuple[str, Any]]:
         """How each joint force is found: a multiplier, the balance of a body, the balance of a pin."""
-        found: dict[Side, tuple[str, Any]] = {side: ("loop", at) for side, at in self.multipliers.items()}
+        recipes: dict[Side, tuple[str, Any]] = {side: ("loop", at) for side, at in self.multipliers.items()}
         equations: list[tuple[str, Any, list[Side]]] = []
         for body, sides in self.sides.items():
             equations.append(("body", body, sides))
@@ -73,11 +73,11 @@ class Order:
         while progress:
             progress = False
             for kind, name, sides in equations:
-                open_sides = [side for side in sides if side not in found]
+                open_sides = [side for side in sides if side not in recipes]
                 if len(open_sides) == 1:
-                    found[open_sides[0]] = kind, name
+                    recipes[open_sides[0]] = kind, name
                     progress = True
-        return found
+        return recipes
 
     @cached_property
     def couples(self) -> tuple[list[tuple[str, int]], list[dict[str, Any]] | None]:
@@ -100,11 +100,11 @@ class Order:
     @cached_property
     def racks(self) -> dict[int, list[int]]:
         """The racks of each guide: the numbers of their meshes."""
-        found: dict[int, list[int]] = {}
+        racks: dict[int, list[int]] = {}
         for i, mesh in enumerate(self.mechanism.meshes):
             if mesh.guide is not None:
-                found.setdefault(mesh.guide, []).append(i)
-        return found
+                racks.setdefault(mesh.guide, []).append(i)
+        return racks
 
     @cached_property
     def along(self) -> dict[int, int]:

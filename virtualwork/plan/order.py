@@ -209,6 +209,14 @@ class _Planner:
         moving = {name for kind, name in block if kind in "xy"} - set(self.anchors)
         closures, trees = self._loops(moving)
         unknown = tuple(x for x in open_ if isinstance(x, int))
+        # a wheel that a rack of the loops turns, and that holds none of them, follows
+        looped = {x for closure in closures for t in closure.terms for x in (t.body, t.slide)}
+        after = tuple(
+            tie
+            for tie in own
+            if tie.body not in looped and all(isinstance(base, int) for base, _ in tie.angle.bases)
+        )
+        own = tuple(tie for tie in own if tie not in after)
         if closures or free or unknown:
             held = {*free, *(t.body for t in own), *moving}
             links = tuple(b for b in self.m.links if b in held)
@@ -217,6 +225,9 @@ class _Planner:
             found: tuple[Coordinate, ...] = (*group.members, *unknown, *group.tied_slides)
             for x in found:
                 self._known(x)
+        for tie in after:
+            self.steps.append(tie)
+            self._known(tie.body)
         self.anchors.update(trees)
         self._settle()
 
@@ -232,10 +243,8 @@ class _Planner:
         if len(group.closures) != 1 or len(group.angles) + len(group.slides) != 2:
             return "Newton"
         terms = group.closures[0].terms
-        looped: set[Coordinate | None] = {*(t.body for t in terms), *(t.slide for t in terms)}
         own = {body: body for body in group.angles}
-        # what only turns along with the loop does not hold it
-        for tie in [tie for tie in group.ties if tie.body in looped]:
+        for tie in group.ties:
             if isinstance(tie.body, int):
                 return "Newton"
             bases = [(b, r) for b, r in tie.angle.bases if b in group.angles]
@@ -257,7 +266,7 @@ class _Planner:
     def _relations(self, fresh: list[Coordinate]) -> list[tuple[Relation, Angle]]:
         """Σ c·θ = const + Σ k·input, for every relation all of whose angles are known once this block is."""
         new = set(fresh)
-        found = []
+        relations = []
         for relation in self.relations:
             bodies = relation.shares.keys()
             if bodies & new and all(body in new or body in self.angles for body in bodies):
@@ -265,8 +274,8 @@ class _Planner:
                 if relation.gear is not None:
                     known = self.phases.get(relation.gear)
                     right = Angle(known) if known is not None else Angle(gears=((relation.gear, 1.0),))
-                found.append((relation, right))
-        return found
+                relations.append((relation, right))
+        return relations
 
     def _eliminate(self, fresh: list[Coordinate]) -> tuple[list[Coordinate], list[Turn]]:
         """Gauss-Jordan on the linear relations: which angles and slides stay free, and what the others are.
@@ -341,9 +350,9 @@ class _Planner:
         for i in range(len(self.m.guides)):
             if i not in self.slides_known or (f"guide {i}", "") in self.used:
                 continue
-            found = self._by_guide(i, body, placed, chain)
-            if found is not None:
-                return found
+            result = self._by_guide(i, body, placed, chain)
+            if result is not None:
+                return result
         return None
 
     def _by_guide(
@@ -352,17 +361,17 @@ class _Planner:
         g, d = self.m.guides[i], self.directions[i]
         if g.link == body and g.on in placed:
             base, terms = chain(g.on, self.throughs[i])
-            found = (
+            result = (
                 base,
                 combined((*terms, Term(d, g.on, i), Term(-self.points[body][g.point], body))),
             )
         elif g.on == body and g.link in placed:
             base, terms = chain(g.link, self.points[g.link][g.point])
-            found = base, combined((*terms, Term(-self.throughs[i], body), Term(-d, body, i)))
+            result = base, combined((*terms, Term(-self.throughs[i], body), Term(-d, body, i)))
         else:
             return None
         self.used.add((f"guide {i}", ""))
-        return found
+        return result
 
     def _loops(self, moving: set[str]) -> tuple[list[Closure], dict[str, Path]]:
         """A tree over the block's bodies from what is placed; every joint outside the tree closes a loop."""

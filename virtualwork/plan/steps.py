@@ -46,7 +46,7 @@ Path = tuple[str | None, tuple[Term, ...]]
 
 
 def path_reads(path: Path) -> set[str]:
-    """What a point hangs on: `angle:BODY`, `slide:GUIDE`, `point:NODE`."""
+    """What a point depends on: `angle:BODY`, `slide:GUIDE`, `point:NODE`."""
     return _term_reads(path[1]) | _node(path[0])
 
 
@@ -75,7 +75,7 @@ class Angle:
         return tuple((base, r) for base, r in self.bases if isinstance(base, str))
 
     def at(self, inputs: tuple[float, ...]) -> float | None:
-        """The angle at given inputs, or None where it hangs on other angles."""
+        """The angle at given inputs, or None where it depends on other angles."""
         if self.bases or self.gears:
             return None
         return self.const + sum(k * inputs[j] for j, k in self.inputs)
@@ -162,7 +162,7 @@ class Group:
     angles: tuple[str, ...]
     slides: tuple[int, ...]
     closures: tuple[Closure, ...]
-    # bodies of the group whose angle hangs on the group's own
+    # bodies of the group whose angle depends on the group's own
     ties: tuple[Turn, ...] = ()
 
     @cached_property
@@ -254,7 +254,7 @@ class Plan:
         return (*(f"angle:{body}" for body in step.members), *(f"slide:{g}" for g in slides))
 
     def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
-        """The steps that the targets hang on, in order; nothing more."""
+        """The steps that the targets depend on, in order; nothing more."""
         wanted, chosen = set(targets), []
         for step in reversed(self.steps):
             if wanted.intersection(self.writes(step)):
@@ -286,12 +286,12 @@ class Joint:
 
 def joints(m: Description) -> list[Joint]:
     """Every joint of the mechanism that holds a point: pins in the order of the file, then guides."""
-    found = [Joint(f"pin:{name}", name, bodies, None, f"pin {name}") for name, bodies in m.pins.items()]
+    joints = [Joint(f"pin:{name}", name, bodies, None, f"pin {name}") for name, bodies in m.pins.items()]
     order = list(m.bodies)
     for i, g in enumerate(m.guides):
         bodies = tuple(sorted((g.link, g.on), key=order.index))
-        found.append(Joint(f"guide:{i}", g.point, bodies, i, guide_label(m, i)))
-    return found
+        joints.append(Joint(f"guide:{i}", g.point, bodies, i, guide_label(m, i)))
+    return joints
 
 
 def guide_label(m: Description, i: int) -> str:

@@ -18,13 +18,13 @@ ABSENT = 1e-13
 def guessed(m: Description) -> dict[Coordinate, float]:
     """The angles of the guess, and the slides of racks, as far as it says them."""
     angles, points = known_by_guess(m)
-    found: dict[Coordinate, float] = dict(angles.items())
+    result: dict[Coordinate, float] = dict(angles.items())
     for i in (mesh.guide for mesh in m.meshes if mesh.guide is not None):
         driver = m.driver_of(i)
         slide = m.at[driver] if driver is not None else slide_by_guess(m, i, angles, points)
         if slide is not None:
-            found[i] = slide
-    return found
+            result[i] = slide
+    return result
 
 
 def eliminated(

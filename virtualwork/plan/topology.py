@@ -1,4 +1,4 @@
-"""The topology of a mechanism: what its order of solution hangs on, the plan kept for it, and which equations go together.
+"""The topology of a mechanism: what its order of solution depends on, the plan kept for it, and which equations go together.
 
 Which links meet, which points of a link lie at the same place, how angles are tied: no length is in it. A plan is made
 once for a topology, with its vectors written down in the names of the points (`order.Vector`); a mechanism puts its numbers in.
@@ -53,7 +53,7 @@ def direction(angle: float) -> complex:
 
 @dataclass(frozen=True)
 class Topology:
-    """What a plan hangs on.
+    """What a plan depends on.
 
     Attributes
     ----------
@@ -287,7 +287,7 @@ def _components(
     low: dict[Variable, int] = {}
     stack: list[Variable] = []
     on: set[Variable] = set()
-    found: list[tuple[Variable, ...]] = []
+    components: list[tuple[Variable, ...]] = []
     place = {v: i for i, v in enumerate(variables)}
 
     def visit(root: Variable) -> None:
@@ -318,9 +318,9 @@ def _components(
                         block.append(u)
                         if u == v:
                             break
-                    found.append(tuple(sorted(block, key=place.__getitem__)))
+                    components.append(tuple(sorted(block, key=place.__getitem__)))
 
     for v in variables:
         if v not in index:
             visit(v)
-    return found
+    return components

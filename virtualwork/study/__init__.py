@@ -1,1 +1,1 @@
-"""What is asked of a whole motion: check, equilibrium, cycle, counterweights, Newton's table."""
+"""What is required of a whole motion: check, equilibrium, cycle, counterweights, Newton's table."""

@@ -61,9 +61,9 @@ class Between:
             return self.poses.again(place[:, None], self.poses.rates)
         q, speed, acceleration = (of(place) for of in self._law)
         rates: list[list[Number]] = [[speed], [acceleration], [0.0]]
-        found = self.poses.again(q[:, None], rates)
-        found.time = place
-        return found
+        result = self.poses.again(q[:, None], rates)
+        result.time = place
+        return result
 
     def effort(self, place: Reals) -> Reals:
         """The effort by virtual work at other places, (m,)."""
@@ -89,11 +89,11 @@ def largest(of: Callable[[Reals], Reals], place: Reals, values: Reals) -> tuple[
     inner = np.concatenate([[-np.inf], size, [-np.inf]])
     tops = np.flatnonzero((inner[1:-1] >= inner[:-2]) & (inner[1:-1] >= inner[2:]))
     tops = tops[np.argsort(-size[tops], kind="stable")][:LOOKED]
-    found = [_within(of, place[max(i - 1, 0)], place[min(i + 1, len(place) - 1)]) for i in tops.tolist()]
+    result = [_within(of, place[max(i - 1, 0)], place[min(i + 1, len(place) - 1)]) for i in tops.tolist()]
     # the poses themselves are known best
-    found += [(float(place[i]), float(size[i])) for i in tops.tolist()]
-    best = max(value for _, value in found)
-    return min((at, value) for at, value in found if value >= best * (1 - ALIKE))
+    result += [(float(place[i]), float(size[i])) for i in tops.tolist()]
+    best = max(value for _, value in result)
+    return min((at, value) for at, value in result if value >= best * (1 - ALIKE))
 
 
 def _within(of: Callable[[Reals], Reals], low: float, high: float) -> tuple[float, float]:

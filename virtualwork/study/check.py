@@ -85,7 +85,7 @@ class Check:
         if not len(here.labels):
             return 0, ()
         if not np.isfinite(here.jacobian).all():
-            raise AssemblyError("assembled at no pose of the motion where the joints' rank could be told")
+            raise AssemblyError("no assembled pose of the motion determines the rank of the joints")
         return dependent(here.labels, here.jacobian)
 
     @property
@@ -215,7 +215,7 @@ class Check:
                 pins.setdefault(frozenset((a, b)), []).append(point)
         driven = [str(e.link) for e in m.inputs if e.link is not None]
         order = [GROUND, *driven, *(b for b in m.links if b not in driven)]
-        found = []
+        result = []
         for a, b, c, d in _cycles(order, pins):
             corners = [pins[frozenset(pair)][0] for pair in ((a, b), (b, c), (c, d), (d, a))]
             if len(set(corners)) < 4:
@@ -224,8 +224,8 @@ class Check:
                 abs(m.bodies[body][p] - m.bodies[body][q])
                 for body, p, q in zip((a, b, c, d), (corners[-1], *corners[:-1]), corners, strict=True)
             )
-            found.append(self._four_bar((a, b, c, d), corners, lengths))  # type: ignore[arg-type]
-        return tuple(found)
+            result.append(self._four_bar((a, b, c, d), corners, lengths))  # type: ignore[arg-type]
+        return tuple(result)
 
     def _four_bar(
         self,
@@ -286,7 +286,7 @@ def _angle(a: float, b: float, opposite: float) -> float:
 
 def _cycles(order: list[str], pins: dict[frozenset[str], list[str]]) -> list[tuple[str, str, str, str]]:
     """Every ring of four bodies once, beginning with the earliest, the earlier neighbour next."""
-    found = []
+    cycles = []
     rank = {body: i for i, body in enumerate(order)}
     beside = {b: [o for o in order if frozenset((b, o)) in pins and o != b] for b in order}
     for a in order:
@@ -299,5 +299,5 @@ def _cycles(order: list[str], pins: dict[frozenset[str], list[str]]) -> list[tup
                         and rank[a] < min(rank[b], rank[c], rank[d])
                         and rank[b] < rank[d]
                     ):
-                        found.append((a, b, c, d))
-    return found
+                        cycles.append((a, b, c, d))
+    return cycles

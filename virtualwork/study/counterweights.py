@@ -123,9 +123,9 @@ def berkof_lowen(mechanism: Description, crank: str, coupler: str, rocker: str) 
     b, c = shared(crank, coupler), shared(coupler, rocker)
     body = links[coupler]
     share = (body.center - body.points[b]) / (body.points[c] - body.points[b])
-    found = {}
+    result = {}
     for link, point, part in ((crank, b, 1 - share), (rocker, c, share)):
         base = pivot(mechanism, link)
         own = links[link].mass * (links[link].center - base)
-        found[link] = -(own + body.mass * part * (links[link].points[point] - base))
-    return found
+        result[link] = -(own + body.mass * part * (links[link].points[point] - base))
+    return result

@@ -247,15 +247,15 @@ def _one(assembly: Assembly, span: Reals, samples: int) -> Equilibria:
 def _towards_limits(assembly: Assembly, q: Reals, good: NDArray[np.bool_]) -> Reals:
     """Inputs ever nearer to where the mechanism ends: the force grows there like 1/√distance, and may change its sign."""
     gap = np.flatnonzero(good[:-1] != good[1:])
-    found: list[Reals] = []
+    result: list[Reals] = []
     if len(gap):
         inside, outside = np.where(good[gap], q[gap], q[gap + 1]), np.where(good[gap], q[gap + 1], q[gap])
         for _ in range(NEARER):
             middle = (inside + outside) / 2
             ok = np.isfinite(Rest(assembly, middle[:, None]).force()[0][:, 0])
-            found.append(middle[ok])
+            result.append(middle[ok])
             inside, outside = np.where(ok, middle, inside), np.where(ok, outside, middle)
-    return np.concatenate(found) if found else np.empty(0)
+    return np.concatenate(result) if result else np.empty(0)
 
 
 def _refine(assembly: Assembly, low: Reals, high: Reals, at_low: Reals, order: int = 0) -> Reals:
@@ -291,11 +291,11 @@ def _judged(assembly: Assembly, inputs: Reals, scale: float) -> Equilibria:
     shift = np.einsum("nij,nj->ni", np.abs(np.nan_to_num(hessian)), 4 * EPS * np.abs(inputs))
     small = np.maximum(1e-8 * np.maximum(size, 1e-3 * scale), np.minimum(shift, 1e-3 * scale))
     true = (np.abs(force) <= small).all(axis=1)
-    found = []
+    result = []
     for i in np.flatnonzero(true):
         low = float(np.linalg.eigvalsh(hessian[i])[0])
         least = 1e-9 * max(float(np.abs(hessian[i]).max()), scale * 1e-3)
-        found.append(
+        result.append(
             Equilibrium(
                 tuple(float(v) for v in inputs[i]),
                 None if abs(low) <= least else low > 0,
@@ -304,7 +304,7 @@ def _judged(assembly: Assembly, inputs: Reals, scale: float) -> Equilibria:
                 assembly,
             )
         )
-    return Equilibria(tuple(found))
+    return Equilibria(tuple(result))
 
 
 def _many(assembly: Assembly, ranges: Reals) -> Equilibria:

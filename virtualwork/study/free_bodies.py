@@ -81,7 +81,7 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
     m, poses = dynamics.poses.mechanism, dynamics.poses
     effort = dynamics.effort
     over = dynamics.reactions.over
-    found = {
+    result = {
         body: FreeBody(
             body,
             {name: poses.point(body, 0j, 0, name) for name in link.points},
@@ -98,10 +98,10 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
         name = SHORT.get(load.kind, load.kind)
         if load.path is None:
             (torque,) = over(load.form)
-            found[load.body].torques.append(Torque(name, load.kind, torque))
+            result[load.body].torques.append(Torque(name, load.kind, torque))
         else:
             force, at = over(load.form, partial(_position, path=load.path), kind=complex)
-            found[load.body].forces.append(Force(name, load.kind, at, force))
+            result[load.body].forces.append(Force(name, load.kind, at, force))
     for joint in dynamics.reactions.joints:
         for body in joint.bodies:
             if body == GROUND:
@@ -114,15 +114,15 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
             else:
                 at = _block(dynamics, joint.guide)
             name = f"{joint.name}: {others[0]}"
-            found[body].forces.append(Force(name, "joint force", at, dynamics.joint_force(joint, body)))
+            result[body].forces.append(Force(name, "joint force", at, dynamics.joint_force(joint, body)))
             moment = dynamics.joint_moment(joint, body)
             if np.any(np.nan_to_num(moment)):
-                found[body].torques.append(Torque(name, "joint moment", moment))
+                result[body].torques.append(Torque(name, "joint moment", moment))
     for j, entry in enumerate(m.inputs):
         if not entry.is_slide:
             for body, sign in ((str(entry.link), 1.0), (m.carrier(j), -1.0)):
                 if body != GROUND:
-                    found[body].torques.append(
+                    result[body].torques.append(
                         Torque("T" if sign > 0 else "−T", "drive", sign * effort[:, j])
                     )
             continue
@@ -132,10 +132,10 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
         at = _block(dynamics, i)
         for body, sign in ((g.link, 1.0), (g.on, -1.0)):
             if body != GROUND:
-                found[body].forces.append(
+                result[body].forces.append(
                     Force("F" if sign > 0 else "−F", "drive", at, sign * effort[:, j] * rail)
                 )
-    return list(found.values())
+    return list(result.values())
 
 
 def _position(block: Block, path: Path) -> Number:

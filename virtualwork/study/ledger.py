@@ -71,8 +71,8 @@ def items(dynamics: Dynamics, unit: int | None = None) -> list[Item]:
     joint force [0.] at rest
     """
     effort = dynamics.effort
-    found = [_applied(dynamics, load, unit) for load in dynamics.scene.case.everything]
-    return [*found, *_drives(dynamics, effort, unit), *_joints(dynamics, unit)]
+    result = [_applied(dynamics, load, unit) for load in dynamics.scene.case.everything]
+    return [*result, *_drives(dynamics, effort, unit), *_joints(dynamics, unit)]
 
 
 def _over(dynamics: Dynamics, kind: type, *forms: Callable[[Block], Number]) -> list[Any]:
@@ -92,12 +92,12 @@ def _applied(dynamics: Dynamics, load: Load, unit: int | None) -> Item:
     path = load.path
 
     def velocity(block: Block) -> Number:
-        found = block.velocity(path) if unit is None else block.coefficient(path, unit)
+        result = block.velocity(path) if unit is None else block.coefficient(path, unit)
         if load.rail is None:
-            return found
+            return result
         # on a rail the material point under the slide: without the slide's own speed along it
         s = block.slide_rate(load.rail) if unit is None else block.by[unit].slide[load.rail][0]
-        return minus(found, times(s, dynamics.reactions.rail(block, load.rail)))
+        return minus(result, times(s, dynamics.reactions.rail(block, load.rail)))
 
     value, rate = _over(dynamics, complex, load.form, velocity)
     kind = "friction" if isinstance(load, FrictionLoad) else load.kind
@@ -129,11 +129,11 @@ def _joint_velocity(dynamics: Dynamics, bodies: Any, guide: int, body: str, unit
     path = case.path(g.link, bodies[g.link][g.point])
 
     def velocity(block: Block) -> Number:
-        found = block.velocity(path) if unit is None else block.coefficient(path, unit)
+        result = block.velocity(path) if unit is None else block.coefficient(path, unit)
         if body == g.link:
-            return found
+            return result
         s = block.slide_rate(guide) if unit is None else block.by[unit].slide[guide][0]
-        return minus(found, times(s, dynamics.reactions.rail(block, guide)))
+        return minus(result, times(s, dynamics.reactions.rail(block, guide)))
 
     (rate,) = _over(dynamics, complex, velocity)
     return np.asarray(rate)

@@ -59,7 +59,7 @@ def loops(m: Description, plan: Plan) -> list[Loop]:
     ]
     left = edges - set(cuts)
     order = [*m.ground]
-    found = []
+    loops = []
     for joint, body in cuts:
         way = _way(left, joint, body)
         if way is None:
@@ -77,8 +77,8 @@ def loops(m: Description, plan: Plan) -> list[Loop]:
         pair = [(first, along_first), (second, along_second)]
         # the way that does not begin on the ground goes first: the driven side
         pair.sort(key=lambda way: way[1][:1] == (GROUND,))
-        found.append(Loop(*pair[0], *pair[1]))
-    return found
+        loops.append(Loop(*pair[0], *pair[1]))
+    return loops
 
 
 def _way(edges: set[tuple[str, str]], joint: str, body: str) -> list[str] | None:

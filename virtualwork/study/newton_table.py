@@ -73,15 +73,15 @@ def worked(assembly: Assembly, inputs: tuple[float, ...], done: AllAtOnce) -> li
     ((2, 2), True)
     """
     group, st = _prepared(assembly, inputs)
-    found = []
+    result = []
     for iterate in done.iterates:
         x = iterate.unknowns[None]
         with np.errstate(all="ignore"):
             write_unknowns(group, st, x)
             f, jacobian = stack_rows(gaps(group, st), 1), stack(columns(group, st), 1)
             step = solve(jacobian, -f)
-        found.append(Worked(iterate.k, iterate.unknowns, f[0], jacobian[0], step[0]))
-    return found
+        result.append(Worked(iterate.k, iterate.unknowns, f[0], jacobian[0], step[0]))
+    return result
 
 
 def _prepared(assembly: Assembly, inputs: tuple[float, ...]) -> tuple[Group, State]:

@@ -66,7 +66,7 @@ def parts(poses: Poses) -> list[Parts]:
     ('P', 'O', 10j, (-18+0j))
     """
     m = poses.mechanism
-    found = []
+    result = []
     for body, link in m.links.items():
         omega, alpha = _turning(poses, body, 1), _turning(poses, body, 2)
         if not (np.any(np.nan_to_num(omega)) or np.any(np.nan_to_num(alpha))) or not link.points:
@@ -78,12 +78,12 @@ def parts(poses: Poses) -> list[Parts]:
                 arm = _point(poses, body, point, 0) - at
                 two = second_point(arm, omega, alpha, v, a)
                 none = np.zeros(poses.n, complex)
-                found.append(
+                result.append(
                     Parts(
                         point, body, base, v, two.velocity_difference, none, a, two.tangential, two.normal, none, none
                     )
                 )  # fmt: skip
-    return [*found, *(_slide(poses, i) for i in range(len(m.guides)))]
+    return [*result, *(_slide(poses, i) for i in range(len(m.guides)))]
 
 
 def pivot(m: Description, body: str) -> str:

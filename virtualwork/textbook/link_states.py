@@ -112,15 +112,15 @@ class LinkStates:
 
         Kinds without a load are never multiplied out.
         """
-        found = {}
+        terms = {}
         for kind, (load, rate) in self.products().items():
             if load.any():
                 size, power = np.abs(load), _power(load, rate)
                 fastest = self.fastest[0 if np.iscomplexobj(load) else 1]
                 works = (np.abs(power) > ROUNDING * size * fastest) | np.isinf(power)
                 works, there = (np.broadcast_to(mask, self.shape) for mask in (works, size > 0))
-                found[kind] = PowerTerm(np.where(works, power, 0.0), works, there & ~works)
-        return found
+                terms[kind] = PowerTerm(np.where(works, power, 0.0), works, there & ~works)
+        return terms
 
     @cached_property
     def power(self) -> Real:
@@ -279,17 +279,17 @@ class Balance:
             values = self.value.reshape(-1, k)
             series = {(f"{UNKNOWN} on {on}", unit): values[:, j] for j, (on, unit) in enumerate(loads)}
             return over_steps(np.arange(1, len(values) + 1), series, figure)
-        found = []
+        result = []
         for f in range(k):
             of, at = (f" (field {f + 1})", (f,)) if k > 1 else ("", ())
             for kind, term in states.terms.items():
                 powers, works = (
                     np.broadcast_to(v, states.shape)[at].tolist() for v in (term.power, term.works)
                 )
-                found += [(n, kind + of, p) for n, p, does in zip(named, powers, works, strict=True) if does]
+                result += [(n, kind + of, p) for n, p, does in zip(named, powers, works, strict=True) if does]
             own = self.unknown_power[f].tolist()
-            found += [(on, UNKNOWN + of, p) for (on, _), p in zip(loads, own, strict=True)]
-        return ledger(found, figure)
+            result += [(on, UNKNOWN + of, p) for (on, _), p in zip(loads, own, strict=True)]
+        return ledger(result, figure)
 
     def error_estimate(self) -> Real:
         """Return a bound (..., k) of the rounding error of each unknown; infinite where it is not determined.

@@ -95,14 +95,14 @@ def child(element: Element | None, *path: str) -> Element | None:
 
 def text(element: Element | None, *path: str) -> str | None:
     """Return the text at the end of such a path, without the blanks around it; None where there is none."""
-    found = child(element, *path)
-    return None if found is None or found.text is None else found.text.strip()
+    result = child(element, *path)
+    return None if result is None or result.text is None else result.text.strip()
 
 
 def stated(limits: Iterable[str | None], friction: str | None) -> tuple[str, ...]:
     """Name what is said of a joint beyond its place: what is there and not zero."""
-    found = {"limits": list(limits), "friction": [friction]}
-    return tuple(what for what, words in found.items() if any((word or "").strip("0. ") for word in words))
+    result = {"limits": list(limits), "friction": [friction]}
+    return tuple(what for what, words in result.items() if any((word or "").strip("0. ") for word in words))
 
 
 class At(NamedTuple):
@@ -135,10 +135,10 @@ class At(NamedTuple):
         """Return n finite numbers, or however many there are; `default` where there is no text."""
         if text is None and default is not None:
             return list(default)
-        found = [self.number(of, word) for word in (text or "").split()]
-        if n is not None and len(found) != n:
+        numbers = [self.number(of, word) for word in (text or "").split()]
+        if n is not None and len(numbers) != n:
             raise self.error(of, quote(text or ""), f"{n} number{'s' * (n != 1)}")
-        return found
+        return numbers
 
     def direction(self, of: str, vector: ArrayLike) -> Array:
         """Return a direction of length 1."""

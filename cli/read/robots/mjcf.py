@@ -237,9 +237,7 @@ class _Reader:
             values = self.whole(e, of)
             shape = values.get("type", "sphere")
             if shape not in SIZES or "mesh" in values:
-                self.robot.notes.append(
-                    f"{where}: the mass of a {values.get('mesh', shape)} is not taken over"
-                )
+                self.robot.notes.append(f"{where}: the mass of a {values.get('mesh', shape)} is not imported")
                 continue
             here = self.frame(f"{where}, geom", values)
             size = at.numbers("geom size", values.get("size", "0"))
@@ -378,11 +376,11 @@ class _Reader:
         own = [j.name for j in self.robot.joints.values() if j.kind in ("turn", "slide")]
         if not keys or keys[0].get("qvel") is None:
             return {}
-        found = At(self.file, "key").numbers("qvel", keys[0].get("qvel"))
-        if len(found) != len(own):
+        result = At(self.file, "key").numbers("qvel", keys[0].get("qvel"))
+        if len(result) != len(own):
             return {}
         # a key frame at rest says of no speed
-        return {name: v for name, v in zip(own, found, strict=True) if v != 0}
+        return {name: v for name, v in zip(own, result, strict=True) if v != 0}
 
 
 def _leading(at: At, values: Mapping[str, str], *keys: str) -> list[float]:

@@ -51,10 +51,10 @@ def read(file: str, root: Element) -> Robot:
 
 
 def _named_text(at: At, element: Element, tag: str) -> str:
-    found = text(element, tag)
-    if not found:
+    result = text(element, tag)
+    if not result:
         raise DataError(f"{at.file}: {at.where}: <{tag}> is missing")
-    return found
+    return result
 
 
 def read_pose(at: At, element: Element | None) -> Array:
@@ -71,7 +71,7 @@ def read_pose(at: At, element: Element | None) -> Array:
 
 
 class _Model:
-    """The frames of a model, each worked out when it is first asked for."""
+    """The frames of a model, each worked out on the first request."""
 
     def __init__(self, robot: Robot, element: Element, version: str) -> None:
         self.robot, self.element, self.file = robot, element, robot.file
@@ -223,11 +223,11 @@ def _axis(at: At, axis: Element | None, frame: Array, model: _Model | None) -> A
 
 def driven(file: str, element: Element) -> dict[str, float | None]:
     """Return the joints that plug-ins drive, with the speed that they begin with."""
-    found: dict[str, float | None] = {}
+    result: dict[str, float | None] = {}
     for plugin in children(element, "plugin"):
         for name in children(plugin, "joint_name", "jointName"):
             if which := text(name):
                 speed = text(plugin, "initial_velocity")
                 at = At(file, "plugin")
-                found[which] = None if speed is None else at.number("initial_velocity", speed)
-    return found
+                result[which] = None if speed is None else at.number("initial_velocity", speed)
+    return result

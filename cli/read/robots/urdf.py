@@ -94,7 +94,7 @@ def _inertial(at: At, element: Element | None) -> Inertial | None:
 
 def _shapes(at: At, link: Element) -> list[tuple[Array, float]]:
     """Return spheres around the shapes of a link; none where the size of one is not said."""
-    found = []
+    shapes = []
     for e in children(link, "visual", "collision"):
         geometry = child(e, "geometry")
         for shape in () if geometry is None else geometry:
@@ -107,8 +107,8 @@ def _shapes(at: At, link: Element) -> list[tuple[Array, float]]:
             radius = sphere_around(plain(shape), size)
             if radius is None:
                 return []
-            found.append((origin(at, child(e, "origin"))[:3, 3], radius))
-    return found
+            shapes.append((origin(at, child(e, "origin"))[:3, 3], radius))
+    return shapes
 
 
 def _end(robot: Robot, e: Element, tag: str, at: At) -> str:
@@ -136,7 +136,7 @@ def _tree(robot: Robot, joints: list[Element]) -> None:
     while waiting:
         ready = [joint for joint in waiting if joint.parent in there]
         if not ready:
-            raise DataError(f"{robot.file}: {waiting[0].at.where}: its links hang on one another alone")
+            raise DataError(f"{robot.file}: {waiting[0].at.where}: its links depend on each other alone")
         waiting = [joint for joint in waiting if joint.parent not in there]
         for joint in ready:
             frame = robot.links[joint.parent].pose @ origin(joint.at, child(joint.element, "origin"))

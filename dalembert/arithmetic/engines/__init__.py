@@ -126,14 +126,14 @@ def _table(rows: int, n: int, pairs: frozenset[int]) -> Rows:
     room = np.empty(rows * n)
     if not pairs:
         return room.reshape(rows, n)
-    found: list[Reals] = []
+    result: list[Reals] = []
     for row in range(rows):
         if row in pairs:
             both = room[row * n : (row + 2) * n]
-            found += [both[::2], both[1::2]]
+            result += [both[::2], both[1::2]]
         elif row - 1 not in pairs:
-            found.append(room[row * n : (row + 1) * n])
-    return found
+            result.append(room[row * n : (row + 1) * n])
+    return result
 
 
 def run_grid(
@@ -145,7 +145,7 @@ def run_grid(
     ----------
     tape : Tape
     inputs : mapping of name to number, or array that broadcasts to the shape
-        What hangs on the row alone is (r, 1), on the column alone (1, c).
+        What depends on the row alone is (r, 1), on the column alone (1, c).
     shape : (r, c)
     out : sequence of array, optional
         Where to write each output: (r, c), in one piece, or the parts of a complex array of one piece, one after the
@@ -241,7 +241,7 @@ def chosen(tape: Tape, n: int) -> str:
 def as_part(lanes: int, function: Callable[..., R], *arguments: Any) -> R:
     """Call a function on a part of work of so many lanes in all: the engine is chosen by these alone.
 
-    Then no digit hangs on what else a process has done, and on how many processes there are.
+    Then no digit depends on what else a process has done, and on how many processes there are.
     """
     before = _whole.set(lanes)
     try:
@@ -251,7 +251,7 @@ def as_part(lanes: int, function: Callable[..., R], *arguments: Any) -> R:
 
 
 def anew() -> None:
-    """Forget the work done so far: which engine does what follows hangs on that alone, in whatever process."""
+    """Forget the work done so far: which engine does what follows depends on that alone, in whatever process."""
     from dalembert.arithmetic.engines import rounds
 
     _done.clear()

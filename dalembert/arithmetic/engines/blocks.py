@@ -1,7 +1,7 @@
 """The tape as straight-line numpy over blocks of lanes: every operation writes into a slot of a small scratch.
 
 A fresh array costs more in page faults than the arithmetic; the scratch is made once for each thread and stays in
-the cache. What hangs on uniform inputs alone is worked out once, not for each lane.
+the cache. What depends on uniform inputs alone is worked out once, not for each lane.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from dalembert.arithmetic.doubled_functions import DOUBLED
 from dalembert.arithmetic.tape import Tape, performed
 
 # lanes of a block: its numbers stay in the cache
-BLOCK = 2048
+BLOCK = 4096
 
 
 def run(tape: Tape, inputs: Mapping[str, Any]) -> dict[str, Doubled]:

@@ -1,6 +1,6 @@
 """A tape over a grid: every row with every column, such as variants with poses, or both signs with variants.
 
-What hangs on the row alone, or on the column alone, is worked out once for it; only the rest is a lane for each pair.
+What depends on the row alone, or on the column alone, is worked out once for it; only the rest is a lane for each pair.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from dalembert.arithmetic.engines.blocks import Blocks
 from dalembert.arithmetic.tape import Tape, performed
 
 Reals = NDArray[np.float64]
-# columns at a time: what hangs on them alone stays in the cache; lanes at a time
+# columns at a time: what depends on them alone stays in the cache; lanes at a time
 WIDE, BLOCK = 16384, 8192
 
 
 class Grid(Blocks):
-    """A tape prepared for a grid; `rows` and `columns` name the inputs that hang on them, or on both."""
+    """A tape prepared for a grid; `rows` and `columns` name the inputs that depend on them, or on both."""
 
     def __init__(self, tape: Tape, rows: frozenset[str], columns: frozenset[str]) -> None:
         self.by = {name: (name in rows) + 2 * (name in columns) for name in tape.inputs}
         super().__init__(tape, frozenset(name for name, on in self.by.items() if on < 3))
 
     def lanes_of(self, tape: Tape, uniform: frozenset[str]) -> list[bool]:
-        """Which operations hang on the row and on the column."""
+        """Which operations depend on the row and on the column."""
         return [on == 3 for on in tape.hang(self.by)]
 
     def over(self, inputs: Mapping[str, Any], out: Sequence[NDArray[Any]], shape: tuple[int, int]) -> None:
@@ -76,7 +76,7 @@ class Grid(Blocks):
 
 
 def _cut(x: Reals, rows: slice, columns: slice) -> Any:
-    """What a block sees of a value that hangs on the row, on the column, on both or on neither."""
+    """What a block sees of a value that depends on the row, on the column, on both or on neither."""
     if not x.ndim:
         return x[()]
     return x[rows if x.shape[0] > 1 else slice(None), columns if x.shape[1] > 1 else slice(None)]

@@ -1,0 +1,136 @@
+"""Mode shapes from a table, for modal balancing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing import UnreachedMode, shapes_at
+from cli.read.options import bad
+from dalembert.errors import DataError, quote
+from dalembert.tables.headers import Heading
+from dalembert.tables.sources import Source
+from dalembert.tables.table import read
+from dalembert.units import parted
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Modes:
+    """Mode shapes at stations along the shaft, and what else is to vanish."""
+
+    file: str
+    names: list[str]
+    z: Real
+    shapes: Real
+    """(k, n)."""
+    rigid: bool
+    """Whether force and couple are to vanish too."""
+    warnings: list[str]
+
+    @property
+    def conditions(self) -> list[str]:
+        """What is to vanish."""
+        return [*(["force", "couple"] if self.rigid else []), *(f"mode {name}" for name in self.names)]
+
+    def at(self, z: Real, what: str) -> Real:
+        """Return the rows of the conditions at places (...): (..., q, m)."""
+        low, high = float(self.z[0]), float(self.z[-1])
+        slack = 1e-9 * (high - low)
+        beyond = (z < low - slack) | (z > high + slack)
+        if beyond.any():
+            place = float(z[beyond][0])
+            raise DataError(
+                f"{self.file}: the shapes reach from z = {low:g} m to {high:g} m, {what} stands at {place:g} m: expected shapes "
+                "along the whole shaft"
+            )
+        shapes = np.moveaxis(shapes_at(self.z, self.shapes, np.clip(z, low, high)), 0, -2)
+        if not self.rigid:
+            return shapes
+        # about the middle, in lengths of the shaft: of one size
+        arm = (z - (low + high) / 2) / (high - low)
+        return np.concatenate([np.ones_like(arm)[..., None, :], arm[..., None, :], shapes], axis=-2)
+
+    def unreached(self, error: UnreachedMode) -> str:
+        """Say on which conditions the planes do not act."""
+        left = [
+            name for name, share in zip(self.conditions, error.combination, strict=True) if abs(share) > 1e-6
+        ]
+        if len(left) == 1:
+            return f"the planes do not act on {left[0]}: they lie at its nodes; expected a plane elsewhere"
+        return f"the planes cannot act on {', '.join(left)} apart from one another: expected planes at other places"
+
+
+def read_modes(path: str, count: int | None, rigid: bool) -> Modes:
+    """Read `z_*` and a column for each mode, or rows of `mode, z_*, shape`."""
+    table = read(path, numbers={"z": "length", "shape": "number"}, texts=["mode"], layout=_by_mode)
+    z, shape = table.require("z", "length").si, table.require("shape", "number").values
+    names, code = table.numbered("mode", "1")
+    if count is not None:
+        if count > len(names):
+            raise bad("--mode-count", f"{count}: {table.file} has {len(names)} modes")
+        names = names[:count]
+    stations = np.unique(z)
+    shapes = np.full((len(names), len(stations)), np.nan)
+    at = np.searchsorted(stations, z)
+    for i, (k, j) in enumerate(zip(code.tolist(), at.tolist(), strict=True)):
+        if k >= len(names):
+            continue
+        if shapes[k, j] == shapes[k, j]:
+            raise DataError(
+                f"{table.file}: mode {quote(names[k])} stands twice at z = {stations[j]:g} m: expected it once"
+            )
+        shapes[k, j] = shape[i]
+    for k, name in enumerate(names):
+        if np.isnan(shapes[k]).any():
+            place = stations[np.isnan(shapes[k])][0]
+            raise DataError(
+                f"{table.file}: no shape of mode {quote(name)} at z = {place:g} m: expected every mode at every station"
+            )
+        if not shapes[k].any():
+            raise DataError(f"{table.file}: mode {quote(name)} is zero everywhere: expected a shape")
+    if len(stations) < 2:
+        raise DataError(f"{table.file}: one station along the shaft: expected two at least")
+    return Modes(table.file, names, stations, shapes, rigid, table.warnings)
+
+
+def _by_mode(source: Source) -> Source:
+    """Bring a column for each mode to a row for each station and mode."""
+    if any(each.name.lower() in ("shape", "mode") for each in source.headings):
+        return source
+    place = next((k for k, each in enumerate(source.headings) if _stem(each) == "z"), None)
+    if place is None:
+        return source
+    modes = [k for k, each in enumerate(source.headings) if k != place and each.written]
+    if not modes:
+        raise DataError(f"{source.file}: no column of a mode: expected z_* and a column for each mode")
+    source.check_cells([place, *modes])
+    names = ["mode", source.headings[place].written, "shape"]
+    records = [
+        (line, [source.headings[k].written.removeprefix("mode_"), cells[place], cells[k]])
+        for line, cells in source.rows()
+        for k in modes
+    ]
+    records.sort(
+        key=lambda record: [source.headings[k].written.removeprefix("mode_") for k in modes].index(
+            record[1][0]
+        )
+    )
+    headings = [Heading("mode", "mode"), source.headings[place], Heading("shape", "shape")]
+    return replace(
+        source,
+        headings=headings,
+        records=[(0, names), *records],
+        sheet=None,
+        above=0,
+        units_below=False,
+        unnamed_first=False,
+    )
+
+
+def _stem(heading: Heading) -> str:
+    """Return a heading without its unit."""
+    return (heading.base if heading.unit else parted(heading.name)[0]).strip().lower()

@@ -1,0 +1,295 @@
+"""The quantities of poses in numbers of 32 digits: the tape with every number of the description as an input.
+
+What was decided in the first run, which assembly, which whole turn and which way a joint slips, enters. The unknowns of
+groups without a closed form go on with Newton's method from those of the first run, and so does the friction of joints
+until it fits the forces that these bear.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dalembert.arithmetic.doubled import Doubled
+from dalembert.arithmetic.engines.doubled import run
+from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.guard import guarded
+from virtualwork.describe.dimensions import dimensions
+from virtualwork.digits.exact import QUARTER, Exact
+from virtualwork.formulas.asked import Key, names
+from virtualwork.formulas.lanes import Lanes, Turning, taped
+from virtualwork.formulas.loads import Tabled
+from virtualwork.formulas.numbers import Reals, dot
+from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.recording import NAMES
+
+if TYPE_CHECKING:
+    from virtualwork.formulas.block import Block
+    from virtualwork.formulas.dynamics import Dynamics
+    from virtualwork.formulas.reactions import Reactions
+
+# steps of Newton's method in 32 digits at most, and a step, of 1 rad or the size, that is the last
+STEPS, SMALL = 8, 2.0**-60
+# exchanges of friction and joint forces at most, and the last change of any friction, relative
+LONGEST, SETTLED = 200, 2.0**-72
+TURN = QUARTER * 4.0
+
+Found = dict[Key, list[Doubled]]
+
+
+@guarded
+class SecondRun:
+    """The quantities of poses in numbers of 32 digits.
+
+    Attributes
+    ----------
+    rest : array (n, k)
+        What the inputs are exactly, less the floats.
+    """
+
+    def __init__(
+        self, poses: Poses, rest: Reals | None = None, dynamics: Callable[[], Dynamics] | None = None
+    ) -> None:
+        self.poses, self.n, self.lock = poses, poses.n, poses.lock
+        self._dynamics = dynamics
+        self.branch = cast(Turning, poses.branch)
+        self.lanes = Lanes(self.branch, poses)
+        self.rest = self._rest() if rest is None else rest
+        self._solutions: dict[str, Doubled] = {}
+
+    def _rest(self) -> Reals:
+        given = self.poses.input_rest
+        if given is not None:
+            rest = given() if callable(given) else np.asarray(given, dtype=float)
+            return np.broadcast_to(rest, self.poses.inputs.shape)
+        rest = np.zeros(self.poses.inputs.shape)
+        if self.n == 1:
+            rest[0] = [self._decimals(j, "value", x) for j, x in enumerate(self.poses.inputs[0].tolist())]
+        return rest
+
+    def _decimals(self, j: int, name: str, x: float) -> float:
+        """What an input's own number of the file is exactly, less the float; 0 for any other."""
+        m = self.poses.mechanism
+        if m.decimals is None or getattr(m.inputs[j], name) != x:
+            return 0.0
+        where = "inputs", j, name
+        kind = next((d.kind for d in dimensions(m).values() if d.where == where), "")
+        return m.decimals.rest(kind, x)
+
+    @cached_property
+    def exact(self) -> Exact:
+        """The formulas of the branch, with its numbers as inputs."""
+        branch, plain = self.branch, self.lanes.recording
+        key = "exact", plain.moves, plain.turning_over
+        if key not in branch.recordings:
+            branch.recordings[key] = Exact(branch, plain)
+        made: Exact = branch.recordings[key]
+        return made
+
+    def some(self, which: NDArray[np.bool_]) -> SecondRun:
+        """Some of the poses."""
+        some = self.poses.some(which)
+        some.time = None if self.poses.time is None else np.asarray(self.poses.time)[which]
+        return SecondRun(some, self.rest[which])
+
+    def sign(self, group: str) -> Doubled:
+        """The sign of a closed form."""
+        return Doubled(
+            np.broadcast_to(np.asarray(self.branch.sign(group, self.poses.inputs[:, 0]), dtype=float), self.n)
+        )
+
+    def again(self, rows: NDArray[np.intp], nodes: Reals) -> SecondRun:
+        """Some of the poses, each at several inputs (rows, nodes), with its own rates."""
+        each = np.repeat(rows, nodes.shape[1])
+        rates = [[rate[each] if np.ndim(rate) else rate for rate in of] for of in self.poses.rates]
+        some = self.poses.again(nodes.reshape(-1, 1), rates)
+        some.time = None if self.poses.time is None else np.asarray(self.poses.time)[each]
+        return SecondRun(some, np.zeros((len(each), 1)))
+
+    def doubled(self, keys: Sequence[Key], changed: Mapping[str, Doubled] | None = None) -> Found:
+        """The quantities, real or as two parts, each Doubled of (n,) or of a number.
+
+        `changed` inputs enter in place of their own numbers.
+        """
+        tape = taped(self.branch, self.exact, tuple(keys))
+        changed = dict(changed or {})
+        found = run(tape, self.entering(name for name in tape.inputs if name not in changed) | changed)
+        zero = Doubled(0.0)
+        return {key: [found.get(name, zero) for name in names(key)] for key in keys}
+
+    def uncertain(self, key: Key, found: Found) -> list[Reals]:
+        """By how much a quantity moves with each number that is not known exactly."""
+        moved = []
+        of = taped(self.branch, self.exact, (key,)).inputs
+        for name, other in self._uncertain.items():
+            if name in of:
+                parts = self.doubled([key], {name: other})[key]
+                moved.append(length([(a - b).value for a, b in zip(parts, found[key], strict=True)]))
+        return moved
+
+    @cached_property
+    def _uncertain(self) -> dict[str, Doubled]:
+        """The inputs of tapes that are not known exactly, moved by as much as they may be off."""
+        moved: dict[str, Doubled] = {}
+        error = np.broadcast_to(np.asarray(self.poses.input_error, dtype=float), self.poses.inputs.shape)
+        for j in range(error.shape[1]):
+            if error[:, j].any():
+                moved[f"q{j}"] = self._input(j) + error[:, j]
+        for name, phase in self.exact.phases.items():
+            moved[name] = Doubled(phase) + 2 * EPS * max(1.0, abs(phase))
+        for group in self.branch.plan.groups:
+            if group.name in self.exact.folded and self.exact.enters(group):
+                # a double root moves by the root of what its loops leave open
+                keys: list[Key] = [("gap", group.name, i) for i in range(len(group.closures))]
+                gap = length([part.value for parts in self.doubled(keys).values() for part in parts])
+                turn = np.sqrt(gap / self.poses.mechanism.size)
+                for i in range(len(group.angles) + len(group.slides)):
+                    off = turn if i < len(group.angles) else turn * self.poses.mechanism.size
+                    moved[f"x {group.name} {i}"] = self._unknown(group.name, str(i)) + off
+        return moved
+
+    # --- what enters ------------------------------------------------------------------------------------------------
+    def entering(self, inputs: Iterable[str]) -> dict[str, Any]:
+        """The inputs of a tape, by their names."""
+        found: dict[str, Any] = {}
+        others = []
+        for name in inputs:
+            kind, _, of = name.partition(" ")
+            if name in self.exact.known:
+                found[name] = self.exact.known[name]
+            elif kind == "x":
+                found[name] = self._unknown(*of.rsplit(" ", 1))
+            elif kind in ("friction", "slip"):
+                found[name] = self._rubbing(name)
+            elif kind == "table":
+                number, part = of.split()
+                found[name] = self._table(int(number))[part == "y"]
+            elif not of and name[0] == "q":
+                found[name] = self._input(int(name[1:]))
+            elif not of:
+                order, j = NAMES.index(name[0]), int(name[1:])
+                rate = self.poses.rates[order - 1][j]
+                own = ("speed", "acceleration", "jerk")[order - 1]
+                found[name] = (
+                    rate if np.ndim(rate) else Doubled(float(rate), self._decimals(j, own, float(rate)))
+                )
+            else:
+                others.append(name)
+        return found | self.lanes.entering(others)
+
+    def _input(self, j: int) -> Doubled:
+        return Doubled(self.poses.inputs[:, j], self.rest[:, j])
+
+    def _unknown(self, group: str, i: str) -> Doubled:
+        """An unknown of a group without a closed form, by Newton's method from that of the first run."""
+        if f"x {group} {i}" not in self._solutions:
+            before = [
+                g for g in self.branch.plan.groups if self.exact.enters(g) and g.name not in self.exact.folded
+            ]
+            keys: list[Key] = []
+            for g in before:
+                keys += [("unknown", g.name, k) for k in range(len(g.angles) + len(g.slides))]
+                if g.name == group:
+                    break
+            self._solve([key for key in keys if f"x {key[1]} {key[2]}" not in self._solutions] or keys, group)
+        return self._solutions[f"x {group} {i}"]
+
+    def _solve(self, keys: Sequence[Key], group: str) -> None:
+        inputs = [f"x {of} {i}" for _, of, i in keys]
+        if any(g.name == group for g in self.branch.plan.groups if g.name in self.exact.folded):
+            of = next(g for g in self.branch.plan.groups if g.name == group)
+            inputs, keys = [f"x {group} {i}" for i in range(len(of.angles) + len(of.slides))], []
+        first = self.lanes.entering(inputs)
+        self._solutions |= {name: Doubled(x) for name, x in first.items()}
+        for _ in range(STEPS if keys else 0):
+            found = self.doubled(keys)
+            steps = 0.0
+            for name, key in zip(inputs, keys, strict=True):
+                new, old = found[key][0], self._solutions[name]
+                steps = max(steps, float(np.nanmax(np.abs((new - old).value), initial=0.0)))
+                self._solutions[name] = new
+            if not steps > SMALL * max(1.0, self.poses.mechanism.size):
+                break
+
+    # --- friction ---------------------------------------------------------------------------------------------------
+    def _rubbing(self, name: str) -> Doubled:
+        """The friction of a contact and which way it slips, from the first run on until the friction fits its force."""
+        if name not in self._solutions:
+            dynamics = self._dynamics() if self._dynamics is not None else self._own_dynamics()
+            contacts = dynamics.scene.case.contacts
+            forms = [partial(_friction_of, dynamics.reactions, n) for n in range(len(contacts))]
+            for n, size in enumerate(dynamics.reactions.over(*forms)):
+                self._solutions |= {f"friction {n}": Doubled(size), f"slip {n}": Doubled(-np.sign(size))}
+            keys: list[Key] = [("rub", n) for n in range(len(contacts))]
+            for _ in range(LONGEST):
+                found, last = self.doubled(keys), 0.0
+                for key in keys:
+                    new, old = found[key][0], self._solutions[f"friction {key[1]}"]
+                    step, size = np.abs((new - old).value), np.abs(new.high)
+                    there = np.broadcast_to(np.isfinite(step) & (size > 0), self.n)
+                    steps = np.divide(step, size, out=np.zeros(self.n), where=there)
+                    last = max(last, float(steps.max(initial=0.0)))
+                    self._solutions[f"friction {key[1]}"] = new + np.zeros(self.n)
+                if not last > SETTLED:
+                    break
+        return self._solutions[name]
+
+    def _own_dynamics(self) -> Dynamics:
+        # a dozen files, loaded where there are forces
+        from virtualwork.formulas.dynamics import Dynamics
+
+        return Dynamics(self.poses)
+
+    def _table(self, number: int) -> tuple[Doubled, Doubled]:
+        """What a table gives, linear between its rows."""
+        case = self.exact.forces[0].case
+        table = [load for load in case.loads if isinstance(load, Tabled)][number]
+        at, force = (np.array(column) for column in zip(*table.table, strict=True))
+        place = self._place(table)
+        if table.periodic:
+            cycles = np.floor((place.high - at[0]) / (at[-1] - at[0]))
+            turns = (at[-1] - at[0]) / (2 * math.pi)
+            whole = abs(turns - round(turns)) <= 4 * EPS * abs(turns)
+            period = TURN * float(round(turns)) if whole else Doubled(at[-1]) - at[0]
+            place = place - period * cycles
+        i = np.clip(np.searchsorted(at, place.high, "right") - 1, 0, len(at) - 2)
+        share = (place - at[i]) / (Doubled(at[i + 1]) - at[i])
+        x, y = (share * (Doubled(part[i + 1]) - part[i]) + part[i] for part in (force.real, force.imag))
+        return x, y
+
+    def _place(self, table: Tabled) -> Doubled:
+        """What a table is over."""
+        if table.axis == "input":
+            return self._input(0)
+        if table.axis == "time":
+            return Doubled(np.asarray(table.timed(self.poses.time), dtype=float))
+        key: Key = ("angle", table.body, int(table.axis == "speed"))
+        (place,) = self.doubled([key])[key]
+        if table.axis == "speed":
+            return place + np.zeros(self.n)
+        # in the turn in which the first run reads it
+        turns = np.rint((self.lanes.place(table) - place.high) / (2 * math.pi))
+        whole: Doubled = place + TURN * turns
+        return whole
+
+
+def _friction_of(reactions: Reactions, n: int, block: Block) -> Any:
+    """The friction of a contact over a block: the torque of a pin, the force along a guide."""
+    joint = reactions.paths.case.contacts[n][0]
+    value = block.friction.get(n)
+    if value is None or joint.guide is None:
+        return value
+    return dot(value, reactions.rail(block, joint.guide))
+
+
+def length(parts: list[Any]) -> Reals:
+    with np.errstate(invalid="ignore"):
+        size = np.abs(parts[0])
+        for part in parts[1:]:
+            size = np.hypot(size, part)
+    return np.fmin(np.where(np.isnan(size), np.inf, size), np.inf)
