@@ -16,13 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from balancing.triangle import triangle
 from dalembert.arithmetic.exact import EPS
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-NEAR = 1e-2
+NEAR = 3e-3
 """From this error on Newton's method on the constraints that look active is tried: it mostly ends at the optimum."""
 MOST = 200
 """Rounds of the interior-point method; some ten are the rule."""
@@ -44,6 +45,7 @@ class ConeProblem:
     def __post_init__(self) -> None:
         self.with_t = bool(self.f.any())
         self.rows = self.e @ self.to_w
+        self.adjoint = self.rows.conj().T
         self.squares = None if self.square is None else np.concatenate(real_rows(self.square @ self.to_w))
 
     def values(self, w: Complex, t: float) -> tuple[Complex, Real]:
@@ -93,20 +95,32 @@ def solve(problem: ConeProblem) -> tuple[Complex, Complex]:
     x = np.zeros(n)
     if with_t:
         x[-1] = 1.2 * max(float(np.abs(offset[problem.f > 0]).max()), 1e-300) + 1e-3
-    s = h - (flat @ x).reshape(k, 3)
-    room = _size(s)
-    if not with_t and room.min() > 0:
+    # s and z side by side
+    pair = np.zeros((2, k, 3))
+    s, z = pair
+    s[:] = h - (flat @ x).reshape(k, 3)
+    room = (s[:, 0] - np.hypot(s[:, 1], s[:, 2])) * (s[:, 0] + np.hypot(s[:, 1], s[:, 2]))
+    if not with_t and s[:, 0].min() > 0 and room.min() > 0:
         # within all limits: on the central path
-        z = s * _MIRROR / room[:, None] ** 2 * (0.5 * float(at @ at) / k * min(1.0, float(room.min())))
+        z[:] = s * _MIRROR / room[:, None] * (0.5 * float(at @ at) / k * min(1.0, float(np.sqrt(room.min()))))
     else:
         short = np.hypot(s[:, 1], s[:, 2]) - s[:, 0]
         s[:, 0] += np.where(short > -1e-2, short + 1.0, 0.0)
-        z = np.zeros((k, 3))
         z[:, 0] = 1.0 / max(float(problem.f.sum()), 1.0) if with_t else 1.0
+
+    # the rows [B; W⁻¹G], of which those of B stay as they are
+    above = 0 if square is None else len(square)
+    stack = np.zeros((above + 3 * k, n))
+    if square is not None:
+        stack[:above, : 2 * p] = square
+    matrix = stack[above:]
+    cells, both, moved = matrix.reshape(k, 3, n), np.empty((2, k, 3)), np.empty((2, k, 3))
+    target = np.empty((k, 3))
 
     best: tuple[float, Real, Real, Real] | None = None
     stalled, near = 0, NEAR
     for _ in range(MOST):
+        s, z = pair
         rx = c + flat.T @ z.ravel()
         if square is not None:
             rx[: 2 * p] += square.T @ (square @ x[: 2 * p] + at)
@@ -123,99 +137,76 @@ def solve(problem: ConeProblem) -> tuple[Complex, Complex]:
             if optimal:
                 return w, force
             near = error / 30
-        # Nesterov-Todd scaling
-        s_size = _size(s)
-        z_size = _size(z)
-        if not (s_size.min() > 0 and z_size.min() > 0):
+        # Nesterov-Todd scaling W = β(u uᵀ - J), by the product form of √(s₀² - |s₁|²)
+        tail = np.hypot(pair[..., 1], pair[..., 2])
+        size = (pair[..., 0] - tail) * (pair[..., 0] + tail)
+        if not size.min() > 0:
             break
-        sn, zn = s / s_size[:, None], z / z_size[:, None]
-        wn = sn + zn * _MIRROR
-        wn /= np.sqrt(2 + 2 * (sn * zn).sum(axis=1))[:, None]
-        beta = np.sqrt(s_size / z_size)[:, None]
-        # W/β; W⁻¹ = J (W/β) J/β
-        scaling = np.empty((k, 3, 3))
-        tail = wn[:, 1:]
-        scaling[:, 0, :] = wn
-        scaling[:, 1:, 0] = tail
-        scaling[:, 1:, 1:] = _EYE + tail[:, :, None] * (tail / (1 + wn[:, :1]))[:, None, :]
-        inverse = scaling * _SIGNS / beta[:, None]
-        lam = np.matvec(scaling, z) * beta
-        lam_size = _size(lam)
-        if not lam_size.min() > 0:
-            break
-        matrix = (inverse @ g).reshape(3 * k, n)
-        stack = matrix
-        if square is not None:
-            stack = np.concatenate([np.pad(square, ((0, 0), (0, n - 2 * p))), matrix])
+        size = np.sqrt(size)
+        unit = pair / size[..., None]
+        mean = unit[0] + unit[1] * _MIRROR
+        mean /= np.sqrt(2 + 2 * np.vecdot(unit[0], unit[1]))[:, None]
+        mean[:, 0] += 1
+        mean /= np.sqrt(mean[:, :1])
+        scaling = mean[:, :, None] * mean[:, None, :] - _J
+        beta = np.sqrt(size[0] / size[1])[:, None]
+        # W⁻¹ = J (W/β) J/β
+        inverse = scaling * (_SIGNS / beta[:, None])
+        lam, lam_size = np.matvec(scaling, z) * beta, np.sqrt(size[0] * size[1])
+        np.matmul(inverse, g, out=cells)
         try:
-            r_inverse = np.linalg.inv(np.linalg.qr(stack, mode="r"))
+            r_inverse = np.linalg.inv(triangle(stack))
         except np.linalg.LinAlgError:
             break
         normalised = lam / lam_size[:, None]
+        mirrored, further = normalised * _MIRROR, normalised[:, 0] + 1
         rz_scaled = np.matvec(inverse, rz)
-
-        def step(
-            target: Real,
-            share: float,
-            rz_scaled: Real = rz_scaled,
-            rx: Real = rx,
-            r_inverse: Real = r_inverse,
-            matrix: Real = matrix,
-        ) -> tuple[Real, Real, Real]:
-            """Solve for (dx, W⁻¹ds, W dz) with λ∘(W dz + W⁻¹ds) = λ∘target."""
-            rhs = (-share * rz_scaled - target).ravel()
+        share, wanted = 1.0, -lam
+        # first straight on, then with what that tells: λ∘(W dz + W⁻¹ds) = λ∘wanted
+        for corrects in (False, True):
+            rhs = (-share * rz_scaled - wanted).ravel()
             dx = r_inverse @ (r_inverse.T @ (matrix.T @ rhs - share * rx))
-            dz = (matrix @ dx - rhs).reshape(k, 3)
-            return dx, target - dz, dz
-
-        _, ds, dz = step(-lam, 1.0)
-        alpha = min(1.0, _room(lam_size, normalised, ds, dz))
-        sigma = (1 - alpha) ** 3
-        # the second-order term counts as far as the first step goes: else a short step is turned about by it
-        target = np.empty((k, 3))
-        target[:, 0] = (ds * dz).sum(axis=1)
-        target[:, 1:] = ds[:, :1] * dz[:, 1:] + dz[:, :1] * ds[:, 1:]
-        target *= -(alpha**2)
-        target[:, 0] += sigma * gap / k
-        dx, ds, dz = step(_divide(lam, lam_size, target) - lam, 1 - sigma)
-        alpha = min(1.0, 0.995 * _room(lam_size, normalised, ds, dz))
+            ds, dz = both
+            dz[:] = (matrix @ dx - rhs).reshape(k, 3)
+            np.subtract(wanted, dz, out=ds)
+            # the largest step for which λ + step·direction stays in the cones
+            first = np.vecdot(both, mirrored)
+            part = (first + both[..., 0]) / further
+            tail = np.hypot(
+                both[..., 1] - part * normalised[:, 1],
+                both[..., 2] - part * normalised[:, 2],
+            )
+            worst = float(((tail - first) / lam_size).max())
+            if corrects:
+                break
+            alpha = min(1.0, 1 / worst) if worst > 0 else 1.0
+            sigma = (1 - alpha) ** 3
+            # the second-order term counts as far as the first step goes: else a short step is turned about by it
+            target[:, 0] = np.vecdot(ds, dz)
+            target[:, 1:] = ds[:, :1] * dz[:, 1:] + dz[:, :1] * ds[:, 1:]
+            target *= -(alpha**2)
+            target[:, 0] += sigma * gap / k
+            share, wanted = 1 - sigma, _divide(lam, lam_size, target) - lam
+        alpha = min(1.0, 0.995 / worst) if worst > 0 else 1.0
+        np.multiply(np.matvec(scaling, ds), beta, out=moved[0])
+        moved[1] = np.matvec(inverse, dz)
         x = x + alpha * dx
-        s = s + alpha * np.matvec(scaling, ds) * beta
-        z = z + alpha * np.matvec(inverse, dz)
+        pair = pair + alpha * moved
     assert best is not None
     return _polish(problem, *best[1:])[1:]
 
 
 _MIRROR = np.array([1.0, -1.0, -1.0])
 _SIGNS = np.outer(_MIRROR, _MIRROR)
-_EYE = np.eye(2)
-
-
-def _size(u: Real) -> Real:
-    """√(u₀² - |u₁|²), by the product form."""
-    tail = np.hypot(u[:, 1], u[:, 2])
-    return np.asarray(np.sqrt(np.maximum((u[:, 0] - tail) * (u[:, 0] + tail), 0.0)))
+_J = np.diag(_MIRROR)
 
 
 def _divide(lam: Real, lam_size: Real, b: Real) -> Real:
     """Solve λ∘u = b in the cones' product."""
     u = np.empty_like(b)
-    u[:, 0] = (lam * _MIRROR * b).sum(axis=1) / lam_size**2
+    u[:, 0] = np.vecdot(lam * _MIRROR, b) / lam_size**2
     u[:, 1:] = (b[:, 1:] - u[:, :1] * lam[:, 1:]) / lam[:, :1]
     return u
-
-
-def _room(lam_size: Real, normalised: Real, ds: Real, dz: Real) -> float:
-    """Return the largest step for which λ + step·direction stays in the cones."""
-    both = np.stack([ds, dz])
-    first = (both * (normalised * _MIRROR)).sum(axis=-1)
-    share = (first + both[..., 0]) / (normalised[:, 0] + 1)
-    tail = np.hypot(
-        both[..., 1] - share * normalised[:, 1],
-        both[..., 2] - share * normalised[:, 2],
-    )
-    worst = float(((tail - first) / lam_size).max())
-    return 1 / worst if worst > 0 else np.inf
 
 
 def _polish(problem: ConeProblem, x: Real, s: Real, z: Real) -> tuple[bool, Complex, Complex]:
@@ -239,7 +230,7 @@ def _polish(problem: ConeProblem, x: Real, s: Real, z: Real) -> tuple[bool, Comp
         if square is not None:
             slope[: 2 * p] = square.T @ problem.left(w)
         gradient = slope.copy()
-        pull = (nu * value) @ problem.rows.conj()
+        pull = problem.adjoint @ (nu * value)
         gradient[:p] += pull.real
         gradient[p : 2 * p] += pull.imag
         if with_t:
@@ -255,8 +246,7 @@ def _polish(problem: ConeProblem, x: Real, s: Real, z: Real) -> tuple[bool, Comp
 
     # what rounding the masses does to the values of the rows
     rounding = 16 * EPS * max(1.0, float((np.abs(problem.e) @ np.abs(w)).max()))
-    slack = s[:, 0] - np.hypot(s[:, 1], s[:, 2])
-    active = np.flatnonzero(slack / np.abs(s).max() < z[:, 0] / np.abs(z).max())
+    active = _active(s, z)
     away, value, radius, slope = judge(w, t, nu)
     best = (away, w, nu * value)
     m = len(active)
@@ -299,6 +289,12 @@ def _polish(problem: ConeProblem, x: Real, s: Real, z: Real) -> tuple[bool, Comp
         best = (away, w, nu * value)
     away, w, force = best
     return away < rounding, w, force
+
+
+def _active(s: Real, z: Real) -> NDArray[np.intp]:
+    """Return the cones that look active: whose forces are larger than what is left to their edge."""
+    slack = s[:, 0] - np.hypot(s[:, 1], s[:, 2])
+    return np.flatnonzero(slack / np.abs(s).max() < z[:, 0] / np.abs(z).max())
 
 
 def _consistent(system: Real, rhs: Real, largest: float) -> Real:

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from balancing.cone_problem import ConeProblem, solve
 from balancing.dependence import DependentPlanes, columns_scaled, roundings
 from balancing.qr import smallest_squares
+from balancing.triangle import triangle
 from dalembert.arithmetic.exact import EPS
 
 Real = NDArray[np.float64]
@@ -215,9 +216,7 @@ class _Limited:
         caps = _caps(self.limit)
         stack, scale = columns_scaled(np.concatenate([self.a / unit, caps]))
         order = np.argsort(-np.abs(stack).max(axis=1), kind="stable")
-        to_w: Complex = np.asarray(
-            scale[:, None] * np.linalg.inv(np.linalg.qr(stack[order], mode="r")), dtype=complex
-        )
+        to_w: Complex = np.asarray(scale[:, None] * np.linalg.inv(triangle(stack[order])), dtype=complex)
         e, offset = self.cones
         readings, ones, none = len(offset), np.ones(len(caps)), np.zeros(len(caps), dtype=complex)
         free = self.squares is None

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.dependence import DependentPlanes, adjoint, columns_scaled, damping_norms, require_independent
+from balancing.dependence import DependentPlanes, columns_scaled, damping_norms, require_independent
+from balancing.triangle import triangle
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -55,9 +56,10 @@ def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> tuple[Comple
     readings = scaled.shape[-2]
     if readings < planes:
         require_independent(scaled, scale, readings, planes, "readings", DependentPlanes)
-    q, r = np.linalg.qr(scaled)
-    sigma = require_independent(r, scale, readings, planes, "readings", DependentPlanes)
-    x = np.linalg.solve(r, -(adjoint(q) @ b[..., None]))[..., 0]
+    # of [a, b] R has Qᴴb in its last column
+    r = triangle(np.concatenate([scaled, b[..., None]], axis=-1))[..., :planes, :]
+    sigma = require_independent(r[..., :planes], scale, readings, planes, "readings", DependentPlanes)
+    x = np.linalg.solve(r[..., :planes], -r[..., planes:])[..., 0]
     return np.asarray(x * scale + 0.0, dtype=complex), sigma
 
 

@@ -60,6 +60,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "severity",
             "synchronous",
         ),
+        ("triangle",),
     ),
     "virtualwork": (
         ("__init__",),

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
         sense,
     )
     from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance
+    from virtualwork.textbook.newton import newton
 
 __all__ = [
     "GROUND",
@@ -75,6 +76,7 @@ __all__ = [
     "equilibria",
     "grashof_class",
     "ledger",
+    "newton",
     "on_incline",
     "on_moving_ramp",
     "rotation",
@@ -96,6 +98,7 @@ _ROOMS = {
     "virtualwork.study.equilibrium": "Equilibria Equilibrium",
     "virtualwork.textbook.combinations": "block_on_bar crank_rod_piston on_incline on_moving_ramp rotation second_point sense",
     "virtualwork.textbook.link_states": "LinkStates UnitLoad balance",
+    "virtualwork.textbook.newton": "newton",
 }
 
 

@@ -16,12 +16,15 @@ import cmath
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from math import isfinite, pi
+from math import isfinite, pi, sqrt
+from typing import Any
 
-from dalembert.arithmetic.varied import rotation
+from dalembert.arithmetic.recorded import RECORDED, bare
+from dalembert.arithmetic.varied import Varied, heading, made, rotation
 from virtualwork.describe.description import Description
 from virtualwork.describe.meshes import Belt, Gear, Rack
 from virtualwork.describe.parts import GROUND, Guide, Spring
+from virtualwork.describe.points import joined
 
 ROLES = {
     "rail": "the walls of a guide in the ground",
@@ -42,7 +45,7 @@ ROLES = {
 
 SYMBOL = 0.016
 """The radius of a pin, of the size of the mechanism."""
-TOOTH = ((0.0, -1.0), (0.2, -1.0), (0.4, 1.0), (0.6, 1.0), (0.8, -1.0), (1.0, -1.0))
+TOOTH = ((0.1, -1.0), (0.4, 1.0), (0.6, 1.0), (0.9, -1.0))
 """The outline of a tooth: along the rack, of the tooth's length, and across, of half its height."""
 UNKNOWN_TRAVEL = 0.2
 """Where nobody says how far a guide is used: so much of the size of the mechanism either way."""
@@ -345,13 +348,21 @@ def _belt(mechanism: Description, belt: Belt) -> Iterator[Line]:
         # the one stands inside the other
         return
     # from the line of centres to where the belt touches
-    touch = cmath.acos((first - side * second) / abs(way)).real
+    share = (first - side * second) / abs(way)
+    touch = heading(joined(share, _root(1 - share * share)))
     along = way / abs(way)
     behind, ahead = 2 * pi - 2 * touch, 2 * touch if side > 0 else 2 * pi - 2 * touch
     start = touch if side > 0 else touch - pi
-    around = [there + second * along * cmath.exp(1j * (start - side * ahead * k / 24)) for k in range(25)]
-    back = [here + first * along * cmath.exp(-1j * (touch + behind * k / 24)) for k in range(25)]
+    around = [there + second * along * rotation(start - side * ahead * (k / 24)) for k in range(25)]
+    back = [here + first * along * rotation(-(touch + behind * (k / 24))) for k in range(25)]
     yield Line("belt", belt.arm, (*around, *back), closed=True)
+
+
+def _root(x: float) -> Any:
+    """The root of a number, plain or varied."""
+    if isinstance(x, Varied):
+        return made(sqrt(complex(x).real), RECORDED.sqrt(bare(x)))
+    return sqrt(x)
 
 
 def _pinion(mechanism: Description, rack: Rack) -> Iterator[Circle]:
@@ -365,7 +376,7 @@ def _pinion(mechanism: Description, rack: Rack) -> Iterator[Circle]:
 def _teeth(mechanism: Description, rack: Rack, span: tuple[float, float], s: float) -> Iterator[Line]:
     """The pitch line of a rack with its teeth, as long as its wheel rolls on it."""
     guide = mechanism.guides[mechanism.guide_at(rack.slider)]
-    d, start = cmath.exp(1j * guide.angle), mechanism.through(guide)
+    d, start = rotation(guide.angle), mechanism.through(guide)
     low, high = span[0] - 4 * s, span[1] + 4 * s
     if guide.link == rack.gear:
         # the wheel rolls: its rack is of the body that carries the slot
@@ -375,14 +386,17 @@ def _teeth(mechanism: Description, rack: Rack, span: tuple[float, float], s: flo
         axis = _axis(mechanism, rack.gear, guide.on)
         if not axis or guide.turned is None:
             return
-        back = cmath.exp(-1j * (guide.angle + guide.turned))
+        back = rotation(-(guide.angle + guide.turned))
         touch = mechanism.bodies[guide.on][axis] - 1j * rack.radius * d - start
         body, along = guide.link, d * back
         origin = mechanism.bodies[guide.link][guide.point] + touch * back
-        low, high = -high, -low
+        # as far as the guided point, too
+        point = -(touch * d.conjugate()).real
+        low, high = min(-high, point), max(-low, point)
         depth = 1j * rack.radius * along
-    depth *= 0.7 * s / abs(rack.radius)
-    count = min(120, max(4, round((high - low) / (2.4 * s))))
+    tooth = max(s, 0.06 * abs(rack.radius))
+    depth *= 0.7 * tooth / abs(rack.radius)
+    count = min(60, max(4, round(complex((high - low) / (2.4 * tooth)).real)))
     step = (high - low) / count
     line = [origin + (low + step * (k + x)) * along + y * depth for k in range(count) for x, y in TOOTH]
     yield Line("rack", body, tuple(line))

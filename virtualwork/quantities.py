@@ -45,6 +45,8 @@ class Quantity(NamedTuple):
     """The bare names that it belongs to."""
     order: int = 0
     """How often it is differentiated in time."""
+    polar: str = ""
+    """`length` or `angle` of a vector, in place of a component (Ibrahim §1.2)."""
     reverse: bool = False
     """Whether it is the other side of a joint force, shown only where its full name is requested."""
 
@@ -55,6 +57,12 @@ class Quantity(NamedTuple):
 
     def of(self, value: Any) -> Reals:
         """The number as it is shown, from the quantity or from its slope."""
+        if self.polar == "length":
+            return np.asarray(np.abs(value))
+        if self.polar:
+            # a vector without length has no direction
+            angle = np.mod(np.degrees(np.angle(value)), 360.0)
+            return np.where(np.asarray(value) == 0, np.nan, np.where(angle >= 360.0, 0.0, angle))
         part = value.imag if self.imaginary else value.real
         return np.asarray(np.degrees(part) if self.turns else part)
 
@@ -112,10 +120,40 @@ def links(names: Iterable[str], order: int) -> list[Quantity]:
     ]
 
 
-def places(m: Description, order: int) -> list[Quantity]:
-    """All that moves, in the order of tables."""
+def places(m: Description, order: int, words: Iterable[str] = ()) -> list[Quantity]:
+    """All that moves, in the order of tables, and the vectors between two points that these words name."""
     guided = dict.fromkeys(g.point for g in m.guides)
-    return [*points(m, m.points, order), *slides(m, guided, order), *links(m.links, order)]
+    every = [*points(m, m.points, order), *slides(m, guided, order), *links(m.links, order)]
+    pairs = dict.fromkeys(pair for word in words if (pair := _two_points(m, word)) is not None)
+    return [*every, *(part for pair in pairs for part in between(m, *pair, order))]
+
+
+def _two_points(m: Description, word: str) -> tuple[str, str] | None:
+    """The points P, Q of `P-Q` or `P-Q.x`; names of points may have hyphens themselves."""
+    for text in (word, word.rpartition(".")[0]):
+        for i, sign in enumerate(text):
+            if sign == "-" and text[:i] in m.points and text[i + 1 :] in m.points:
+                return text[:i], text[i + 1 :]
+    return None
+
+
+def between(m: Description, p: str, q: str, order: int) -> list[Quantity]:
+    """The vector R_PQ from Q to P (Ibrahim §1.2), Cartesian and polar, and its rates: `P-Q.x`, `P-Q.length`.
+
+    >>> from virtualwork import Link
+    >>> m = Description({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})})
+    >>> [each.header for each in between(m, "P", "O", 1)]
+    ['P-O_x_m', 'P-O_y_m', 'P-O_length_m', 'P-O_angle_deg', 'P-O_vx_m_s', 'P-O_vy_m_s']
+    """
+    name, found = f"{p}-{q}", []
+    for k in range(order + 1):
+        to, start = (("point", m.points[point][0], 0j, point, k) for point in (p, q))
+        parts = vector(("vectors", name), f"{name}_", POINT[k], to)
+        if k == 0:
+            for kind, header in (("length", "length_m"), ("angle", "angle_deg")):
+                parts.append(Quantity(("vectors", name, header), f"{name}_{header}", to, polar=kind))
+        found += [part._replace(less=start) for part in called(parts, name, k)]
+    return found
 
 
 def effort_name(slide: bool) -> str:

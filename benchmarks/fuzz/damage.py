@@ -212,6 +212,9 @@ def _times(cell: str, factor: float) -> str:
 NEW: list[tuple[str, Any]] = [
     ("gears", {"links": ["crank", "rod"], "ratio": -2}),
     ("gears", {"links": ["rod", "crank"], "ratio": 1, "arm": "rocker"}),
+    ("belts", {"links": ["crank", "rod"], "radii": [20, 30], "crossed": True}),
+    ("belts", {"links": ["rod", "crank"], "radii": [1, 0], "arm": "rocker"}),
+    ("racks", {"gear": "crank", "slider": "B", "radius": -30}),
     ("slots", {"point": "B", "link": "crank", "on": "rod", "through": "A", "angle": 30}),
     ("sliders", {"point": "B", "through": [1, 0]}),
     ("forces", {"link": "crank", "point": "B", "force": [1, 2]}),

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork import GROUND, Gear, Guess, Guide, Input, Link, Mechanism
+from virtualwork import GROUND, Belt, Gear, Guess, Guide, Input, Link, Mechanism, Rack
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -79,6 +79,8 @@ class _Builder:
         self.points: dict[str, dict[str, complex]] = {b: {} for b in (GROUND, *self.names)}
         self.guides: list[Guide] = []
         self.gears: list[Gear] = []
+        self.belts: list[Belt] = []
+        self.racks: list[Rack] = []
         self.pins: dict[str, list[str]] = {}
         self.count = 0
 
@@ -141,6 +143,27 @@ class _Builder:
         ratio = float(self.rng.choice([-2.0, -1.0, -0.5, 1.0, 2.0, 3.0, float(self.rng.uniform(-3, 3))]))
         self.gears.append(Gear((a, b), ratio, arm))
 
+    def belt(self, a: str, b: str) -> None:
+        """Lay a belt around two bodies, open or crossed, on the ground or on another link that carries them."""
+        self.gear(a, b)
+        gear = self.gears.pop()
+        self.belts.append(Belt(gear.links, (abs(gear.ratio), 1.0), gear.ratio < 0, gear.arm))
+
+    def rack(self) -> bool:
+        """Let a body be the wheel of a rack; False where there is no guide for one."""
+        runs = [g.point for g in self.guides]
+        pairs = [
+            (g.point, wheel)
+            for g in self.guides
+            for wheel in self.names
+            if runs.count(g.point) == 1 and wheel != g.on and not (wheel == g.link and g.is_slider)
+        ]
+        if not pairs:
+            return False
+        point, wheel = pairs[int(self.rng.integers(len(pairs)))]
+        self.racks.append(Rack(wheel, point, float(self.rng.choice([-1, 1]) * self.rng.uniform(0.1, 1))))
+        return True
+
     def drive(self) -> tuple[Input, float]:
         """An input of the pose: a link against the ground or another link, or a slide."""
         speed, acceleration = map(float, self.rng.normal(size=2))
@@ -158,12 +181,14 @@ class _Builder:
         ] - self.angles[on]
 
 
-def generate(seed: int) -> Topology:
+def generate(seed: int, toothed: bool = False) -> Topology:
     """A random mechanism in a random pose.
 
     Parameters
     ----------
     seed : int
+    toothed : bool
+        With belts and at least one rack besides.
 
     Returns
     -------
@@ -180,16 +205,19 @@ def generate(seed: int) -> Topology:
     regular = bool(rng.random() < REGULAR_SHARE)
     links = int(rng.integers(LINKS[0], LINKS[1] + 1))
     while True:
-        found = _draw(rng, seed, links)
+        found = _draw(rng, seed, links, toothed)
         if found is not None and (not regular or regularity(found) > REGULAR):
             return found
 
 
-def _draw(rng: Generator, seed: int, links: int) -> Topology | None:
+def _draw(rng: Generator, seed: int, links: int, toothed: bool) -> Topology | None:
     """Bodies joined and driven at random; None where one of them is left without a joint."""
     made = _Builder(rng, links)
     freedoms = 1 if rng.random() < 0.8 else 2
-    if not _join(made, 3 * links - freedoms):
+    if not _join(made, 3 * links - freedoms, toothed):
+        return None
+    runs = [g.point for g in made.guides]
+    if toothed and (not made.racks or any(runs.count(rack.slider) > 1 for rack in made.racks)):
         return None
     driven: list[Input] = []
     at: list[float] = []
@@ -204,6 +232,8 @@ def _draw(rng: Generator, seed: int, links: int) -> Topology | None:
         links={b: Link(points[b]) for b in made.names},
         guides=made.guides,
         gears=made.gears,
+        belts=made.belts,
+        racks=made.racks,
         inputs=driven,
         guess=Guess(
             at=at,
@@ -216,7 +246,7 @@ def _draw(rng: Generator, seed: int, links: int) -> Topology | None:
     return Topology(seed, mechanism, made.origins, made.angles)
 
 
-def _join(made: _Builder, left: int) -> bool:
+def _join(made: _Builder, left: int, toothed: bool) -> bool:
     """Join until so many constraints are used up; False where a link is left without a joint."""
     loose = set(made.names)
     while left:
@@ -226,7 +256,13 @@ def _join(made: _Builder, left: int) -> bool:
             b = str(made.rng.choice([GROUND, *(x for x in made.names if x not in loose)]))
             loose.discard(a)
         kind = str(made.rng.choice(["pin", "slot", "prism", "gear"], p=[0.5, 0.2, 0.15, 0.15]))
-        if kind == "gear" and len(made.names) > 1:
+        if toothed and kind == "gear" and made.rng.random() < 0.8:
+            if not made.rack():
+                if len(made.names) < 2:
+                    continue
+                made.belt(a, b)
+            left -= 1
+        elif kind == "gear" and len(made.names) > 1:
             made.gear(a, b)
             left -= 1
         elif kind == "slot" or left == 1:
@@ -255,11 +291,16 @@ def rows(t: Topology) -> list[tuple[str, tuple[Any, ...]]]:
         found.append(("line", (g.link, m.links[g.link].points[g.point], g.on, g.through, g.angle)))
         if g.turned is not None:
             found.append(("turn", ({g.link: 1.0, g.on: -1.0}, (g.angle, g.turned), None)))
-    for gear in m.gears:
-        a, b = gear.links
-        held = {b: 1.0, a: -gear.ratio}
-        held[gear.arm] = held.get(gear.arm, 0.0) + gear.ratio - 1.0
+    toothed: tuple[Gear | Belt, ...] = (*m.gears, *m.belts)
+    for part in toothed:
+        a, b = part.links
+        held = {b: 1.0, a: -part.ratio}
+        held[part.arm] = held.get(part.arm, 0.0) + part.ratio - 1.0
         found.append(("turn", (held, None, None)))
+    for rack in m.racks:
+        g = next(g for g in m.guides if g.point == rack.slider)
+        line = g.link, m.bodies[g.link][g.point], g.on, g.through, g.angle
+        found.append(("rack", (*line, {rack.gear: -rack.radius, g.on: rack.radius})))
     for j, e in enumerate(m.inputs):
         if e.link is not None:
             found.append(("turn", ({e.link: 1.0, e.on: -1.0}, (0.0, 0.0), j)))
@@ -325,9 +366,18 @@ def evaluate(t: Topology, x: Reals, inputs: tuple[float, ...]) -> tuple[Reals, R
             d = cmath.exp(1j * data[4]) * turn
             along = 1j * d if kind == "line" else d
             value = (along.conjugate() * (p - q)).real - (inputs[data[5]] if kind == "run" else 0.0)
+            if kind == "rack":
+                # as it was drawn
+                turned = {b: _seat(t, x, b, 0j)[2] + 2 for b in data[5] if b != GROUND}
+                value += sum(c * (x[turned[b]] - t.angles[b]) for b, c in data[5].items() if b in turned)
+                (drawn, _, _), (from_, _, _) = (_seat(t, t.unknowns(), *of) for of in (data[:2], data[2:4]))
+                here = cmath.exp(1j * (data[4] + t.angles.get(data[2], 0.0)))
+                value -= (here.conjugate() * (drawn - from_)).real
             parts = moves(i, arm_p, along, 1.0) + moves(k, arm_q, along, -1.0)
             if k >= 0:  # the line turns with its body
                 parts.append((k + 2, ((1j * along).conjugate() * (p - q)).real))
+            if kind == "rack":
+                parts += [(turned[b], c) for b, c in data[5].items() if b in turned]
             add(value, parts)
     return np.array(out), np.array(jacobian)
 

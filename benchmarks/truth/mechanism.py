@@ -100,9 +100,10 @@ class Exact:
     def _phase(self, i: int, gear: Any) -> Any:
         """θ_b − r θ_a + (r − 1) θ_arm at the guess."""
         a, b = gear.links
-        at = {e.link: mp.mpf(float(q)) for e, q in zip(self.m.inputs, self.m.at, strict=True)} | {
-            GROUND: mp.mpf(0)
-        }
+        at = {GROUND: mp.mpf(0)}
+        for e, q in zip(self.m.inputs, self.m.at, strict=True):
+            if e.link is not None and e.on == GROUND:
+                at[e.link] = mp.mpf(float(q))
         if not {a, gear.arm} <= at.keys():
             return mp.mpf(self.seat[i])
         r = _ratio(gear)
@@ -363,11 +364,19 @@ class Exact:
                 return
             wheel = self.series(rack.gear, self.m.bodies[rack.gear][pin], 0)[0]
             touch, bodies = wheel - 1j * mp.mpf(rack.radius) * along, ((g.link, 1), (rack.gear, -1))
+        # in a slot the link may turn: a block of no mass takes the teeth, pinned to the link, and its guide the moment
+        seat = (
+            touch
+            if g.is_slider or rack.gear == g.link
+            else self.series(g.link, self.m.bodies[g.link][g.point], 0)[0]
+        )
         row.clear()
+        if g.on != GROUND:
+            row[3 * self.links.index(g.on)] = mp.im(mp.conj(touch - seat) * along)
         for body, sign in bodies:
             if body != GROUND:
                 c = 3 * self.links.index(body)
-                arm = touch - self.origin[body][0]
+                arm = (seat if body == g.link else touch) - self.origin[body][0]
                 row[c] = row.get(c, mp.mpf(0)) + sign * mp.im(mp.conj(arm) * along)
                 row[c + 1] = row.get(c + 1, mp.mpf(0)) + sign * mp.re(along)
                 row[c + 2] = row.get(c + 2, mp.mpf(0)) + sign * mp.im(along)

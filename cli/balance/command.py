@@ -12,6 +12,7 @@ from cli.show.output import command
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from cli.read.planes import Planes
     from cli.show.commands import ShowOptions
     from cli.show.result import Result
     from dalembert.results.way import Topic
@@ -24,6 +25,7 @@ Arguments:
 What:
   plane NAME[:Z]:RADIUS  A correction plane, such as A:0mm:20mm; once: static balancing.
   planes FILE.csv  The planes as a table: plane, z_*, radius_*, rotor.
+  mass NAME:MASS  Mass of a plane's correction, such as A:7kg: its radius is found where the plane has ? for it.
   gravity G  g for weights, m/s².
 How:
   remove  Corrections as material to remove, not to add.
@@ -36,7 +38,7 @@ How: the tolerance:
   speed SPEED  Highest service speed, such as 3000rpm.
   rotor_mass MASS  Mass of the rotor, such as 12kg.
   permissible UNBALANCE  Permissible residual unbalance, such as 30g_mm, in place of a grade.
-  bearings Z1:Z2  The bearing planes, where the tolerance holds.
+  bearings Z1:Z2  The bearing planes, where the tolerance holds; with --speed also the forces in them.
 Further options (docs/commands.md describes them):
   mode_count K  Take the first K modes of --modes.
   rigid  With --modes: force and couple vanish too (N + 2 planes).
@@ -49,6 +51,7 @@ def run(
     table: str,
     plane: list[str] | None = None,
     planes: str | None = None,
+    mass: list[str] | None = None,
     gravity: float = 9.80665,
     remove: bool = False,
     round_mass: str | None = None,
@@ -73,7 +76,7 @@ def run(
     Angles are counter-clockwise as seen against +z.
     """
     # numpy and what stands on it are loaded only once the command line itself is in order
-    from cli.balance.rotors import Balancing, Request, read_rotors
+    from cli.balance.rotors import Balancing, Carried, Request, read_rotors
     from cli.balance.tables import METHOD, MODAL, tables, warnings
     from cli.read.planes import from_options, from_table
     from cli.read.tolerance import tolerance_of
@@ -86,23 +89,36 @@ def run(
     if modes is None:
         options.refuse("needs --modes", mode_count=mode_count, rigid=rigid)
     else:
-        options.refuse("shows rigid balancing: it does not go with --modes", steps=show.steps)
+        options.refuse("shows rigid balancing: it does not go with --modes", steps=show.steps, mass=mass)
     shapes = None
     if modes is not None:
         from cli.balance.modes import read_modes
 
         shapes = read_modes(modes, mode_count, rigid)
+    chosen = from_table(planes) if planes is not None else from_options(plane or [], sought=True)
+    carried = None
+    if bearings is not None and speed is not None and shapes is None:
+        carried = Carried(
+            options.two_bearings("--bearings", bearings),
+            options.needed("--speed", speed, "speed", positive=True),
+            options.quantity("--rotor-mass", rotor_mass, "mass", positive=True),
+        )
+    only_forces = carried is not None and grade is None and permissible is None
     request = Request(
         gravity=gravity,
         remove=remove,
         mass_step=options.with_unit("--round-mass", round_mass, "mass", positive=True),
         angle_step=options.with_unit("--round-angle", round_angle, "angle", positive=True),
         center=options.quantity("--center-z", center_z, "length"),
-        tolerance=tolerance_of(grade, speed, rotor_mass, permissible, bearings),
+        tolerance=None if only_forces else tolerance_of(grade, speed, rotor_mass, permissible, bearings),
+        masses=_masses(mass or [], chosen),
+        carried=carried,
         modes=shapes,
     )
-    chosen = from_table(planes) if planes is not None else from_options(plane or [])
-    rotors = read_rotors(table, gravity, needs_z=chosen.several or shapes is not None)
+    needs_z = chosen.several or carried is not None or shapes is not None
+    rotors = read_rotors(table, gravity, needs_z=needs_z)
+    if carried is not None and chosen.z is None:
+        raise options.bad("--bearings", "the forces need the place of the plane: --plane NAME:Z:RADIUS")
     with options.processes(workers) as executor:
         balancing = Balancing(rotors, chosen, request, executor)
 
@@ -125,3 +141,22 @@ def run(
         about={"title": "Balancing of known masses"},
         warnings=[*rotors.table.warnings, *(shapes.warnings if shapes else []), *warnings(balancing)],
     )
+
+
+def _masses(texts: list[str], planes: Planes) -> dict[str, float]:
+    """Read `NAME:MASS`, and refuse a radius that is sought without a mass."""
+    found: dict[str, float] = {}
+    for text in texts:
+        name, colon, amount = text.rpartition(":")
+        if not colon or name.strip() not in planes.name:
+            names = ", ".join(dict.fromkeys(planes.name))
+            raise options.bad(
+                "--mass", f"'{text}': expected NAME:MASS with one of the planes {names}, such as A:7kg"
+            )
+        if name.strip() in found:
+            raise options.bad("--mass", f"the mass of plane {name.strip()} is given twice")
+        found[name.strip()] = options.needed("--mass", amount, "mass", positive=True)
+    for name, radius in zip(planes.name, planes.radius.tolist(), strict=True):
+        if radius != radius and name not in found:
+            raise options.bad("--plane", f"the radius of plane {name} is ?: expected --mass {name}:MASS too")
+    return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -109,6 +109,19 @@ class Request:
     tolerance: Tolerance | None
     modes: Modes | None = None
     """Whose modal sums are to vanish, in place of force and couple alone."""
+    masses: Mapping[str, float] = field(default_factory=dict)
+    """Plane -> the mass that its correction is to have, kg: where the plane has no radius, that is sought."""
+    carried: Carried | None = None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Carried:
+    """Two bearings that carry the rotor at a speed: what acts in them is asked for."""
+
+    bearings: tuple[float, float]
+    speed: float
+    mass: float | None
+    """Of the rotor, kg; None where its weight is not known."""
 
 
 @dataclass(eq=False, repr=False)
@@ -195,9 +208,16 @@ class Balancing:
         """Return the corrections as printed, mass in the table's unit and angle in degrees, and their unbalance."""
         request, unit, radius = self.request, self.rotors.mass_unit, self.radius
         angle = degrees(-self.ideal if request.remove else self.ideal)
-        mass = from_si(np.abs(self.ideal) / radius, "mass", unit)
+        # at radius 0, which a given mass may lead to, there is nothing to correct
+        size = np.abs(self.ideal)
+        mass = from_si(np.divide(size, radius, out=np.zeros_like(size), where=radius > 0), "mass", unit)
+        fixed = self.given_mass
+        mass = np.where(np.isnan(fixed), mass, from_si(fixed, "mass", unit))
         if request.mass_step is None and request.angle_step is None:
-            return mass, angle, self.ideal
+            made = np.where(
+                np.isnan(fixed) | self.sought, self.ideal, phasor(fixed * radius, degrees(self.ideal), "deg")
+            )
+            return mass, angle, made
         if request.mass_step is not None:
             step, step_unit = request.mass_step
             if step_unit != unit:
@@ -210,6 +230,27 @@ class Balancing:
         given = phasor(to_si(mass, "mass", unit) * radius, angle, "deg")
         return mass, angle, -given if request.remove else given
 
+    @cached_property
+    def given_mass(self) -> Real:
+        """The mass that each row's correction is to have, kg; NaN where it is free."""
+        masses = self.request.masses
+        return np.array([masses.get(self.planes.name[p], np.nan) for p in self.plane_of_row])
+
+    @cached_property
+    def sought(self) -> NDArray[np.bool_]:
+        """Which rows have no radius: it follows from the mass."""
+        return np.asarray(np.isnan(self.planes.radius[self.plane_of_row]))
+
+    def in_planes(self, places: tuple[float, float]) -> tuple[Complex, Complex]:
+        """Return the unbalances before and after as two in planes at these places, (rotors, 2) each."""
+        before, after = np.empty((2, len(self.rotors.names), 2), dtype=complex)
+        for group, rows, fix in self.solved:
+            before[group] = -correct(fix.moment, fix.z, places).unbalance
+            corrected = np.concatenate([fix.moment, self.made[rows]], axis=-1)
+            at = np.concatenate([fix.z, fix.planes], axis=-1)
+            after[group] = -correct(corrected, at, places).unbalance
+        return before, after
+
     def _in_tolerance_planes(self) -> tuple[Complex, Complex]:
         """Return the unbalances before and after: (rotors, 2) in the bearings, else a row for each correction plane."""
         tolerance = self.request.tolerance
@@ -221,18 +262,13 @@ class Balancing:
             raise DataError(
                 "--bearings: the tolerance in the bearings needs the place of the plane: --plane NAME:Z:RADIUS"
             )
-        before, after = np.empty((2, len(self.rotors.names), 2), dtype=complex)
-        for group, rows, fix in self.solved:
-            before[group] = -correct(fix.moment, fix.z, bearings).unbalance
-            corrected = np.concatenate([fix.moment, self.made[rows]], axis=-1)
-            places = np.concatenate([fix.z, fix.planes], axis=-1)
-            after[group] = -correct(corrected, places, bearings).unbalance
-        return before, after
+        return self.in_planes(bearings)
 
-    @property
+    @cached_property
     def radius(self) -> Real:
-        """The radius of each row's plane."""
-        return np.asarray(self.planes.radius[self.plane_of_row])
+        """The radius of each row's plane: as given, or as the mass that is to stand there needs it."""
+        radius = np.asarray(self.planes.radius[self.plane_of_row])
+        return np.where(self.sought, np.abs(self.ideal) / self.given_mass, radius)
 
     @property
     def mass_kg(self) -> Real:

@@ -14,7 +14,7 @@ from cli.balance.rotors import Balancing
 from cli.read.rounding import angle_error, size_error
 from cli.read.tolerance import verdict_table
 from dalembert.angles import degrees
-from dalembert.results.columns import Column, Table, names, number, read_number
+from dalembert.results.columns import Column, Table, names, number, read_number, vector
 from dalembert.units import from_si
 
 if TYPE_CHECKING:
@@ -40,6 +40,8 @@ def tables(b: Balancing) -> dict[str, Callable[[], Table]]:
         "corrections": cache(lambda: corrections(b)),
         "rotors": lambda: states(b),
     }
+    if b.request.carried is not None:
+        found["bearings"] = lambda: bearings(b)
     if b.modal:
         found["modes"] = lambda: modes(b)
     return found | ({} if b.request.tolerance is None else {"tolerance": lambda: verdicts(b)})
@@ -156,6 +158,41 @@ def states(b: Balancing) -> Table:
     )
 
 
+def bearings(b: Balancing) -> Table:
+    """One row per rotor and bearing: the forces of the bearings on the rotor, at rest, and as it turns before and after."""
+    carried = b.request.carried
+    assert carried is not None
+    z1, z2 = carried.bearings
+    before, after = b.in_planes(carried.bearings)
+    n = len(b.rotors.names)
+    square = carried.speed**2
+
+    def across(force: Complex) -> Real:
+        return np.stack([force.real, force.imag], axis=-1).reshape(-1, 2) + 0.0
+
+    columns = [
+        names("rotor", np.repeat(b.rotors.names, 2).tolist()),
+        names("bearing", ["1", "2"] * n),
+        number("z", "length", np.tile([z1, z2], n), b.length_unit),
+    ]
+    if carried.mass is not None and b.request.center is not None:
+        share = np.array([z2 - b.request.center, b.request.center - z1]) / (z2 - z1)
+        weight = share * complex(0.0, carried.mass * b.request.gravity)
+        static = np.asarray(np.tile(weight, (n, 1)), dtype=np.complex128)
+        columns += vector("static", "force", across(static), "xy")
+    # rounding of nothing is shown as nothing
+    left = np.where(np.abs(after) > 1e-12 * np.abs(before).max(axis=-1, keepdims=True), after, 0)
+    turning: dict[str, Complex] = {
+        "dynamic": np.asarray(-square * before, dtype=np.complex128),
+        "corrected": np.asarray(-square * left, dtype=np.complex128),
+    }
+    for name, force in turning.items():
+        columns += vector(name, "force", across(force), "xy")
+        columns.append(number(f"{name}_size", "force", np.abs(force).ravel(), place=f"{name}_size"))
+    above = "forces of the bearings on the rotor: static ones carry its weight (gravity along -y), dynamic ones turn with it"
+    return Table(columns, ("rotor", "bearing"), "rotors[].bearings[]", above=above)
+
+
 def verdicts(b: Balancing) -> Table:
     """One row per rotor and tolerance plane: what is permissible, what it was and is."""
     limit, unit = b.request.tolerance, b.rotors.unbalance_unit
@@ -188,7 +225,15 @@ def warnings(b: Balancing) -> list[str]:
     ]
     if len(near) > 5:
         lines.append(f"… and of {len(near) - 5} further rotors")
-    limit = b.request.tolerance
+    limit, carried = b.request.tolerance, b.request.carried
+    if limit is None and carried is not None and (carried.mass is None) != (b.request.center is None):
+        lines.append("no static forces in the bearings: they need --rotor-mass and --center-z")
+    fixed = ~np.isnan(b.given_mass) & ~b.sought
+    if fixed.any():
+        named = ", ".join(dict.fromkeys(b.planes.name[p] for p in b.plane_of_row[fixed]))
+        lines.append(
+            f"mass and radius are given in plane {named}: the angle alone is found, the residual is what that leaves"
+        )
     if limit is None:
         return lines
     if limit.grade is not None and limit.iso and float(limit.grade[1:]) not in GRADES:

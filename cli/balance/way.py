@@ -166,7 +166,7 @@ def _plane(
     b: Balancing, row: int, name: str, made: complex, text: list[str], scale: _Scale, heading: str = ""
 ) -> Topic:
     radius = float(b.radius[row])
-    mass = abs(made) / radius
+    mass = abs(made) / radius if radius else 0.0
     x, y = (value + 0.0 for value in (made.real, made.imag))
     q = quadrant(x, y)
     angle = float(degrees(np.array([made]))[0])

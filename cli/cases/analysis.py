@@ -149,7 +149,7 @@ class Analysis:
     @cached_property
     def places(self) -> list[Quantity]:
         """The places and rates that are requested."""
-        every = quantities.places(self.mechanism, 3)
+        every = quantities.places(self.mechanism, 3, self.request.only or ())
         return quantities.chosen(every, self.request.only, self.order)
 
     @cached_property
@@ -198,7 +198,7 @@ class Analysis:
         only = self.request.only
         if only is None:
             return
-        moving = quantities.places(self.mechanism, 3)
+        moving = quantities.places(self.mechanism, 3, only)
         forces = quantities.forces(self.mechanism, self.pairs)
         here = [*moving, *forces] if self.request.forces else moving
         word = quantities.unknown(here, only)

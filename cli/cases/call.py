@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from cli.cases.case import Case
-    from cli.cases.options import Asked
+    from cli.cases.options import Options
+    from cli.cases.sought import Found
     from cli.show.commands import ShowOptions
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
@@ -144,17 +145,32 @@ class Call:
     varied: Grid | None
     moved: Grid | None
     workers: int
+    found: Found | None = None
+    """The number that --find asked for."""
 
     @classmethod
-    def of(cls, asked: Asked, show: ShowOptions, request: Request) -> Call:
+    def of(cls, own: Options, show: ShowOptions, request: Request) -> Call:
         """Read the file, change its numbers, and lay out the cases."""
         with naming(request.file):
-            mechanism, bare, remarks, about = load(asked.file)
-            if asked.set:
-                mechanism = assigned(mechanism, bare, asked.set)
-            varied, moved = grids(mechanism, asked.at, asked.over, asked.cases, bare, remarks)
-        workers = getattr(asked, "workers", None) or 1
-        return cls(request, show, mechanism, bare, remarks, about, varied, moved, workers)
+            mechanism, bare, remarks, about = load(own.file)
+            if own.set:
+                mechanism = assigned(mechanism, bare, own.set)
+            varied, moved = grids(mechanism, own.at, own.over, own.cases, bare, remarks)
+            found = None
+            name, wanted = getattr(own, "find", None), getattr(own, "so_that", None)
+            if (name is None) != (wanted is None):
+                raise bad(
+                    "--find" if name is None else "--so-that", "expected --find NAME --so-that QUANTITY=VALUE"
+                )
+            if name is not None and wanted is not None:
+                from cli.cases.sought import find
+
+                if varied is not None or (moved is not None and moved.n > 1):
+                    raise bad("--find", "expected one pose of one mechanism, such as --at 60deg")
+                found = find(mechanism, bare, request, moved, name, wanted)
+                mechanism = found.mechanism
+        workers = getattr(own, "workers", None) or 1
+        return cls(request, show, mechanism, bare, remarks, about, varied, moved, workers, found)
 
     def refuse_inputs(self, message: str) -> None:
         """Refuse options that move inputs, where these mean nothing."""
@@ -242,6 +258,8 @@ class Call:
             result = self._alone(study, loop) if self.varied is None else self._of_variants(loop)
         if page is not None and drawn is not None:
             result = replace(result, beside={**result.beside, page: lambda: drawn(loop.every_case())})
+        if self.found is not None:
+            result = _with_found(result, self.found)
         title = {"title": self.mechanism.name or "Mechanism"}
         if self.show.steps:
             result = replace(result, way=lambda: self._way(loop))
@@ -300,3 +318,14 @@ class Call:
             notes=lambda: name,
             warnings=[*self.remarks, *loop.remarks.lines()],
         )
+
+
+def _with_found(result: Result, found: Found) -> Result:
+    """The result with the number that --find asked for: above the table, in JSON, beside a table alone."""
+    notes, document = result.notes, result.documented
+    return replace(
+        result,
+        notes=lambda: "\n".join(filter(None, (notes(), f"found: {found.text}"))),
+        document=lambda: {**document(), "found": {found.header: found.value}},
+        aside=lambda: [*result.aside(), f"found: {found.text}"],
+    )

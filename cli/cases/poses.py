@@ -67,11 +67,15 @@ def table(analysis: Analysis, found: Sequence[Mapping[Key, Any]] = ()) -> Table:
 
     def error(each: Quantity) -> list[float]:
         formed()
-        return [
-            b
-            for motion in analysis.motions
-            for b in bounds_of(sum(bound(motion, key, given) for key in keys_of([each])))  # type: ignore[arg-type]
-        ]
+        bounds = [sum(bound(motion, key, given) for key in keys_of([each])) for motion in analysis.motions]
+        if each.polar == "angle":
+            # across the vector, over its length
+            lengths = [np.abs(of[each.key] - of[each.less]) for of in every]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                bounds = [
+                    np.degrees(b / size) + TURNED * 360 for b, size in zip(bounds, lengths, strict=True)
+                ]
+        return [b for each in bounds for b in bounds_of(each)]  # type: ignore[arg-type]
 
     columns = [Column("step", "", [*analysis.inputs.steps] * times)]
     if analysis.several:
@@ -153,7 +157,9 @@ def in_json(analysis: Analysis) -> list[Quantity]:
 
 
 def _moving(analysis: Analysis) -> list[Quantity]:
-    return sorted(analysis.places, key=lambda each: ("links", "points", "slides").index(each.path[0]))
+    return sorted(
+        analysis.places, key=lambda each: ("links", "points", "slides", "vectors").index(each.path[0])
+    )
 
 
 def poses_of(

@@ -151,6 +151,7 @@ def cells_of(
             part = exact_degrees(given[name]) if name in given else degrees(np.exp(1j * value))
         else:
             part = each.of(value)
+            known = known & np.isfinite(part)
         shown[each] = cells(part, known if where is None else known & where)
     return shown
 

@@ -180,6 +180,7 @@ def run(
 
 
 def _result(b: FieldBalancing, save_influence: Path | None) -> Result:
+    from cli.field.dates import latest
     from cli.field.doubts import warnings
     from cli.field.tables import METHOD, sense
     from cli.show.result import Result
@@ -189,6 +190,7 @@ def _result(b: FieldBalancing, save_influence: Path | None) -> Result:
 
         check(b)
     remarks = warnings(b)
+    day = latest(b.runs.table)
     tables = _tables(b, remarks)
 
     def stored() -> bytes:
@@ -232,7 +234,7 @@ def _result(b: FieldBalancing, save_influence: Path | None) -> Result:
         method=METHOD,
         sheets=sheets,
         shows_input=True,
-        about={"title": "Balancing in the field"},
+        about={"title": "Balancing in the field"} | ({} if day is None else {"date": day}),
         way=way,
         beside={} if save_influence is None else {save_influence: stored},
         warnings=remarks,

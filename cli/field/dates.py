@@ -42,3 +42,14 @@ def _year(table: Table, row: int, text: str) -> float:
         raise table.error(row, "date", text, DATE) from None
     # in days first, so that no digit is lost
     return (at - datetime(2000, 1, 1)).total_seconds() / 86400 / YEAR
+
+
+def latest(table: Table) -> str | None:
+    """Return the last date of a table, as 2019-03-14; None where none can be read."""
+    found = [_ISO.fullmatch(text) or _POINTS.fullmatch(text) for text in table.texts.get("date", ()) if text]
+    days = []
+    for match in filter(None, found):
+        first, month, last = match.groups()[:3]
+        year, day = (first, last or "01") if match.re is _ISO else (last, first)
+        days.append(f"{year}-{int(month):02}-{int(day):02}")
+    return max(days, default=None)

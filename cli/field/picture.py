@@ -37,26 +37,33 @@ SUGGESTED = "tab:purple"
 
 def draw(found: FieldBalancing, rotors: Sequence[int]) -> Figure:
     """Draw for each rotor the vibration before and after, and the corrections; of a fit with all that it was found from."""
-    figure = blank()
     if found.runs.fitted:
-        return _fits(found, rotors, figure)
-    vibration([_rotor(found, rotor) for rotor in rotors], amplitude_unit(found), found.unit, figure=figure)
+        return _fits(found, rotors, blank())
+    return dials(found, rotors)
+
+
+def dials(found: FieldBalancing, rotors: Sequence[int], *, trims: bool = False) -> Figure:
+    """Draw for each rotor the vibration before and after, and the corrections, as dials; or what to add as it stands."""
+    figure = blank()
+    shown = [_rotor(found, rotor, trims=trims) for rotor in rotors]
+    vibration(shown, amplitude_unit(found), found.unit, figure=figure)
     return figure
 
 
-def _rotor(found: FieldBalancing, rotor: int) -> Vibration:
+def _rotor(found: FieldBalancing, rotor: int, *, trims: bool = False) -> Vibration:
     k, i = found.place[rotor]
     solved = found.solved[k]
+    fix, start = (solved.trim, 0 * solved.standing) if trims else (solved.corrections, solved.start)
     places = found.request.places or ()
-    split = [_on_places(found, w) for w in solved.corrections[i].tolist()] if places else []
+    split = [_on_places(found, w) for w in fix[i].tolist()] if places else []
     return Vibration(
         found.runs.rotors[rotor] if found.runs.several else "",
         [str(channel) for channel in solved.group.channels],
         solved.initial[i],
         solved.residual[i],
         solved.planes,
-        found.amount(solved.corrections[i]),
-        found.amount(solved.start[i]),
+        found.amount(fix[i]),
+        found.amount(start[i]),
         places=np.radians(places).tolist(),
         split=split,
     )

@@ -13,25 +13,28 @@ from cli.field.field_balancing import FieldBalancing
 from cli.field.runs import Complex, Real
 from cli.field.solution import Solved
 from cli.field.tables import Tables, amplitude_unit, channels, masses_text, sense
-from cli.field.trim import LastRun, first_reading, last_run, measured_verdicts, verdicts
+from cli.field.trim import LastRun, Trim, first_reading, last_run, measured_verdicts, verdicts
 from cli.read.tolerance import verdict_table
+from cli.show.bars import Bar, Bars
 from cli.show.result import Section, Sheet
 from dalembert.angles import degrees
 from dalembert.results.columns import Column, Table
-from dalembert.results.text import as_list
+from dalembert.results.text import as_list, with_uncertainty
 from dalembert.units import from_si
 
 MOST = 24  # rotors of one report
+BARS = 6  # sensors of one page
 
 
 def sheets(b: FieldBalancing, tables: Tables) -> Iterator[Sheet]:
-    """Yield for each rotor what to do and what it does, and on a page of its own how that was computed."""
+    """Yield for each rotor a page with what to do and what it does, and one with how that was computed."""
     made = {name: table() for name, table in tables.items()}
     for rotor, (name, solved, i) in enumerate(b.each(MOST)):
         title = f"Rotor {name}" if name else ""
         of = _Rotor(b, made, b.runs.rotors[rotor], solved, i)
-        yield Sheet(title, list(of.sections()), partial(picture.draw, b, [rotor]))
-        yield Sheet(title, [Section("How it was computed", of.method())])
+        history = partial(picture.draw, b, [rotor]) if b.runs.fitted else None
+        yield Sheet(title, list(of.sections()), partial(picture.dials, b, [rotor], trims=of.trims))
+        yield Sheet(title, list(of.method()), history)
     if len(b.runs.rotors) > MOST:
         yield Sheet("", [Section("Further rotors", [f"{len(b.runs.rotors) - MOST} are not shown here."])])
 
@@ -62,19 +65,60 @@ class _Rotor:
         return [part for table in tables for part in (table.above, table, table.below)]
 
     def sections(self) -> Iterator[Section]:
-        """Yield what to do, and what it does."""
+        """Yield the verdict, what to do, and what it does."""
         b, solved, i, last = self.b, self.solved, self.i, self.last
-        before, sentences = first_reading(b, solved, i), [_convention(b)]
-        if before is None:
-            sentences.append("Before: as fitted to all runs, of which none was without masses.")
+        why = sorted(set(Trim(b, solved).reasons[i])) if solved.standing[i].any() else [""]
+        done = [] if "" in why else [f"Nothing to add: {' and '.join(why)}."]
+        yield Section("Verdict", [*done, *_verdict(b, solved, i, last), *self.parts("zones")])
+        yield Section("Vibration", [_bars(b, solved, self.states())])
+        yield Section("What to add now", list(self._add()))
+        if expected := self.parts("predict", "suggest", "suggest_gain"):
+            yield Section("What to expect", expected)
+
+    @property
+    def trims(self) -> bool:
+        """Whether the rotor runs with corrections on, so that only what to add to these counts."""
+        return bool(self.solved.standing[self.i].any()) and (
+            self.last is not None or self.b.request.from_here
+        )
+
+    def _add(self) -> Iterator[str | Table]:
+        """Yield what to add, as people write it: to the bare rotor, and to the rotor as it stands."""
+        b, solved, i = self.b, self.solved, self.i
+        on = masses_text(b, solved.planes, solved.standing[i], ".6g")
+        if not self.trims:
+            yield "With all trial masses off, ADD (or REMOVE the same amounts opposite, +180°):"
+            yield _people(b, solved, i, here=False)
+            yield from self.parts("split")
+        if on:
+            needed = "" in Trim(b, solved).reasons[i]
+            leave = "Leave" if self.trims else "Or leave"
+            add = "and ADD:" if needed else "and add nothing; the trim would be:"
+            yield f"{leave} {on} on the rotor, as in its last run, {add}"
+            yield _people(b, solved, i, here=True)
+            yield from self.parts("trim_split")
+
+    def states(self) -> dict[str, Complex]:
+        """Return the vibration before, in the last run with corrections, and as predicted."""
+        b, solved, i, last = self.b, self.solved, self.i, self.last
+        before = first_reading(b, solved, i)
         states = {"before": solved.initial[i] if before is None else before}
         if last is not None:
             states[f"run {last.run}"] = last.vibration
+        states["predicted"] = solved.residual[i]
+        return states
+
+    def method(self) -> Iterator[Section]:
+        """Yield the vibration with its phases, the corrections in full, and how they were computed."""
+        b, solved, i, last = self.b, self.solved, self.i, self.last
+        sentences = [_convention(b)]
+        if first_reading(b, solved, i) is None:
+            sentences.append("Before: as fitted to all runs, of which none was without masses.")
+        if last is not None:
             sentences.append(
                 f"Run {last.run}: with {masses_text(b, solved.planes, last.on, '.6g')} on the rotor."
             )
-        states["predicted"] = solved.residual[i]
-        yield Section("Vibration", [_vibration(b, solved, states), *sentences])
+        yield Section("Vibration and phase", [_vibration(b, solved, self.states()), *sentences])
         fix = self.tables["corrections"]
         amounts = replace(fix, columns=[c for c in fix.columns if not c.name.startswith("trim_")])
         state = (
@@ -82,17 +126,11 @@ class _Rotor:
             if b.request.from_here
             else "in its initial state, all trial masses off"
         )
-        sentence = f"To ADD to the rotor {state}; or to REMOVE the same amounts opposite (+180°)."
-        title = "Trim: what to add now" if b.request.from_here else "Corrections"
-        yield Section(title, [amounts, *self.parts("static", "couple", "split"), sentence])
-        if solved.standing[i].any():
-            title = "On the rotor now" if b.request.from_here else "Trim: what to add now"
-            yield Section(title, self.parts("trim", "trim_split"))
-        yield Section("Verdict", _verdict(b, solved, i, last))
-        if expected := self.parts("predict", "suggest", "suggest_gain", "robust"):
-            yield Section("What to expect", expected)
+        parts = [amounts, f"To ADD to the rotor {state}.", *self.parts("static", "couple", "robust")]
+        yield Section("Corrections in full", [*parts, *self.parts("trim")])
+        yield Section("How it was computed", self._computed())
 
-    def method(self) -> list[str | Table]:
+    def _computed(self) -> list[str | Table]:
         """Return readings, coefficients, figures of merit."""
         b, solved, i = self.b, self.solved, self.i
         group, parts = solved.group, list[str | Table]()
@@ -121,6 +159,42 @@ class _Rotor:
             if column.name == "phase" and self.b.against:
                 columns[k] = replace(column, values=[round(-float(v or 0) % 360, 2) for v in column.values])
         return replace(residuals, columns=columns)
+
+
+def _bars(b: FieldBalancing, solved: Solved, states: dict[str, Complex]) -> Bars:
+    """Each sensor's vibration before and after as bars, with the limit where there is one."""
+    unit, rows = amplitude_unit(b), []
+    few = solved.group.channels[:BARS]
+    for s, channel in enumerate(few):
+        for name, vibration in states.items():
+            size = float(np.abs(vibration[s]))
+            if size == size:
+                label = f"{channel} {name}" if len(solved.group.channels) > 1 else name
+                rows.append(Bar(label, size, f"{size:.3g} {unit}", name != "before"))
+    ceiling, more = b.ceiling, len(solved.group.channels) - len(few)
+    said = [] if ceiling is None else [f"Limit: {ceiling:.4g} {unit}."]
+    said += [f"{more} further readings stand on the next page."] if more > 0 else []
+    return Bars(rows, ceiling, " ".join(said))
+
+
+def _people(b: FieldBalancing, solved: Solved, i: int, here: bool) -> Table:
+    """What to add in each plane, as people write it: 95.1 ± 0.9."""
+    masses = solved.trim if here else solved.corrections
+    along, across = solved.uncertainty_of(masses)
+    sizes = zip(np.abs(masses[i]).tolist(), along[i].tolist(), strict=True)
+    turns = zip(degrees(masses[i]).tolist(), across[i].tolist(), strict=True)
+    amounts = [with_uncertainty(float(b.amount(w)), float(b.amount(sd))) for w, sd in sizes]
+    angles = [with_uncertainty(turn, sd) if sd == sd else f"{turn:.1f}" for turn, sd in turns]
+    angles = ["" if w == 0 else angle for w, angle in zip(masses[i].tolist(), angles, strict=True)]
+    columns = [
+        Column("plane", "", solved.planes),
+        Column(b.runs.per, b.runs.mass_unit, amounts),
+        Column("angle", "deg", angles),
+    ]
+    if here:
+        needed = [not why for why in Trim(b, solved).reasons[i]]
+        columns.append(Column("needed", "", ["yes" if one else "no" for one in needed]))
+    return Table(columns, ("plane",))
 
 
 def _vibration(b: FieldBalancing, solved: Solved, states: dict[str, Complex]) -> Table:

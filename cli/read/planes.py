@@ -56,8 +56,8 @@ class Planes:
         )
 
 
-def from_options(specs: Sequence[str], flag: str = "--plane") -> Planes:
-    """Read `NAME:RADIUS` (once) or `NAME:Z:RADIUS` (each)."""
+def from_options(specs: Sequence[str], flag: str = "--plane", *, sought: bool = False) -> Planes:
+    """Read `NAME:RADIUS` (once) or `NAME:Z:RADIUS` (each); `sought`: a RADIUS may be ?, which is NaN here."""
     names: list[str] = []
     z: list[tuple[float, str]] = []
     radii: list[tuple[float, str]] = []
@@ -68,12 +68,13 @@ def from_options(specs: Sequence[str], flag: str = "--plane") -> Planes:
                 raise ValueError(
                     f"'{spec}': expected NAME:Z:RADIUS, such as A:0mm:20mm, or for one plane NAME:RADIUS"
                 )
-            radius = parse_quantity(parts[-1], "length")
+            unknown = sought and parts[-1].strip() == "?"
+            radius = (float("nan"), "") if unknown else parse_quantity(parts[-1], "length")
             if len(parts) == 3:
                 z.append(parse_quantity(parts[1], "length"))
         except ValueError as error:
             raise bad(flag, error) from None
-        if not radius[0] >= SMALLEST:
+        if not unknown and not radius[0] >= SMALLEST:
             raise bad(flag, f"'{spec}': expected a positive radius")
         if parts[0].strip() in names:
             raise bad(flag, f"the plane {parts[0].strip()} is given twice")
@@ -86,9 +87,9 @@ def from_options(specs: Sequence[str], flag: str = "--plane") -> Planes:
     planes = Planes(
         names,
         np.array([to_si(value, "length", unit) for value, unit in z]) if z else None,
-        np.array([to_si(value, "length", unit) for value, unit in radii]),
+        np.array([to_si(value, "length", unit) if unit else value for value, unit in radii]),
         z[0][1] if z else "",
-        radii[0][1],
+        next((unit for _, unit in radii if unit), "mm"),
         flag,
     )
     if (pair := _together(planes, range(len(names)))) is not None:

@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.read.about import HEAD
+from cli.show import bars
+from cli.show.bars import Bars
 from cli.show.files import markdown
 from cli.show.in_units import finished
 from cli.show.picture import drawn
@@ -37,11 +39,12 @@ ROWS = 36  # rows of a result that are shown
 READ = 24  # rows of an input that are shown
 LINES = 100  # lines of a file that are shown
 WIDE = 88  # characters beside each other that fit A4 and Letter
+VERDICT = "Verdict"  # of a report that begins with it
 TINY = 1e-9  # a number smaller than this may be the rounding of zero
 _THINNED = ("step", "t_s")  # of tables that begin so every k-th row is shown: they are sweeps
 
 
-Part = str | Grid
+Part = str | Grid | Bars
 
 
 @dataclass(frozen=True)
@@ -88,11 +91,15 @@ def report(
     given = list(_given(asked, () if result.shows_input else named()))
     if sheets:
         sections = list(sheets[0].sections)
-        if given:
+        if given and sections[0].title != VERDICT:
             sections.insert(0, Section("Given", given))
         if checked is not None:
             sections.append(Section("Compared with what was expected", [checked.table, checked.summary]))
         sheets[0] = replace(sheets[0], sections=sections)
+        if given and sections[0].title == VERDICT:
+            # what is wanted comes first
+            last = sheets[-1]
+            sheets[-1] = replace(last, sections=[*last.sections, Section("Given", given)])
     pages = [
         Page(
             sheet.title,
@@ -192,9 +199,11 @@ def _spaced(text: str) -> str:
     return re.sub(r"[^,:@=\s]+(?: [^,:@=\s\d]+)?", lambda found: spoken(found[0]), text).replace(",", ", ")
 
 
-def _printed(parts: Iterable[str | Table], finish: Callable[[Table], Table]) -> Iterator[Part]:
+def _printed(parts: Iterable[str | Table | Bars], finish: Callable[[Table], Table]) -> Iterator[Part]:
     for part in parts:
-        if isinstance(part, str):
+        if isinstance(part, Bars):
+            yield part
+        elif isinstance(part, str):
             if part.strip():
                 yield part
         elif part.columns and len(part.columns[0].values):
@@ -294,7 +303,7 @@ th { background: #eee; font-weight: 600; vertical-align: bottom } .n { text-alig
 td.n { white-space: nowrap } th, td { overflow-wrap: break-word } .long { overflow-wrap: anywhere } .good { color: #06632f; font-weight: 600 } .bad { color: #b00020; font-weight: 700 }
 .warning { border-left: 1mm solid #b00020; padding-left: 2mm } footer { margin-top: 4mm; font-size: 8.5pt; color: #444 }
 figure { margin: 3mm 0; break-inside: avoid } svg { display: block; max-width: 100%; height: auto; max-height: 95mm; margin: 0 auto } .rows svg { max-height: 220mm }
-.wide { overflow-x: auto } section + section { break-before: page }
+.verdict svg { max-height: 62mm } .wide { overflow-x: auto } section + section { break-before: page }
 @page { margin: 13mm 12mm } @media print { body { margin: 0; padding: 0; max-width: none } .wide { overflow: visible } }
 """
 _MARKS = {**dict.fromkeys(GOOD, "good"), **dict.fromkeys(BAD, "bad")}
@@ -330,14 +339,13 @@ def _html(report: Report) -> Iterator[str]:
     title = html.escape(report.title)
     yield '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
     yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
-    yield f"<title>{title}</title><style>{_STYLE}</style></head>\n<body>\n<h1>{title}</h1>\n"
+    yield f"<title>{title}</title><style>{_STYLE}{bars.STYLE}</style></head>\n<body>\n<h1>{title}</h1>\n"
     if report.about:
         rows = (f"<dt>{key}</dt><dd>{html.escape(value)}</dd>" for key, value in report.about)
         yield f"<dl>{''.join(rows)}</dl>\n"
-    for text in report.warnings:
-        yield f'<p class="warning">{html.escape(text)}</p>\n'
     for page in report.pages:
-        yield "<section>\n"
+        first = bool(page.sections) and page.sections[0][0] == VERDICT
+        yield '<section class="verdict">\n' if first else "<section>\n"
         if page.title:
             yield f"<h2>{html.escape(page.title)}</h2>\n"
         for name, parts in page.sections:
@@ -346,6 +354,10 @@ def _html(report: Report) -> Iterator[str]:
         if page.figure is not None:
             yield _figure(_picture(page))
         yield "</section>\n"
+    if report.warnings:
+        yield "<h3>Warnings</h3>\n"
+    for text in report.warnings:
+        yield f'<p class="warning">{html.escape(text)}</p>\n'
     yield f"<footer>{''.join(f'<p>{html.escape(text)}</p>' for text in report.closing)}</footer>\n</body></html>\n"
 
 
@@ -359,6 +371,8 @@ def _figure(drawing: str | None) -> str:
 
 
 def html_part(part: Part) -> str:
+    if isinstance(part, Bars):
+        return part.html()
     if isinstance(part, str):
         tag, text = ("pre", part.removeprefix(CODE)) if part.startswith(CODE) else ("p", part.strip("\n"))
         return f"<{tag}>{html.escape(text)}</{tag}>\n"
@@ -380,7 +394,6 @@ def html_part(part: Part) -> str:
 def _markdown(path: Path, report: Report) -> dict[Path, bytes]:
     beside: dict[Path, bytes] = {}
     lines = [f"# {_escaped(report.title)}", *(f"- {key}: {_escaped(value)}" for key, value in report.about)]
-    lines += [f"> {_escaped(text)}" for text in report.warnings]
     for page in report.pages:
         if page.title:
             lines.append(f"## {_escaped(page.title)}")
@@ -393,6 +406,8 @@ def _markdown(path: Path, report: Report) -> dict[Path, bytes]:
             lines.append(_NO_PICTURE if drawing is None else f"![{_escaped(report.title)}](<{file.name}>)")
             if drawing is not None:
                 beside[file] = drawing.encode()
+    if report.warnings:
+        lines += ["### Warnings", *(f"> {_escaped(text)}" for text in report.warnings)]
     lines += ["---", *map(_escaped, report.closing)]
     text = "\n\n".join(lines)
     # entries of a list stand below each other
@@ -400,6 +415,8 @@ def _markdown(path: Path, report: Report) -> dict[Path, bytes]:
 
 
 def _markdown_part(part: Part) -> str:
+    if isinstance(part, Bars):
+        return f"~~~\n{part.text()}\n~~~"
     if isinstance(part, Grid):
         return markdown(part).rstrip("\n")
     if part.startswith(CODE):

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from cli.show.bars import Bars
     from dalembert.results.columns import Document, Json
     from dalembert.results.way import Topic
 
@@ -36,7 +37,7 @@ class Section:
     """A part of a report below a heading of its own: paragraphs and tables."""
 
     title: str
-    parts: Sequence[str | Table]
+    parts: Sequence[str | Table | Bars]
 
 
 @dataclass(eq=False, repr=False)

@@ -19,6 +19,7 @@ from cli.cases.poses import column
 from cli.cases.quantities import SLIDE, Quantity, bounds_of, cells, in_rows, keys_of, nested
 from cli.read import options
 from cli.show.picture import shown as on_page
+from cli.show.terminal import progress_in_time
 from dalembert.angles import read_degrees
 from dalembert.arithmetic.engines import anew
 from dalembert.errors import DataError
@@ -69,6 +70,8 @@ class Motion(TableCase):
 
     study: Simulation
     analysis: Analysis
+    # the only one, whose progress a terminal shows; of many variants it is counted how many are done
+    alone: bool = False
     name: str = field(init=False)
 
     def __post_init__(self) -> None:
@@ -82,7 +85,14 @@ class Motion(TableCase):
         a, study = self.analysis, self.study
         (assembly,) = a.assemblies
         try:
-            return simulate(assembly, study.times, accuracy=study.accuracy, until=study.levels(a.mechanism))
+            with progress_in_time() if self.alone else nullcontext() as progress:
+                return simulate(
+                    assembly,
+                    study.times,
+                    accuracy=study.accuracy,
+                    until=study.levels(a.mechanism),
+                    progress=progress,
+                )
         except MechanismError:
             raise
         except ValueError as error:
@@ -247,7 +257,7 @@ class Simulation(TableStudy):
     def case(self, row: Rows | None = None) -> Motion:
         """A variant, or the mechanism itself."""
         m = self.mechanism if row is None else self.variant(row)
-        motion = Motion(self, Analysis(self.request, m, self.inputs(m, row)))
+        motion = Motion(self, Analysis(self.request, m, self.inputs(m, row)), alone=row is None)
         if len(motion.analysis.assemblies) > 1:
             raise options.bad("--branch", "simulate follows one assembly: expected its number")
         return motion

@@ -133,3 +133,26 @@ def paragraphs(*parts: str) -> str:
 def transposed(rows: Sequence[Mapping[str, Cell]]) -> dict[str, list[Cell]]:
     """Return rows as columns."""
     return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
+
+
+def with_uncertainty(value: float, uncertainty: float | None, figures: int = 4) -> str:
+    """Write a number as people do: to the place of its uncertainty, which has two figures below 3, else one.
+
+    Without one: so many figures.
+
+    >>> with_uncertainty(95.1234, 0.913), with_uncertainty(95.1234, 0.123), with_uncertainty(12345.6, 230.0)
+    ('95.1 ± 0.9', '95.12 ± 0.12', '12350 ± 230')
+    >>> with_uncertainty(2.01168, None), with_uncertainty(0.0, None), with_uncertainty(0.3, 0.0)
+    ('2.012', '0', '0.3')
+    """
+    from math import floor, isfinite, log10
+
+    if uncertainty is None or not isfinite(uncertainty) or uncertainty <= 0:
+        return f"{value:.{figures}g}"
+    place = floor(log10(uncertainty))
+    two = float(f"{uncertainty / 10**place:.2g}") < 3
+    last = place - two
+    if round(uncertainty / 10**last) == 10 and not two:
+        last += 1
+    shown = (f"{round(number / 10**last) * 10**last:.{max(-last, 0)}f}" for number in (value, uncertainty))
+    return " ± ".join(shown)

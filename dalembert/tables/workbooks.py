@@ -136,7 +136,7 @@ def read_sheet(file: str, data: bytes, wanted: str) -> Sheet:
         for row in range(top, bottom + 1):
             for column in range(left, right + 1):
                 faults[row, column] = (f"merged cells {span}", "a value in each cell")
-    hidden = unseen(data, name) if data[:4] == ZIP else Unseen()
+    hidden = unseen(data, name)
     return Sheet(file, name, [each for each in names if each != name], _texts(cells), faults, hidden)
 
 
@@ -241,6 +241,10 @@ def part_of(archive: zipfile.ZipFile, name: str) -> bytes:
 
 def unseen(data: bytes, name: str) -> Unseen:
     """Find hidden rows and columns and percentages in a sheet; nothing in a file that holds them otherwise."""
+    if data[:4] != ZIP:
+        from dalembert.tables.old_workbooks import looks
+
+        return Unseen(*looks(data, name))
     with (
         zipfile.ZipFile(io.BytesIO(data)) as archive,
         suppress(KeyError, StopIteration, ElementTree.ParseError),

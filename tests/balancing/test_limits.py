@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import islice
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -233,47 +237,89 @@ def test_uncertainties_under_limits_are_those_of_repeated_measurements(objective
     assert total == pytest.approx(float(np.trace(drawn, axis1=1, axis2=2).sum()), rel=0.6)
 
 
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::balancing.Doubtful")
-def test_campaign(first_seed: int) -> None:
-    """Rows to 200, doubled sensors, units 1e±4, conditions to 1e10: proven, or refused where rounding decides."""
-    rng = np.random.default_rng(first_seed)
-    doubtful = 0
-    for case in range(400):
+class Drawn(NamedTuple):
+    """A problem of the campaign, and by which factors of the smallest largest residual its ceilings differ from it."""
+
+    a: Complex
+    v: Complex
+    limit: Real
+    kappa: float
+    above: float
+    below: float
+
+
+def drawn(seed: int) -> Iterator[Drawn | None]:
+    """Rows to 200, doubled sensors, units 1e±4, conditions to 1e10; None where planes are dependent."""
+    rng = np.random.default_rng(seed)
+    while True:
         readings = int(rng.choice([3, 8, 24, 24, 24, 100, 200]))
         planes = int(rng.integers(1, min(9, readings) + 1))
         kappa = 10 ** rng.uniform(0, 10) if rng.random() < 0.3 and planes > 1 else 1.0
         doubled = int(rng.integers(readings // 2 + 1)) if rng.random() < 0.3 else 0
-        where = f"case {case}"
         try:
             a, v, limit = problem(
                 rng, readings, planes, kappa=kappa, doubled=doubled, scales=rng.choice([0, 0, 1, 4])
             )
         except DependentPlanes:
+            yield None
             continue
         if rng.random() < 0.3:
             limit = np.full(planes, np.inf)
-        for solve in (minimax, lambda a, v, m: least_squares(a, v, max_mass=m)):
-            try:
-                fix = solve(a, v, limit)
-            except (NotConverged, DependentPlanes):
-                assert np.linalg.cond(a) > 1e7, where
-                continue
-            floor = 1e-15 * (np.abs(v) + np.abs(a) @ np.abs(fix.corrections)).max() / fix.residual_max
-            assert fix.gap <= 1e-12 + 10 * floor, where
-            assert (np.abs(fix.corrections) <= limit).all(), where
-        if kappa > 1 or readings == planes:
+        factors = 0.0, 0.0
+        if kappa == 1 and readings > planes:
+            factors = 10 ** rng.uniform(-6, 0), rng.uniform(0.3, 0.999)
+        yield Drawn(a, v, limit, kappa, *factors)
+
+
+def holds(one: Drawn) -> bool:
+    """Whether the answer within a ceiling is proven to nine digits; every other one is, or is refused for its condition."""
+    a, v, limit = one[:3]
+    for solve in (minimax, lambda a, v, m: least_squares(a, v, max_mass=m)):
+        try:
+            fix = solve(a, v, limit)
+        except (NotConverged, DependentPlanes):
+            assert np.linalg.cond(a) > 1e7
             continue
-        least = float(minimax(a, v, limit).residual_max)
-        top = least * (1 + 10 ** rng.uniform(-6, 0))
-        fix = least_squares(a, v, max_mass=limit, max_residual=top)
-        assert fix.residual_max <= top, where
-        doubtful += fix.gap > 1e-9
-        with pytest.raises(Infeasible) as caught:
-            least_squares(a, v, max_mass=limit, max_residual=least * rng.uniform(0.3, 0.999))
-        assert caught.value.smallest == pytest.approx(least, rel=1e-9), where
+        floor = 1e-15 * (np.abs(v) + np.abs(a) @ np.abs(fix.corrections)).max() / fix.residual_max
+        assert fix.gap <= 1e-12 + 10 * floor
+        assert (np.abs(fix.corrections) <= limit).all()
+    if not one.above:
+        return True
+    least = float(minimax(a, v, limit).residual_max)
+    top = least * (1 + one.above)
+    within = least_squares(a, v, max_mass=limit, max_residual=top)
+    assert within.residual_max <= top
+    with pytest.raises(Infeasible) as caught:
+        least_squares(a, v, max_mass=limit, max_residual=least * one.below)
+    assert caught.value.smallest == pytest.approx(least, rel=1e-9)
+    return within.gap <= 1e-9
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::balancing.Doubtful")
+def test_campaign(first_seed: int) -> None:
+    """Proven, or refused where rounding decides."""
+    doubtful = 0
+    for case, one in enumerate(islice(drawn(first_seed), 400)):
+        print(f"case {case}")
+        doubtful += one is not None and not holds(one)
     # next to what cannot be met, in units far apart: a warning says so, and it is rare
     assert doubtful <= 4
+
+
+def test_a_ceiling_that_hardly_leaves_a_choice_in_units_far_apart() -> None:
+    """Case 221 of seed 77: condition 3e8, a ceiling 3e-6 above the smallest: once refused, and proven to some 1e-8."""
+    one = next(islice(drawn(77), 221, None))
+    assert one is not None
+    with pytest.warns(Doubtful, match="the limits hardly leave a choice"):
+        holds(one)
+    with pytest.warns(Doubtful):
+        fix = least_squares(
+            one.a,
+            one.v,
+            max_residual=float(minimax(one.a, one.v).residual_max) * (1 + one.above),
+        )
+    assert fix.gap < 1e-7
 
 
 @pytest.mark.parametrize("power", [-12, 12])

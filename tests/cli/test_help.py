@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from cli.app import COMMANDS
-from cli.show.commands import SHARED, told
-from cli.show.terminal import progress
+from cli.show.commands import SHARED, help_lines
+from cli.show.terminal import progress, progress_in_time
 from tests.conftest import Dalembert
 
 COMMAND = Path(sys.executable).with_name("dalembert")
@@ -65,7 +65,7 @@ def test_options_stand_in_panels_of_at_most_ten(command: str, dalembert: Dalembe
     assert further is panels[-2]
     for panel in panels:
         assert len(re.findall(r"^  -", panel, re.MULTILINE)) <= 10, panel
-    for name in told(SHARED):
+    for name in help_lines(SHARED):
         assert f"--{name.replace('_', '-')}" in page
 
 
@@ -193,3 +193,26 @@ def test_an_error_wipes_the_progress_away(monkeypatch: pytest.MonkeyPatch) -> No
         list(progress((1 / x for x in (1, 0)), 2, "rotors"))
     assert "1 of 2 rotors" in terminal.getvalue()
     assert terminal.getvalue().rpartition("\r")[2] == ""
+
+
+def test_progress_of_one_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a terminal the time reached in each of its solutions, wiped at the end; in a pipe nothing."""
+    from tests.virtualwork.let_go import double_pendulum
+    from virtualwork.intime.run import simulate
+
+    monkeypatch.setattr("cli.show.terminal.AFTER", -1.0)
+    monkeypatch.setattr("cli.show.terminal.EVERY", -1.0)
+    assembly = double_pendulum().assembly
+    plain = simulate(assembly, [0.0, 0.5])
+    for stream in (Terminal(), io.StringIO()):
+        monkeypatch.setattr(sys, "stderr", stream)
+        with progress_in_time() as progress:
+            run = simulate(assembly, [0.0, 0.5], progress=progress)
+        assert (run.angle == plain.angle).all()
+        lines = [line.strip() for line in stream.getvalue().split("\r") if line.strip()]
+        if isinstance(stream, Terminal):
+            assert lines[-1] == "simulated 0.5 of 0.5 s, solution 2"
+            assert any(line.endswith("of 0.5 s, solution 1") for line in lines)
+            assert stream.getvalue().endswith("\r")
+        else:
+            assert not lines

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import re
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +23,19 @@ CALLS = {
         *("--grade", "G2.5", "--speed", "3000rpm", "--rotor-mass", "12kg"),
     ),
     "export": ("export", "m.toml", "-o", "m.urdf"),
+    "field": ("field", "f.csv", "--blades", "12", "--max-residual", "0.7mm_s", "--zone-class", "2-rigid"),
 }
+RUNS = """run,date,sensor,amplitude_mm_s,phase_deg,trial_plane,trial_mass_g,trial_angle_deg
+initial,2025-03-11,drive end of the fan,5.2,116,,,
+trial,2025-03-11,drive end of the fan,3.9,75,A,40,20
+1,14.03.2025,drive end of the fan,0.61,200,A,88,327
+"""
 
 
 def report(dalembert: Dalembert, tmp_path: Path, call: str) -> Path:
     (tmp_path / "m.toml").write_text(FOUR_BAR)
     (tmp_path / "r.csv").write_text(ROTOR)
+    (tmp_path / "f.csv").write_text(RUNS)
     done = dalembert(
         *CALLS[call], "--report", "report.html", "--about", "title=A title of some length for a phone"
     )
@@ -45,7 +54,7 @@ def test_every_table_scrolls_by_itself(dalembert: Dalembert, tmp_path: Path) -> 
 def test_it_is_as_wide_as_the_screen(dalembert: Dalembert, tmp_path: Path, browser: Any, call: str) -> None:
     opened = Opened(browser, report(dalembert, tmp_path, call))
     try:
-        for width in (320, 390, 768):
+        for width in (320, 360, 390, 768):
             opened.browser.execute_cdp_cmd(
                 "Emulation.setDeviceMetricsOverride",
                 {"width": width, "height": 900, "deviceScaleFactor": 2, "mobile": width < 700},
@@ -58,3 +67,33 @@ def test_it_is_as_wide_as_the_screen(dalembert: Dalembert, tmp_path: Path, brows
             )
     finally:
         opened.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+@pytest.mark.slow
+def test_a_customer_s_report_is_two_pages_of_a4(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """An initial run and a trial run; the verdict, bars, what to add and the dials are on the first page."""
+    runs = "".join(line for line in RUNS.splitlines(keepends=True) if not line.startswith("1,"))
+    (tmp_path / "f.csv").write_text(runs)
+    options = ("--reading-error", "2%,2deg", "--report", "report.html")
+    done = dalembert(*CALLS["field"], *options)
+    assert done.returncode == 0, done.stderr
+    opened = Opened(browser, tmp_path / "report.html")
+    paper = {"paperWidth": 8.27, "paperHeight": 11.69, "preferCSSPageSize": False}
+    printed = opened.browser.execute_cdp_cmd("Page.printToPDF", paper)
+    assert b"/Count 2" in base64.b64decode(printed["data"])
+
+
+def test_a_customer_s_report(dalembert: Dalembert, tmp_path: Path) -> None:
+    """The verdict first, people's digits, bars held against the limit, the log's own date, warnings last."""
+    page = report(dalembert, tmp_path, "field").read_text()
+    assert "<dd>2025-03-14</dd>" in page
+    titles = re.findall(r"<h3>(.*?)</h3>", page)
+    assert titles[:3] == ["Verdict", "Vibration", "What to add now"]
+    assert titles[-1] in ("Given", "Warnings")
+    assert "Nothing to add: the vibration is within the limit." in page
+    assert page.count('<span class="track">') == 3
+    assert '<i class="after"' in page
+    assert "Leave 88 g at 327° in A on the rotor" in page
+    amount = re.search(r"<td>A</td><td>([\d.]+) ± ([\d.]+)</td>", page)
+    assert amount is not None
+    assert len(amount[2].replace(".", "").strip("0")) <= 2

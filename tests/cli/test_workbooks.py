@@ -6,10 +6,12 @@ import io
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from struct import pack
 
 import openpyxl
 import pytest
 
+from dalembert.tables.old_workbooks import looks
 from tests.conftest import Dalembert
 
 HERE = Path(__file__).parent / "workbooks"
@@ -200,3 +202,68 @@ def test_a_technicians_sheet(dalembert: Dalembert, tmp_path: Path) -> None:
         for text in (done.stdout, dalembert("field", "-", "--json", stdin=csv).stdout)
     )
     assert found == wanted
+
+
+def compound(stream: bytes) -> bytes:
+    """A compound document of sectors of 512 bytes: one of the table, one of the directory, and the stream's."""
+    count = max(8, -(-len(stream) // 512))
+    free, last, table = 0xFFFFFFFF, 0xFFFFFFFE, 0xFFFFFFFD
+    head = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(16)
+    head += pack("<HHHHH6x", 62, 3, 0xFFFE, 9, 6) + pack("<IIIIIIIII", 0, 1, 1, 0, 4096, last, 0, last, 0)
+    head += pack("<109I", 0, *[free] * 108)
+    following = [table, last, *range(3, 2 + count), last]
+
+    def entry(name: str, kind: int, first: int, size: int) -> bytes:
+        title = name.encode("utf-16-le") + bytes(2)
+        return title.ljust(64, b"\0") + pack("<HBB48xIQ", len(title), kind, 1, first, size)
+
+    directory = entry("Root Entry", 5, last, 0) + entry("Workbook", 2, 2, count * 512)
+    sectors = pack(f"<{len(following)}I", *following).ljust(512, b"\xff") + directory.ljust(512, b"\0")
+    return head + sectors + stream.ljust(count * 512, b"\0")
+
+
+def test_what_is_hidden_in_an_old_workbook() -> None:
+    """Rows, columns and percentages, of plain, short, many and computed numbers; of the sheet that is read alone."""
+
+    def record(kind: int, body: bytes) -> bytes:
+        return pack("<HH", kind, len(body)) + body
+
+    styles = b"".join(record(0xE0, pack("<HH16x", 0, number)) for number in (0, 10, 164))
+    formats = record(0x41E, pack("<HHB", 164, 4, 0) + b"0.0%")
+    end = record(0x0A, b"")
+    sheet = record(0x7D, pack("<HHHHHH", 3, 4, 2304, 0, 1, 0)) + record(
+        0x7D, pack("<HHHHHH", 5, 5, 9, 0, 0, 0)
+    )
+    for row, options in ((0, 0x100), (1, 0x120), (2, 0x100)):
+        sheet += record(0x208, pack("<HHHHHHHH", row, 0, 6, 255, 0, 0, options, 15))
+    sheet += record(0x203, pack("<HHHd", 1, 0, 1, 0.5)) + record(0x203, pack("<HHHd", 1, 1, 0, 0.5))
+    sheet += record(0x27E, pack("<HHHI", 1, 2, 2, 0)) + record(0xBD, pack("<HHHIHIH", 2, 0, 0, 0, 1, 0, 1))
+    value = pack("<d", 0.5)
+    sheet += record(0x06, pack("<HHH8s", 2, 3, 1, value)) + record(
+        0x06, pack("<HHH8s", 2, 4, 1, b"\0" * 6 + b"\xff" * 2)
+    )
+    other = record(0x208, pack("<HHHHHHHH", 7, 0, 6, 255, 0, 0, 0x20, 15))
+
+    def book(first: int, second: int) -> bytes:
+        names = ((first, b"\x05\0Other"), (second, b"\x03\x01" + "Öl1".encode("utf-16-le")))
+        return (
+            styles + formats + b"".join(record(0x85, pack("<IH", at, 0) + name) for at, name in names) + end
+        )
+
+    begin = len(book(0, 0))
+    data = compound(book(begin, begin + len(other + end)) + other + end + sheet + end)
+    rows, columns, percent = map(set, looks(data, "Öl1"))
+    assert (rows, columns, percent) == ({1}, {3, 4}, {(1, 0), (1, 2), (2, 1), (2, 3)})
+    assert list(map(set, looks(data, "Other"))) == [{7}, set(), set()]
+    # of what is damaged nothing is known
+    assert not any(looks(data[:1100], "Öl1"))
+    assert not any(looks(b"\xd0\xcf", "Öl1"))
+
+
+def test_a_hidden_row_of_an_old_workbook_is_named(dalembert: Dalembert, plain: str, tmp_path: Path) -> None:
+    data = bytearray((HERE / "masses.xls").read_bytes())
+    data[data.index(pack("<HHH", 0x208, 16, 2)) + 4 + 12] |= 0x20
+    (tmp_path / "m.xls").write_bytes(data)
+    done = dalembert("balance", "m.xls", *PLANE)
+    assert done.stdout == plain
+    assert done.stderr == "warning: m.xls: sheet 'Massen': the row 3 is hidden and takes part\n"

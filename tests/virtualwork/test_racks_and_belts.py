@@ -23,7 +23,8 @@ from virtualwork import (
     Rack,
     Torque,
 )
-from virtualwork.describe.dimensions import dimensions
+from virtualwork.describe.dimensions import changed, dimensions
+from virtualwork.describe.dimensions import value as number_at
 from virtualwork.describe.reader import read_text
 from virtualwork.describe.text import toml_text
 from virtualwork.drawing import Circle, Line, draw
@@ -436,3 +437,16 @@ def test_the_examples_stand(tmp_path: Path) -> None:
     for name in ("rack-lift", "belt-drive", "doubling-rack"):
         m = Mechanism.from_toml(EXAMPLES / name / f"{name}.toml")
         assert m.motion().assembled.all()
+
+
+@pytest.mark.parametrize("path", ["racks.1.radius", "links.rod.B.x", "links.crank.A.x", "links.rod.mass"])
+def test_sensitivities_of_a_wheel_behind_a_loop(path: str) -> None:
+    """The wheel stands at its guess where the guess places the slide: that place depends on the dimensions too."""
+    m, h = engine(), 1e-6
+    motion = m.motion(Q)
+    exact = motion.link("wheel").sensitivity(path), motion.sensitivity("effort", path)
+    there = number_at(m, path)
+    moved = [changed(m, {path: there + s * h}).motion(Q) for s in (1, -1)]
+    turned = np.angle(np.exp(1j * (moved[0].link("wheel").angle - moved[1].link("wheel").angle)))
+    assert exact[0] == pytest.approx(turned / (2 * h), rel=1e-6, abs=1e-7)
+    assert exact[1] == pytest.approx((moved[0].effort - moved[1].effort) / (2 * h), rel=1e-5, abs=1e-5)

@@ -136,9 +136,11 @@ class Description(Record):
 
     @property
     def spans(self) -> list[float]:
-        """Distances of two points of one link or of the ground, and of guides from their bodies' axes, m."""
+        """Distances of two points of one link or of the ground, of guides from their bodies' axes, and radii, m."""
         spans = [abs(a - b) for body in self.bodies.values() for a in body.values() for b in body.values()]
-        return spans + [abs(g.through) for g in self.guides if not isinstance(g.through, str)]
+        spans += [abs(g.through) for g in self.guides if not isinstance(g.through, str)]
+        wheels = [abs(rack.radius) for rack in self.racks]
+        return spans + wheels + [radius for belt in self.belts for radius in belt.radii]
 
     @cached_property
     def bodies(self) -> Mapping[str, Mapping[str, complex]]:

@@ -146,7 +146,7 @@ class Sensitivities:
 
     def _refuse(self, keys: Sequence[Key], written: Written) -> None:
         m = self.assembly.mechanism
-        if written.open_gears:
+        if not written.placed:
             raise MechanismError(
                 "sensitivity: the phase of a gear depends on links that have to be placed first"
             )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -11,10 +12,10 @@ from dalembert.arithmetic.adjoint import derivatives
 from dalembert.arithmetic.guard import guarded, own_lock
 from dalembert.arithmetic.recorded import RECORDED, Recorder, bare
 from dalembert.arithmetic.tape import Tape
-from dalembert.arithmetic.varied import Varied
+from dalembert.arithmetic.varied import Varied, made
 from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.guess import distance, sign_of_angles
-from virtualwork.describe.description import Description, joints_apart, known_by_guess
+from virtualwork.describe.description import Description, joints_apart, known_by_guess, slide_by_guess
 from virtualwork.describe.dimensions import Dimension, changed, value
 from virtualwork.describe.keys import keys_of
 from virtualwork.describe.parts import Link
@@ -25,7 +26,7 @@ from virtualwork.formulas.numbers import WRITTEN, Number
 from virtualwork.formulas.positions import State, run
 from virtualwork.formulas.recording import NEAR, Recording
 from virtualwork.plan.order import plan
-from virtualwork.plan.steps import Group, Step, Turn
+from virtualwork.plan.steps import Group, Plan, Step, Turn
 
 # what the tape of the choice says of each group
 CHOICE = ("margin", "plus", "minus", "guessed", "sign")
@@ -73,6 +74,12 @@ class Written:
         self.plan = plan(self.mechanism)
         # whether a gear's constant is that of links which the guess has to place first
         self.open_gears = any(turn.angle.gears for step in self.plan.steps for turn in _turns(step))
+        # the same of one assembly with its own signs, whose links the tape places at the guess
+        self.placed = not self.open_gears
+        if self.open_gears and not own_signs:
+            placed = _placed(self.mechanism, self.plan, assembly)
+            if placed is not None:
+                self.plan, self.placed = placed, True
         # two slides have one solution: their sign is that of any
         signs = {g.name: assembly.signs.get(g.name, 1) for g in self.plan.groups if g.kind != "Newton"}
         turning = [g.name for g in self.closed] if own_signs else assembly.turning_over
@@ -264,6 +271,44 @@ class Written:
         run(self.plan.steps, st, close)
         outputs["allowed"] = every(allowed)
         return recorder.tape(outputs)
+
+
+def _placed(m: Description, order: Plan, assembly: Assembly) -> Plan | None:
+    """The order of solution with the constants of gears, belts and racks as the guess's own pose has them.
+
+    None where a group without a closed form has to be placed for one.
+    """
+    angles, points = known_by_guess(m)
+    st = State([bare(q) for q in m.at], kind=WRITTEN)
+    steps: list[Step] = []
+
+    def close(group: Group, st: State) -> None:
+        Case(group, bare).solve(st, assembly.signs.get(group.name, 1), bare(m.size))
+        for body in group.members:
+            st.angle[body] = WRITTEN.angle(st.turn[body])
+
+    for step in order.steps:
+        if isinstance(step, Group) and any(tie.angle.gears for tie in step.ties):
+            return None
+        if isinstance(step, Turn) and step.angle.gears:
+            of, rest = step.angle, st.whole(step.angle)
+            if len(of.gears) > 1 or rest is None:
+                return None
+            ((number, share),) = of.gears
+            guess: Number = angles.get(step.body, 0.0) if isinstance(step.body, str) else None
+            if isinstance(step.body, int):
+                guess = slide_by_guess(m, step.body, angles, points) or 0.0
+            # it stands at its guess there
+            recorded = bare(guess) - bare(rest) + bare(of.const)
+            const = made(float(complex(of.const).real) + share * assembly.phases[number], recorded)
+            step = Turn(step.body, replace(of, const=const, gears=()))
+        steps.append(step)
+        if isinstance(step, Group) and step.kind == "Newton":
+            if any(turn.angle.gears for later in order.steps[len(steps) :] for turn in _turns(later)):
+                return None
+            break
+        run([step], st, close)
+    return replace(order, steps=(*steps, *order.steps[len(steps) :]))
 
 
 def every(conditions: Iterable[Number], found: Number = 1.0, otherwise: float = -1.0) -> Number:

@@ -217,8 +217,7 @@ class Case:
 
     def __init__(self, group: Group, constant: Callable[[Number], Number] | None = None) -> None:
         closure = group.closures[0]
-        looped = {t.body for t in closure.terms}
-        tie = {str(t.body): t.angle for t in group.ties if t.body in looped}
+        tie = {str(t.body): t.angle for t in group.ties}
         owner = {b: b for b in group.angles} | {
             b: next(str(base) for base, _ in a.bases if base in group.angles) for b, a in tie.items()
         }

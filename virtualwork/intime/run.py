@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -188,10 +189,14 @@ def simulate(
     speed: ArrayLike | None = None,
     accuracy: float = 1e-9,
     until: Mapping[str, float] | None = None,
+    progress: Callable[[float, float, int], None] | None = None,
 ) -> Run:
-    """Let go of the inputs; see `Mechanism.simulate`."""
+    """Let go of the inputs; see `Mechanism.simulate`.
+
+    `progress` is called after every step, or some, with the time reached, the last time and the number of the solution.
+    """
     with assembly.lock:
-        return _simulated(assembly, times, angle, speed, accuracy, until)
+        return _simulated(assembly, times, angle, speed, accuracy, until, progress)
 
 
 def _simulated(
@@ -201,6 +206,7 @@ def _simulated(
     speed: ArrayLike | None,
     accuracy: float,
     until: Mapping[str, float] | None,
+    progress: Callable[[float, float, int], None] | None,
 ) -> Run:
     m, t = assembly.mechanism, rising(times)
     k = len(m.inputs)
@@ -214,11 +220,17 @@ def _simulated(
     scale = np.array(equations.scale)
     levels = levels_of(m.inputs, until)
     tolerance, end = max(LEAST, FIRST * accuracy), float(t[-1])
-    start = float(t[0]), q, v
-    fine = travel(own, start, end, tolerance, levels, DormandPrince(), accuracy)
+    start, solutions = (float(t[0]), q, v), count(1)
+
+    def reports() -> Callable[[float], None] | None:
+        """What the next solution reports to."""
+        number = next(solutions)
+        return None if progress is None else lambda reached: progress(reached, end, number)
+
+    fine = travel(own, start, end, tolerance, levels, DormandPrince(), accuracy, progress=reports())
     if fine.stiff:
         # what is stiff somewhere is from the beginning
-        fine = travel(own, start, end, tolerance, levels, Radau(), accuracy)
+        fine = travel(own, start, end, tolerance, levels, Radau(), accuracy, progress=reports())
     for tries in range(TRIES):
         coarse, method = fine, fine.legs[0].method
         # near change points every solution is interpolated from other poses
@@ -227,7 +239,7 @@ def _simulated(
         last = coarse.end if coarse.ended == UNDECIDED else end
         # nothing is asked below rounding
         finer = max(LEAST, tolerance / (GAIN + 1))
-        fine = travel(ways, start, last, finer, levels, method, accuracy, coarse)
+        fine = travel(ways, start, last, finer, levels, method, accuracy, coarse, reports())
         if last < end and fine.ended == "end":
             fine.ended = coarse.ended
         coarse.backwards()
@@ -257,7 +269,7 @@ def _error(fine: Travel, coarse: Travel, t: Reals, part: float) -> Reals:
 def _least(fine: Travel, t: Reals) -> Reals:
     """What no shorter steps make smaller: rounding, and interpolation near change points, (n, k)."""
     q, v, a, _ = fine.at(t)
-    return np.asarray(rounding(t, q, v, a) + fine.blur(t)[:, None])
+    return np.asarray(np.maximum(rounding(t, q, v, a), fine.noise(t)) + fine.blur(t)[:, None])
 
 
 def _arrives(fine: Travel, coarse: Travel, levels: Levels, part: float) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -21,6 +21,8 @@ from virtualwork.intime.path import Method, Path, followed
 from virtualwork.intime.walk import MOST, Walk
 from virtualwork.intime.watch import Floats, noise
 
+# standard deviations of rounding that count
+DEVIATIONS = 3.0
 # changes of coordinates in one simulation
 CHANGES = 10_000
 # changes of the mode of friction at one time, for each joint that rubs
@@ -113,6 +115,23 @@ class Travel:
                 before, place = float(ends[-1]), float(way[-1])
         return np.interp(times, np.concatenate(t), np.concatenate(places))
 
+    def noise(self, times: Reals) -> Reals:
+        """How far the coordinates may be wrong for what rounds in their accelerations, at times between nodes too, (n, k)."""
+        k = self.legs[0].equations.k
+        t, places, place = [self.legs[0].nodes.t[:1]], [np.zeros((1, k))], np.zeros(k)
+        before = np.zeros(k)
+        for leg in self.legs:
+            if leg.steps:
+                h = np.diff(leg.nodes.t)[:, None]
+                # a step takes each stage with its weight, and each of them rounds by itself
+                each = DEVIATIONS * leg.noise * float(np.linalg.norm(leg.method.stages[1])) * h
+                squares = before + np.cumsum(each**2, axis=0)
+                way = place + np.cumsum(np.sqrt(squares) * h, axis=0)
+                t, places = [*t, leg.nodes.t[1:]], [*places, way]
+                before, place = squares[-1], way[-1]
+        nodes, whole = np.concatenate(t), np.concatenate(places)
+        return np.stack([np.interp(times, nodes, of) for of in whole.T], axis=1)
+
     @property
     def halves(self) -> Floats:
         """The times of the nodes, and in the middle between them."""
@@ -178,6 +197,7 @@ def travel(
     method: Method,
     accuracy: float,
     like: Travel | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Travel:
     """Go from a state of the inputs to a time, or until an input has a value.
 
@@ -233,7 +253,7 @@ def travel(
         most = MOST if like is None else MOST + 2 * like.steps
         path = Path(coordinates, method, inputs)
         way = path, end, tolerance, watches, equations.stops, monitor, most - found.steps, left, plan
-        Walk(*way).go(t, q, v, work)
+        Walk(*way, progress).go(t, q, v, work)
         found.legs.append(path)
         found.ended = path.ended
         if isinstance(equations, Rubbing):

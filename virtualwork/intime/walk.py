@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,6 +74,8 @@ class Walk:
     budget: int
     left: Mapping[str, float]
     plan: Sequence[float]
+    # told how far it has come
+    progress: Callable[[float], None] | None = None
     # by how much the next step may be longer, and how many have been limited by the method's stability
     grow: float = GROW
     stiff: float = 0.0
@@ -108,6 +110,8 @@ class Walk:
                 self.left, by_code = {}, False
             else:
                 self._steps()
+            if self.progress is not None:
+                self.progress(path.end)
 
     # --- step by step ---------------------------------------------------------------------------------------------
     def _steps(self) -> None:

@@ -209,6 +209,14 @@ class _Planner:
         moving = {name for kind, name in block if kind in "xy"} - set(self.anchors)
         closures, trees = self._loops(moving)
         unknown = tuple(x for x in open_ if isinstance(x, int))
+        # a wheel that a rack of the loops turns, and that holds none of them, follows
+        looped = {x for closure in closures for t in closure.terms for x in (t.body, t.slide)}
+        after = tuple(
+            tie
+            for tie in own
+            if tie.body not in looped and all(isinstance(base, int) for base, _ in tie.angle.bases)
+        )
+        own = tuple(tie for tie in own if tie not in after)
         if closures or free or unknown:
             held = {*free, *(t.body for t in own), *moving}
             links = tuple(b for b in self.m.links if b in held)
@@ -217,6 +225,9 @@ class _Planner:
             found: tuple[Coordinate, ...] = (*group.members, *unknown, *group.tied_slides)
             for x in found:
                 self._known(x)
+        for tie in after:
+            self.steps.append(tie)
+            self._known(tie.body)
         self.anchors.update(trees)
         self._settle()
 
@@ -232,10 +243,8 @@ class _Planner:
         if len(group.closures) != 1 or len(group.angles) + len(group.slides) != 2:
             return "Newton"
         terms = group.closures[0].terms
-        looped: set[Coordinate | None] = {*(t.body for t in terms), *(t.slide for t in terms)}
         own = {body: body for body in group.angles}
-        # what only turns along with the loop does not hold it
-        for tie in [tie for tie in group.ties if tie.body in looped]:
+        for tie in group.ties:
             if isinstance(tie.body, int):
                 return "Newton"
             bases = [(b, r) for b, r in tie.angle.bases if b in group.angles]
