@@ -91,8 +91,10 @@ class _Rotor:
             yield _people(b, solved, i, here=False)
             yield from self.parts("split")
         if on:
-            leave = "" if self.trims else "Or l"
-            yield f"{leave or 'L'}eave {on} on the rotor, as in its last run, and ADD:"
+            needed = "" in Trim(b, solved).reasons[i]
+            leave = "Leave" if self.trims else "Or leave"
+            add = "and ADD:" if needed else "and add nothing; the trim would be:"
+            yield f"{leave} {on} on the rotor, as in its last run, {add}"
             yield _people(b, solved, i, here=True)
             yield from self.parts("trim_split")
 
