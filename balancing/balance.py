@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
 
     from balancing.rounding import Bounds, Solved
+    from dalembert.page import Page
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -75,6 +76,21 @@ class Balance:
         else:
             raise ValueError(f"'{of}': expected corrections or residual")
         return table({names[0]: np.abs(values), names[1]: np.degrees(angle_of(values))}, ("rotor", axis))
+
+    def page(self, sensors: Sequence[str] = (), planes: Sequence[str] = (), amplitude: str = "") -> Page:
+        """Return the machine's sheet, a page that computes corrections and trim of readings typed into it; names as in `plot`.
+
+        ValueError of several machines, of minimax or with limits: it computes least squares.
+        """
+        from balancing.sheet import machine_sheet
+
+        limited = self.of_largest or self.max_mass is not None or self.max_residual is not None
+        if self.influence.ndim > 2 or limited:
+            raise ValueError("a sheet is of one machine, and computes least squares without limits")
+        s, p = self.influence.shape
+        names = [list(given) or [str(i + 1) for i in range(n)] for given, n in ((sensors, s), (planes, p))]
+        more: dict[str, Any] = {"weights": self.weights, "ridge": self.ridge, "amplitude_unit": amplitude}
+        return machine_sheet(self.influence, self.initial, *names, **more)
 
     def plot(
         self,

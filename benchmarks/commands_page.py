@@ -10,7 +10,7 @@ from typer.core import TyperGroup
 
 from cli.app import COMMANDS, build
 from cli.examples.command import describe
-from cli.show.commands import SHARED, Command, told
+from cli.show.commands import SHARED, Command, help_lines
 
 _HEAD = """# Commands and options
 
@@ -24,7 +24,7 @@ What tables and quantities may look like, and what is written: [tables](tables.m
 def page() -> Iterator[str]:
     """Yield the lines of the page."""
     yield from _HEAD.splitlines()
-    of_all = told(SHARED)
+    of_all = help_lines(SHARED)
     shared: dict[str, list[tuple[str, str]]] = {}
     for name, (_, line) in COMMANDS.items():
         group = typer.main.get_command(build(name))
@@ -37,7 +37,7 @@ def page() -> Iterator[str]:
         parameters = {param.name or "" for param in command.get_params(context)}
         solves = "json" in parameters
         # --about may be a value of the command itself too
-        alike = [each for each in of_all if solves and each not in command.told]
+        alike = [each for each in of_all if solves and each not in command.lines]
         for heading, records in command.panels_of(context, without=alike).items():
             yield from _table(heading, records)
         if solves and not shared:

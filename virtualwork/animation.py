@@ -303,8 +303,8 @@ def _comes_back(series: Series, link: str) -> bool:
     return bool(gap < 1e-6)
 
 
-def of_motion(poses: Poses, drawing: Drawing, forces: Forces | None) -> Page:
-    """Return the page of one motion with the columns of its table, and of its joint forces."""
+def of_motion(poses: Poses, drawing: Drawing, forces: Forces | None, note: str = "") -> Page:
+    """Return the page of one motion with the columns of its table, and of its joint forces; `note` is what it says too."""
     table = columns(poses)
     over = list(table)[: poses.inputs.shape[1]]
     del table["assembled"]
@@ -312,7 +312,7 @@ def of_motion(poses: Poses, drawing: Drawing, forces: Forces | None) -> Page:
     arrows = [JointForce.of(*pair) for pair in pairs]
     if forces is not None:
         table |= force_columns(forces, pairs)
-    return moving_page(poses.mechanism.name, [Series(poses, drawing, plain(table), over, arrows)])
+    return moving_page(poses.mechanism.name, [Series(poses, drawing, plain(table), over, arrows)], note=note)
 
 
 def force_columns(forces: Forces, pairs: Iterable[tuple[Joint, str, str]]) -> dict[str, ArrayLike]:

@@ -8,7 +8,7 @@ What a tape has not is left to a page that replays: `refused` says what.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -19,7 +19,7 @@ from dalembert.arithmetic.engines.javascript import engine, written
 from dalembert.arithmetic.recorded import Number, Real, bare
 from dalembert.arithmetic.tape import Tape
 from dalembert.page import Page, Shown, packed
-from dalembert.units import UNITS, to_si
+from dalembert.page.typed import units
 from virtualwork.animation import JointForce, Series, moving_page
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError
@@ -28,11 +28,13 @@ from virtualwork.describe.dimensions import Dimension, changed, dimensions, valu
 from virtualwork.describe.text import toml_text
 from virtualwork.drawing import Circle, Coil, Drawing, Line, draw
 from virtualwork.family.written import Written
+from virtualwork.forces import Forces
 from virtualwork.formulas.asked import FORCES, Key, names
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.poses import Poses
 from virtualwork.picture.paper import travel_of
-from virtualwork.quantities import Quantity
+from virtualwork.quantities import Quantity, places
+from virtualwork.quantities import forces as quantities_of_forces
 
 ORDERS = 2
 """How often places are differentiated in time."""
@@ -109,6 +111,8 @@ class Formulas:
             return "the speed follows a law in time"
         if forces and m.friction:
             return "friction is found by iteration"
+        if {g.name: g.kind for g in self.written.plan.groups} != {g.name: g.kind for g in own.plan.groups}:
+            return "its loops have a closed form for these numbers alone"
         if self.written.open_gears:
             return "a gear's phase depends on links that the guess places"
         if not self.written.recording.takes(keys):
@@ -147,21 +151,16 @@ class Formulas:
         written = self.written
         groups = written.plan.groups
         closed = [g.name for g in written.closed]
-        iterated = [g for g in groups if g.kind == "Newton"]
         every = ("closed", *(g.name for g in groups))
         found = {
             "pose": written.tape((*self.keys, every)),
             "choice": written.choice,
             "margins": written.tape([("margin", name) for name in closed]),
-            "short": written.tape([("short", g.name) for g in groups if g.kind != "Newton"]),
+            "short": written.short,
             "drawn": written.recording.recorder.tape(dict(drawn)),
         }
-        if iterated:
-            keys: list[Key] = []
-            for g in iterated:
-                keys.append(("open loops", g.name))
-                keys += [("unknown", g.name, i) for i in range(len(g.angles) + len(g.slides))]
-            found["steps"] = written.tape(keys)
+        if any(g.kind == "Newton" for g in groups):
+            found["steps"] = written.steps
         if self.mechanism.torsion_springs:
             springs = range(len(self.mechanism.torsion_springs))
             found["twists"] = written.tape([("twist", i) for i in springs])
@@ -309,30 +308,6 @@ def handles(m: Description) -> list[list[Any]]:
     return found
 
 
-def units(kinds: Iterable[str]) -> dict[str, dict[str, list[float]]]:
-    """What can be typed: every unit of these dimensions, and what it is in SI and radians, as a ratio."""
-    found = {}
-    for kind in dict.fromkeys(kinds):
-        listed = UNITS.get(kind, {})
-        si = min(listed, key=lambda unit: abs(float(to_si(1.0, kind, unit)) - 1.0), default="")
-        # the SI unit first
-        order = sorted(listed, key=lambda unit: unit != si)
-        found[kind] = {spelled(unit): [float(x) for x in listed[unit]] for unit in order}
-    return found
-
-
-def spelled(unit: str) -> str:
-    """A unit of a header as people write it.
-
-    >>> spelled("m_s2"), spelled("N_m"), spelled("N_s_per_m"), spelled("kg_m3")
-    ('m/s2', 'N m', 'N s/m', 'kg m3')
-    """
-    above, per, below = unit.partition("_per_")
-    if not per and re.search(r"[a-z]_s[23]?$", above):
-        above, per, below = above.rpartition("_")
-    return above.replace("_", " ") + (f"/{below.replace('_', ' ')}" if per else "")
-
-
 def computing_page(
     poses: Poses,
     columns: Mapping[str, tuple[Quantity | int, Shown]],
@@ -378,7 +353,8 @@ def computing_page(
 
     def computed() -> tuple[str, dict[str, Any]]:
         quantities: dict[str, dict[str, Any]] = {}
-        for each in named:
+        # of two joints of one name on one link that which has the number
+        for each in sorted(named, key=lambda one: not one.key):
             for word in each.names:
                 quantities.setdefault(word, formulas.column(each))
         places, numbers = drawn_numbers(drawing, draw(formulas.written.mechanism, travel), formulas)
@@ -394,3 +370,43 @@ def computing_page(
         return f"{engine()}\nconst tapes = {{\n{tapes}\n}};\n", {"model": model}
 
     return moving_page(m.name, [series, *others], computed=computed)
+
+
+def page_of(poses: Poses, drawing: Drawing, forces: Forces | None = None, over: Sequence[float] = ()) -> Page:
+    """Return the page of one motion: it computes itself where its formulas can be written down, else it replays and says why.
+
+    Parameters
+    ----------
+    drawing : Drawing
+        What a page that replays draws.
+    forces : Forces, optional
+        Those of the motion, where they are to be there too.
+    over : sequence of float
+        The input of the pose that is shown at first.
+    """
+    m = poses.mechanism
+    named = places(m, ORDERS)
+    moves = any(np.any(rate) for rates in poses.rates for rate in rates)
+    listed = [each for each in named if not each.order or moves]
+    arrows: list[JointForce] = []
+    if forces is not None:
+        pairs = forces.reactions.order.pairs
+        every = quantities_of_forces(m, pairs)
+        named += every
+        listed += [each for each in every if each.key and not each.reverse]
+        arrows = [JointForce.of(*pair) for pair in pairs]
+    degree = float(np.pi / 180)
+    several = len(m.inputs) > 1
+    columns: dict[str, tuple[Quantity | int, Shown]] = {}
+    for j, entry in enumerate(m.inputs):
+        header = f"{entry.name}_input_m" if entry.is_slide else f"{entry.name}_input_deg"
+        header = header if several else header.removeprefix(f"{entry.name}_")
+        columns[header] = j, Shown((), header, 1.0 if entry.is_slide else degree)
+    for each in listed:
+        columns[each.header] = each, Shown((), each.header, degree if each.turns else 1.0)
+    made = computing_page(poses, columns, named, arrows, first=over or None)
+    if isinstance(made, Page):
+        return made
+    from virtualwork.animation import of_motion
+
+    return of_motion(poses, drawing, forces, f"This page replays what was computed: {made}.")

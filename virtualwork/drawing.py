@@ -321,7 +321,7 @@ def _wheels(mechanism: Description, gear: Gear) -> Iterator[Circle]:
     """
     arm = mechanism.bodies[gear.arm]
     axes = [_axis(mechanism, body, gear.arm) for body in gear.links]
-    if gear.ratio == 1 or gear.arm in gear.links or "" in axes or axes[0] == axes[1]:
+    if complex(gear.ratio) == 1 or gear.arm in gear.links or "" in axes or axes[0] == axes[1]:
         return
     second = abs(arm[axes[1]] - arm[axes[0]]) / abs(1 - gear.ratio)
     for body, axis, radius in zip(gear.links, axes, (abs(gear.ratio) * second, second), strict=True):

@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from virtualwork.branch.assembly import Assembly
@@ -18,6 +19,7 @@ from virtualwork.motion import Motion
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from dalembert.page import Page
     from virtualwork.describe.dimensions import Dimension
     from virtualwork.evaluator import Evaluator
     from virtualwork.family.design import Design
@@ -142,6 +144,12 @@ class Mechanism(Description):
         array([[0., 6.]])
         """
         return Motion(self.assembly, angle, speed, acceleration, jerk)
+
+    def page(self, over: ArrayLike | None = None, forces: bool = False) -> Page:
+        """Return the page that computes (`Motion.page`) over inputs (n,) or (n, k), rad or m; default: a turn from the own pose."""
+        start = self.motion().inputs
+        turn = np.linspace(0.0, 0.0 if len(self.inputs) > 1 or self.inputs[0].is_slide else 2 * np.pi, 361)
+        return self.motion(start + turn[:, None] if over is None else over).page(forces)
 
     def simulate(
         self,

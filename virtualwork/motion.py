@@ -29,16 +29,13 @@ from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.positions import EvenSweep
 from virtualwork.parts_of_motion import LinkMotion, PointMotion, SlideMotion
+from virtualwork.pictured import Pictured
 from virtualwork.plan.steps import Step
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import FigureBase
     from pandas import DataFrame
 
-    from dalembert.page import Page
     from virtualwork.digits.estimates import Estimates
-    from virtualwork.drawing import Drawing
     from virtualwork.family.sensitivity import Sensitivities
     from virtualwork.forces import Forces
     from virtualwork.formulas.lanes import Lanes
@@ -49,7 +46,7 @@ ENDS = 10
 
 
 @guarded
-class Motion:
+class Motion(Pictured):
     """Position, velocity, acceleration, jerk and forces over given inputs, on demand.
 
     `Mechanism.motion` makes one. See there for the parameters.
@@ -351,55 +348,6 @@ class Motion:
         if what == "shaking moment":
             return np.asarray(self.derivative(("shaking moment",), path))
         raise ValueError(f"'{what}': expected effort, shaking force or shaking moment")
-
-    # --- as a picture -----------------------------------------------------------------------------------------------
-    @cached_property
-    def drawing(self) -> Drawing:
-        """What the mechanism is drawn as, its guides as long as they are used; `at(shape.body, z)` carries shapes along."""
-        from virtualwork.picture.paper import shapes_of
-
-        return shapes_of(self.poses)
-
-    def plot(self, points: Sequence[str] | None = None, figure: FigureBase | None = None) -> Axes:
-        """Draw the mechanism to scale and the paths of points (default: of all that are no joint); return the axes.
-
-        Without a figure it is a new one of pyplot's; without matplotlib (the extra `plot`) an ImportError.
-        """
-        from virtualwork.picture.paper import on_paper
-
-        return on_paper(self.poses, points, figure)
-
-    def plot_curves(self, *names: str, figure: FigureBase | None = None) -> NDArray[np.object_]:
-        """Draw `H.x`, `coupler.omega` … against the input, a panel for each unit; return their axes."""
-        from virtualwork.picture.over_input import curves
-
-        return curves(self.poses, names, figure)
-
-    def animate(self, forces: bool = False) -> Page:
-        """Return a page that moves: the mechanism over these poses with play, slider, curves and values.
-
-        A notebook shows it; `.save("motion.html")` writes it to a file that any browser opens.
-
-        Parameters
-        ----------
-        forces : bool
-            Draw the joint forces too.
-
-        Raises
-        ------
-        ValueError
-            More poses than a page can hold.
-
-        Examples
-        --------
-        >>> from virtualwork import Input, Link, Mechanism
-        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 2})}, inputs=Input(link="crank"))
-        >>> "P_vx_m_s" in crank.motion(np.linspace(0, 6, 37), speed=3.0).animate().html
-        True
-        """
-        from virtualwork.animation import of_motion
-
-        return of_motion(self.poses, self.drawing, self.dynamics if forces else None)
 
     # --- as a table -------------------------------------------------------------------------------------------------
     def to_frame(self) -> DataFrame:

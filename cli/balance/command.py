@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli.read import options
+from cli.show.commands import ShowOptions, suffix_among
 from cli.show.output import command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.read.planes import Planes
-    from cli.show.commands import ShowOptions
     from cli.show.result import Result
     from dalembert.results.way import Topic
 
@@ -39,6 +40,7 @@ How: the tolerance:
   rotor_mass MASS  Mass of the rotor, such as 12kg.
   permissible UNBALANCE  Permissible residual unbalance, such as 30g_mm, in place of a grade.
   bearings Z1:Z2  The bearing planes, where the tolerance holds; with --speed also the forces in them.
+  page FILE.html  Write a page with the masses to edit, which computes the corrections itself.
 Further options (docs/commands.md describes them):
   mode_count K  Take the first K modes of --modes.
   rigid  With --modes: force and couple vanish too (N + 2 planes).
@@ -66,6 +68,7 @@ def run(
     mode_count: Annotated[int | None, typer.Option(min=1)] = None,
     rigid: bool = False,
     workers: Annotated[int, typer.Option(min=1)] = 1,
+    page: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None,
     *,
     show: ShowOptions,
 ) -> Result:
@@ -89,7 +92,10 @@ def run(
     if modes is None:
         options.refuse("needs --modes", mode_count=mode_count, rigid=rigid)
     else:
-        options.refuse("shows rigid balancing: it does not go with --modes", steps=show.steps, mass=mass)
+        options.refuse(
+            "shows rigid balancing: it does not go with --modes", steps=show.steps, mass=mass, page=page
+        )
+    options.refuse("takes the planes as they are: it does not go with --mass", page=page and mass)
     shapes = None
     if modes is not None:
         from cli.balance.modes import read_modes
@@ -132,8 +138,14 @@ def run(
 
         return way(balancing)
 
+    def sheet() -> bytes:
+        from cli.balance.page import sheet
+
+        return sheet(balancing).html.encode()
+
     return Result(
         tables=tables(balancing),
+        beside={} if page is None else {page: sheet},
         head={"correction": "remove" if remove else "add"},
         figure=figure,
         way=way,

@@ -130,10 +130,10 @@ def _rate(b: MovingBody) -> Topic:
 
 
 def _principal(b: MovingBody) -> Topic:
-    found = b.parts.whole.principal
-    free = bool(free_axes(found.moments))
-    axes = own_axes(found)
-    moments = _list(found.moments)
+    principal = b.parts.whole.principal
+    free = bool(free_axes(principal.moments))
+    axes = own_axes(principal)
+    moments = _list(principal.moments)
     head: dict[str, Any] = {
         "principal_kg_m2": moments,
         "principal_axes": [_list(axis) for axis in axes],
@@ -149,7 +149,7 @@ def _principal(b: MovingBody) -> Topic:
             else "All three moments are equal: any axes will do; those shown are the body's own."
         )
     columns: list[Column] = [names("axis", ["1", "2", "3"], None)]
-    columns.append(number("moment", "inertia", found.moments, place=None))
+    columns.append(number("moment", "inertia", principal.moments, place=None))
     columns += [number(f"n_{a}", "number", axes[:, k], place=None) for k, a in enumerate(AXES)]
     if b.moving:
         w, h = axes @ b.motion.omega, axes @ b.motion.momentum

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from cli.cases.case import Case
-    from cli.cases.options import Asked
+    from cli.cases.options import Options
     from cli.cases.sought import Found
     from cli.show.commands import ShowOptions
     from dalembert.results.way import Topic
@@ -149,15 +149,15 @@ class Call:
     """The number that --find asked for."""
 
     @classmethod
-    def of(cls, asked: Asked, show: ShowOptions, request: Request) -> Call:
+    def of(cls, own: Options, show: ShowOptions, request: Request) -> Call:
         """Read the file, change its numbers, and lay out the cases."""
         with naming(request.file):
-            mechanism, bare, remarks, about = load(asked.file)
-            if asked.set:
-                mechanism = assigned(mechanism, bare, asked.set)
-            varied, moved = grids(mechanism, asked.at, asked.over, asked.cases, bare, remarks)
+            mechanism, bare, remarks, about = load(own.file)
+            if own.set:
+                mechanism = assigned(mechanism, bare, own.set)
+            varied, moved = grids(mechanism, own.at, own.over, own.cases, bare, remarks)
             found = None
-            name, wanted = getattr(asked, "find", None), getattr(asked, "so_that", None)
+            name, wanted = getattr(own, "find", None), getattr(own, "so_that", None)
             if (name is None) != (wanted is None):
                 raise bad(
                     "--find" if name is None else "--so-that", "expected --find NAME --so-that QUANTITY=VALUE"
@@ -169,7 +169,7 @@ class Call:
                     raise bad("--find", "expected one pose of one mechanism, such as --at 60deg")
                 found = find(mechanism, bare, request, moved, name, wanted)
                 mechanism = found.mechanism
-        workers = getattr(asked, "workers", None) or 1
+        workers = getattr(own, "workers", None) or 1
         return cls(request, show, mechanism, bare, remarks, about, varied, moved, workers, found)
 
     def refuse_inputs(self, message: str) -> None:

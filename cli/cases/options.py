@@ -23,5 +23,5 @@ WORKERS = """
 """
 
 
-class Asked(SimpleNamespace):
+class Options(SimpleNamespace):
     """The values of a command's own options, by their names."""

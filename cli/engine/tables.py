@@ -130,13 +130,13 @@ def counterweights(e: Engine) -> Table:
 
 def shafts(e: Engine) -> Table:
     """A row for each."""
-    found = e.shaft_unbalances
+    shaft_unbalances = e.shaft_unbalances
     columns = [
         names("order", [s.order for s in e.shafts]),
         number("z", "length", [s.z for s in e.shafts], e.cylinders.length_unit),
         names("direction", ["against" if s.against else "with" for s in e.shafts]),
-        number("unbalance", "unbalance", np.abs(found), e.cylinders.unbalance_unit),
-        number("angle", "angle", degrees(found)),
+        number("unbalance", "unbalance", np.abs(shaft_unbalances), e.cylinders.unbalance_unit),
+        number("angle", "angle", degrees(shaft_unbalances)),
     ]
     if not e.shafts:
         return Table([], place="shafts[]", documented=columns)

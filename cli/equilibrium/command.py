@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cli.cases.options import CASES, FILE, WORKERS, Asked
+from cli.cases.options import CASES, FILE, WORKERS, Options
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
@@ -15,8 +15,8 @@ EXAMPLE = "desk-lamp"
 OPTIONS = f"{FILE}{CASES}{WORKERS}"
 
 
-@declared_command(OPTIONS, Asked)
-def run(asked: Asked, show: ShowOptions) -> Result:
+@declared_command(OPTIONS, Options)
+def run(own: Options, show: ShowOptions) -> Result:
     """Find the positions in which a mechanism rests under its loads without effort, and whether stably.
 
     --over or --cases of an input give the range that is searched; without them it is a whole turn, of a slide two sizes
@@ -26,8 +26,8 @@ def run(asked: Asked, show: ShowOptions) -> Result:
     from cli.cases.call import Call
     from cli.equilibrium.rest import Equilibria
 
-    call = Call.of(asked, show, Request(asked.file))
-    if asked.at:
+    call = Call.of(own, show, Request(own.file))
+    if own.at:
         from cli.read.options import bad
 
         raise bad(

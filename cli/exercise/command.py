@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,7 +26,9 @@ What:
   students NUMBER|ROSTER.csv  How many students, or a table with a column student; others are kept (default 1).
   seed N  Random seed of the draws (default 1).
   folder -o --output FOLDER  Where the sheets, answers.csv, key.csv, solutions.html and moodle.xml go.
+  system --for prairielearn|numbas  Write the questions for this system too; repeatable.
 """
+SYSTEMS = ("prairielearn", "numbas")
 MOST = 2000
 
 
@@ -34,6 +37,7 @@ def _run(
     students: str = "1",
     seed: int = 1,
     folder: str | None = None,
+    system: list[str] | None = None,
 ) -> Result:
     """Make the variants of an exercise for a class: a sheet for each student, a table for the answers, key and solutions.
 
@@ -56,6 +60,9 @@ def _run(
 
     if folder is None:
         raise options.bad("-o", "expected -o FOLDER, where the sheets go")
+    for name in system or ():
+        if name not in SYSTEMS:
+            raise options.bad("--for", f"'{name}': expected {' or '.join(SYSTEMS)}")
     exercise = read_exercise(file)
     warnings = list(exercise.warnings)
     people = _students(students)
@@ -74,6 +81,10 @@ def _run(
         files["solutions.html"] = solutions(exercise, people, drawn, drawings)
         slips = {id(variant): candidates(variant) for variant in dict.fromkeys(drawn)}
         files["moodle.xml"] = moodle(exercise, people, drawn, drawings, slips)
+        for name in system or ():
+            # cli.exercise.prairielearn, cli.exercise.numbas
+            questions = getattr(import_module(f"cli.exercise.{name}"), name)
+            files |= questions(exercise, drawn, drawings, slips)
         put(Path(folder), files)
         made = len({id(variant) for variant in drawn})
         result = Result(
@@ -134,10 +145,15 @@ def _students(text: str) -> list[Student]:
 
 
 def _show(result: Result, given: ShowOptions, asked: object) -> None:
-    """Show the result as every command does; into a pipe the note stands in place of the key."""
-    if not given.json:
-        given.text = True
-    show(result, given, {})
+    """Say what was written; with --json the document with the key."""
+    import typer
+
+    if given.json:
+        show(result, given, {})
+        return
+    for line in result.warnings:
+        typer.echo(f"warning: {line}", err=True)
+    typer.echo(result.notes(), nl=False)
 
 
-run = with_options(_run, OPTIONS, ("json", "text", "no_color"), _show)
+run = with_options(_run, OPTIONS, ("json",), _show)

@@ -54,12 +54,10 @@ class Recomputed:
     def slips(self, k: int) -> list[Slip]:
         """Return the slips of a question: of its answer alone, of other assemblies, of the data."""
         answer = self.variant.answers[k]
-        slips = [*_final(answer), *self._siblings(k), *self._assemblies(k)]
-        for text, values in self._runs:
-            value = values[k]
-            if value is not None:
-                slips.append(Slip(text, value))
-        return slips
+        own = [*_final(answer), *self._siblings(k), *self._assemblies(k)]
+        data = [Slip(text, value) for text, values in self._runs if (value := values[k]) is not None]
+        # of two slips with one result the first is named: a phase counted the other way turns the angle of a correction
+        return [*data, *own] if self.variant.problem.exercise.command[0] == "field" else [*own, *data]
 
     def _siblings(self, k: int) -> Iterator[Slip]:
         """The other component of a vector: sine for cosine."""
@@ -78,19 +76,25 @@ class Recomputed:
         yield Slip("sine in place of cosine: the other component", value)
         yield Slip("sine in place of cosine: the other component, with the wrong sign", -value)
 
-    def _assemblies(self, k: int) -> Iterator[Slip]:
+    @cached_property
+    def _others(self) -> Solved | None:
+        """The result in every assembly; None where there is no other."""
         words = self.variant.problem.command
         if self.variant.problem.exercise.command[0] not in ("mechanism", "forces") or "--branch" in words:
-            return
+            return None
         try:
-            every = replace_further(self.variant.problem, "--branch", "all").result()
+            return replace_further(self.variant.problem, "--branch", "all").result()
         except DataError:
+            return None
+
+    def _assemblies(self, k: int) -> Iterator[Slip]:
+        if self._others is None:
             return
-        branches = next((c.values for t in every.tables for c in t.columns if c.name == "branch"), [])
+        branches = next((c.values for t in self._others.tables for c in t.columns if c.name == "branch"), [])
         for number in dict.fromkeys(map(str, branches)):
             ask = self.variant.answers[k].ask
             try:
-                value = every.answer(k + 1, replace(ask, where={**ask.where, "branch": number})).value
+                value = self._others.answer(k + 1, replace(ask, where={**ask.where, "branch": number})).value
             except DataError:
                 continue
             yield Slip("the other assembly", value)
@@ -126,7 +130,7 @@ class Recomputed:
 
 def replace_further(problem: Problem, *words: str) -> Problem:
     """Return a problem with further words behind its command."""
-    return Problem(problem.workshop, problem.drawn, problem.cells, problem.words, [*problem.further, *words])
+    return replace(problem, further=[*problem.further, *words])
 
 
 def _final(answer: Answer) -> Iterator[Slip]:
@@ -175,13 +179,7 @@ def _options(problem: Problem) -> Iterator[tuple[str, Problem]]:
     words = list(problem.words or problem.exercise.command)
 
     def with_word(k: int, word: str) -> Problem:
-        return Problem(
-            problem.workshop,
-            problem.drawn,
-            problem.cells,
-            [*words[:k], word, *words[k + 1 :]],
-            problem.further,
-        )
+        return replace(problem, words=[*words[:k], word, *words[k + 1 :]])
 
     for k, word in enumerate(words):
         if k and words[k - 1] == "--gravity":
@@ -202,7 +200,7 @@ def _options(problem: Problem) -> Iterator[tuple[str, Problem]]:
             rest = [word for word in words if word != "--phase-lag"]
             yield (
                 "the phase is counted the other way",
-                Problem(problem.workshop, problem.drawn, problem.cells, rest, problem.further),
+                replace(problem, words=rest),
             )
         else:
             yield "the phase is counted the other way", replace_further(problem, "--phase-lag")
@@ -213,9 +211,7 @@ def _cells(problem: Problem) -> Iterator[tuple[str, Problem]]:
     kinds: list[list[tuple[str, Problem]]] = [[], [], [], []]
 
     def changed(cells: dict[tuple[str, int, int], str]) -> Problem:
-        return Problem(
-            problem.workshop, problem.drawn, {**problem.cells, **cells}, problem.words, problem.further
-        )
+        return replace(problem, cells={**problem.cells, **cells})
 
     for file, sheet in problem.sheets.items():
         names = sheet.names()
@@ -258,22 +254,24 @@ def _cells(problem: Problem) -> Iterator[tuple[str, Problem]]:
 
 
 def _trials_left_on(problem: Problem, file: str) -> list[tuple[str, Problem]]:
-    """A trial mass that was left on taken as removed, or the reverse."""
+    """Trial masses that were left on taken as removed, or the reverse."""
     sheet = problem.sheets[file]
-    column = sheet.column("trial_kept")
-    if column is None:
+    mass = next(
+        (k for k, title in enumerate(sheet.header) if title.startswith(("trial_mass", "trial_unbalance"))),
+        None,
+    )
+    if mass is None:
         return []
-    result = []
-    for r, row in enumerate(sheet.rows):
-        text = row[column].strip().lower()
-        if text in ("yes", "no"):
-            other, said = (
-                ("no", "a trial mass that was left on is taken as removed")
-                if text == "yes"
-                else ("yes", "a trial mass that was removed is taken as left on")
-            )
-            cells = {**problem.cells, (file, r, column): other}
-            result.append(
-                (said, Problem(problem.workshop, problem.drawn, cells, problem.words, problem.further))
-            )
-    return result
+    column = sheet.column("trial_kept")
+    trials = [r for r, row in enumerate(sheet.rows) if row[mass].strip()]
+    if column is None:
+        kept = ["yes" if r in trials else "" for r in range(len(sheet.rows))]
+        return [("a trial mass is taken as left on", replace(problem, added={file: ("trial_kept", kept)}))]
+    on = {r for r in trials if sheet.rows[r][column].strip().lower() in ("yes", "ja", "y", "1", "true")}
+    other, said = (
+        ("", "a trial mass that was left on is taken as removed")
+        if on
+        else ("yes", "a trial mass is taken as left on")
+    )
+    cells = {(file, r, column): other for r in on or trials}
+    return [(said, replace(problem, cells={**problem.cells, **cells}))]

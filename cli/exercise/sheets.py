@@ -30,6 +30,7 @@ th, td { padding: 1mm 1.6mm; border: .2mm solid #bbb; text-align: left; vertical
 .dense { font-size: 9pt } .dense th, .dense td { padding: .7mm 1mm } figure { margin: 4mm 0; break-inside: avoid } figure svg, figure img { display: block; width: 100%; max-width: 132mm; height: auto; margin: 0 auto }
 .blank { width: 40mm; min-width: 20mm } .small { font-size: 9pt; color: #444 } pre { font: 9pt/1.35 monospace; white-space: pre-wrap; margin: 1.5mm 0 }
 section + section { break-before: page }
+@media (max-width: 480px) { table { font-size: 9pt } th, td { padding: .6mm .8mm } .blank { width: auto; min-width: 13mm } }
 @page { size: A4; margin: 14mm 13mm } @media print { body { margin: 0; padding: 0; max-width: none } .wide { overflow: visible } }
 """
 

@@ -103,7 +103,9 @@ class Candidates:
         """
         a, size = float(number.value) * scale, abs(scale)
         # zeros at the end of a whole number may stand for digits that were rounded
-        most = float(self.right.unit) / 2 * (1 + 1e-9)
+        figures = self.answer.ask.figures
+        own = 10.0 ** (number.value.adjusted() - figures + 1) * size
+        most = max(float(self.right.unit), own) / 2 * (1 + 1e-9)
         halves = [float(half) * size for half in number.half_units]
         halves = [half for half in halves if half <= most] or halves[:1]
         near = [(abs(self.distance(slip.value, a)), k) for k, slip in enumerate(self.wrong)]

@@ -54,7 +54,13 @@ def _solution(variant: Variant, names: Sequence[str], drawing: str) -> Iterator[
     )
     result = _worked(variant)
     with result.within():
-        for each in report(replace(result, shows_input=True), ShowOptions(), {}, None).pages:
+        # the way, where there is one, has what the tables have
+        shown = (
+            replace(result, shows_input=True, sheets=list)
+            if result.shows_way
+            else replace(result, shows_input=True)
+        )
+        for each in report(shown, ShowOptions(), {}, None).pages:
             for name, found in each.sections:
                 yield f"<h3>{html.escape(name)}</h3>\n"
                 yield from map(html_part, found)

@@ -16,12 +16,12 @@ from math import isfinite, isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cli.exercise.description import Ask, Exercise, Value
+from cli.exercise.description import Ask, Exercise, Value, value_of
 from cli.show.taking import result_of
 from dalembert.errors import DataError, quote
 from dalembert.hints import nearest
 from dalembert.quantities import is_number
-from dalembert.tables.files import SUFFIXES, split_sheet
+from dalembert.tables.files import SUFFIXES, read_bytes, split_sheet
 from dalembert.tables.sources import open_source
 from dalembert.units import composed, parted, unit_name, written
 
@@ -208,6 +208,9 @@ class Workshop:
         from dalembert.units import LISTED, from_si
         from virtualwork.describe.dimensions import value
 
+        said = self._written(name)
+        if said is not None:
+            return said
         m, bare, *_ = self.described
         kind = self.dimensions[name].kind
         unit = {"length": bare.get("length", "m"), "angle": bare.get("angle", "deg")}.get(kind)
@@ -215,6 +218,23 @@ class Workshop:
         number = float(value(m, name))  # type: ignore[arg-type]
         shown = from_si(number, kind, unit) if unit else number
         return Value(Decimal(f"{shown:.12g}"), unit)
+
+    def _written(self, name: str) -> Value | None:
+        """A number with its unit as the mechanism's file has it, such as 300 rpm; None where it is another form."""
+        import tomllib
+
+        assert self.mechanism is not None
+        here: Any = tomllib.loads(
+            read_bytes(str(self.exercise.folder / self.mechanism))[1].decode("utf-8-sig")
+        )
+        for part in name.split("."):
+            if isinstance(here, list) and part.isdecimal() and 1 <= int(part) <= len(here):
+                here = here[int(part) - 1]
+            elif isinstance(here, dict) and part in here:
+                here = here[part]
+            else:
+                return None
+        return value_of(here) if isinstance(here, str) and not is_number(here) else None
 
 
 def _cell(name: str) -> tuple[str, str, str] | None:
@@ -270,6 +290,8 @@ class Problem:
     drawn: dict[str, Value]
     cells: dict[tuple[str, int, int], str] = field(default_factory=dict)
     """Further cells of tables: file, row, column -> text."""
+    added: dict[str, tuple[str, Sequence[str]]] = field(default_factory=dict)
+    """A further column of a table: its title and cells."""
     words: Sequence[str] = ()
     """The command's words, where they are not the exercise's own."""
     further: Sequence[str] = ()
@@ -305,14 +327,20 @@ class Problem:
             sheet.rows[row][column] = text
         for (name, r, c), text in self.cells.items():
             sheets[name].rows[r][c] = text
+        for name, (title, further) in self.added.items():
+            own = sheets[name]
+            rows = [[*cells, text] for cells, text in zip(own.rows, further, strict=True)]
+            sheets[name] = Sheet(name, [*own.header, title], rows)
         return sheets
 
     @cached_property
     def command(self) -> list[str]:
         """The words of the command, files in place."""
-        changed = {cell[0] for name in self.drawn if (cell := _cell(name))} | {
-            name for name, *_ in self.cells
-        }
+        changed = (
+            {cell[0] for name in self.drawn if (cell := _cell(name))}
+            | {name for name, *_ in self.cells}
+            | set(self.added)
+        )
         words = []
         for word in self.words or self.exercise.command:
             for name in _placeholders(word):

@@ -372,12 +372,12 @@ class Travel:
             return None
         track = m.assembly.track
         low, high = self.limits or (track.start, track.start + (m.assembly.reach.period or track.length))
-        found = self.m.check.input_limits
-        if self.limits is None and found is not None:
+        input_limits = self.m.check.input_limits
+        if self.limits is None and input_limits is not None:
             low, high = (
-                (found[0], found[0] + track.length)
-                if math.isfinite(found[0])
-                else (found[1] - track.length, found[1])
+                (input_limits[0], input_limits[0] + track.length)
+                if math.isfinite(input_limits[0])
+                else (input_limits[1] - track.length, input_limits[1])
             )
         e = m.inputs[0]
         return m.motion(np.linspace(low, high, SAMPLES), e.speed or 0.0, e.acceleration or 0.0)

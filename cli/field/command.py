@@ -13,7 +13,8 @@ from cli.show.commands import suffix_among
 from cli.show.output import command
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
+    from types import ModuleType
 
     from matplotlib.figure import Figure
 
@@ -42,6 +43,7 @@ How:
   grade GRADE  Tolerance: G6.3 (ISO 21940-11), API or MIL.
   blades N  Split onto N places, evenly spaced.
   save_influence FILE.csv  Store the coefficients.
+  page FILE.html  Write the machine's sheet: readings are typed in, corrections come out.
 Further options (docs/commands.md describes them):
   fit  Fit all runs, even where few are needed.
   predict MASS@ANGLE,…  Predict a run: 10kg@-90deg or A=1g@0deg.
@@ -109,6 +111,7 @@ def run(
     zone_class: Literal["1-rigid", "1-flexible", "2-rigid", "2-flexible"] | None = None,
     columns: str | None = None,
     workers: Annotated[int, typer.Option(min=1)] = 1,
+    page: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None,
     signal: Annotated[str | None, typer.Option(hidden=True)] = None,
     pulses: Annotated[str | None, typer.Option(hidden=True)] = None,
     suggest_trial: Annotated[bool, typer.Option(hidden=True)] = False,
@@ -176,10 +179,10 @@ def run(
     measured, stored = read_measured(runs, request, influence or (), runout)
     with options.processes(workers) as executor:
         balancing = FieldBalancing(measured, request, stored, executor)
-    return _result(balancing, save_influence)
+    return _result(balancing, save_influence, page)
 
 
-def _result(b: FieldBalancing, save_influence: Path | None) -> Result:
+def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -> Result:
     from cli.field.dates import latest
     from cli.field.doubts import warnings
     from cli.field.tables import METHOD, sense
@@ -220,6 +223,12 @@ def _result(b: FieldBalancing, save_influence: Path | None) -> Result:
 
         return prediction_lines(b)
 
+    beside: dict[Path, Callable[[], bytes]] = {} if save_influence is None else {save_influence: stored}
+    if page is not None:
+        from cli.field.page import sheet
+
+        html = sheet(b).html.encode()
+        beside[page] = lambda: html
     return Result(
         tables=tables,
         head={
@@ -236,14 +245,13 @@ def _result(b: FieldBalancing, save_influence: Path | None) -> Result:
         shows_input=True,
         about={"title": "Balancing in the field"} | ({} if day is None else {"date": day}),
         way=way,
-        beside={} if save_influence is None else {save_influence: stored},
+        beside=beside,
         warnings=remarks,
     )
 
 
 def _tables(b: FieldBalancing, warnings: list[str]) -> Tables:
     """The tables of a result, the CSV's first. `warnings` takes in why --digits leaves a correction whole."""
-    from cli.field import limits
     from cli.field import tables as of
 
     def influence() -> Table:
@@ -272,11 +280,18 @@ def _tables(b: FieldBalancing, warnings: list[str]) -> Tables:
         "rotors": lambda: of.rotors(b, further),
     }
     if b.request.tolerance is not None:
-        made["tolerance"] = lambda: limits.tolerance(b)
+        made["tolerance"] = lambda: _limits().tolerance(b)
     if b.request.zone_class is not None:
-        made["zones"] = lambda: limits.zones(b)
+        made["zones"] = lambda: _limits().zones(b)
     if b.request.four_run:
         made |= {"misfit": lambda: of.misfit(b), "alternatives": lambda: of.alternatives(b)}
     if b.request.view is not None:
         made |= {"static": lambda: of.static_couple(b, 0), "couple": lambda: of.static_couple(b, 1)}
     return {**made, **fits}
+
+
+def _limits() -> ModuleType:
+    """What is held against limits, loaded where it is asked for."""
+    from cli.field import limits
+
+    return limits

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cli.cases.options import CASES, FILE, WORKERS, Asked
+from cli.cases.options import CASES, FILE, WORKERS, Options
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
@@ -26,8 +26,8 @@ How:
 """
 
 
-@declared_command(OPTIONS, Asked)
-def run(asked: Asked, show: ShowOptions) -> Result:
+@declared_command(OPTIONS, Options)
+def run(own: Options, show: ShowOptions) -> Result:
     """Fit dimensions of a mechanism to a target: a path, a function of the input, a guided body.
 
     Without a column for the input it is free at each row of the target, in order. -o FILE.toml writes the mechanism's
@@ -39,24 +39,24 @@ def run(asked: Asked, show: ShowOptions) -> Result:
     from cli.read.options import bad
 
     for flag, value, example in (
-        ("--want", asked.want, "--want H"),
-        ("--free", asked.free, "--free NAME=LOW:HIGH"),
+        ("--want", own.want, "--want H"),
+        ("--free", own.free, "--free NAME=LOW:HIGH"),
     ):
         if not value:
             raise bad(flag, f"missing: expected {example}")
-    call = Call.of(asked, show, Request(asked.file))
+    call = Call.of(own, show, Request(own.file))
     call.refuse_inputs("the rows of the target have the inputs: expected a dimension, links.crank.B.x=...")
-    with naming(asked.file):
-        targets = aims(call.mechanism, asked.target, asked.want, asked.weight, call.remarks)
-        free = bounds(call.mechanism, asked.free, call.bare)
+    with naming(own.file):
+        targets = aims(call.mechanism, own.target, own.want, own.weight, call.remarks)
+        free = bounds(call.mechanism, own.free, call.bare)
     workers = 1 if call.varied is not None else call.workers
     study = call.study(
         Fits,
         aims=targets,
         free=free,
-        starts=asked.starts or STARTS,
-        seed=asked.seed,
-        best=asked.best or 1,
+        starts=own.starts or STARTS,
+        seed=own.seed,
+        best=own.best or 1,
         workers=workers,
     )
     return call.result(study)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cli.cases.options import BRANCH, CASES, FILE, WORKERS, Asked
+from cli.cases.options import BRANCH, CASES, FILE, WORKERS, Options
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ Output:
 """
 
 
-@declared_command(OPTIONS, Asked)
-def run(asked: Asked, show: ShowOptions) -> Result:
+@declared_command(OPTIONS, Options)
+def run(own: Options, show: ShowOptions) -> Result:
     """Compute the forces of a planar mechanism: effort at the inputs, joint forces, shaking force.
 
     The loads of FILE.toml act: gravity, forces, torques, springs, friction and the inertia of its masses. The table has
@@ -40,16 +40,16 @@ def run(asked: Asked, show: ShowOptions) -> Result:
     from cli.cases.call import Call
     from cli.forces.cycle import Forces, checked
 
-    weights = names(asked.counterweights, "--counterweights", "names of links, such as crank, rocker")
-    request = Request(asked.file, names(asked.only), None, branch(asked.branch), forces=True)
-    call = Call.of(asked, show, request)
+    weights = names(own.counterweights, "--counterweights", "names of links, such as crank, rocker")
+    request = Request(own.file, names(own.only), None, branch(own.branch), forces=True)
+    call = Call.of(own, show, request)
     call.check_names()
-    checked(call, asked.flywheel, weights, asked.states)
-    study = call.study(Forces, flywheel=asked.flywheel, counterweights=weights, states=asked.states)
+    checked(call, own.flywheel, weights, own.states)
+    study = call.study(Forces, flywheel=own.flywheel, counterweights=weights, states=own.states)
 
     def page(cases: Sequence[tuple[str, Case]]) -> bytes:
         from cli.cases.page import of_poses
 
         return of_poses(cases, show.units, call.bare)
 
-    return call.result(study, asked.page, page)
+    return call.result(study, own.page, page)

@@ -170,9 +170,9 @@ def _part(analysis: Analysis, motion: Motion, name: str, order: int) -> Part:
     if order >= 1:
         force, torque = motion.applied(name)
         # a pose that cannot be assembled has no loads either
-        known = motion.assembled
-        part |= _vector(FORCE, force, known)
-        part["torque_N_m"] = cells(torque, np.isfinite(torque) & known)
+        assembled = motion.assembled
+        part |= _vector(FORCE, force, assembled)
+        part["torque_N_m"] = cells(torque, np.isfinite(torque) & assembled)
     return part
 
 

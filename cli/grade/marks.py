@@ -151,7 +151,7 @@ def scale_of(unit: str, asked: str) -> Fraction | None:
     """
     if unit == asked or not asked:
         return Fraction(1) if unit == asked or not unit else None
-    unit = JOINED.get(unit, "k*J" if unit == "" else unit)
+    unit = JOINED.get(unit, unit)
     own, wanted = _measure(unit), _measure(asked)
     if own is None or wanted is None or own[1] != wanted[1]:
         return None

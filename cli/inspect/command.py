@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cli.cases.options import CASES, FILE, WORKERS, Asked
+from cli.cases.options import CASES, FILE, WORKERS, Options
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
@@ -15,8 +15,8 @@ EXAMPLE = "watt-six-bar"
 OPTIONS = f"{FILE}{CASES}{WORKERS}"
 
 
-@declared_command(OPTIONS, Asked)
-def run(asked: Asked, show: ShowOptions) -> Result:
+@declared_command(OPTIONS, Options)
+def run(own: Options, show: ShowOptions) -> Result:
     """Inspect a planar mechanism: mobility, groups, Grashof classes, limits, dead and change points.
 
     Speaks of the whole range of the input: --over, --cases and --set change dimensions. On a terminal also the order
@@ -26,7 +26,7 @@ def run(asked: Asked, show: ShowOptions) -> Result:
     from cli.cases.call import Call
     from cli.inspect.character import Inspection
 
-    call = Call.of(asked, show, Request(asked.file))
+    call = Call.of(own, show, Request(own.file))
     call.refuse_inputs(
         "inspect speaks of the whole range of the input: expected a dimension, links.crank.B.x=..."
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cli.cases.options import BRANCH, CASES, FILE, WORKERS, Asked
+from cli.cases.options import BRANCH, CASES, FILE, WORKERS, Options
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
@@ -41,8 +41,8 @@ def print_schema(_: bool) -> None:
     typer.echo(json.dumps(schema(), indent=2, ensure_ascii=False))
 
 
-@declared_command(OPTIONS, Asked, eager={"schema": print_schema})
-def run(asked: Asked, show: ShowOptions) -> Result:
+@declared_command(OPTIONS, Options, eager={"schema": print_schema})
+def run(own: Options, show: ShowOptions) -> Result:
     """Solve the poses of a planar mechanism: positions, velocities, accelerations.
 
     FILE.toml describes ground, links, slots, sliders, gears, input and guess. The table has a row for each pose: its
@@ -52,15 +52,15 @@ def run(asked: Asked, show: ShowOptions) -> Result:
     from cli.cases.call import Call
     from cli.mechanism.newton import Poses
 
-    order = None if asked.order is None else ORDERS.index(asked.order)
-    request = Request(asked.file, names(asked.only), order, branch(asked.branch))
-    call = Call.of(asked, show, request)
+    order = None if own.order is None else ORDERS.index(own.order)
+    request = Request(own.file, names(own.only), order, branch(own.branch))
+    call = Call.of(own, show, request)
     call.check_names()
-    study = call.study(Poses, newton=asked.newton)
+    study = call.study(Poses, newton=own.newton)
 
     def page(cases: Sequence[tuple[str, Case]]) -> bytes:
         from cli.cases.page import of_poses
 
         return of_poses(cases, show.units, call.bare)
 
-    return call.result(study, asked.page, page)
+    return call.result(study, own.page, page)

@@ -136,8 +136,8 @@ class ShowOptions:
         return self.json or (self.output is not None and self.output.suffix.lower() == ".json")
 
 
-class Told(NamedTuple):
-    """What the help says of a parameter, and below which heading."""
+class HelpLine(NamedTuple):
+    """The help of a parameter, and the heading that it stands below."""
 
     heading: str
     flags: Sequence[str]
@@ -145,8 +145,8 @@ class Told(NamedTuple):
     help: str
 
 
-def told(options: str) -> dict[str, Told]:
-    """Read what a command's help is to say of its parameters.
+def help_lines(options: str) -> dict[str, HelpLine]:
+    """Read the help of a command's parameters.
 
     Below each heading a line is a parameter's name as the function has it, its flags where they are others than that
     name, what stands for its value, and after two blanks its help.
@@ -161,7 +161,7 @@ def told(options: str) -> dict[str, Told]:
         name, *others = head.split(" ")
         flags = [word for word in others if word.startswith("-")]
         metavar = " ".join(others[len(flags) :])
-        result[name] = Told(heading, flags or [f"--{name.replace('_', '-')}"], metavar or None, words)
+        result[name] = HelpLine(heading, flags or [f"--{name.replace('_', '-')}"], metavar or None, words)
     return result
 
 
@@ -175,7 +175,7 @@ def with_options(
 ) -> Callable[..., None]:
     """Make a command that takes these of the shared options too, None for all, and hands on what it has found.
 
-    `options` is what its help says of its own, as `told` reads it. `asked` is a class of them: then the function takes
+    `options` is what its help says of its own, as `help_lines` reads it. `asked` is a class of them: then the function takes
     one of these and the shared ones. `declared`: its options, where their text is their only declaration.
     """
     own = dict(declared) if declared is not None else _parameters(asked or find, options)
@@ -184,7 +184,7 @@ def with_options(
     # a command may have a value of its own below --about, which is no KEY=TEXT
     two = "about" in own
     if two:
-        point, head = told(options)["about"], told(SHARED)["about"]
+        point, head = help_lines(options)["about"], help_lines(SHARED)["about"]
         line = point._replace(help=f"{point.help} KEY=TEXT: {head.help}")
         shared["about"] = shared["about"].replace(annotation=_annotated(list[str] | None, line))
 
@@ -233,7 +233,7 @@ def _said(value: object) -> str:
 
 def _parameters(of: Callable[..., object], options: str) -> dict[str, Parameter]:
     """Return the parameters with their types and help; what is returned is not looked at, nor loaded for it."""
-    names, said = vars(sys.modules[of.__module__]), told(options)
+    names, said = vars(sys.modules[of.__module__]), help_lines(options)
     return {
         name: p.replace(
             kind=Parameter.KEYWORD_ONLY,
@@ -243,13 +243,13 @@ def _parameters(of: Callable[..., object], options: str) -> dict[str, Parameter]
     }
 
 
-def _annotated(kind: Any, said: Told) -> object:
-    """Add to a parameter's type what the help says of it."""
-    argument = said.heading == "Arguments"
+def _annotated(kind: Any, line: HelpLine) -> object:
+    """Add to a parameter's type its help."""
+    argument = line.heading == "Arguments"
     kind, given = get_args(kind) if hasattr(kind, "__metadata__") else (kind, None)
     info = copy(given) or (typer.Argument() if argument else typer.Option())
-    info.param_decls = None if argument else said.flags
-    info.metavar, info.help = said.metavar, said.help
+    info.param_decls = None if argument else line.flags
+    info.metavar, info.help = line.metavar, line.help
     return Annotated[kind, info]
 
 
@@ -260,7 +260,7 @@ FURTHER = "Further options"
 class Command(TyperCommand):
     """A command whose help has the options below headings: what, how, output."""
 
-    told: Mapping[str, Told] = {}
+    lines: Mapping[str, HelpLine] = {}
     example = ""
     # the call that an example shows, by the example's name
     call_of: Callable[[str], str]
@@ -282,12 +282,12 @@ class Command(TyperCommand):
 
     def panels_of(self, ctx: Any, without: Collection[str] = ()) -> dict[str, list[tuple[str, str]]]:
         """Return the rows of help below their headings, further options last; `without`: parameters to leave out."""
-        shared = told(SHARED)
-        place = {name: line.heading for name, line in {**shared, **self.told}.items()}
+        shared = help_lines(SHARED)
+        place = {name: line.heading for name, line in {**shared, **self.lines}.items()}
         listed = (
             "Arguments",
             "Options",
-            *(line.heading for of in (self.told, shared) for line in of.values()),
+            *(line.heading for of in (self.lines, shared) for line in of.values()),
         )
         headings = sorted(listed, key=lambda heading: heading.startswith(FURTHER))
         rows: dict[str, list[tuple[str, str]]] = {heading: [] for heading in headings}
@@ -320,7 +320,7 @@ class Command(TyperCommand):
 
 def with_help(options: str, example: str, call_of: Callable[[str], str]) -> type[Command]:
     """Return the kind of command whose help says this of its options, and ends in this example's call."""
-    own = {"told": told(options), "example": example, "call_of": staticmethod(call_of)}
+    own = {"lines": help_lines(options), "example": example, "call_of": staticmethod(call_of)}
     return type("Command", (Command,), own)
 
 
@@ -343,7 +343,7 @@ def parameters(
         What a shell completes an option's value with.
     """
     parameters = {}
-    for name, line in told(text).items():
+    for name, line in help_lines(text).items():
         kind, default, more = _kind(line.metavar or "", line.heading == "Arguments")
         shown = line.metavar
         if shown is not None and not shown.endswith(",..."):

@@ -54,7 +54,7 @@ def compare(table: Table, file: str, rtol: float, others: Sequence[Callable[[], 
     relative error is at most `rtol`, an angle where it is off by at most `rtol` radians, modulo a turn; an
     expected zero is measured against the largest value in its column. Empty cells expect nothing. A key that is a
     number is matched to the digits that the file has. Values in another unit are converted; further columns of texts
-    (a student's name) are not compared. `others` are the result's further tables, for a file with columns of one of them.
+    (a student's name) are kept beside the verdicts, not compared. `others` are the result's further tables, for a file with columns of one of them.
     """
     read_table = read(file, texts=None)
     headers = list(read_table.texts)
@@ -62,11 +62,13 @@ def compare(table: Table, file: str, rtol: float, others: Sequence[Callable[[], 
     table = max(tables, key=lambda each: sum(_partner(header, each) is not None for header in headers))
     columns = table.cells
     compared, aside = _columns(read_table, table, file)
+    kept = {name: read_table.texts[name] for name in aside if name.strip() and name not in COMPARED}
     numbers = [c.header for c in compared if _has_numbers(columns[c.column])]
     read_table.points(numbers)
     keys = [c for c in compared if c.column in table.keys and not (is_input(c.column) and "step" in headers)]
     _refuse_ambiguous(table, keys, file)
-    rows = list(_match(columns, file, keys, read_table.rows, rtol))
+    has = [key for key in table.keys if key in columns]
+    rows = list(_match(columns, file, keys, read_table.rows, rtol, has))
     labels = [
         key for key in table.keys if key in columns and (key in {c.column for c in keys} or not is_input(key))
     ]
@@ -84,10 +86,11 @@ def compare(table: Table, file: str, rtol: float, others: Sequence[Callable[[], 
             value = columns[c.column][row]
             number, error = _error(c, value, wanted, columns[c.column])
             label = "/".join(shown[key][row] for key in labels) or str(row + 1)
-            lines.append((label, c.column, value, number, error, "ok" if error <= rtol else "WRONG"))
+            names = [cells[index] for cells in kept.values()]
+            lines.append((label, c.column, value, number, error, "ok" if error <= rtol else "WRONG", *names))
     if not lines:
         raise DataError(f"{file}: no expected value in it: nothing would be checked")
-    cells = dict(zip(COMPARED, zip(*lines, strict=True), strict=True))
+    cells = dict(zip((*COMPARED, *kept), zip(*lines, strict=True), strict=True))
     right = cells["verdict"].count("ok")
     blanks = f", {blank} blank" if blank else ""
     summary = f"{right} of {len(lines)} values within {rtol:g}{blanks}"
@@ -97,8 +100,8 @@ def compare(table: Table, file: str, rtol: float, others: Sequence[Callable[[], 
         place="check[]",
         below=summary,
     )
-    kept = [f"{file}: not compared: {', '.join(aside)}"] if aside else []
-    return Comparison(check, summary, right == len(lines), kept)
+    left_aside = [f"{file}: not compared: {', '.join(aside)}"] if aside else []
+    return Comparison(check, summary, right == len(lines), left_aside)
 
 
 def _partner(header: str, table: Table) -> tuple[str, str] | None:
@@ -183,14 +186,24 @@ def _refuse_ambiguous(table: Table, keys: Sequence[_Expected], file: str) -> Non
 
 
 def _match(
-    columns: Mapping[str, Values], file: str, keys: Sequence[_Expected], rows: int, rtol: float
+    columns: Mapping[str, Values],
+    file: str,
+    keys: Sequence[_Expected],
+    rows: int,
+    rtol: float,
+    named: Sequence[str],
 ) -> Iterator[int]:
-    """Yield for each expected row the result's row."""
+    """Yield for each expected row the result's row; `named`: the key columns that the result has."""
     length = len(next(iter(columns.values())))
     if not keys:
         if rows > length:
             raise DataError(
                 f"{file}: row {length + 1}: expected {length} rows, as many as the result has, found {rows}"
+            )
+        if rows < length:
+            missing = f"a key column ({', '.join(named)})" if named else "a row for each"
+            raise DataError(
+                f"{file}: found {rows} of the result's {length} rows: expected {missing}, as it cannot be said which"
             )
         yield from range(rows)
         return
@@ -199,15 +212,27 @@ def _match(
     places: dict[tuple[str, ...], list[int]] = {}
     for row in range(length):
         places.setdefault(tuple(str(columns[c.column][row]) for c in texts), []).append(row)
+    # of each key: the first row of the file, how many rows the result has of it, and the file
+    groups: dict[tuple[str, ...], list[int]] = {}
     for index in range(rows):
-        left = places.get(tuple(c.cells[index] for c in texts), [])
+        left = there = places.get(tuple(c.cells[index] for c in texts), [])
         for c in numbers:
             left = _nearest(c, columns[c.column], left, c.cells[index], rtol)
+            there = left
+        taken = groups.setdefault(tuple(c.cells[index] for c in keys), [index, len(there), 0])
+        taken[2] += 1
         if not left:
-            named = ", ".join(f"{c.header} {c.cells[index]}" for c in keys)
-            raise DataError(f"{file}: row {index + 1}: the result has no (further) row with {named}")
+            wanted = ", ".join(f"{c.header} {c.cells[index]}" for c in keys)
+            raise DataError(f"{file}: row {index + 1}: the result has no (further) row with {wanted}")
         yield left[0]
         places[tuple(c.cells[index] for c in texts)].remove(left[0])
+    for cells, (index, many, few) in groups.items():
+        absent = [name for name in named if name not in {c.column for c in keys}]
+        if few < many and absent:
+            wanted = ", ".join(f"{c.header} {cell}" for c, cell in zip(keys, cells, strict=True))
+            raise DataError(
+                f"{file}: row {index + 1}: {many} rows of the result have {wanted}: expected a column {' or '.join(absent)} too"
+            )
 
 
 def _nearest(c: _Expected, column: Values, rows: list[int], wanted: str, rtol: float) -> list[int]:

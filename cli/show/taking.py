@@ -45,13 +45,14 @@ def _runner(name: str) -> Callable[[Sequence[str]], Any]:
     return lambda words: built.main(list(words), prog_name="dalembert", standalone_mode=False)
 
 
-def options_of(name: str) -> set[str]:
+@cache
+def options_of(name: str) -> frozenset[str]:
     """Return the options that a command takes."""
     import typer
 
     app = typer.Typer(add_completion=False)
     app.command(name)(import_module(f"cli.{name}.command").run)
-    return {flag for parameter in typer.main.get_command(app).params for flag in parameter.opts}
+    return frozenset(flag for parameter in typer.main.get_command(app).params for flag in parameter.opts)
 
 
 def result_of(words: Sequence[str]) -> Result:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cli.cases.options import BRANCH, CASES, FILE, WORKERS, Asked
+from cli.cases.options import BRANCH, CASES, FILE, WORKERS, Options
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
@@ -26,8 +26,8 @@ Output:
 """
 
 
-@declared_command(OPTIONS, Asked)
-def run(asked: Asked, show: ShowOptions) -> Result:
+@declared_command(OPTIONS, Options)
+def run(own: Options, show: ShowOptions) -> Result:
     """Simulate a mechanism whose inputs are released: its motion in time under the loads of FILE.toml.
 
     The inputs start at the first time with the file's angle (or position) and speed; --at, --over and --cases set where
@@ -38,13 +38,13 @@ def run(asked: Asked, show: ShowOptions) -> Result:
     from cli.read.options import bad
     from cli.simulate.motion import Simulation, page, times_and_accuracy
 
-    if asked.time is None:
+    if own.time is None:
         raise bad("--time", "expected the times, such as --time 0:10:0.01")
-    if asked.until is not None and asked.page is not None and (asked.over or asked.cases):
+    if own.until is not None and own.page is not None and (own.over or own.cases):
         raise bad("--until", "expected no --page: its variants have one clock; --set shows one of them")
-    times, accuracy = times_and_accuracy(asked.time, asked.accuracy)
-    request = Request(asked.file, names(asked.only), 2, branch(asked.branch), forces=asked.forces)
-    call = Call.of(asked, show, request).started()
+    times, accuracy = times_and_accuracy(own.time, own.accuracy)
+    request = Request(own.file, names(own.only), 2, branch(own.branch), forces=own.forces)
+    call = Call.of(own, show, request).started()
     call.check_names()
-    study = call.study(Simulation, times=times, accuracy=accuracy, until=asked.until)
-    return call.result(study, asked.page, lambda cases: page(cases, show.units), len(times))
+    study = call.study(Simulation, times=times, accuracy=accuracy, until=own.until)
+    return call.result(study, own.page, lambda cases: page(cases, show.units), len(times))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cli.cases.options import CASES, FILE, WORKERS, Asked
+from cli.cases.options import CASES, FILE, WORKERS, Options
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
@@ -23,8 +23,8 @@ What:
 """
 
 
-@declared_command(OPTIONS, Asked)
-def run(asked: Asked, show: ShowOptions) -> Result:
+@declared_command(OPTIONS, Options)
+def run(own: Options, show: ShowOptions) -> Result:
     """Compute what the [tolerances] of FILE.toml do to the motion: worst case, standard deviation, shares.
 
     The first order is from exact derivatives; --draws solves drawn mechanisms. The table has a row for each pose.
@@ -35,16 +35,16 @@ def run(asked: Asked, show: ShowOptions) -> Result:
     from cli.read.options import bad
     from cli.tolerance.spread import Spreads
 
-    if asked.draws is not None and asked.draws < 2:
-        raise bad("--draws", f"{asked.draws}: expected two or more drawn mechanisms")
-    order = None if asked.order is None else ORDERS.index(asked.order)
-    call = Call.of(asked, show, Request(asked.file, names(asked.only), order))
+    if own.draws is not None and own.draws < 2:
+        raise bad("--draws", f"{own.draws}: expected two or more drawn mechanisms")
+    order = None if own.order is None else ORDERS.index(own.order)
+    call = Call.of(own, show, Request(own.file, names(own.only), order))
     only = call.request.only
     if only is not None and quantities.unknown(quantities.places(call.mechanism, 3, only), only) is not None:
         call.request = call.request._replace(forces=True)
     call.check_names()
     workers = 1 if call.varied is not None else call.workers
     study = call.study(
-        Spreads, draws=asked.draws or 0, seed=asked.seed, distribution=asked.distribution, workers=workers
+        Spreads, draws=own.draws or 0, seed=own.seed, distribution=own.distribution, workers=workers
     )
     return call.result(study)

@@ -54,13 +54,13 @@ class Tolerances(TableCase):
     @cached_property
     def limits(self) -> dict[Dimension, float]:
         """The limit of each dimension, SI."""
-        given = self.analysis.mechanism.tolerances
-        if not given:
+        tolerances = self.analysis.mechanism.tolerances
+        if not tolerances:
             raise DataError(
                 f"{self.analysis.file}: [tolerances]: missing; expected limits such as "
                 '"links.crank.B.x" = "0.05 mm"'
             )
-        return limits(self.analysis.mechanism, given)
+        return limits(self.analysis.mechanism, tolerances)
 
     @cached_property
     def numbers(self) -> list[Quantity]:

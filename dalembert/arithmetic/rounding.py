@@ -13,8 +13,7 @@ sizes are the same for many outputs (`_Pattern`).
 A root of what may cancel is not smooth where its argument a is no more than the argument's own error κ. There the
 first order is not enough. The true argument is within κ of a, and that of the engine whose answer is judged within κ of
 the true one: no step between the two is steeper than the chord from a to a − 3κ, which has it in its middle. That is the
-root's slope here. Where a < 3κ it is 4/√κ: the sign of √a may be the other then, and √3κ + √4κ < 4√κ. What depends on 1/√a
-needs τ = 3κ/2a too, the share of the second order in the first.
+root's slope here. Where a < 3κ it is 4/√κ: the sign of √a may be the other then, and √3κ + √4κ < 4√κ.
 """
 
 from __future__ import annotations
@@ -54,7 +53,6 @@ def rounding_bounds(
     inputs: Mapping[str, str] | None = None,
     of: Iterable[str] | None = None,
     constants: float = 0.0,
-    turned: float = 0.0,
 ) -> Tape:
     """The tape of bounds of the outputs' own rounding errors, to first order.
 
@@ -66,14 +64,11 @@ def rounding_bounds(
     of : names of outputs; all where not given
     constants : float
         How many roundings a constant errs by; short ones, as 3 or 0.25, are exact.
-    turned : float
-        By how many units u the sine and cosine of an input err besides.
 
     Returns
     -------
     Tape
-        The outputs themselves, the bounds, `error(output)`, and of each `tau(output)`, the largest share of the second
-        order in the first, of the roots that it depends on.
+        The outputs themselves and the bounds, `error(output)`.
 
     Examples
     --------
@@ -90,7 +85,7 @@ def rounding_bounds(
     recorder = Recorder()
     given = {name: recorder.input(name) for name in tape.inputs}
     errors = {name: recorder.input(other) for name, other in (inputs or {}).items()}
-    return recorder.tape(_Bounds(tape, given, RECORDED, errors, constants, turned).of(of))
+    return recorder.tape(_Bounds(tape, given, RECORDED, errors, constants).of(of))
 
 
 def bounds_of_few(
@@ -99,14 +94,13 @@ def bounds_of_few(
     inputs: Mapping[str, str],
     of: Iterable[str],
     constants: float = 0.0,
-    turned: float = 0.0,
 ) -> dict[str, Any]:
     """The same for a few lanes, on numbers, without writing it down."""
     arrays = {name: np.asarray(value, dtype=float) for name, value in given.items()}
 
     def results(numbers: Mapping[str, Any], kind: Kind) -> dict[str, Any]:
         errors = {name: numbers[other] for name, other in inputs.items()}
-        return _Bounds(tape, numbers, kind, errors, constants, turned).of(of)
+        return _Bounds(tape, numbers, kind, errors, constants).of(of)
 
     if all(array.size == 1 for array in arrays.values()):
         # one pose: nothing of numpy, but at a singular place, where its numbers go on with infinity and NaN
@@ -128,20 +122,18 @@ class _Bounds:
         kind: Kind,
         errors: Mapping[str, Number],
         constants: float,
-        turned: float,
     ) -> None:
-        self.tape, self.kind, self.errors, self.turned = tape, kind, errors, turned
+        self.tape, self.kind, self.errors = tape, kind, errors
         self.constants = constants
         self.values = tape.values(inputs, kind)
-        # the slopes of roots that are no derivatives, and their τ
+        # the slopes of roots that are no derivatives
         self.slopes: dict[int, Number] = {}
-        self.shares: dict[int, Number] = {}
         self._sums: dict[tuple[Term, ...], Number] = {}
         self._own: dict[int, Number] = {}
         self._errors: dict[int, Number] = {}
 
     def of(self, names: Iterable[str] | None) -> dict[str, Number]:
-        """The outputs, the bounds of some, and their τ."""
+        """The outputs, and the bounds of some."""
         tape = self.tape
         wanted = set(tape.names if names is None else names)
         roots = [
@@ -149,12 +141,7 @@ class _Bounds:
             for number, (name, *arguments) in enumerate(tape.operations)
             if name == "sqrt" and not _norm(tape, arguments[0])
         ]
-        below = {
-            name: frozenset(reached(tape.operations, [number]))
-            for name, number in tape.outputs
-            if name in wanted and roots
-        }
-        needed = set[int]().union(*below.values())
+        needed = set(reached(tape.operations, [number for name, number in tape.outputs if name in wanted]))
         for number, argument in roots:
             if number in needed:
                 self._root(number, argument)
@@ -163,16 +150,7 @@ class _Bounds:
             results[name] = self.values[number]
             if name in wanted:
                 results[f"error({name})"] = self.error(number)
-                results[f"tau({name})"] = self._largest(below[name]) if roots else 0.0
         return results
-
-    def _largest(self, below: frozenset[int]) -> Number:
-        largest: Number = 0.0
-        for number, share in self.shares.items():
-            if number in below:
-                # what is no number counts as none: the bound is none either
-                largest = self.kind.select(share - largest, share, largest)
-        return largest
 
     def error(self, output: int) -> Number:
         """The bound of one operation's value, formed once: outputs may be one, as entries of a symmetric matrix are."""
@@ -230,8 +208,6 @@ class _Bounds:
                 bound: Number = abs(self.errors[arguments[0]] * (1 / UNIT_ROUNDOFF))
             elif name in ("sin", "cos"):
                 bound = self.kind.binade(self.values[number]) * ROUNDINGS[name]
-                if self.turned and operations[arguments[0]][0] == "input":
-                    bound = bound + self.turned
             else:
                 constant = next(operations[a][1] for a in arguments if operations[a][0] == "const")
                 bound = abs(self.values[number]) + self.constants * abs(constant)
@@ -246,7 +222,6 @@ class _Bounds:
         apart = a - 3.0 * error
         chord = 1.0 / (self.values[number] + kind.sqrt(kind.select(apart, apart, 0.0)))
         self.slopes[number] = kind.select(apart, chord, 4.0 / kind.sqrt(error))
-        self.shares[number] = 1.5 * error / a
 
 
 Term = tuple[int, float, bool]

@@ -125,29 +125,35 @@ def page(
     rest
         What else the script reads.
     """
-    own = [_part("player.js"), _part(f"{scene}.js")]
+    own = ["common.js", "player.js", f"{scene}.js"]
     if script:
-        own = [script, _part("texts.js"), _part("model.js"), *own, _part("entry.js"), _part("editor.js")]
-    return filled(title, "page.html", own, {"series": series, **rest})
+        own = ["texts.js", "model.js", *own, "entry.js", "editor.js"]
+    return _filled(title, "page.html", script, own, {"series": series, **rest})
 
 
-def filled(title: str, html: str, parts: Sequence[str], data: Mapping[str, Json]) -> Page:
-    """Return the page of some scripts and their data.
+def sheet(title: str, kind: Literal["balance", "field"], script: str, sheet: Json) -> Page:
+    """Return a sheet whose numbers are typed, and which computes what follows.
 
     Parameters
     ----------
     title : str
-    html : str
-        The file of the page's own elements.
-    parts : sequence of str
-        The scripts, one after the other in one text, which the page's policy names by its hash.
-    data
-        What they read.
+    kind : "balance" or "field"
+        Which script fills it.
+    script : str
+        Engine and tapes.
+    sheet
+        What the script reads.
     """
+    own = ["texts.js", "common.js", "entry.js", "sheet.js", f"{kind}.js"]
+    return _filled(title, "sheet.html", script, own, {"sheet": sheet})
+
+
+def _filled(title: str, html: str, script: str, names: Sequence[str], data: Mapping[str, Json]) -> Page:
+    """Return the page of some scripts, in one text that the page's policy names by its hash, and of their data."""
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False)
     # a name in the data cannot end the element that holds it
     text = text.replace("<", "\\u003c")
-    script = "\n".join(['"use strict";', *parts, ""])
+    script = "\n".join(['"use strict";', script, *map(_part, names), ""])
     hashed = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     places = {
         "{{title}}": escape(title or "dalembert"),

@@ -74,7 +74,7 @@ function soon() {
 const lengthText = (x) => `${Number((x / (model.units.length[unitOf("length")][0] / model.units.length[unitOf("length")][1])).toPrecision(3))} ${unitOf("length")}`;
 function whyNot() {
   if (wrong.size) return "";
-  if (!state.chosen) return TEXTS.impossible;
+  if (!state.chosen) return state.given?.open ? TEXTS.openAtGuess(state.given.open) : TEXTS.impossible;
   if (Number.isFinite(state.closed[shown])) return "";
   const found = machine.short(state, shown);
   return found ? TEXTS.short(found[0], lengthText(found[1])) : TEXTS.open;

@@ -3,16 +3,16 @@ const plainUnit = (unit) => unit.replace(/per/g, "").replace(/[\s_/·^*.]/g, "")
 
 // a number with or without its unit in SI and radians; NaN where it is none. A decimal times a power of ten is rounded once.
 function typed(text, units, unit) {
-  const found = /^\s*([+-−]?)(\d+[.,]?\d*|[.,]\d+)(?:[eE]([+-]?\d+))?\s*(.*?)\s*$/.exec(text);
-  if (!found || !/^[+\-−]?$/.test(found[1])) return NaN;
+  const found = /^\s*([+\-−]?)(\d+[.,]?\d*|[.,]\d+)(?:[eE]([+-]?\d+))?\s*(.*?)\s*$/.exec(text);
+  if (!found) return NaN;
   const [, sign, digits, power = "0", own] = found;
   const name = own === "" ? unit : Object.keys(units ?? {}).find((each) => plainUnit(each) === plainUnit(own));
   if (own !== "" && name === undefined) return NaN;
   const mantissa = `${sign === "-" || sign === "−" ? "-" : ""}${digits.replace(",", ".")}`;
   const [by, over] = units?.[name] ?? [1, 1];
   if (name === "deg") return Number(`${mantissa}e${power}`) * (Math.PI / 180);
-  const shift = Math.log10(over / by);
-  if (Number.isInteger(shift) && 10 ** shift === over / by) return Number(`${mantissa}e${Number(power) - shift}`);
+  const shift = Math.round(Math.log10(over / by));
+  if (10 ** shift === over / by) return Number(`${mantissa}e${Number(power) - shift}`);
   return (Number(`${mantissa}e${power}`) * by) / over;
 }
 // the shortest text that is read back to the same bits

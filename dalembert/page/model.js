@@ -81,7 +81,8 @@ class Machine {
     let found = choice.one(given);
     for (const g of this.model.groups) {
       if (g.start) {
-        if (!this.#iterate(g, given)) return false;
+        // the program goes on to search from many starts; the page says that it cannot
+        if (!this.#iterate(g, given)) return (given.open = g.name) && false;
         found = choice.one(given);
         continue;
       }
@@ -482,11 +483,13 @@ function begin(data) {
 const changes = () => Object.keys(numbers).filter((path) => !Object.is(numbers[path], machine.own[path]));
 function recompute(series) {
   state = wrong.size ? { chosen: false } : machine.solve(numbers, freePose);
+  // what one of a unit is in SI, or how many of it make one: the one of them that is a whole number is exact
+  const inUnit = (x, si) => (si < 1 && Math.abs(Math.round(1 / si) * si - 1) < 1e-15 ? x * Math.round(1 / si) : x / si);
   for (const column of series.columns) {
     const si = column.si ?? 1;
     if ("input" in column) {
-      for (let l = 0; l <= machine.n; l++) column.values[l] = (l < machine.n ? machine.sweep[column.input][l] : freePose[column.input]) / si;
-    } else for (let l = 0; l <= machine.n; l++) column.values[l] = machine.value(state, column, l) / si;
+      for (let l = 0; l <= machine.n; l++) column.values[l] = inUnit(l < machine.n ? machine.sweep[column.input][l] : freePose[column.input], si);
+    } else for (let l = 0; l <= machine.n; l++) column.values[l] = inUnit(machine.value(state, column, l), si);
   }
   if (!state.rows) return;
   const drawn = machine.drawn(state);

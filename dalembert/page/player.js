@@ -1,110 +1,9 @@
-// What every page shares: numbers, play and pause, slider, keys, table, plots. A scene (plane.js, space.js) draws.
-const data = JSON.parse(document.getElementById("data").textContent);
-const $ = (id) => document.getElementById(id);
-
-// --- elements: text is always text --------------------------------------------------------------------------------
-function make(name, attributes = {}, text) {
-  const svg = ["svg", "g", "path", "circle", "line", "text", "title"].includes(name);
-  const found = svg ? document.createElementNS("http://www.w3.org/2000/svg", name) : document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) found.setAttribute(key, value);
-  if (text !== undefined) found.textContent = text;
-  return found;
-}
-function put(parent, ...rest) {
-  return parent.appendChild(make(...rest));
-}
-function svgIn(host) {
-  return put(host, "svg", { role: "img" });
-}
-// one unit of a picture is one pixel of the screen: words keep their size on a phone
-function sized(svg, width, height) {
-  for (const [key, value] of Object.entries({ width, height, viewBox: `0 0 ${width} ${height}` })) svg.setAttribute(key, value);
-}
-// a picture of words made anew at every pose
-function texts(parent) {
-  const pool = [];
-  let used = 0;
-  return {
-    put(x, y, text, kind) {
-      const one = pool[used] ?? (pool[used] = put(parent, "text"));
-      used++;
-      one.setAttribute("x", x.toFixed(1));
-      one.setAttribute("y", y.toFixed(1));
-      one.setAttribute("class", kind);
-      one.textContent = text;
-    },
-    done() {
-      while (pool.length > used) pool.pop().remove();
-      used = 0;
-    },
-  };
-}
-function arrow(x, y, dx, dy) {
-  const length = Math.hypot(dx, dy);
-  if (!(length > 1.5)) return "";
-  const [u, v] = [dx / length, dy / length];
-  const head = Math.min(9, length / 2);
-  const end = [x + dx, y + dy];
-  const barb = (side) => [end[0] - head * (u - side * 0.42 * v), end[1] - head * (v + side * 0.42 * u)];
-  return `M${fixed(x, y)}L${fixed(...end)}M${fixed(...barb(1))}L${fixed(...end)}L${fixed(...barb(-1))}`;
-}
-function fixed(x, y) {
-  return `${x.toFixed(2)} ${y.toFixed(2)}`;
-}
-
-// --- numbers --------------------------------------------------------------------------------------------------------
-function unpack(column, n) {
-  if ("all" in column) return new Float64Array(n).fill(column.all);
-  const Kind = "f8" in column ? Float64Array : Float32Array;
-  const bytes = Uint8Array.from(atob(column.f8 ?? column.f4), (c) => c.charCodeAt(0));
-  // least significant byte first on every machine that shows pages
-  return new Kind(bytes.buffer);
-}
+// What pages of poses share: play and pause, slider, table, plots. A scene (plane.js, space.js) draws.
 for (const series of data.series) {
   // what is computed here has one pose more than the sweep: the free one
   for (const column of series.columns) column.values = data.model && series === data.series[0] ? new Float64Array(series.n + 1).fill(NaN) : unpack(column, series.n);
 }
 if (data.model) begin(data);
-// every digit, as the CSV has it
-function exact(x) {
-  if (!Number.isFinite(x)) return "–";
-  const [mantissa, power] = x.toExponential().split("e");
-  const e = Number(power);
-  if (x !== 0 && (e < -4 || e >= 16)) return `${mantissa}e${e < 0 ? "-" : "+"}${String(Math.abs(e)).padStart(2, "0")}`;
-  return Number.isInteger(x) ? `${x === 0 ? 0 : x}.0` : String(x);
-}
-// six digits, as a table on a terminal has them
-function short(x) {
-  return Number.isFinite(x) ? String(Number(x.toPrecision(6))) : "–";
-}
-// a cell with every digit, those beyond the sixth small
-function fill(cell, x) {
-  const text = exact(x);
-  const [, lead, rest, power] = /^(-?(?:0\.0*)?(?:\d\.?){1,6})(\d*\.?\d*)(e.*)?$/.exec(text) ?? [0, text, "", ""];
-  cell.replaceChildren(lead);
-  if (rest) put(cell, "small", {}, rest);
-  if (power) cell.append(power);
-}
-function range(values) {
-  let [low, high] = [Infinity, -Infinity];
-  for (const x of values) {
-    if (x < low) low = x;
-    if (x > high) high = x;
-  }
-  return [low, high];
-}
-// the step at which at most so many ticks fit; degrees over much of a turn go by parts of it
-function stepOf(low, high, most, degrees = false) {
-  const rough = (high - low) / most;
-  const power = 10 ** Math.floor(Math.log10(rough));
-  const turned = degrees && rough > 10 ? [15, 30, 60, 90, 180, 360, 720, 3600].find((m) => m >= rough) : undefined;
-  return turned ?? power * [1, 2, 5, 10].find((m) => m * power >= rough * (1 - 1e-9));
-}
-function ticks(low, high, step) {
-  const first = Math.ceil(low / step - 1e-9);
-  const count = Math.min(Math.floor(high / step + 1e-9) - first + 1, 50);
-  return Array.from({ length: Math.max(0, count) }, (_, k) => Number(((first + k) * step).toPrecision(12)));
-}
 
 // --- the pose shown, and time -----------------------------------------------------------------------------------------
 const whole = data.series[0];
@@ -173,11 +72,6 @@ function faster(by) {
 }
 
 // --- controls ---------------------------------------------------------------------------------------------------------
-const keys = new Map(); // key -> [what it does, its words]
-function onKey(key, words, act) {
-  keys.set(key, act);
-  $("keys").append(`${key === " " ? "space" : key}: ${words}. `);
-}
 function controls() {
   $("slider").max = n - 1;
   for (const id of ["slider", "play", "first", "back", "ahead", "speed"]) $(id).disabled = n < 2;
@@ -199,15 +93,6 @@ function controls() {
   $("first").addEventListener("click", () => jump(0));
   $("back").addEventListener("click", () => jump(shown - 1));
   $("ahead").addEventListener("click", () => jump(shown + 1));
-  document.addEventListener("keydown", (event) => {
-    const act = keys.get(event.key);
-    const here = event.target;
-    if (!act || event.ctrlKey || event.metaKey || event.altKey || here.tagName === "SELECT") return;
-    // a button that has the focus is pressed by space itself
-    if (event.key === " " && (here.tagName === "BUTTON" || here.tagName === "SUMMARY")) return;
-    event.preventDefault();
-    act(event);
-  });
 }
 function toggle(key, words, on, change, possible = true) {
   const button = put($("toggles"), "button", { type: "button", "aria-pressed": on && possible, title: `${words} (${key})`, "data-toggle": words }, words);
@@ -222,20 +107,6 @@ function toggle(key, words, on, change, possible = true) {
   button.addEventListener("click", flip);
   onKey(key, words, flip);
 }
-function theme() {
-  const dark = matchMedia("(prefers-color-scheme: dark)");
-  let own = null;
-  const set = () => (document.documentElement.dataset.theme = own ?? (dark.matches ? "dark" : "light"));
-  const flip = () => {
-    own = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
-    set();
-  };
-  dark.addEventListener("change", set);
-  $("theme").addEventListener("click", flip);
-  onKey("d", "dark or light", flip);
-  set();
-}
-
 // --- the table of a pose ----------------------------------------------------------------------------------------------
 // rows: [name, [column or null, ...]]; the columns marked exact show every digit
 function table(caption, heads, rows, exactly, more) {

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import csv
+import json
 import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -248,3 +250,75 @@ def test_answers_that_are_filled_in_are_never_lost(dalembert: Dalembert, folder:
     assert done.returncode == 1
     assert "answers.csv" in done.stderr
     assert before == {path.name: path.read_bytes() for path in (folder / "out").iterdir()}
+
+
+def test_prairielearns_question(dalembert: Dalembert, folder: Path) -> None:
+    """The element grades by |a − right| ≤ atol; server.py names mistakes and takes an angle a turn off."""
+    done = dalembert("exercise", "e.toml", "--students", 3, "-o", "out", "--for", "prairielearn")
+    assert done.returncode == 0, done.stderr
+    question = folder / "out" / "prairielearn" / "a-rotor"
+    info = json.loads((question / "info.json").read_text())
+    assert info["type"] == "v3"
+    assert {"uuid", "title", "topic"} <= info.keys()
+    page = (question / "question.html").read_text()
+    assert re.findall(r'answers-name="(\w+)"', page) == ["answer1", "answer2", "answer3"]
+    assert re.findall(r' weight="(\d+)"', page) == ["2", "1", "1"]
+    assert page.count('comparison="relabs" rtol="0"') == 3
+    server: dict[str, Any] = {}
+    exec((question / "server.py").read_text(), server)
+    data: dict[str, Any] = {
+        "params": {}, "correct_answers": {}, "variant_seed": 17, "options": {"question_path": str(question)},
+        "submitted_answers": {}, "partial_scores": {},
+    }  # fmt: skip
+    server["generate"](data)
+    assert "<svg" in data["params"]["problem"]
+    right = data["correct_answers"]
+    mistake = data["params"]["answer1"]["mistakes"][0]
+    data["submitted_answers"] = {
+        "answer1": mistake["value"],
+        "answer2": right["answer2"] - 360,
+        "answer3": right["answer3"],
+    }
+    for name, weight in (("answer1", 2), ("answer2", 1), ("answer3", 1)):
+        off = abs(data["submitted_answers"][name] - right[name])
+        data["partial_scores"][name] = {
+            "score": float(off <= data["params"][name]["tolerance"]),
+            "weight": weight,
+        }
+    assert [each["score"] for each in data["partial_scores"].values()] == [0, 0, 1]
+    server["grade"](data)
+    assert [each["score"] for each in data["partial_scores"].values()] == [0, 1, 1]
+    assert data["partial_scores"]["answer1"]["feedback"] == f"Likely mistake: {mistake['text']}."
+    assert data["score"] == 0.5
+
+
+def test_numbas_exam(dalembert: Dalembert, folder: Path) -> None:
+    done = dalembert("exercise", "e.toml", "--students", 3, "-o", "out", "--for", "numbas")
+    assert done.returncode == 0, done.stderr
+    head, _, body = (folder / "out" / "numbas.exam").read_text().partition("\n")
+    assert head.startswith("// Numbas version: ")
+    exam = json.loads(body)
+    (group,) = exam["question_groups"]
+    assert (group["pickingStrategy"], group["pickQuestions"], len(group["questions"])) == (
+        "random-subset",
+        1,
+        3,
+    )
+    key = rows(folder / "out" / "key.csv")
+    for k, question in enumerate(group["questions"]):
+        # braces would be variables, dollars formulas
+        assert not set("{}$") & set(question["statement"])
+        for part, row in zip(question["parts"], key[3 * k : 3 * k + 3], strict=True):
+            assert part["type"] == "numberentry"
+            assert part["marks"] == float(row["points"])
+            assert float(part["minValue"]) < float(row["answer"]) < float(part["maxValue"])
+            assert float(part["minValue"]) <= float(row["value"]) <= float(part["maxValue"])
+            named = [each for each in part["alternatives"] if each["marks"] == 0]
+            assert all(each["alternativeFeedbackMessage"] for each in named)
+            assert len(named) > 3
+
+
+def test_an_unknown_system_is_status_2(dalembert: Dalembert, folder: Path) -> None:
+    done = dalembert("exercise", "e.toml", "-o", "out", "--for", "canvas")
+    assert done.returncode == 2
+    assert "prairielearn or numbas" in done.stderr

@@ -91,3 +91,44 @@ def test_a_number_that_is_a_key_is_matched_to_its_digits(dalembert: Dalembert, t
     assert (
         dalembert(*call, "--at", "40deg", "--at", "60.00000000000001deg", "--expect", "e.csv").returncode == 0
     )
+
+
+def test_many_rows_need_their_keys(dalembert: Dalembert, tmp_path: Path) -> None:
+    """Where the result has several rows, a file of fewer says which they are."""
+    (tmp_path / "bar.toml").write_text(
+        '[units]\nlength = "mm"\nangle = "deg"\n[ground]\nA = [0, 0]\n[links.crank]\npoints = { A = [0, 0], B = [100, 0] }\n'
+        '[input]\nlink = "crank"\nangle = 0\n'
+    )
+    command = ("mechanism", "bar.toml", "--over", "0deg:90deg:30deg", "--only", "B")
+    (tmp_path / "e.csv").write_text("B_x_mm\n100\n")
+    done = dalembert(*command, "--expect", "e.csv")
+    assert done.returncode == 1
+    assert "1 of the result's 4 rows" in done.stderr
+    assert "input_deg" in done.stderr
+    (tmp_path / "e.csv").write_text("input_deg,B_x_mm\n60,50\n")
+    assert dalembert(*command, "--expect", "e.csv").returncode == 0
+    (tmp_path / "e.csv").write_text("B_x_mm\n100\n86.6025\n50\n0\n")
+    assert dalembert(*command, "--expect", "e.csv").returncode == 0
+    variants = (
+        "mechanism",
+        "bar.toml",
+        "--over",
+        "links.crank.B.x=50mm:100mm:50mm",
+        "--at",
+        "0deg",
+        "--only",
+        "B",
+    )
+    (tmp_path / "e.csv").write_text("student,B_x_mm\nAna,50\n")
+    done = dalembert(*variants, "--expect", "e.csv")
+    assert done.returncode == 1
+    assert "variant" in done.stderr
+
+
+def test_names_stand_beside_the_verdicts(dalembert: Dalembert, rotor: Path) -> None:
+    rotor.with_name("e.csv").write_text("student,plane,angle_deg\nAna,A,1\nBo,B,2\n")
+    done = dalembert("balance", "rotor.csv", *TWO, "--expect", "e.csv", "-o", "check.csv")
+    assert done.returncode == 1
+    lines = rotor.with_name("check.csv").read_text().splitlines()
+    assert lines[0] == "row,column,value,expected,error,verdict,student"
+    assert [line.rpartition(",")[2] for line in lines[1:]] == ["Ana", "Bo"]

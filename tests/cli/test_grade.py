@@ -229,3 +229,14 @@ def test_without_a_key_there_are_no_numbers(dalembert: Dalembert, rotor: Path) -
     assert done.returncode == 1
     assert "--key" in done.stderr
     assert dalembert("grade", "e.toml", "elsewhere.csv", "--key", "out/key.csv").returncode == 0
+
+
+def test_an_answer_in_its_own_unit_counts_as_in_the_other(dalembert: Dalembert, work: Path) -> None:
+    """STACK judges 18.1 kJ and 18100 J differently."""
+    (work / "w.toml").write_text(WORK.replace("figures = 4", 'figures = 4\nunit = "kN m"'))
+    answers = ("103000 N m", "103.0", "103.0 kN·m", "103", "102.9", "103 kJ")
+    (work / "a.csv").write_text(
+        "student,quantity,answer\n" + "".join(f"{k},torque_N_m,{a}\n" for k, a in enumerate(answers))
+    )
+    verdicts = [mark["verdict"] for mark in marks(dalembert, "w.toml", "a.csv")]
+    assert verdicts == ["right", "right", "right", "right", "rounding", "right"]

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from cli.app import COMMANDS
-from cli.show.commands import SHARED, told
+from cli.show.commands import SHARED, help_lines
 from cli.show.terminal import progress, progress_in_time
 from tests.conftest import Dalembert
 
@@ -65,7 +65,7 @@ def test_options_stand_in_panels_of_at_most_ten(command: str, dalembert: Dalembe
     assert further is panels[-2]
     for panel in panels:
         assert len(re.findall(r"^  -", panel, re.MULTILINE)) <= 10, panel
-    for name in told(SHARED):
+    for name in help_lines(SHARED):
         assert f"--{name.replace('_', '-')}" in page
 
 

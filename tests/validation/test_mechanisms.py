@@ -93,7 +93,7 @@ def test_two_disc_four_bar_newton_and_geometry_agree():
     b = 0.1 * np.exp(1j * q)
     c = 0.5 + 0.12 * np.exp(1j * motion.link("disc").angle)
     assert np.abs(c - b) == pytest.approx(np.full(len(q), 0.5), rel=1e-14)
-    assert max(all_at_once(m.assembly, (v,)).difference for v in q[10:25]) < 1e-13
+    assert max(all_at_once(m.assembly, (v,)).difference for v in q) < 1e-13
 
 
 # --- Norton, Design of Machinery ---------------------------------------------------------------------------

@@ -76,7 +76,7 @@ def test_every_quantity_of_the_worked_examples_on_the_other_engines(name, engine
 def test_every_quantity_of_mechanisms_of_any_topology(monkeypatch) -> None:
     """Drawn at random at a pose: two to six links, slots, prisms and gears on moving links, one or two inputs."""
     compared = 0
-    for seed in range(250):
+    for seed in range(120):
         try:
             m = generate(seed).mechanism
             _ = m.assembly
@@ -84,7 +84,7 @@ def test_every_quantity_of_mechanisms_of_any_topology(monkeypatch) -> None:
             continue
         compare(m, monkeypatch, "numpy", 0.02)
         compared += 1
-    assert compared > 200
+    assert compared > 95
 
 
 def test_an_evaluator_gives_what_the_motion_gives() -> None:

@@ -103,7 +103,7 @@ def test_ctrl_c_stops_all_workers(tmp_path):
     (tmp_path / "m.toml").write_text(text)
     command = [
         *TAKES_CTRL_C,
-        "mechanism",
+        "tolerance",
         "m.toml",
         "--over",
         "0deg:360deg:10deg",

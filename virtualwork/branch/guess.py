@@ -208,8 +208,8 @@ class _Chooser:
                     "guides of different directions (`angle`)"
                 ) from None
             return 1
-        found = self._solutions(group, case, st)
-        if not found:
+        solutions = self._solutions(group, case, st)
+        if not solutions:
             ahead = self._ahead(group, case)
             if ahead is None or not informed(self.m, group):
                 st.turn.update({b: complex(np.nan, np.nan) for b in group.members})
@@ -222,17 +222,17 @@ class _Chooser:
             st.turn.update({b: near.turn[b] for b in group.members})
             st.slide.update({g: near.slide[g] for g in group.slides})
             return sign
-        distances = [self._distance(group, trial) for _, trial in found]
+        distances = [self._distance(group, trial) for _, trial in solutions]
         # a guess to full precision tells apart even assemblies that all but meet; distances are squares
         told = min(distances) < 1e-3 * max(distances) and max(distances) > 1e-28
-        if len(found) == 2 and abs(found[0][1].margin[group.name]) < 1e-14 and not told:
-            ahead = self._ahead(group, case, found[0][1])
+        if len(solutions) == 2 and abs(solutions[0][1].margin[group.name]) < 1e-14 and not told:
+            ahead = self._ahead(group, case, solutions[0][1])
             if ahead is not None:
                 distances = ahead
             self.warnings.append(self._meeting(group))
-        elif len(found) == 2 and not informed(self.m, group):
-            raise AssemblyError(self._choices(group, [t for _, t in found]))
-        sign, chosen = found[int(np.argmin(distances))]
+        elif len(solutions) == 2 and not informed(self.m, group):
+            raise AssemblyError(self._choices(group, [t for _, t in solutions]))
+        sign, chosen = solutions[int(np.argmin(distances))]
         for name in ("turn", "point", "slide", "angle", "margin"):
             getattr(st, name).update(getattr(chosen, name))
         return sign
@@ -272,11 +272,11 @@ class _Chooser:
                 st = self._beside(group, side * step)
             except (KeyError, ZeroDivisionError):
                 return None
-            found = self._solutions(group, case, st)
-            if len(found) < 2:
+            solutions = self._solutions(group, case, st)
+            if len(solutions) < 2:
                 continue
             if here is None or not group.members:
-                distances = [self._distance(group, trial) for _, trial in found]
+                distances = [self._distance(group, trial) for _, trial in solutions]
             else:
                 turned = complex(np.exp(1j * side * step))
                 distances = [
@@ -285,7 +285,7 @@ class _Chooser:
                         for b in group.members
                         for e in [here.turn[b]]
                     )
-                    for _, trial in found
+                    for _, trial in solutions
                 ]
             # seen from before the point, the Jacobian has the other sign on the same branch
             return distances if side > 0 else distances[::-1]
@@ -400,7 +400,7 @@ def sign_of_angles(group: Group, case: Case, st: State, angles: Mapping[str, Num
 
 def informed(m: Description, group: Group) -> bool:
     """Does the guess say anything about the links of this group?"""
-    given = m.guess
-    return any(b in given.angles for b in group.links) or any(
-        p in given.points for b in group.links for p in m.links[b].points
+    guess = m.guess
+    return any(b in guess.angles for b in group.links) or any(
+        p in guess.points for b in group.links for p in m.links[b].points
     )

@@ -177,7 +177,7 @@ class Exact(Recording):
         if group.name in self.folded and not self.enters(group):
             # where the numbers as given do not quite meet, the root says how far off the assemblies are
             kind, st.kind = st.kind, MEETING
-            self._cases[group.name].solve(st, 1.0, bare(self.mechanism.size))
+            self.cases[group.name].solve(st, 1.0, bare(self.mechanism.size))
             st.kind = kind
             return
         super()._close(group, st)

@@ -302,8 +302,8 @@ class Solver:
         whole = list(dict.fromkeys(closed.values()))
         tape = written.tape((*asked, *whole, *margins))
         table = run_grid(tape, {name: self._entering(name, rows) for name in tape.inputs}, (v, n))
-        found = Outputs(tape, np.reshape(table, (-1, v * n)))
-        lanes = {key: quantity(found, key, v * n).reshape(v, n) for key in (*asked, *whole, *margins)}
+        outputs = Outputs(tape, np.reshape(table, (-1, v * n)))
+        lanes = {key: quantity(outputs, key, v * n).reshape(v, n) for key in (*asked, *whole, *margins)}
         near = np.zeros(v, dtype=bool)
         for key in margins:
             near |= (np.abs(lanes[key]) < NEAR).any(axis=1)

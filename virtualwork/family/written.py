@@ -20,8 +20,8 @@ from virtualwork.describe.dimensions import Dimension, changed, value
 from virtualwork.describe.keys import keys_of
 from virtualwork.describe.parts import Link
 from virtualwork.formulas.asked import FORCES, Key, names
-from virtualwork.formulas.closed_forms import Case
-from virtualwork.formulas.newton import put_unknowns
+from virtualwork.formulas.closed_forms import Case, missing
+from virtualwork.formulas.newton import put_unknowns, unknowns
 from virtualwork.formulas.numbers import WRITTEN, Number
 from virtualwork.formulas.positions import State, run
 from virtualwork.formulas.recording import NEAR, Recording
@@ -143,6 +143,26 @@ class Written:
         yield from (abs(bare(ratio)) for ratio in m.ratios)
         yield from (bare(radius) for belt in m.belts for radius in belt.radii)
         yield from (abs(bare(rack.radius)) for rack in m.racks)
+
+    @cached_property
+    def short(self) -> Tape:
+        """The tape of how much each closed form lacks of closing, m, in the order of solution; negative where it closes."""
+        of, outputs = self.recording, {}
+        for group in (g for g in self.plan.groups if g.kind != "Newton"):
+            case = of.cases[of.solved(group.name).name]
+            vectors = map(bare, case.vectors(of.st))
+            outputs[group.name] = missing(group.kind, bare(case.offset(of.st)), *vectors)
+        return of.recorder.tape(outputs)
+
+    @cached_property
+    def steps(self) -> Tape:
+        """The tape of a Newton step of each group without a closed form: how far its loops are open, then its next unknowns."""
+        of, outputs = self.recording, {}
+        for group in (g for g in self.plan.groups if g.kind == "Newton"):
+            found = unknowns(of.solved(group.name), of.st)
+            outputs[f"open {group.name}"] = of.open_loops[group.name]
+            outputs |= {f"next {group.name} {i}": x for i, x in enumerate(found)}
+        return of.recorder.tape(outputs)
 
     def told(self, samples: int) -> Tape:
         """The tape of how all closed forms close at the inputs of the guess, and whether that is told plainly.

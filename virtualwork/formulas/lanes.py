@@ -317,12 +317,12 @@ def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Re
 
     Such a mechanism has one input that turns, no change point, no limit, and a closed form for every group.
     """
-    known = branch.recordings
+    recordings = branch.recordings
     name = "ready", moves, keys
-    if name not in known:
+    if name not in recordings:
         with branch.lock:
-            known[name] = _made(branch, moves, keys)
-    result: Ready | None = known[name]
+            recordings[name] = _made(branch, moves, keys)
+    result: Ready | None = recordings[name]
     return result
 
 

@@ -27,7 +27,7 @@ from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND, TorsionSpring
 from virtualwork.formulas.asked import FORCES, JOINTS, Key, names
 from virtualwork.formulas.block import Block, Shared, Table
-from virtualwork.formulas.closed_forms import Case, missing
+from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.dynamics import joints_at, resultant, shaking_loads
 from virtualwork.formulas.effort import generalized_force
 from virtualwork.formulas.load_case import LoadCase
@@ -91,14 +91,15 @@ class Recording:
             [self.recorder.input(f"{name}{j}") if there else None for j in range(k)]
             for name, there in zip(NAMES[1:], moves, strict=True)
         ]
-        self._cases = {g.name: Case(g, bare) for g in plan.groups if g.kind != "Newton"}
+        self.cases = {g.name: Case(g, bare) for g in plan.groups if g.kind != "Newton"}
         self._by = [Rates(plan, self.st, [[1.0] if i == j else [] for i in range(k)]) for j in range(k)]
         given = [[rate[j] for rate in self.rates] for j in range(k)]
         self._along = Rates(plan, self.st, given) if k > 1 else None
         self._done: set[tuple[int, int, int]] = set()
         self._values: dict[Key, Number] = {}
         self._forces: tuple[LoadPaths, JointForces, Block] | None = None
-        self._open: dict[str, Number] = {}
+        # how far the loops of groups without a closed form are from closing as they enter, m
+        self.open_loops: dict[str, Number] = {}
 
     @property
     def lock(self) -> Lock:
@@ -124,7 +125,7 @@ class Recording:
         if self.enters(group):
             x = self.unknowns(group)
             put_unknowns(group, st, x)
-            self._open[group.name] = WRITTEN.sqrt(sum(map(squared, gaps(group, st)), 0.0))
+            self.open_loops[group.name] = WRITTEN.sqrt(sum(map(squared, gaps(group, st)), 0.0))
             step = self.step(group, st)
             if step is not None:
                 put_unknowns(group, st, [a + b for a, b in zip(x, step, strict=True)])
@@ -132,7 +133,7 @@ class Recording:
         sign: Number = self.signs[group.name]
         if group.name in self.turning_over:
             sign = self.recorder.input(f"sign {group.name}")
-        self._cases[group.name].solve(st, sign, bare(self.mechanism.size))
+        self.cases[group.name].solve(st, sign, bare(self.mechanism.size))
         for body in sorted(self.geared.intersection(group.members)):
             st.angle[body] = self.unwrapped(f"near {body}", st.turn[body])
 
@@ -231,9 +232,6 @@ class Recording:
         ("column", loop, unknown)                    of the Jacobian of all loops (`loops`), complex; as their columns
         ("size",)                                    the mechanism's characteristic length
         ("regularity", group's name)                 of a larger group: how far its Jacobian is from singular, of 1
-        ("short", group's name)                      by how much a closed form does not close, m; negative where it does
-        ("unknown", group's name, i)                 of a group without a closed form, after the step that is on the tape
-        ("open loops", group's name)                   how far its loops are from closing before it, m
         """
         if key not in self._values:
             found = getattr(self, f"_{key[0].replace('-', '_').replace(' ', '_')}")(*key[1:])
@@ -383,16 +381,6 @@ class Recording:
     def _regularity(self, group: str) -> Number:
         cols = columns(self.solved(group), self.st)
         return regularity([[part(c) for c in row] for row in cols for part in PARTS])
-
-    def _short(self, group: str) -> Number:
-        of, case = self.solved(group), self._cases[group]
-        return missing(of.kind, bare(case.offset(self.st)), *map(bare, case.vectors(self.st)))
-
-    def _unknown(self, group: str, i: int) -> Number:
-        return unknowns(self.solved(group), self.st)[i]
-
-    def _open_loops(self, group: str) -> Number:
-        return self._open[self.solved(group).name]
 
     @cached_property
     def loops(self) -> Group | None:

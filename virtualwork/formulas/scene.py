@@ -39,20 +39,20 @@ class Scene:
         self.mechanism, self.plan = poses.mechanism, poses.plan
         self.setting = Setting(poses, at_rest)
         self.moves, self.formed = self.setting.moves, self.setting.formed
-        known = poses.branch.prepared
+        prepared = poses.branch.prepared
         with self.lock:
-            if self.moves not in known:
-                known[self.moves] = LoadCase(self.mechanism, self.plan, self.moves)
-        self.case: LoadCase = known[self.moves]
+            if self.moves not in prepared:
+                prepared[self.moves] = LoadCase(self.mechanism, self.plan, self.moves)
+        self.case: LoadCase = prepared[self.moves]
         self._blocks: dict[tuple[str, ...], list[Block]] = {}
 
     @cached_property
     def paths(self) -> LoadPaths:
         """How the loads bear on what moves, and how joint forces follow; made once for an assembly."""
-        known = self.poses.branch.load_paths
-        if self.moves not in known:
-            known[self.moves] = LoadPaths(self.case)
-        result: LoadPaths = known[self.moves]
+        load_paths = self.poses.branch.load_paths
+        if self.moves not in load_paths:
+            load_paths[self.moves] = LoadPaths(self.case)
+        result: LoadPaths = load_paths[self.moves]
         return result
 
     @property

@@ -19,7 +19,7 @@ from copy import copy
 from functools import cached_property
 from itertools import islice
 from operator import mul
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ from virtualwork.formulas.block import Block
 from virtualwork.formulas.numbers import Reals, dot, minus, plus
 from virtualwork.intime.equations import Equations, Lost
 from virtualwork.intime.powers import motion_of
+from virtualwork.intime.sliding import Mode, Values
 from virtualwork.intime.watch import Floats, Rate, Value, Watch, sign
 
 # iterations of friction and joint forces; each gains a factor of some μ r / l
@@ -44,45 +45,10 @@ NOISE = 1e-12
 RECENT = 64
 # ways in which a sticking joint may break away
 WAYS = (" +1", " -1")
-Mode = tuple[int, ...]
-"""For each joint that rubs: the sign of its rate, 0 where it sticks."""
 
 
 # what depends on the friction of each joint that rubs: its force, the acceleration of its slide; and the speed of it
 QUANTITIES = ("x", "y", "slip", "rate")
-
-
-class Values(NamedTuple):
-    """What the tape says at one state; complex R = P + Q·φ, accelerations a + A·φ, of the joints' rates s + S·φ."""
-
-    a: Floats
-    per: list[Floats]
-    p: list[complex]
-    q: list[list[complex]]
-    rate: Floats
-    slip: Floats
-    slips: list[Floats]
-    power: float
-
-    @property
-    def signs(self) -> Mode:
-        """Which way each joint slides."""
-        return tuple(sign(rate) for rate in self.rate)
-
-    def force(self, n: int, phi: Floats) -> float:
-        """A joint's force with friction, in size."""
-        return float(abs(self.p[n] + sum(map(mul, self.q[n], phi))))
-
-    def slid(self, n: int, phi: Floats) -> float:
-        """The acceleration of a joint's slide with friction."""
-        return float(self.slip[n] + sum(map(mul, self.slips[n], phi)))
-
-    def moved(self, phi: Floats) -> Floats:
-        """The accelerations with friction."""
-        result = list(self.a)
-        for x, per in zip(phi, self.per, strict=True):
-            result = [a + x * b for a, b in zip(result, per, strict=True)]
-        return result
 
 
 class Rubbing(Equations):

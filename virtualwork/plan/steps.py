@@ -66,8 +66,6 @@ class Angle:
     inputs: tuple[tuple[int, float], ...] = ()
     bases: tuple[tuple[Coordinate, float], ...] = ()
     gears: tuple[tuple[int, float], ...] = ()
-    # of what was added up to const: its rounding is so many times the unit's
-    size: float = field(default=0.0, compare=False)
 
     @property
     def turning(self) -> tuple[tuple[str, float], ...]:
@@ -82,14 +80,11 @@ class Angle:
 
     def plus(self, other: Angle, factor: float = 1.0) -> Angle:
         """This angle and so many times another."""
-        const, more = self.const + factor * other.const, factor * other.const
-        added = abs(more) + abs(const) if self.const and other.const else 0.0
         return Angle(
-            const,
+            self.const + factor * other.const,
             _sums(self.inputs, other.inputs, factor),
             _sums(self.bases, other.bases, factor),
             _sums(self.gears, other.gears, factor),
-            self.size + abs(factor) * other.size + added,
         )
 
 

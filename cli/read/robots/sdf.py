@@ -44,8 +44,8 @@ def read(file: str, root: Element) -> Robot:
         robot.notes.append(f"models after the first are left out: {len(models) - 1}")
     robot.add(RobotLink(WORLD, np.eye(4)))
     if world is not None:
-        given = At(file, "world").numbers("gravity", text(world, "gravity"), 3, (0.0, 0.0, -9.8))
-        robot.gravity = np.array(given)
+        numbers = At(file, "world").numbers("gravity", text(world, "gravity"), 3, (0.0, 0.0, -9.8))
+        robot.gravity = np.array(numbers)
     _Model(robot, models[0], root.get("version", "1.0")).read()
     return robot
 

@@ -1,0 +1,100 @@
+"""A machine's sheet as a page: coefficients stand in it, readings are typed in, corrections and trim come out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from hashlib import sha256
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing.tapes import measured, split
+from dalembert.angles import degrees
+from dalembert.arithmetic.engines.javascript import engine, written
+from dalembert.page import Page
+from dalembert.page import sheet as sheet_page
+from dalembert.page.typed import spelled, units
+from dalembert.units import to_si
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+RUNS = 4
+"""The initial run, and runs with masses on."""
+
+
+def machine_sheet(
+    influence: Complex,
+    initial: Complex,
+    sensors: Sequence[str],
+    planes: Sequence[str],
+    *,
+    weights: Real | None = None,
+    ridge: float = 0.0,
+    errors: tuple[float, float] | None = None,
+    covariance: Complex | None = None,
+    runout: Complex | None = None,
+    against: bool = False,
+    first: str = "initial",
+    amplitude_unit: str = "",
+    mass: tuple[str, str] = ("mass", "kg"),
+    channels: Sequence[tuple[str, float | None]] | None = None,
+    speed_unit: str = "rpm",
+    places: Sequence[float] | None = None,
+) -> Page:
+    """Return the sheet of one machine.
+
+    Parameters
+    ----------
+    influence : complex array (s, p)
+        Amplitude per kg or kg·m.
+    initial : complex array (s,)
+        What the sheet begins with.
+    weights, ridge, errors, covariance, runout
+        See `tapes.measured`.
+    against : bool
+        Whether phases are typed against the sense of the mass angles.
+    first : str
+        What the initial run is called.
+    mass : (kind, unit)
+        "mass" or "unbalance", and the unit it is shown in.
+    channels : sequence of (sensor, speed)
+        How the rows call the sensors; default: as `sensors`, without a speed.
+    places : sequence of float
+        Angles where masses go, rad.
+    """
+    tape = measured(influence, weights, ridge, RUNS, errors, runout, covariance)
+    values: dict[str, float] = {}
+    for sensor, v in zip(sensors, initial, strict=True):
+        values[f"{first}/{sensor}/amplitude"] = float(abs(v))
+        values[f"{first}/{sensor}/phase"] = float(np.radians(degrees(v.conjugate() if against else v)))
+    kind, unit = mass
+    amplitude = spelled(amplitude_unit)
+    coefficients = [
+        [sensor, plane, float(abs(a)), float(degrees(a))]
+        for sensor, row in zip(sensors, influence, strict=True)
+        for plane, a in zip(planes, row, strict=True)
+    ]
+    whole: dict[str, Any] = {
+        "runs": [first, *(f"run {k + 1}" for k in range(1, RUNS))],
+        "sensors": list(sensors),
+        "channels": [list(each) for each in channels or [(sensor, None) for sensor in sensors]],
+        "speedUnit": speed_unit,
+        "planes": list(planes),
+        "values": values,
+        "rows": [],
+        "first": [],
+        "outputs": list(tape.names),
+        "against": against,
+        "errors": errors,
+        "amplitude": amplitude_unit,
+        "mass": {"kind": kind, "unit": spelled(unit), "header": unit, "si": float(to_si(1.0, kind, unit))},
+        "word": kind,
+        "coefficients": coefficients,
+        "places": None if places is None else sorted(places),
+        "units": {**units([kind, "angle"]), "amplitude": {amplitude: [1.0, 1.0]}},
+    }
+    whole["id"] = sha256(repr(sorted(whole.items(), key=lambda item: item[0])).encode()).hexdigest()[:16]
+    script = f"{engine()}\nconst tapes = {{ solve: {written(tape)}, split: {written(split())} }};\n"
+    return sheet_page("Balancing in the field", "field", script, whole)

@@ -1,0 +1,117 @@
+"""The page of a balancing: the masses as a table to edit, the formulas as tapes that compute what follows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from balancing.known_masses import known_masses
+from cli.balance.rotors import Balancing
+from dalembert.arithmetic.engines.javascript import engine, written
+from dalembert.errors import DataError
+from dalembert.page import Page
+from dalembert.page import sheet as sheet_page
+from dalembert.page.typed import spelled, units
+from dalembert.units import to_si
+
+MOST = 50
+"""Rotors of a page."""
+KINDS = {
+    "mass": "mass",
+    "weight": "force",
+    "unbalance": "unbalance",
+    "radius": "length",
+    "angle": "angle",
+    "z": "length",
+}
+
+
+def sheet(b: Balancing) -> Page:
+    """The page of a table of rotors."""
+    rotors, request = b.rotors, b.request
+    if len(rotors.names) > MOST:
+        raise DataError(f"--page: {len(rotors.names)} rotors: expected at most {MOST}")
+    read = rotors.table.numbers
+    columns = [name for name in KINDS if name in read]
+    amount = columns[0]
+    tapes: dict[str, int] = {}
+    outputs: list[dict[str, list[str]]] = []
+    documents, rows, values = [], [], dict[str, float]()
+    named = rotors.table.texts.get("name")
+    several = len(rotors.names) > 1
+    for r, rotor in enumerate(rotors.names):
+        here = b.rows_of(r)
+        at = b.plane_of_row[here]
+        planes = np.zeros(len(at)) if b.planes.z is None else b.planes.z[at]
+        limit = request.tolerance
+        bearings = None if limit is None or limit.bearings is None else np.array(limit.bearings)
+        about = float(b.about[r]) if b.has_couple else 0.0
+        made = known_masses(
+            planes,
+            b.planes.radius[at],
+            about,
+            request.gravity if rotors.weights else None,
+            bearings,
+            request.remove,
+        )
+        text = f"{{ mass: {written(made['mass'])}, result: {written(made['result'])} }}"
+        if text not in tapes:
+            tapes[text] = len(tapes)
+            outputs.append({name: list(tape.names) for name, tape in made.items()})
+        document: dict[str, Any] = {
+            "name": rotor,
+            "planes": [b.planes.name[p] for p in at],
+            "tapes": tapes[text],
+        }
+        if limit is not None:
+            verdicts = b.verdicts(r)
+            document["tolerance"] = {
+                "names": [v.plane for v in verdicts],
+                "permissible": [float(v.permissible) for v in verdicts],
+            }
+        documents.append(document)
+        mine: list[str] = []
+        for i in np.flatnonzero(rotors.rotor == r).tolist():
+            name = named[i] if named else ""
+            name = name if name and name not in mine else str(len(mine) + 1)
+            mine.append(name)
+            for column in columns:
+                key = f"{rotor}/{name}.{column}" if several else f"{name}.{column}"
+                values[key] = float(read[column].si[i])
+        rows.append(mine)
+    couple = f"{rotors.unbalance_unit}_{b.length_unit}".replace(
+        f"{b.length_unit}_{b.length_unit}", f"{b.length_unit}2"
+    )
+    listed = ",\n".join(tapes)
+    script = f"{engine()}\nconst tapes = [\n{listed}\n];\n"
+    whole = {
+        "rotors": documents,
+        "rows": rows,
+        "first": rows,
+        "values": values,
+        "outputs": outputs,
+        "amount": amount,
+        "columns": [
+            {
+                "name": name,
+                "kind": KINDS[name],
+                "unit": spelled(read[name].unit),
+                "header": f"{name}_{read[name].unit}",
+            }
+            for name in columns
+        ],
+        "units": units(KINDS[name] for name in columns),
+        "couple": b.has_couple,
+        "remove": request.remove,
+        "shown": {
+            "mass": _shown("mass", rotors.mass_unit),
+            "unbalance": _shown("unbalance", rotors.unbalance_unit),
+            "couple": _shown("inertia", couple),
+        },
+    }
+    return sheet_page("Balancing of known masses", "balance", script, whole)
+
+
+def _shown(kind: str, unit: str) -> dict[str, Any]:
+    return {"unit": spelled(unit), "si": float(to_si(1.0, kind, unit))}

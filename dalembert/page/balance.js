@@ -1,0 +1,160 @@
+// Rotors whose masses are known: rows are typed, corrections, states, tolerances and polygons follow.
+const tapesOf = sheet.rotors.map((rotor) => ({ mass: new Tape(tapes[rotor.tapes].mass), result: new Tape(tapes[rotor.tapes].result) }));
+const ROW = ["share", "sum"];
+const namesOf = sheet.rotors.map((rotor) => sheet.outputs[rotor.tapes]);
+const prefix = (rotor) => (sheet.rotors.length > 1 ? `${rotor.name}/` : "");
+const cellName = (rotor, row, column) => `${prefix(rotor)}${row}.${column}`;
+let polygons = [];
+
+solveSheet = () => {
+  polygons = [];
+  for (const [r, rotor] of sheet.rotors.entries()) {
+    const { mass, result } = tapesOf[r];
+    const names = namesOf[r];
+    const [sums, pairs] = [{}, {}];
+    for (const name of names.mass) if (name.startsWith("sum ")) [sums[name], pairs[name]] = [0, [0, 0]];
+    const drawn = rotor.planes.map(() => []);
+    for (const row of sheet.rows[r]) {
+      const given = { ...sums, radius: 1, z: 0 };
+      for (const { name } of sheet.columns) given[name === sheet.amount ? "amount" : name] = values[cellName(rotor, row, name)];
+      const out = solved(mass, names.mass, given, { ...given, ...pairs });
+      for (const name of Object.keys(sums)) [sums[name], pairs[name]] = [out.get(name)[0], out.get(name)[2]];
+      rotor.planes.forEach((_, p) => drawn[p].push([row, out.get(`share ${p} x`)[0], out.get(`share ${p} y`)[0]]));
+    }
+    const out = solved(result, names.result, sums, pairs);
+    const set = (name, from, turn = false) => out.has(from) && answers.set(`${prefix(rotor)}${name}`, turn ? [whole(out.get(from)[0]), out.get(from)[1]] : out.get(from));
+    rotor.planes.forEach((plane, p) => {
+      set(`${plane}.unbalance`, `plane ${p} size`);
+      set(`${plane}.mass`, `mass ${p}`);
+      set(`${plane}.angle`, `plane ${p} angle`, true);
+      polygons.push([`${prefix(rotor)}${plane}`, drawn[p], [out.get(`made ${p} x`)[0], out.get(`made ${p} y`)[0]]]);
+    });
+    set("static.unbalance", "static size");
+    set("static.angle", "static angle", true);
+    set("residual.static", "left static");
+    if (sheet.couple) {
+      set("couple.unbalance", "couple size");
+      set("couple.angle", "couple angle", true);
+      set("residual.couple", "left couple");
+    }
+    rotor.tolerance?.names.forEach((name, p) => set(`tolerance.${name}`, out.has(`before ${p}`) ? `before ${p}` : `plane ${p} size`));
+  }
+};
+
+function build() {
+  $("entries").querySelectorAll(".scroll").forEach((one) => one.remove());
+  inputs.clear();
+  for (const [r, rotor] of sheet.rotors.entries()) {
+    const scroll = put($("entries"), "div", { class: "scroll" });
+    const table = put(scroll, "table", { class: "cells" });
+    put(table, "caption", {}, sheet.rotors.length > 1 ? TEXTS.massesOf(rotor.name) : TEXTS.masses);
+    const head = put(put(table, "thead"), "tr");
+    for (const text of ["", ...sheet.columns.map((c) => `${c.name}, ${c.unit}`), ""]) put(head, "th", { scope: "col" }, text);
+    const body = put(table, "tbody");
+    for (const row of sheet.rows[r]) {
+      const line = put(body, "tr");
+      put(line, "th", { scope: "row" }, row);
+      for (const { name, kind, unit } of sheet.columns) cell(put(line, "td"), cellName(rotor, row, name), kind, unit, { positive: name !== "angle" && name !== "z" });
+      const away = put(put(line, "td"), "button", { type: "button", "aria-label": TEXTS.removeRow(row), title: TEXTS.removeRow(row) }, "×");
+      away.addEventListener("click", () => {
+        remember();
+        sheet.rows[r] = sheet.rows[r].filter((other) => other !== row);
+        for (const { name } of sheet.columns) {
+          wrong.delete(cellName(rotor, row, name));
+          delete values[cellName(rotor, row, name)];
+        }
+        build();
+      });
+    }
+    const add = put(scroll, "button", { type: "button", class: "add" }, TEXTS.addRow);
+    add.addEventListener("click", () => {
+      remember();
+      let k = sheet.rows[r].length + 1;
+      const named = /^[A-Za-z]+(?=\d+$)/.exec(sheet.rows[r].at(-1) ?? "")?.[0] ?? "";
+      while (sheet.rows[r].includes(`${named}${k}`)) k++;
+      sheet.rows[r].push(`${named}${k}`);
+      for (const { name } of sheet.columns) values[cellName(rotor, `${named}${k}`, name)] = 0;
+      build();
+    });
+  }
+  update();
+}
+
+drawSheet = () => {
+  const host = $("answers");
+  host.replaceChildren();
+  const listed = (caption, heads, rows) => {
+    const table = put(put(host, "div", { class: "scroll" }), "table");
+    put(table, "caption", {}, caption);
+    const head = put(put(table, "thead"), "tr");
+    for (const text of heads) put(head, "th", { scope: "col" }, text);
+    const body = put(table, "tbody");
+    for (const [name, ...cells] of rows) {
+      const line = put(body, "tr");
+      put(line, "th", { scope: "row" }, name);
+      for (const text of cells) put(line, "td", {}, text);
+    }
+  };
+  const [mass, unbalance] = [sheet.shown.mass, sheet.shown.unbalance];
+  const turn = Math.PI / 180;
+  listed(
+    sheet.remove ? TEXTS.toRemove : TEXTS.toAdd,
+    ["", `mass, ${mass.unit}`, "angle, deg", `unbalance, ${unbalance.unit}`],
+    sheet.rotors.flatMap((rotor) => rotor.planes.map((plane) => [`${prefix(rotor)}${plane}`, shownAnswer(`${prefix(rotor)}${plane}.mass`, mass.si), shownAnswer(`${prefix(rotor)}${plane}.angle`, turn), shownAnswer(`${prefix(rotor)}${plane}.unbalance`, unbalance.si)])),
+  );
+  listed(
+    TEXTS.state,
+    ["", `static, ${unbalance.unit}`, "angle, deg", ...(sheet.couple ? [`couple, ${sheet.shown.couple.unit}`, "angle, deg"] : []), `residual, ${unbalance.unit}`],
+    sheet.rotors.map((rotor) => [
+      rotor.name,
+      shownAnswer(`${prefix(rotor)}static.unbalance`, unbalance.si),
+      shownAnswer(`${prefix(rotor)}static.angle`, turn),
+      ...(sheet.couple ? [shownAnswer(`${prefix(rotor)}couple.unbalance`, sheet.shown.couple.si), shownAnswer(`${prefix(rotor)}couple.angle`, turn)] : []),
+      shownAnswer(`${prefix(rotor)}residual.static`, unbalance.si),
+    ]),
+  );
+  if (sheet.rotors.some((rotor) => rotor.tolerance)) {
+    listed(
+      TEXTS.tolerance,
+      ["", `permissible, ${unbalance.unit}`, `before, ${unbalance.unit}`, ""],
+      sheet.rotors.flatMap((rotor) => (rotor.tolerance?.names ?? []).map((name, p) => {
+        const [limit, x] = [rotor.tolerance.permissible[p], answer(`${prefix(rotor)}tolerance.${name}`)];
+        return [`${prefix(rotor)}${name}`, short(limit / unbalance.si), shownAnswer(`${prefix(rotor)}tolerance.${name}`, unbalance.si), Number.isFinite(x) ? (x <= limit ? TEXTS.within : TEXTS.beyond) : "–"];
+      })),
+    );
+  }
+  const drawn = put(host, "div", { class: "polygons" });
+  if (!wrong.size) for (const [name, vectors, closing] of polygons.slice(0, 8)) polygon(drawn, TEXTS.polygon(name), vectors, closing, TEXTS.correction);
+};
+
+function csv() {
+  const several = sheet.rotors.length > 1;
+  const lines = [[...(several ? ["rotor"] : []), "name", ...sheet.columns.map((c) => c.header)].join(",")];
+  for (const [r, rotor] of sheet.rotors.entries()) {
+    for (const row of sheet.rows[r]) lines.push([...(several ? [quoted(rotor.name)] : []), quoted(row), ...sheet.columns.map((c) => inUnit(values[cellName(rotor, row, c.name)], c.kind, c.unit))].join(","));
+  }
+  return `${lines.join("\n")}\n`;
+}
+const settable = () => sheet.rotors.flatMap((rotor, r) => sheet.rows[r].flatMap((row) => sheet.columns.map((c) => cellName(rotor, row, c.name))));
+
+window.dalembert = {
+  get names() {
+    return settable();
+  },
+  set(changed) {
+    const unknown = Object.keys(changed).find((name) => !settable().includes(name));
+    if (unknown !== undefined) {
+      say(TEXTS.unknown(unknown));
+      return false;
+    }
+    for (const [name, x] of Object.entries(changed)) check(name, x, String(x), inputs.get(name).rules);
+    update();
+    return !wrong.size;
+  },
+  get: (name) => (settable().includes(name) ? (wrong.has(name) ? NaN : values[name]) : answer(name)),
+  curve: () => [],
+  options: () => "",
+  toml: () => "",
+  csv,
+};
+start();

@@ -1,0 +1,237 @@
+// A machine's sheet: readings are typed, corrections, trim, the vibration that is expected and the split on places follow.
+const solveTape = new Tape(tapes.solve);
+const splitTape = new Tape(tapes.split);
+const word = sheet.word;
+const amplitudeUnit = Object.keys(sheet.units.amplitude)[0];
+const reading = (k, s, what) => `${sheet.runs[k]}/${sheet.sensors[s]}/${what}`;
+const onRotor = (k, p, what) => `${sheet.runs[k]}/${sheet.planes[p]}/${what}`;
+const has = (name) => Number.isFinite(values[name] ?? NaN);
+let doubts = [];
+const settable = sheet.runs.flatMap((_, k) => [
+  ...sheet.sensors.flatMap((_s, s) => [reading(k, s, "amplitude"), reading(k, s, "phase")]),
+  ...(k ? sheet.planes.flatMap((_p, p) => [onRotor(k, p, word), onRotor(k, p, "angle")]) : []),
+]);
+
+function enter(last) {
+  const given = {};
+  for (let k = 0; k < sheet.runs.length; k++) {
+    for (let s = 0; s < sheet.sensors.length; s++) {
+      const there = k <= last && has(reading(k, s, "amplitude")) && has(reading(k, s, "phase"));
+      // as the program takes them: the initial run tells the initial vibration, later ones where it was not read
+      given[`run ${k} there ${s}`] = there && (k === 0 || !has(reading(0, s, "amplitude"))) ? 1 : 0;
+      given[`run ${k} amplitude ${s}`] = there ? values[reading(k, s, "amplitude")] : 0;
+      given[`run ${k} phase ${s}`] = there ? (sheet.against ? -1 : 1) * values[reading(k, s, "phase")] : 0;
+    }
+    for (let p = 0; k && p < sheet.planes.length; p++) {
+      given[`run ${k} mass ${p}`] = standing[k]?.[p][0] ?? 0;
+      given[`run ${k} angle ${p}`] = standing[k]?.[p][1] ?? 0;
+    }
+  }
+  return given;
+}
+let standing = [];
+const readIn = (k) => sheet.sensors.some((_, s) => has(reading(k, s, "amplitude")) || has(reading(k, s, "phase")));
+
+solveSheet = () => {
+  doubts = [];
+  standing = [];
+  // a reading is an amplitude with its phase; each sensor is read in some run
+  for (let k = 0; k < sheet.runs.length; k++) {
+    for (let s = 0; s < sheet.sensors.length; s++) {
+      if (has(reading(k, s, "amplitude")) !== has(reading(k, s, "phase"))) return;
+    }
+  }
+  let out = null;
+  let last = 0;
+  for (let k = 0; k < sheet.runs.length; k++) {
+    if (k && !readIn(k)) continue;
+    if (k) {
+      // what stands on the rotor: as typed, else what was advised before
+      standing[k] = sheet.planes.map((_, p) => {
+        const own = [onRotor(k, p, word), onRotor(k, p, "angle")];
+        return own.every(has) ? own.map((name) => values[name]) : out ? [out.get(`plane ${p} size`)[0], out.get(`plane ${p} angle`)[0]] : [0, 0];
+      });
+    }
+    last = k;
+    const given = enter(k);
+    out = solved(solveTape, sheet.outputs, given, given);
+  }
+  if (!out) return;
+  const turned = (name) => [whole(out.get(name)[0]), out.get(name)[1]];
+  const phase = (name) => [whole((sheet.against ? -1 : 1) * out.get(name)[0]), out.get(name)[1]];
+  sheet.planes.forEach((plane, p) => {
+    answers.set(`${plane}.${word}`, out.get(`plane ${p} size`));
+    answers.set(`${plane}.angle`, turned(`plane ${p} angle`));
+    const trim = last ? `trim ${last} ${p}` : `plane ${p}`;
+    answers.set(`trim.${plane}.${word}`, out.get(`${trim} size`));
+    answers.set(`trim.${plane}.angle`, turned(`${trim} angle`));
+    if (last && sheet.sensors.every((_, s) => has(reading(last, s, "amplitude")))) {
+      answers.set(`fresh.${plane}.${word}`, out.get(`fresh ${last} ${p} size`));
+      answers.set(`fresh.${plane}.angle`, turned(`fresh ${last} ${p} angle`));
+    }
+    if (sheet.errors) {
+      answers.set(`${plane}.${word}_uncertainty`, out.get(`along ${p}`));
+      answers.set(`${plane}.angle_uncertainty`, [out.get(`across ${p}`)[0] / out.get(`plane ${p} size`)[0], 0]);
+    }
+  });
+  sheet.sensors.forEach((sensor, s) => {
+    answers.set(`residual/${sensor}/amplitude`, out.get(`residual ${s} size`));
+    answers.set(`residual/${sensor}/phase`, phase(`residual ${s} angle`));
+  });
+  // a reading that is farther off what the others say than three of its own standard deviations
+  if (sheet.errors && last) {
+    for (let k = 0; k <= last; k++) {
+      for (let s = 0; s < sheet.sensors.length; s++) {
+        const a = values[reading(k, s, "amplitude")];
+        const limit = 3 * a * Math.hypot(...sheet.errors);
+        if (has(reading(k, s, "amplitude")) && out.get(`off ${k} ${s}`)[0] > limit) doubts.push(TEXTS.repeat(sheet.runs[k], sheet.sensors[s]));
+      }
+    }
+  }
+  if (sheet.places) {
+    sheet.planes.forEach((plane, p) => {
+      const [size, angle] = [answer(`trim.${plane}.${word}`), answer(`trim.${plane}.angle`)];
+      const k = sheet.places.findLastIndex((place) => place <= angle);
+      const low = sheet.places.at(k);
+      const high = sheet.places.at((k + 1) % sheet.places.length);
+      const [first, second] = splitTape.one({ size, angle, first: low, second: high });
+      answers.set(`split.${plane}.1.${word}`, [first, 0]);
+      answers.set(`split.${plane}.1.angle`, [low, 0]);
+      answers.set(`split.${plane}.2.${word}`, [second, 0]);
+      answers.set(`split.${plane}.2.angle`, [high, 0]);
+    });
+  }
+};
+
+function build() {
+  $("entries").querySelectorAll("fieldset, .scroll").forEach((one) => one.remove());
+  inputs.clear();
+  for (const [k, run] of sheet.runs.entries()) {
+    const box = put($("entries"), "fieldset", {});
+    put(box, "legend", {}, run);
+    const table = put(put(box, "div", { class: "scroll" }), "table", { class: "cells" });
+    const head = put(put(table, "thead"), "tr");
+    for (const text of ["", `${TEXTS.amplitude}, ${amplitudeUnit}`, `${TEXTS.phase}, deg`]) put(head, "th", { scope: "col" }, text);
+    const body = put(table, "tbody");
+    sheet.sensors.forEach((sensor, s) => {
+      const line = put(body, "tr");
+      put(line, "th", { scope: "row" }, sensor);
+      cell(put(line, "td"), reading(k, s, "amplitude"), "amplitude", amplitudeUnit, { positive: true, empty: k > 0 });
+      cell(put(line, "td"), reading(k, s, "phase"), "angle", "deg", { empty: k > 0 });
+    });
+    if (!k) continue;
+    put(box, "p", { class: "soft" }, TEXTS.standing);
+    const on = put(put(put(box, "div", { class: "scroll" }), "table", { class: "cells" }), "tbody");
+    sheet.planes.forEach((plane, p) => {
+      const line = put(on, "tr");
+      put(line, "th", { scope: "row" }, `${plane}, ${sheet.mass.unit}`);
+      cell(put(line, "td"), onRotor(k, p, word), sheet.mass.kind, sheet.mass.unit, { positive: true, empty: true });
+      cell(put(line, "td"), onRotor(k, p, "angle"), "angle", "deg", { empty: true });
+    });
+  }
+  update();
+}
+
+function listed(host, caption, heads, rows) {
+  const table = put(put(host, "div", { class: "scroll" }), "table");
+  put(table, "caption", {}, caption);
+  const head = put(put(table, "thead"), "tr");
+  for (const text of heads) put(head, "th", { scope: "col" }, text);
+  const body = put(table, "tbody");
+  for (const [name, ...cells] of rows) {
+    const line = put(body, "tr");
+    put(line, "th", { scope: "row" }, name);
+    for (const text of cells) put(line, "td", {}, text);
+  }
+}
+function dial(parent, plane) {
+  const host = put(parent, "figure");
+  put(host, "figcaption", {}, TEXTS.dial(plane));
+  const picture = put(host, "svg", { role: "img", "aria-label": TEXTS.dial(plane), viewBox: "0 0 300 260", class: "polygon" });
+  put(picture, "circle", { class: "dial", cx: 150, cy: 130, r: 92 });
+  const at = (angle, r) => [(150 + r * Math.cos(angle)).toFixed(1), (130 - r * Math.sin(angle)).toFixed(1)];
+  for (const place of sheet.places ?? []) {
+    const [x, y] = at(place, 92);
+    put(picture, "circle", { class: "place", cx: x, cy: y, r: 4 });
+  }
+  const marks = sheet.places ? [1, 2].map((i) => [answer(`split.${plane}.${i}.angle`), answer(`split.${plane}.${i}.${word}`)]) : [[answer(`trim.${plane}.angle`), answer(`trim.${plane}.${word}`)]];
+  for (const [angle, size] of marks) {
+    if (!Number.isFinite(angle + size)) continue;
+    const [x, y] = at(angle, 92);
+    put(picture, "circle", { class: "place on", cx: x, cy: y, r: 7 });
+    const [u, v] = at(angle, 115);
+    put(picture, "text", { x: u, y: v }, `${short(Number((size / sheet.mass.si).toPrecision(4)))} ${sheet.mass.unit}`);
+    const [c, d] = at(angle, 70);
+    put(picture, "text", { x: c, y: d }, `${Number(((angle * 180) / Math.PI).toFixed(1))}°`);
+  }
+  put(picture, "text", { x: 150, y: 130 }, "0° →");
+}
+drawSheet = () => {
+  keep();
+  const host = $("answers");
+  host.replaceChildren();
+  const turn = Math.PI / 180;
+  const sure = (name, by) => (sheet.errors && Number.isFinite(answer(name)) ? ` ± ${Number((answer(name) / by).toPrecision(2))}` : "");
+  const vectors = (lead, more) => sheet.planes.map((plane) => [plane, shownAnswer(`${lead}${plane}.${word}`, sheet.mass.si) + (more ? sure(`${plane}.${word}_uncertainty`, sheet.mass.si) : ""), shownAnswer(`${lead}${plane}.angle`, turn) + (more ? sure(`${plane}.angle_uncertainty`, turn) : "")]);
+  listed(host, TEXTS.corrections, ["", `${word}, ${sheet.mass.unit}`, "angle, deg"], vectors("", true));
+  listed(host, TEXTS.trim, ["", `${word}, ${sheet.mass.unit}`, "angle, deg"], vectors("trim.", false));
+  if (sheet.planes.some((plane) => answers.has(`fresh.${plane}.${word}`))) listed(host, TEXTS.fresh, ["", `${word}, ${sheet.mass.unit}`, "angle, deg"], vectors("fresh.", false));
+  if (doubts.length) put(host, "p", { class: "doubt", role: "status" }, doubts.join(" "));
+  listed(host, TEXTS.expected, ["", `${TEXTS.amplitude}, ${amplitudeUnit}`, `${TEXTS.phase}, deg`], sheet.sensors.map((sensor) => [sensor, shownAnswer(`residual/${sensor}/amplitude`), shownAnswer(`residual/${sensor}/phase`, turn)]));
+  const drawn = put(host, "div", { class: "polygons" });
+  if (answers.size) for (const plane of sheet.planes) dial(drawn, plane);
+  const box = put(host, "details");
+  put(box, "summary", {}, TEXTS.coefficients);
+  listed(box, TEXTS.coefficients, [TEXTS.sensor, TEXTS.plane, `${amplitudeUnit} per ${sheet.mass.unit}`, `${TEXTS.phase}, deg`], sheet.coefficients.map(([sensor, plane, size, angle]) => [sensor, plane, short(size * sheet.mass.si), short(sheet.against ? (360 - angle) % 360 : angle)]));
+};
+
+function csv() {
+  const speeds = sheet.channels.some(([, speed]) => speed !== null);
+  const lines = [["run", "sensor", ...(speeds ? [`speed_${sheet.speedUnit}`] : []), `amplitude_${sheet.amplitude}`, "phase_deg", "trial_plane", `trial_${word}_${sheet.mass.header}`, "trial_angle_deg"].join(",")];
+  for (const [k, run] of sheet.runs.entries()) {
+    if (!readIn(k)) continue;
+    const on = k ? (standing[k] ?? sheet.planes.map(() => [0, 0])) : null;
+    for (const [s, [sensor, speed]] of sheet.channels.entries()) {
+      if (!has(reading(k, s, "amplitude"))) continue;
+      const masses = on ? [sheet.planes.join(";"), on.map(([size]) => inUnit(size, sheet.mass.kind, sheet.mass.unit)).join(";"), on.map(([, angle]) => inUnit(whole(angle), "angle", "deg")).join(";")] : ["", "", ""];
+      lines.push([quoted(run), quoted(sensor), ...(speeds ? [String(speed ?? "")] : []), String(values[reading(k, s, "amplitude")]), inUnit(values[reading(k, s, "phase")], "angle", "deg"), ...masses].join(","));
+    }
+  }
+  return `${lines.join("\n")}\n`;
+}
+
+// what was typed is kept on this machine, where the browser allows it
+const kept = `dalembert ${sheet.id}`;
+function keep() {
+  try {
+    if (!wrong.size) localStorage.setItem(kept, JSON.stringify(Object.entries(values).filter(([, x]) => Number.isFinite(x))));
+  } catch {
+    // a page in a frame keeps nothing
+  }
+}
+try {
+  const before = localStorage.getItem(kept);
+  if (before) for (const [name, x] of JSON.parse(before)) if (settable.includes(name) && typeof x === "number") values[name] = x;
+} catch {
+  // nothing was kept
+}
+
+window.dalembert = {
+  names: settable,
+  set(changed) {
+    const unknown = Object.keys(changed).find((name) => !settable.includes(name));
+    if (unknown !== undefined) {
+      say(TEXTS.unknown(unknown));
+      return false;
+    }
+    for (const [name, x] of Object.entries(changed)) check(name, x, Number.isNaN(x) ? "" : String(x), inputs.get(name).rules);
+    update();
+    return answers.size > 0;
+  },
+  get: (name) => (settable.includes(name) ? (wrong.has(name) ? NaN : (values[name] ?? NaN)) : answer(name)),
+  curve: () => [],
+  options: () => "",
+  toml: () => "",
+  csv,
+};
+start();

@@ -1,0 +1,133 @@
+// A sheet of numbers that are typed and answers that follow: cells by name, undo, reset, what is handed over.
+const sheet = data.sheet;
+let values = { ...sheet.values }; // SI and radians, amplitudes as the file has them; NaN where a cell is empty
+const own = { ...sheet.values };
+const wrong = new Map(); // cells that are no number: what to say
+const past = [];
+let answers = new Map(); // name -> [number, how far a second computation with 32 digits is from it]
+let solveSheet, drawSheet; // of the kind of sheet
+const inputs = new Map(); // name -> {input, units, unit}
+
+function remember() {
+  past.push(structuredClone({ values, rows: sheet.rows }));
+  if (past.length > 500) past.shift();
+}
+// a cell of a table: what was typed is checked at once, and a wrong one leaves no answer standing
+function cell(parent, name, kind, unit, rules = {}) {
+  const units = sheet.units[kind];
+  const input = numberField(parent, name, name, units, unit, (x, text) => {
+    const empty = text.trim() === "";
+    check(name, empty && rules.empty ? NaN : x, text, rules);
+    update();
+  });
+  input.addEventListener("blur", listCells);
+  inputs.set(name, { input, units, unit, rules, kind });
+  return input;
+}
+function check(name, x, text, rules) {
+  const empty = Number.isNaN(x) && rules.empty && String(text).trim() === "";
+  const of = inputs.get(name);
+  if (!empty && (typeof x !== "number" || !Number.isFinite(x))) {
+    wrong.set(name, text.trim() === "" ? TEXTS.blank(name) : TEXTS.wrong(name, text, of ? `10 ${of.unit}` : ""));
+    return;
+  }
+  if (x < 0 && rules.positive) {
+    wrong.set(name, TEXTS.negative(name, text));
+    return;
+  }
+  if (!wrong.delete(name) || !Object.is(values[name], x)) remember();
+  values[name] = x;
+}
+function listCells() {
+  for (const [name, { input, units, unit }] of inputs) {
+    if (input === document.activeElement || wrong.has(name)) continue;
+    const text = Number.isNaN(values[name] ?? NaN) ? "" : shortest(values[name], units, unit);
+    if (input.value !== text) input.value = text;
+    input.removeAttribute("aria-invalid");
+    input.classList.toggle("changed", !Object.is(values[name], own[name]));
+  }
+  undoButton.disabled = !past.length;
+}
+function update() {
+  answers = new Map();
+  if (!wrong.size) solveSheet();
+  say([...wrong.values()].join("; "));
+  drawSheet();
+  listCells();
+}
+const answer = (name) => answers.get(name)?.[0] ?? NaN;
+// an answer in a unit, with the digits that hold
+function shownAnswer(name, by = 1) {
+  const [x, error] = answers.get(name) ?? [NaN, 0];
+  return Number.isFinite(x) ? short(Number(held(x / by, error / by)) || 0) : "–";
+}
+const whole = (x) => (x < 0 ? (x + 2 * Math.PI < 2 * Math.PI ? x + 2 * Math.PI : 0) : x + 0);
+// the outputs of a tape by their names, with how far 32 digits are from them
+function solved(tape, names, given, twice) {
+  const [out, more] = [tape.one(given), tape.twice(twice)];
+  return new Map(names.map((name, k) => [name, [out[k], Math.abs(more[k][0] - out[k] + more[k][1]), more[k]]]));
+}
+const tools = put($("entries"), "div", { id: "tools", role: "group" });
+put($("entries"), "p", { id: "alert", role: "alert" });
+function tool(text, act) {
+  const button = put(tools, "button", { type: "button" }, text);
+  button.addEventListener("click", act);
+  return button;
+}
+const undoButton = tool(TEXTS.undo, () => {
+  if (!past.length) return;
+  const before = past.pop();
+  values = before.values;
+  sheet.rows = before.rows;
+  wrong.clear();
+  build();
+});
+tool(TEXTS.reset, () => {
+  remember();
+  values = { ...own };
+  sheet.rows = structuredClone(sheet.first);
+  wrong.clear();
+  build();
+});
+const given = make("textarea", { id: "given", readonly: "", rows: "4", "aria-label": TEXTS.toCopy, hidden: "" });
+tools.after(given);
+tool(TEXTS.copyRows, () => {
+  given.hidden = false;
+  given.value = csv();
+  given.select();
+  navigator.clipboard?.writeText(given.value).then(() => say(TEXTS.copied), () => {});
+});
+tool(TEXTS.saveRows, () => {
+  const link = make("a", { href: URL.createObjectURL(new Blob([csv()], { type: "text/csv" })), download: `${document.title.replace(/[^\w-]+/g, "-") || "sheet"}.csv` });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+});
+tool(TEXTS.print, () => print());
+const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+const inUnit = (x, kind, unit) => (Number.isNaN(x ?? NaN) ? "" : shortest(x, sheet.units[kind], unit));
+
+// vectors from one point to the next, and a last one that closes them
+function polygon(parent, title, vectors, closing, label) {
+  const host = put(parent, "figure");
+  put(host, "figcaption", {}, title);
+  const svg = put(host, "svg", { role: "img", "aria-label": title, viewBox: "0 0 300 260", class: "polygon" });
+  const corners = [[0, 0]];
+  for (const [, x, y] of vectors) corners.push([corners.at(-1)[0] + x, corners.at(-1)[1] + y]);
+  const all = [...corners, [corners.at(-1)[0] + closing[0], corners.at(-1)[1] + closing[1]]].filter(([x, y]) => Number.isFinite(x + y));
+  if (all.length < corners.length + 1) return;
+  const [xs, ys] = [range(all.map(([x]) => x)), range(all.map(([, y]) => y))];
+  const k = Math.min(240 / (xs[1] - xs[0] || 1e-300), 190 / (ys[1] - ys[0] || 1e-300));
+  const at = ([x, y]) => [150 + k * (x - (xs[0] + xs[1]) / 2), 130 - k * (y - (ys[0] + ys[1]) / 2)];
+  const line = (a, b, kind, text) => {
+    const [[x, y], [u, v]] = [at(a), at(b)];
+    put(svg, "path", { class: kind, d: arrow(x, y, u - x, v - y) });
+    const length = Math.hypot(u - x, v - y);
+    if (length > 12) put(svg, "text", { x: ((x + u) / 2 + (9 * (v - y)) / length).toFixed(1), y: ((y + v) / 2 - (9 * (u - x)) / length).toFixed(1), class: "point" }, text);
+  };
+  vectors.forEach(([name], i) => line(corners[i], corners[i + 1], "share", name));
+  line(corners.at(-1), all.at(-1), "closing", label);
+}
+function start() {
+  theme();
+  build();
+}

@@ -1,0 +1,106 @@
+"""A motion as pictures and pages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from virtualwork.formulas.poses import Poses
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import FigureBase
+
+    from dalembert.page import Page
+    from virtualwork.drawing import Drawing
+    from virtualwork.forces import Forces
+
+
+class Pictured:
+    """What a motion looks like: its drawing, pictures on paper, pages that move and that compute."""
+
+    poses: Poses
+
+    @property
+    def dynamics(self) -> Forces:
+        """The forces of the motion."""
+        raise NotImplementedError
+
+    @cached_property
+    def drawing(self) -> Drawing:
+        """What the mechanism is drawn as, its guides as long as they are used; `at(shape.body, z)` carries shapes along."""
+        from virtualwork.picture.paper import shapes_of
+
+        return shapes_of(self.poses)
+
+    def plot(self, points: Sequence[str] | None = None, figure: FigureBase | None = None) -> Axes:
+        """Draw the mechanism to scale and the paths of points (default: of all that are no joint); return the axes.
+
+        Without a figure it is a new one of pyplot's; without matplotlib (the extra `plot`) an ImportError.
+        """
+        from virtualwork.picture.paper import on_paper
+
+        return on_paper(self.poses, points, figure)
+
+    def plot_curves(self, *names: str, figure: FigureBase | None = None) -> NDArray[np.object_]:
+        """Draw `H.x`, `coupler.omega` … against the input, a panel for each unit; return their axes."""
+        from virtualwork.picture.over_input import curves
+
+        return curves(self.poses, names, figure)
+
+    def animate(self, forces: bool = False) -> Page:
+        """Return a page that moves: the mechanism over these poses with play, slider, curves and values.
+
+        A notebook shows it; `.save("motion.html")` writes it to a file that any browser opens.
+
+        Parameters
+        ----------
+        forces : bool
+            Draw the joint forces too.
+
+        Raises
+        ------
+        ValueError
+            More poses than a page can hold.
+
+        Examples
+        --------
+        >>> from virtualwork import Input, Link, Mechanism
+        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 2})}, inputs=Input(link="crank"))
+        >>> "P_vx_m_s" in crank.motion(np.linspace(0, 6, 37), speed=3.0).animate().html
+        True
+        """
+        from virtualwork.animation import of_motion
+
+        return of_motion(self.poses, self.drawing, self.dynamics if forces else None)
+
+    def page(self, forces: bool = False) -> Page:
+        """Return a page that computes: dimensions can be dragged and typed, and poses, paths, curves and limits follow.
+
+        The mechanism's formulas stand in the page, which needs no network. What it cannot compute (friction, loads given by
+        tables, a law of motion in time) it replays, and says so.
+
+        Parameters
+        ----------
+        forces : bool
+            Effort, joint forces and shaking force too.
+
+        Raises
+        ------
+        ValueError
+            More poses than a page can hold.
+
+        Examples
+        --------
+        >>> from virtualwork import Input, Link, Mechanism
+        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 2})}, inputs=Input(link="crank"))
+        >>> "links.crank.P.x" in crank.motion(np.linspace(0, 6, 37), speed=3.0).page().html
+        True
+        """
+        from virtualwork.computing import page_of
+
+        return page_of(self.poses, self.drawing, self.dynamics if forces else None)
