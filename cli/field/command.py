@@ -14,6 +14,7 @@ from cli.show.output import command
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from types import ModuleType
 
     from matplotlib.figure import Figure
 
@@ -251,7 +252,6 @@ def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -
 
 def _tables(b: FieldBalancing, warnings: list[str]) -> Tables:
     """The tables of a result, the CSV's first. `warnings` takes in why --digits leaves a correction whole."""
-    from cli.field import limits
     from cli.field import tables as of
 
     def influence() -> Table:
@@ -280,11 +280,18 @@ def _tables(b: FieldBalancing, warnings: list[str]) -> Tables:
         "rotors": lambda: of.rotors(b, further),
     }
     if b.request.tolerance is not None:
-        made["tolerance"] = lambda: limits.tolerance(b)
+        made["tolerance"] = lambda: _limits().tolerance(b)
     if b.request.zone_class is not None:
-        made["zones"] = lambda: limits.zones(b)
+        made["zones"] = lambda: _limits().zones(b)
     if b.request.four_run:
         made |= {"misfit": lambda: of.misfit(b), "alternatives": lambda: of.alternatives(b)}
     if b.request.view is not None:
         made |= {"static": lambda: of.static_couple(b, 0), "couple": lambda: of.static_couple(b, 1)}
     return {**made, **fits}
+
+
+def _limits() -> ModuleType:
+    """What is held against limits, loaded where it is asked for."""
+    from cli.field import limits
+
+    return limits

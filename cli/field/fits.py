@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import cache
-from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -16,13 +15,12 @@ from balancing import (
     NextRun,
     drift,
     least_squares,
-    repeats,
     robust_fit,
     suggest_run,
 )
 from balancing.doubt import LEVEL
 from cli.field.field_balancing import FieldBalancing
-from cli.field.runs import SHOWN, Before, Channel, Complex, Group, Real
+from cli.field.runs import Before, Channel, Complex, Group, Real
 from cli.field.solution import Solved
 from cli.field.tables import (
     READINGS,
@@ -365,93 +363,3 @@ def robust_tables(b: FieldBalancing) -> tuple[Table, Table]:
 def vibration(b: FieldBalancing, value: Complex) -> list[Column]:
     """Return amplitude and phase."""
     return [amplitude(b, "amplitude", np.abs(value)), number("phase", "angle", degrees(value))]
-
-
-def remarks(b: FieldBalancing) -> Iterator[str]:
-    """What is to be said of the fits."""
-    unit = b.runs.amplitude_unit
-    for solved in b.solved:
-        group, fit = solved.group, solved.group.fit
-        if fit is None or solved.balance is None:
-            continue
-        bare = np.flatnonzero(fit.degrees_of_freedom == 0)
-        known = group.before is not None and group.before.reading is not None
-        if len(bare) and b.request.reading_error is None and not known:
-            yield (
-                f"{b.of(group, int(bare[0]))}as many readings as unknowns: nothing is left over to show their scatter; expected "
-                "a further run, or --reading-error, for uncertainties"
-            )
-        with_outliers = np.flatnonzero((group.chance < LEVEL).any(axis=(1, 2))).tolist()
-        outliers = ((i, row) for i in with_outliers for row in rows(group, i) if row.outlier)
-        for i, one in islice(outliers, SHOWN):
-            yield (
-                f"{b.of(group, i)}run {one.run}, sensor {one.channel}: the reading lies {abs(one.residual):.4g} {unit} from the "
-                f"fitted one (standardised {one.standardized:.3g}; by chance in {one.chance:.2g} of logs): an outlier; it "
-                f"takes part, --exclude {one.run} leaves the run out"
-            )
-        if next(outliers, None) is not None:
-            yield "… and further outliers: they are marked in --json"
-        for i in range(min(len(group.logs), SHOWN)):
-            yield from _repeats(b, solved, i)
-        yield from _drifts(b, group)
-        if b.request.reading_error is not None:
-            yield from _more_scatter(b, solved)
-
-
-def _repeats(b: FieldBalancing, solved: Solved, i: int) -> Iterator[str]:
-    """Repeats with the same masses that contradict each other: by the test, or by 30 % of the vibration."""
-    assert solved.balance is not None
-    group, one = solved.group, solved.balance.machine(i)
-    fit = one.fit
-    largest = np.abs(np.where(fit.present, fit.readings, 0.0)).max(axis=0)
-    said = 0
-    for pair in repeats(fit, one.errors):
-        far = pair.difference > 0.3 * largest[pair.channel]
-        if (pair.probability < LEVEL or far) and said < SHOWN:
-            said += 1
-            runs = [group.logs[i].rows[j][0] for j in pair.runs]
-            where = f"runs {runs[0]} and {runs[1]}" if runs[0] != runs[1] else f"run {runs[0]}"
-            figures = [
-                f"{abs(fit.readings[j, pair.channel]):.4g} at {degrees(fit.readings[j, pair.channel]):.4g}°"
-                for j in pair.runs
-            ]
-            yield (
-                f"{b.of(group, i)}{where}, sensor {group.channels[pair.channel]}: with the same masses on it was read {figures[0]} "
-                f"and {figures[1]}: the readings contradict each other by {pair.difference:.4g} {b.runs.amplitude_unit}"
-            )
-
-
-def _drifts(b: FieldBalancing, group: Group) -> Iterator[str]:
-    """Say where the vibration without masses drifts with time."""
-    of_time = drifts(group)
-    if of_time is None:
-        return
-    for i in np.flatnonzero(of_time.probability < LEVEL)[:SHOWN].tolist():
-        told = [
-            f"sensor {channel} by {abs(rate):.4g} {b.runs.amplitude_unit} at {degrees(rate):.4g}°"
-            for channel, rate in zip(group.channels, of_time.rate[i].tolist(), strict=True)
-            if rate == rate
-        ]
-        yield (
-            f"{b.of(group, i)}the vibration drifts with time, in a year {', '.join(told)}: by chance in "
-            f"{of_time.probability[i]:.2g} of logs (F test at {LEVEL:.0%}); all runs count alike, --exclude leaves out those of "
-            "another time"
-        )
-
-
-def _more_scatter(b: FieldBalancing, solved: Solved) -> Iterator[str]:
-    """Say where the residuals are larger than the errors stated, by χ²."""
-    from scipy.special import gammaincc
-
-    assert solved.balance is not None
-    fit, errors = solved.balance.fit, solved.balance.errors
-    square = np.where(fit.present, np.square(errors.along) + np.square(errors.across), 0.0)
-    mean = square.sum(axis=(1, 2)) / fit.present.sum(axis=(1, 2))
-    nu = fit.degrees_of_freedom
-    ratio = fit.sum_of_squares / np.where(mean > 0, mean, np.inf)
-    wide = np.flatnonzero((nu > 0) & (gammaincc(np.maximum(nu, 1), ratio) < LEVEL))
-    for i in wide[:SHOWN].tolist():
-        yield (
-            f"{b.of(solved.group, i)}the residuals scatter by {fit.residual_sd[i]:.4g} {b.runs.amplitude_unit} (standard "
-            f"deviation), more than --reading-error says ({np.sqrt(mean[i]):.4g}): uncertainties are too small"
-        )

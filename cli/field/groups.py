@@ -17,8 +17,8 @@ from balancing import (
     phase_sense,
 )
 from cli.field.request import Request
-from cli.field.rows import Part, Sorted
-from cli.field.runs import SHOWN, Before, Complex, Group, Real, Rows, Runs
+from cli.field.rows import Sorted
+from cli.field.runs import SHOWN, Before, Complex, Group, Part, Real, Rows, Runs
 from cli.field.stored import Sisters
 from dalembert.angles import degrees
 from dalembert.errors import DataError, quote

@@ -7,12 +7,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from cli.field.channels import OfInitialRun, near_speeds
 from cli.field.dates import YEAR, years
 from cli.field.groups import read_groups
 from cli.field.layouts import Layout, alpha_of, is_log, log_table, runs_table
 from cli.field.request import Request
-from cli.field.rows import LogRows, Masses, NoInitialRun, Sorted, numbered
-from cli.field.runs import NEAR_SPEED, YES, Channel, Real, Rows, Runs, apart
+from cli.field.rows import NoInitialRun, Sorted, numbered
+from cli.field.runs import YES, LogRows, Masses, Real, Rows, Runs
 from cli.field.stored import Sisters, Stored, read_runout, read_stored, stored_alpha
 from cli.read import options
 from cli.read.rounding import EPS, vector_error
@@ -143,7 +144,7 @@ class _Reading:
         if self.fitted:
             if "ref" in table.texts:
                 masses = Masses.of(_on_top(table, self.rotor, masses.by_row()))
-            channels, channel = _near_speeds(table, self.rotor)
+            channels, channel = near_speeds(table, self.rotor)
             if "run" not in table.texts:
                 run_names, run = _run_names(self.rotor, channel, when, masses)
             for name in request.exclude:
@@ -153,7 +154,7 @@ class _Reading:
         rows_of = Sorted(rows, request.exclude)
         if not self.fitted:
             rows_of.find_initial(self.stored is not None)
-            channels, channel = self._channels_of_initial(rows_of)
+            channels, channel = OfInitialRun(table, self.rotor, runs, rows_of.is_initial).channels()
         rows.channels, rows.channel = channels, channel
         read_groups(rows_of, request, self.sisters, self.stored is not None)
         runs.warnings = [*table.warnings, *runs.warnings]
@@ -320,68 +321,6 @@ class _Reading:
             more = ", with a decimal comma as elsewhere in the file" if cells.decimal_comma else ""
             raise self._wrong(row, cells.header, cells.values[row], expected + more) from None
 
-    # -- channels ----------------------------------------------------------------------------------------------
-
-    def _channels_of_initial(self, rows: Sorted) -> tuple[list[Channel], Rows]:
-        """Return the sensors and speeds of the initial runs, and that of each row; the nearest speed is meant."""
-        table = self.table
-        sensors, sensor = table.numbered("sensor", "1")
-        speed = table.numbers.get("speed")
-        of_sensor = self.rotor * len(sensors) + sensor
-        initial = rows.is_initial
-        if speed is None:
-            missing = ~np.isin(of_sensor, of_sensor[initial])
-            channels = [Channel(name, None) for name in sensors]
-            if missing.any():
-                raise self._not_there(int(np.argmax(missing)), sensors, sensor, initial, channels, sensor)
-            return channels, sensor
-        given, si = speed.values, np.asarray(speed.si)
-        out: dict[Channel, int] = {}
-        exact: dict[tuple[int, float | None], int] = {}
-        of: dict[int, list[int]] = {}
-        code = np.full(table.rows, -1)
-        for i in np.flatnonzero(initial).tolist():
-            value = None if given[i] != given[i] else float(given[i])
-            channel = Channel(sensors[sensor[i]], None if value is None else float(si[i]), value)
-            code[i] = out.setdefault(channel, len(out))
-            if exact.setdefault((int(of_sensor[i]), value), code[i]) == code[i]:
-                mine = of.setdefault(int(of_sensor[i]), [])
-                mine += [] if code[i] in mine else [int(code[i])]
-        channels = list(out)
-        for i in np.flatnonzero(~initial).tolist():
-            value = None if given[i] != given[i] else float(given[i])
-            found = exact.get((int(of_sensor[i]), value))
-            if found is None:
-                found = self._nearest(i, given[i], [(c, channels[c]) for c in of.get(int(of_sensor[i]), ())])
-            if found is None:
-                raise self._not_there(i, sensors, sensor, initial, channels, code)
-            code[i] = found
-        return channels, code
-
-    def _nearest(self, row: int, speed: float, same: list[tuple[int, Channel]]) -> int | None:
-        """Return the channel that is meant: the speed of a run is never quite that of another."""
-        off = [apart(channel.speed_given, speed) for _, channel in same]
-        nearest = min(range(len(same)), key=off.__getitem__, default=None)
-        if nearest is None or (off[nearest] > NEAR_SPEED and len(same) > 1):
-            return None
-        if off[nearest] > 0.01:
-            self.read.warnings.append(
-                f"{self.read.of(int(self.rotor[row]))}run {self.table.texts['run'][row]} ran at {speed:g}, the initial run at "
-                f"{same[nearest][1].speed_given or 0:g}: coefficients hold at one speed"
-            )
-        return same[nearest][0]
-
-    def _not_there(
-        self, row: int, sensors: list[str], sensor: Rows, initial: Flags, channels: list[Channel], code: Rows
-    ) -> DataError:
-        mine = np.flatnonzero(initial & (self.rotor == self.rotor[row]))
-        known = ", ".join(dict.fromkeys(str(channels[code[i]]) for i in mine.tolist()))
-        speed = self.table.numbers.get("speed")
-        name = sensors[sensor[row]]
-        at = np.nan if speed is None else speed.values[row]
-        what = name if at != at else f"{name} at {at:g}"
-        return self._wrong(row, "sensor", what, f"a sensor and speed of the initial run ({known})")
-
 
 def _codes(values: Sequence[str]) -> Rows:
     """Number texts, 0 for a blank."""
@@ -432,43 +371,6 @@ def _on_top(
         before.append(i)
         out.append(mine)
     return out
-
-
-def _near_speeds(table: Table, rotor: Rows) -> tuple[list[Channel], Rows]:
-    """Return the channels, and that of each row; speeds within 5 % of the slowest of their kind are one."""
-    sensors, sensor = table.numbered("sensor", "1")
-    states, state = table.numbered("state")
-    kind, first = numbered(sensor * len(states) + state)
-    named = "state" in table.texts
-    kinds = [(sensors[sensor[i]], states[state[i]] if named else None) for i in first.tolist()]
-    speed = table.numbers.get("speed")
-    if speed is None:
-        return [Channel(one, None, state=of) for one, of in kinds], kind
-    given, si = speed.values, speed.si
-    of_rotor = numbered(rotor * len(kinds) + kind)[0]
-    value = np.where(np.isnan(given), -np.inf, given)
-    near, left, many = np.zeros(table.rows, dtype=np.intp), np.arange(table.rows), int(of_rotor.max()) + 1
-    while len(left):
-        slowest = np.full(many, np.inf)
-        np.minimum.at(slowest, of_rotor[left], value[left])
-        slowest = np.maximum(slowest, slowest * (1 + NEAR_SPEED))
-        inside = value[left] <= slowest[of_rotor[left]]
-        near[left[~inside]] += many
-        left = left[~inside]
-    number, first = numbered(near + of_rotor)
-    count = np.bincount(number)
-    means = [np.bincount(number, of) / count for of in (given, np.asarray(si))]
-    alike = np.ones(len(first), dtype=bool)
-    np.logical_and.at(alike, number, value == value[first[number]])
-    out: dict[Channel, int] = {}
-    code = []
-    for k, i in enumerate(first.tolist()):
-        one, of = kinds[kind[i]]
-        mean = (given[i], si[i]) if alike[k] else (means[0][k], means[1][k])
-        none = given[i] != given[i]
-        channel = Channel(one, None if none else float(mean[1]), None if none else float(mean[0]), state=of)
-        code.append(out.setdefault(channel, len(out)))
-    return list(out), np.array(code)[number]
 
 
 def _run_names(rotor: Rows, channel: Rows, when: Real | None, masses: Masses) -> tuple[list[str], Rows]:

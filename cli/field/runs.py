@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -254,3 +255,131 @@ def apart(one: float | None, other: float) -> float:
     if one is None or other != other or one == other:
         return 0.0
     return abs(one - other) / max(abs(one), abs(other))
+
+
+class Masses(NamedTuple):
+    """What the rows of a table put on, an entry for each mass."""
+
+    planes: list[str]
+    row: Rows
+    """Ascending, (k,)."""
+    plane: Rows
+    value: Complex
+    """SI."""
+    told: NDArray[np.bool_]
+    """Whether a row says anything of masses, (n,)."""
+
+    @classmethod
+    def of(cls, rows: Sequence[dict[str, complex] | None]) -> Masses:
+        """Take the masses of each row, plane -> mass; None where it says nothing of them."""
+        planes: dict[str, int] = {}
+        entries = [
+            (i, planes.setdefault(plane, len(planes)), mass)
+            for i, masses in enumerate(rows)
+            for plane, mass in (masses or {}).items()
+        ]
+        row, plane, value = zip(*entries, strict=True) if entries else ((), (), ())
+        told = np.array([masses is not None for masses in rows])
+        at, of = (np.array(part, dtype=np.intp) for part in (row, plane))
+        return cls(list(planes), at, of, np.array(value, dtype=complex), told)
+
+    def by_row(self) -> list[dict[str, complex] | None]:
+        """Return them as `of` takes them."""
+        out: list[dict[str, complex] | None] = [{} if told else None for told in self.told.tolist()]
+        for i, plane, mass in zip(self.row.tolist(), self.plane.tolist(), self.value.tolist(), strict=True):
+            mine = out[i]
+            assert mine is not None
+            mine[self.planes[plane]] = mass
+        return out
+
+
+@dataclass
+class LogRows:
+    """What each row of the table says, by row."""
+
+    of: Runs
+    """What the rows are of."""
+    rotor: Rows
+    vibration: Complex
+    masses: Masses
+    named: NDArray[np.bool_]
+    """Whether a row names a plane, or a mass where there is but one plane."""
+    run: Rows
+    runs: list[str]
+    years: Real | None = None
+    """When it was read; NaN where the row does not say."""
+    reading_share: float = 0.0
+    """By what share of it a reading may be off from its decimals."""
+    mass_share: float = 0.0
+    channels: list[Channel] = field(default_factory=list)
+    channel: Rows = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    """The sensor, state and speed of each row."""
+
+
+class Lines(Sequence[Log]):
+    """The rows of readings of many rotors' fits, each named when it is asked for."""
+
+    def __init__(self, names: list[str], run: Rows, again: Rows, years: Real | None) -> None:
+        self.names, self.run, self.again, self.years = names, run, again, years
+        self.senses: list[str | None] = [None] * len(run)
+
+    def __len__(self) -> int:
+        return len(self.run)
+
+    @overload
+    def __getitem__(self, i: int) -> Log: ...
+    @overload
+    def __getitem__(self, i: slice) -> list[Log]: ...
+    def __getitem__(self, i: int | slice) -> Log | list[Log]:
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(len(self)))]
+        rows = [(self.names[r], k) for r, k in zip(self.run[i].tolist(), self.again[i].tolist(), strict=True)]
+        return Log(rows, self.senses[i], None if self.years is None else self.years[i].tolist())
+
+    def only(self, rotors: Rows, lines: Rows) -> Lines:
+        """Return some lines of some of the rotors."""
+        mine = np.ix_(rotors, lines)
+        return Lines(
+            self.names, self.run[mine], self.again[mine], None if self.years is None else self.years[mine]
+        )
+
+
+class Part(NamedTuple):
+    """Rotors of like shape."""
+
+    rotors: Rows
+    """(g,)."""
+    lines: Lines
+    """The rows of readings, (g, r)."""
+    channels: list[Channel]
+    planes: list[str]
+    readings: Complex
+    """(g, r, s)."""
+    masses: Complex
+    """(g, r, p)."""
+    sizes: Real
+    """The sizes of all masses of which these are the sum, (g, r, p)."""
+    standing: Complex
+    """What is on the rotor in its last run, (g, p)."""
+    last: list[str]
+    """What that run is called, (g,)."""
+    weights: Real | None
+    """(g, s)."""
+    trials: list[Trial]
+    """The runs, the initial one first; none where all are fitted together."""
+
+    def only(self, rotors: Rows, lines: Rows, channels: Rows) -> Part:
+        """Return some lines and channels of some of the rotors."""
+        return Part(
+            self.rotors[rotors],
+            self.lines.only(rotors, lines),
+            [self.channels[s] for s in channels],
+            self.planes,
+            self.readings[np.ix_(rotors, lines, channels)],
+            self.masses[np.ix_(rotors, lines)],
+            self.sizes[np.ix_(rotors, lines)],
+            self.standing[rotors],
+            [self.last[k] for k in rotors],
+            None if self.weights is None else self.weights[np.ix_(rotors, channels)],
+            self.trials,
+        )

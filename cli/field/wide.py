@@ -44,9 +44,9 @@ class _Column:
 
 
 def long_form(source: Source) -> Source:
-    """Return a table of runs with a row for each reading; one that is such a table already as it is."""
+    """Return a table of runs with a row for each reading; of one that is such a table already only foreign names change."""
     if not is_wide(source):
-        return source
+        return _translated(source)
     columns = list(_columns(source.headings))
     source.check_cells(column.place for column in columns)
     for column in columns:
@@ -75,6 +75,44 @@ def long_form(source: Source) -> Source:
             f"{source.file}: ignored the column{'s' * (len(left) > 1)} {', '.join(map(quote, left))}"
         )
     return _Long(source, columns, unit).source()
+
+
+def _translated(source: Source) -> Source:
+    """Return a table with a row for each reading under the names of its columns that the command knows.
+
+    A foreign word for the sensor makes it one; a name that is known already, or that two columns would share, stays.
+    """
+    names, before = [each.name for each in source.headings], ""
+    if not any(_is_foreign_sensor(each) for each in source.headings):
+        return source
+    for place, each in enumerate(source.headings):
+        column = _known(place, each, before)
+        before = "" if column is None else column.kind
+        unit = find_unit("amplitude", each.unit or parted(each.name)[1])
+        words = plain_word(each.base).split("_")
+        if _is_foreign_sensor(each):
+            names[place] = "sensor"
+        elif unit and any(word in AMPLITUDE for word in words):
+            names[place] = f"amplitude_{unit}"
+        elif quantity_meant(each.base, ["trial_plane", "plane"]):
+            names[place] = "trial_plane"
+        elif column is not None:
+            names[place] = f"{column.kind}_{column.unit}" if column.unit else column.kind
+    read = [
+        (k, each, name)
+        for k, (each, name) in enumerate(zip(source.headings, names, strict=True))
+        if name != each.name and names.count(name) == 1
+    ]
+    taken = ", ".join(f"{quote(each.written)} as {name}" for _, each, name in read)
+    source.warnings.append(f"{source.file}: read {taken}")
+    headings = list(source.headings)
+    for k, each, name in read:
+        headings[k] = Heading(each.written, name)
+    return replace(source, headings=headings)
+
+
+def _is_foreign_sensor(each: Heading) -> bool:
+    return plain_word(each.base) != "sensor" and bool(quantity_meant(each.base, ["sensor"]))
 
 
 def is_wide(source: Source) -> bool:

@@ -135,3 +135,28 @@ def test_without_a_column_of_runs_each_row_is_one(dalembert: Dalembert) -> None:
     done = dalembert("field", "-", "--json", stdin=bare)
     assert np.abs(corrections(done) * 1e3 - W).max() < 1e-12
     assert any("each row is a run" in w for w in document(done)["warnings"])
+
+
+BY_READING = """\
+run;sensor;amplitude_mm_s;phase_deg;trial_plane;trial_mass_g;trial_angle_deg;speed_rpm
+1;L1;5,5;30;;;;1500
+2;L1;4,5;80;A;5;0;1500
+"""
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "Lauf;Aufnehmer;Schwinggeschwindigkeit [mm/s];Phasenwinkel [°];Ebene;Testmasse [g];Winkel [°];Drehzahl [1/min]",
+        "Messlauf;Messstelle;Schwingung (mm/s);Phase;Ausgleichsebene;Probegewicht (g);Winkellage (°);Drehzahl (U/min)",
+        "run;Messpunkt;amplitude_mm_s;phase_deg;Ebene;Masse [g];Winkel [°];speed_rpm",
+    ],
+)
+def test_german_words_in_a_table_with_a_row_a_reading(dalembert: Dalembert, header: str) -> None:
+    """As in sheets with a row a run; in English nothing is renamed."""
+    plain = dalembert("field", "-", stdin=BY_READING)
+    assert plain.returncode == 0, plain.stderr
+    german = dalembert("field", "-", stdin="\n".join([header, *BY_READING.splitlines()[1:]]))
+    assert german.stdout == plain.stdout
+    assert "as sensor" in german.stderr
+    assert "as sensor" not in plain.stderr

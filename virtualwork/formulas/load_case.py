@@ -24,8 +24,8 @@ from virtualwork.formulas.loads import (
     TorsionEnd,
 )
 from virtualwork.formulas.quantities import Combination, Quantities
-from virtualwork.plan.order import combined
 from virtualwork.plan.steps import Joint, Path, Place, Plan, Term, joints, path_reads
+from virtualwork.plan.sums import combined
 
 
 class LoadCase:

@@ -2,18 +2,18 @@
 
 The equations of the joints and the coordinates they hold form a bipartite graph. Its Dulmage-Mendelsohn
 decomposition (A. L. Dulmage, N. S. Mendelsohn, Can. J. Math. 10 (1958) 517) is unique; its irreducible blocks, in
-order, are the Assur groups: each is solved when what it hangs on is known. Angles tied by sliders, gears and
+order, are the Assur groups: each is solved when what it depends on is known. Angles tied by sliders, gears and
 inputs are linear relations and are eliminated before anything else; what remains of a block is its loop closure
 R_1 e^{iθ1} + R_2 e^{iθ2} + ... = 0 (Ibrahim eq. 1.3.1; Nicoletti, lecture 7) in its own few angles and slides.
 
-All of this hangs on which points are the same, not on where they lie: the vectors R are written down in the points'
-names (`Vector`), and another mechanism of the same topology only puts its own numbers in.
+All of this depends on which points are the same, not on where they lie: the vectors R are written down in the points'
+names (`sums.Vector`), and another mechanism of the same topology only puts its own numbers in.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -30,69 +30,15 @@ from virtualwork.plan.steps import (
     Plan,
     Relation,
     Slide,
-    Slot,
     Step,
     Term,
     Turn,
     Variable,
     relations,
 )
+from virtualwork.plan.sums import Vector, combined, longer
 from virtualwork.plan.ties import eliminated, guessed
 from virtualwork.plan.topology import Topology, decompose
-
-
-class Vector:
-    """A sum of a body's points, each so many times, as the order of solution adds them up.
-
-    >>> a, b = Vector.of(("arm", "A")), Vector.of(("arm", "B"))
-    >>> a + -b == 0, a + -b + -a + b == 0
-    (False, True)
-    """
-
-    __slots__ = ("parts",)
-
-    def __init__(self, parts: Mapping[Slot, int]) -> None:
-        self.parts = parts
-
-    @classmethod
-    def of(cls, slot: Slot | None) -> Vector:
-        """One of them; None is the origin."""
-        return cls({} if slot is None else {slot: 1})
-
-    def __add__(self, other: Any) -> Vector:
-        if other == 0:
-            return self
-        sums = dict(self.parts)
-        for slot, times in other.parts.items():
-            total = sums.get(slot, 0) + times
-            if total:
-                sums[slot] = total
-            else:
-                del sums[slot]
-        return Vector(sums)
-
-    __radd__ = __add__
-
-    def __neg__(self) -> Vector:
-        return Vector({slot: -times for slot, times in self.parts.items()})
-
-    def __eq__(self, other: object) -> bool:
-        return self.parts == other.parts if isinstance(other, Vector) else not self.parts and other == 0
-
-
-def combined(terms: Iterable[Term]) -> tuple[Term, ...]:
-    """Add terms of the same body and slide; drop those that cancel."""
-    sums: dict[tuple[str, int | None], complex] = {}
-    for t in terms:
-        sums[t.body, t.slide] = sums.get((t.body, t.slide), 0j) + t.z
-    return tuple(Term(z, body, slide) for (body, slide), z in sums.items() if z != 0)
-
-
-def longer(terms: tuple[Term, ...], t: Term) -> tuple[Term, ...]:
-    """Terms and one more, added to that of the same body and slide."""
-    if any(own.body == t.body and own.slide == t.slide for own in terms):
-        return combined((*terms, t))
-    return (*terms, t) if t.z != 0 else terms
 
 
 def plan(m: Description, *, merged: bool = False, phases: Mapping[int, float] | None = None) -> Plan:
