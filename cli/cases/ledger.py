@@ -5,14 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from dalembert.results.columns import Column, Table, names
 from dalembert.results.way import Topic, figures, vector_text
 
 if TYPE_CHECKING:
     from dalembert.results.columns import Cell
+    from virtualwork.motion import Motion
+    from virtualwork.study.ledger import Item
 
 PERPENDICULAR, REST, PAIR = "perpendicular to the displacement", "at rest", "pair"
 """Why a force does no work (Riul, unit II, eq. 2 and what follows it)."""
+TINY = 1e-13
+"""A power below this share of load times largest velocity is rounding."""
 SYMBOLS = {"weight": "W", "inertia force": "Fi", "inertia torque": "Ti"}
 
 
@@ -69,6 +75,46 @@ def why_not(load: complex | float, rate: complex | float, works: bool, fastest: 
     if works:
         return None
     return REST if abs(rate) <= 1e-13 * fastest or isinstance(rate, float) else PERPENDICULAR
+
+
+def entries_of(motion: Motion, unit: int | None = None) -> list[list[Entry]]:
+    """The loads of a mechanism at every pose, none of one that is not assembled; `unit`: for a unit speed of that input."""
+    from virtualwork.study.ledger import items
+
+    every = items(motion.dynamics, unit)
+    with np.errstate(invalid="ignore"):
+        speeds = [np.abs(item.rate) for item in every if not item.turns]
+        fast = np.max(speeds, axis=0) if speeds else np.zeros(motion.n)
+        turns = [np.abs(item.rate) for item in every if item.turns]
+        turning = np.max(turns, axis=0) if turns else np.zeros(motion.n)
+    several = unit is not None and len(motion.mechanism.inputs) > 1
+    field = motion.mechanism.inputs[unit].name if several and unit is not None else ""
+    whole = motion.assembled
+    return [
+        [_entry(item, i, float(turning[i] if item.turns else fast[i]), field) for item in every] if whole[i] else []
+        for i in range(motion.n)
+    ]  # fmt: skip
+
+
+def _entry(item: Item, i: int, fastest: float, field: str) -> Entry:
+    load, rate, power = item.load[i], item.rate[i], float(item.power[i])
+    at_rest = abs(rate) <= TINY * fastest
+    if item.workless:
+        why: str | None = REST if at_rest and item.workless == PERPENDICULAR else item.workless
+    elif at_rest:
+        why = REST
+    else:
+        idle = load != 0 and not item.turns and abs(power) <= TINY * abs(load) * fastest
+        why = PERPENDICULAR if idle else None
+    if why is not None:
+        power = 0.0
+    if item.turns:
+        return Entry(
+            item.link, item.kind, torque=float(load), omega=float(rate), power=power, workless=why, field=field
+        )  # fmt: skip
+    return Entry(
+        item.link, item.kind, complex(load), complex(rate), power=power, workless=why, field=field, point=item.joint
+    )  # fmt: skip
 
 
 def ledger(

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.cases.case import Rows
+    from dalembert.results.way import Topic
     from virtualwork.study.equilibrium import Equilibria as Found
 
 
@@ -82,6 +83,12 @@ class Rest(TableCase):
                 "stable null: the second variation of the potential vanishes there and does not decide"
             )
         return lines
+
+    def way(self) -> list[Topic]:
+        """The virtual work of every load at each position."""
+        from cli.equilibrium.way import way
+
+        return way(self.analysis, self.equilibria.found)
 
     def figure(self) -> Figure:
         """The mechanism in its positions of rest; in its own pose where there is none."""

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from cli.cases.case import Rows
     from dalembert.results.columns import Document, Json
+    from dalembert.results.way import Topic
     from virtualwork import Mechanism
     from virtualwork.family.fitting import Fit
     from virtualwork.family.target import Reached, Target
@@ -89,6 +90,12 @@ class Fitted(TableCase):
     def words(self) -> str:
         """How near it comes."""
         return _sentence(self.best)
+
+    def way(self) -> list[Topic]:
+        """What is minimised, and what is left."""
+        from cli.fit.way import way
+
+        return way(_document(self.solutions))
 
     def figure(self) -> Figure:
         """The target, and the fitted mechanism."""

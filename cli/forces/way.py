@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.cases.ledger import PERPENDICULAR, REST, Entry, components, ledger
+from cli.cases.ledger import Entry, components, entries_of, ledger
 from cli.cases.poses import over_poses
 from dalembert.results.columns import Column, Table, finite, names
 from dalembert.results.way import Topic, figures, vector_text
@@ -19,10 +19,6 @@ if TYPE_CHECKING:
     from cli.cases.analysis import Analysis
     from virtualwork.motion import Motion
     from virtualwork.study.free_bodies import FreeBody
-    from virtualwork.study.ledger import Item
-
-TINY = 1e-13
-"""A power below this share of load times largest velocity is rounding."""
 
 
 def way(analysis: Analysis) -> list[Topic]:
@@ -33,7 +29,7 @@ def way(analysis: Analysis) -> list[Topic]:
         moves = motion.dynamics.scene.moves and any(np.any(rate) for rate in motion.poses.rates[0])
         # at rest the displacements are virtual: of a unit speed of each input alone
         units = [None] if moves else list(range(len(analysis.mechanism.inputs)))
-        entries = [_entries(analysis, motion, unit) for unit in units]
+        entries = [entries_of(motion, unit) for unit in units]
         if not equations:
             equations = _equations(analysis, motion, [e[0] for e in entries], moves)
         for i in range(motion.n):
@@ -165,46 +161,6 @@ def _pose(analysis: Analysis, i: int) -> list[Column]:
             ((e, analysis.input_names[e.name]) for e in inputs), shown, strict=True
         )
     ]
-
-
-def _entries(analysis: Analysis, motion: Motion, unit: int | None) -> list[list[Entry]]:
-    """The loads of every pose; none of one that is not assembled."""
-    from virtualwork.study.ledger import items
-
-    every = items(motion.dynamics, unit)
-    with np.errstate(invalid="ignore"):
-        speeds = [np.abs(item.rate) for item in every if not item.turns]
-        fast = np.max(speeds, axis=0) if speeds else np.zeros(motion.n)
-        turns = [np.abs(item.rate) for item in every if item.turns]
-        turning = np.max(turns, axis=0) if turns else np.zeros(motion.n)
-    several = unit is not None and len(analysis.mechanism.inputs) > 1
-    field = analysis.mechanism.inputs[unit].name if several and unit is not None else ""
-    whole = motion.assembled
-    return [
-        [_entry(item, i, float(turning[i] if item.turns else fast[i]), field) for item in every] if whole[i] else []
-        for i in range(motion.n)
-    ]  # fmt: skip
-
-
-def _entry(item: Item, i: int, fastest: float, field: str) -> Entry:
-    load, rate, power = item.load[i], item.rate[i], float(item.power[i])
-    at_rest = abs(rate) <= TINY * fastest
-    if item.workless:
-        why: str | None = REST if at_rest and item.workless == PERPENDICULAR else item.workless
-    elif at_rest:
-        why = REST
-    else:
-        idle = load != 0 and not item.turns and abs(power) <= TINY * abs(load) * fastest
-        why = PERPENDICULAR if idle else None
-    if why is not None:
-        power = 0.0
-    if item.turns:
-        return Entry(
-            item.link, item.kind, torque=float(load), omega=float(rate), power=power, workless=why, field=field
-        )  # fmt: skip
-    return Entry(
-        item.link, item.kind, complex(load), complex(rate), power=power, workless=why, field=field, point=item.joint
-    )  # fmt: skip
 
 
 def _equations(analysis: Analysis, motion: Motion, entries: list[list[Entry]], moves: bool) -> list[str]:

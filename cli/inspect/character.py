@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from cli.cases.case import Rows
     from dalembert.results.columns import Cell
+    from dalembert.results.way import Topic
     from virtualwork.formulas.asked import Key
 
 Document = dict[str, Any]
@@ -55,6 +56,12 @@ class Character(TableCase):
     def words(self) -> str:
         """The order of solution."""
         return order_text(self.analysis)
+
+    def way(self) -> list[Topic]:
+        """Mobility, loops, four-bars."""
+        from cli.inspect.way import way
+
+        return way(self.analysis.mechanism, self.check)
 
     def figure(self) -> Figure:
         """The mechanism in its own pose."""

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
     from cli.cases.case import Rows
     from dalembert.results.columns import Column, Document
+    from dalembert.results.way import Topic
     from virtualwork import Mechanism
     from virtualwork.animation import Series
     from virtualwork.intime.run import Run
@@ -194,6 +195,12 @@ class Motion(TableCase):
             f"error of the inputs, estimated: {error}\n"
             f"energy that the work of the loads does not explain: {drift:.1e} J"
         )
+
+    def way(self) -> list[Topic]:
+        """The start, and the energy."""
+        from cli.simulate.way import way
+
+        return way(self.run, self.analysis.mechanism.inputs)
 
     def figure(self) -> Figure:
         """Inputs, speeds and energy over time, and the mechanism at instants."""

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from cli.cases.quantities import Numbers
     from cli.show.commands import ShowOptions
     from dalembert.results.columns import Document
+    from dalembert.results.way import Topic
 
 # how far a drawn standard deviation may be from the linear one, in its sampling errors and by its size
 SURE, APART = 5.0, 0.02
@@ -214,6 +215,12 @@ class Tolerances(TableCase):
     def is_drawn(self) -> bool:
         """Whether anything varies."""
         return bool(self.numbers)
+
+    def way(self) -> list[Topic]:
+        """The terms of every dimension."""
+        from cli.tolerance.way import way
+
+        return way(self.analysis, self.numbers, self.slopes, self.limits)
 
     def figure(self) -> Figure:
         """The band of paths, and which dimension has which share."""

@@ -1,4 +1,4 @@
-"""`--steps` of place, engine, flywheel, index, trial, signal and spin: every worked example has a way that adds up."""
+"""`--steps` of all other commands: every worked example has a way, and the simplest cases add up."""
 
 from __future__ import annotations
 
@@ -12,7 +12,20 @@ import pytest
 
 from cli.examples.command import EXAMPLES
 
-OTHERS = ("place", "engine", "flywheel", "index", "spin", "trial", "signal")
+OTHERS = (
+    "place",
+    "engine",
+    "flywheel",
+    "index",
+    "spin",
+    "trial",
+    "signal",
+    "equilibrium",
+    "inspect",
+    "fit",
+    "simulate",
+    "tolerance",
+)
 CALLS = {
     f.parent.name: tomllib.loads(f.read_text())["command"].split()
     for f in sorted(EXAMPLES.glob("*/example.toml"))
@@ -20,7 +33,6 @@ CALLS = {
 }
 
 
-@pytest.mark.whole
 @pytest.mark.parametrize("name", list(CALLS))
 def test_every_worked_example_has_a_way(name: str, dalembert: Any, tmp_path: Path) -> None:
     for file in (EXAMPLES / name).iterdir():
@@ -95,3 +107,46 @@ def test_the_shares_of_cylinders_add_up(dalembert: Any, tmp_path: Path) -> None:
             assert total == pytest.approx(sum(each), abs=1e-6 * hypot(*each, 1.0))
     first = next(row for row in shares if row["cylinder"] == "1" and row["order"] == 1)
     assert first["y_sin_N"] == pytest.approx(0.5 * 0.04 * (100 * pi) ** 2)
+
+
+ARM = (
+    "gravity = [0, -10]\n[ground]\nO = [0, 0]\n[links.arm]\npoints = { O = [0, 0], P = [1, 0] }\nmass = 2\ncenter = [0.5, 0]\n"
+    'inertia = 0.1\n[input]\nlink = "arm"\nangle = 0\n[tolerances]\n"links.arm.P.x" = "3 mm"\n'
+)
+
+
+def test_a_pendulum_rests_where_its_weight_does_no_work(dalembert: Any, tmp_path: Path) -> None:
+    (tmp_path / "arm.toml").write_text(ARM)
+    way = topics(dalembert, "equilibrium", "arm.toml")
+    assert way["condition"]["positions"] == 2
+    for pose in way["ledger"]["poses"]:
+        assert pose["input_deg"] in (pytest.approx(90), pytest.approx(270))
+        (weight,) = pose["terms"]
+        assert (weight["kind"], weight["power_W"]) == ("weight", pytest.approx(0, abs=1e-12))
+
+
+def test_a_pendulum_begins_with_its_angular_acceleration(dalembert: Any, tmp_path: Path) -> None:
+    """q̈ = −m·g·s/(I + m·s²) = −10/0.6; its energy stays."""
+    (tmp_path / "arm.toml").write_text(ARM)
+    way = topics(dalembert, "simulate", "arm.toml", "--time", "0:1:0.5")
+    assert way["start"]["acceleration"] == pytest.approx([-10 / 0.6])
+    assert way["energy"]["start_J"] == pytest.approx(way["energy"]["end_J"], abs=1e-6)
+
+
+def test_a_length_carries_its_tolerance_to_the_tip(dalembert: Any, tmp_path: Path) -> None:
+    (tmp_path / "arm.toml").write_text(ARM)
+    way = topics(dalembert, "tolerance", "arm.toml", "--only", "P.x")
+    (term,) = way["terms"]["terms"]
+    assert (term["slope"], term["term"], term["share"]) == (1.0, pytest.approx(0.003), 1.0)
+    (total,) = way["terms"]["sums"]
+    assert (total["worst"], total["sd"]) == (pytest.approx(0.003), pytest.approx(0.001))
+
+
+def test_a_four_bar_has_one_degree_of_freedom(dalembert: Any, tmp_path: Path) -> None:
+    for file in (EXAMPLES / "klann").iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    way = topics(dalembert, "inspect", "klann.toml")
+    # five links, seven pins
+    assert way["mobility"] == {
+        "topic": "mobility", "links": 5, "pins_and_slots": 14, "sliders_and_gears": 0, "mobility": 1,
+    }  # fmt: skip

@@ -1,0 +1,74 @@
+"""The worked solution of `dalembert tolerance`: slope times limit of every dimension, worst case and standard deviation."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dalembert.results.columns import Column, Table, finite, names
+from dalembert.results.way import Topic
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from cli.cases.analysis import Analysis
+    from cli.cases.quantities import Quantity
+    from virtualwork.describe.dimensions import Dimension
+    from virtualwork.formulas.asked import Key
+
+
+def way(
+    analysis: Analysis,
+    shown: Sequence[Quantity],
+    slopes_of: Mapping[Key, Sequence[Any]],
+    limits: Mapping[Dimension, float],
+) -> list[Topic]:
+    """The one topic: at the first pose that is assembled."""
+    whole = analysis.motions[0].assembled
+    if not shown or not whole.any():
+        return [
+            Topic("terms", ["None of the numbers shown varies with [tolerances]."], "Terms", {"terms": []})
+        ]
+    i = int(np.argmax(whole))
+    rows: list[tuple[str, str, float, float, float, float]] = []
+    sums: list[tuple[str, float, float]] = []
+    for each in shown:
+        slopes = [float(np.broadcast_to(each.of(slope), len(whole))[i]) for slope in slopes_of[each.key]]
+        terms = [slope * limit for slope, limit in zip(slopes, limits.values(), strict=True)]
+        variance = sum((term / 3) ** 2 for term in terms)
+        for d, slope, limit, term in zip(limits, slopes, limits.values(), terms, strict=True):
+            share = (term / 3) ** 2 / variance if variance else 0.0
+            rows.append((each.header, d.path, slope, limit, term, share))
+        sums.append((each.header, sum(map(abs, terms)), variance**0.5))
+    table = Table(
+        [
+            names("column", [row[0] for row in rows]),
+            names("path", [row[1] for row in rows]),
+            *(
+                Column(name, "", [finite(value) for value in values], place=name)
+                for name, values in zip(
+                    ("slope", "limit", "term", "share"),
+                    zip(*(row[2:] for row in rows), strict=True),
+                    strict=True,
+                )
+            ),
+        ],
+        ("column", "path"),
+        "terms[]",
+    )
+    total = Table(
+        [
+            names("column", [header for header, *_ in sums]),
+            Column("worst", "", [finite(worst) for _, worst, _ in sums], place="worst"),
+            Column("sd", "", [finite(sd) for *_, sd in sums], place="sd"),
+        ],
+        ("column",),
+        "sums[]",
+    )
+    at = f"At {analysis.inputs.shown[i][0]:g}: " if len(whole) > 1 else ""
+    text = (
+        f"{at}Δq = Σ (∂q/∂d)·δd to first order, slopes exact: worst case Σ |∂q/∂d|·limit, "
+        "standard deviation √Σ (∂q/∂d·limit/3)²; limits in SI, slopes in the column's unit per SI unit:"
+    )
+    return [Topic("terms", [text, table, "Sums:", total], "Terms of each dimension")]
