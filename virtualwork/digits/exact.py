@@ -34,7 +34,7 @@ from virtualwork.formulas.dynamics import applied_loads, reduced
 from virtualwork.formulas.effort import generalized_force
 from virtualwork.formulas.lanes import Turning
 from virtualwork.formulas.load_paths import LoadPaths
-from virtualwork.formulas.newton import gaps
+from virtualwork.formulas.newton import gaps, unknowns
 from virtualwork.formulas.numbers import Written, dot, plus
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.reactions import JointForces
@@ -131,6 +131,7 @@ class Exact(Recording):
     ("applied", link)           complex: what acts on a link but its weight and inertia
     ("applied moment", link)    about its centre of mass
     ("rub", n)                  the friction of the n-th contact by the force that it bears
+    ("unknown", group, i)       an unknown of a group without a closed form
     ("gap", group, loop)        complex: what the unknowns of a group leave open of a loop
     ("balance", row)            what the forces that enter leave of an equation of redundant statics
 
@@ -184,6 +185,9 @@ class Exact(Recording):
 
     def step(self, group: Group, st: State) -> list[Number] | None:
         return None if group.name in self.folded else super().step(group, st)
+
+    def _unknown(self, group: str, i: int) -> Number:
+        return unknowns(self.solved(group), self.st)[i]
 
     def _gap(self, group: str, loop: int) -> Number:
         return gaps(self.solved(group), self.st)[loop]
