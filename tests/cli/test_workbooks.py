@@ -189,19 +189,16 @@ def test_a_technicians_sheet(dalembert: Dalembert, tmp_path: Path) -> None:
         (1, 1, 1.8, 42, "A", 2, 0),
     )
     book(tmp_path / "fan.xlsx", {"Tabelle1": rows}, merge="A1:G1")
-    refused = dalembert("field", "fan.xlsx")
-    assert refused.returncode == 1
     columns = "run=Lauf sensor=Messstelle trial_plane=Ebene trial_mass=Testmasse trial_angle=Testwinkel"
     options = [word for pair in columns.split() for word in ("--column", pair)]
-    done = dalembert("field", "fan.xlsx", *options, "--json")
-    assert done.returncode == 0, done.stderr
     csv = "run,sensor,amplitude_mm_s,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n0,1,3.4,116,,,\n1,1,1.8,42,A,2,0\n"
-    assert '"mass_kg"' in done.stdout
-    found, wanted = (
-        text.partition('"warnings"')[0]
-        for text in (done.stdout, dalembert("field", "-", "--json", stdin=csv).stdout)
-    )
-    assert found == wanted
+    wanted = dalembert("field", "-", "--json", stdin=csv).stdout.partition('"warnings"')[0]
+    assert '"mass_kg"' in wanted
+    # its German words are known; they can be mapped by hand too
+    for words in ([], options):
+        done = dalembert("field", "fan.xlsx", *words, "--json")
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.partition('"warnings"')[0] == wanted
 
 
 def compound(stream: bytes) -> bytes:
