@@ -283,9 +283,9 @@ def _link(
 def hull(points: Iterable[complex]) -> tuple[complex, ...]:
     """Return the convex hull, counter-clockwise (Andrew's chain); two points where all lie on one line.
 
-    >>> hull([0, 1, 1 + 1j, 1j, 0.5 + 0.5j])
+    >>> hull([0j, 1 + 0j, 1 + 1j, 1j, 0.5 + 0.5j])
     (0j, (1+0j), (1+1j), 1j)
-    >>> hull([0, 2, 1])
+    >>> hull([0j, 2 + 0j, 1 + 0j])
     (0j, (2+0j))
     """
     # numbers that vary stay what they are: which of them are corners is decided by their own values

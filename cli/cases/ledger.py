@@ -69,7 +69,7 @@ class Entry(NamedTuple):
 def why_not(load: complex | float, rate: complex | float, works: bool, fastest: float) -> str | None:
     """Return why a load does no work; None where it does.
 
-    >>> why_not(-30j, 5.0, False, 5.0), why_not(-30j, 0j, False, 5.0), why_not(2.0, 3.0, True, 3.0)
+    >>> why_not(-30j, 5 + 0j, False, 5.0), why_not(-30j, 0j, False, 5.0), why_not(2.0, 3.0, True, 3.0)
     ('perpendicular to the displacement', 'at rest', None)
     """
     if works:

@@ -112,6 +112,7 @@ def _variant(variant: Variant, slips: Sequence[Candidates], drawing: str) -> dic
 def weights(exercise: Exercise) -> list[int]:
     """The points as whole numbers in the same proportion, as the element takes them.
 
+    >>> from fractions import Fraction
     >>> from types import SimpleNamespace as Some
     >>> weights(Some(asks=[Some(points=Fraction(1, 2)), Some(points=Fraction(2))]))
     [1, 4]

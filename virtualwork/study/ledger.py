@@ -65,9 +65,9 @@ def items(dynamics: Dynamics, unit: int | None = None) -> list[Item]:
     >>> from virtualwork import Input, Link, Mechanism
     >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="arm"), gravity=-9.81j)
     >>> for item in items(arm.motion(0.0).dynamics, unit=0):
-    ...     print(item.kind, item.power.round(9), item.workless)
-    weight [-9.81]
-    unknown [9.81]
+    ...     print(item.kind, item.power.round(9), item.workless or "works")
+    weight [-9.81] works
+    unknown [9.81] works
     joint force [0.] at rest
     """
     effort = dynamics.effort
