@@ -152,7 +152,8 @@ class _Place:
 
     def known(self, table: object, keys: tuple[str, ...], where: str) -> None:
         """Refuse a key that means nothing."""
-        assert isinstance(table, dict)
+        if not isinstance(table, dict):
+            raise self.error(where or "the file", table, "a table of keys")
         for key in table:
             if key not in keys:
                 at = f"{where}, key {key}" if where else f"key {key}"

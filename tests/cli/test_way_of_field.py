@@ -20,6 +20,10 @@ def vector(entry: Any, key: str = "amplitude") -> complex:
     return cmath.rect(entry[key], radians(entry["phase_deg"] or 0.0))
 
 
+def place(entry: Any) -> tuple[Any, Any]:
+    return entry["sensor"], entry.get("speed_rad_s")
+
+
 def mass(entry: Any) -> complex:
     return cmath.rect(
         entry.get("mass_kg", entry.get("unbalance_kg_m", 0.0)), radians(entry["angle_deg"] or 0.0)
@@ -44,7 +48,7 @@ def test_every_worked_example_holds_together(name: str, dalembert: Any, tmp_path
                 assert complex(reading["x"], reading["y"]) == pytest.approx(vector(reading), abs=1e-9)
     for effect in topics.get("effects", {"effects": []})["effects"]:
         v, w = (
-            next(r for r in runs[effect[key]]["readings"] if r["sensor"] == effect["sensor"])
+            next(r for r in runs[effect[key]]["readings"] if place(r) == place(effect))
             for key in ("run", "against")
         )
         assert vector(effect) == pytest.approx(vector(v) - vector(w), abs=1e-9)
@@ -52,7 +56,7 @@ def test_every_worked_example_holds_together(name: str, dalembert: Any, tmp_path
         (coefficient,) = (
             c
             for c in topics["coefficients"]["coefficients"]
-            if (c["sensor"], c["plane"]) == (effect["sensor"], on["plane"])
+            if (*place(c), c["plane"]) == (*place(effect), on["plane"])
         )
         # each trial of these examples stands in one plane: α = T/m
         assert complex(coefficient["x"], coefficient["y"]) * mass(on) == pytest.approx(

@@ -16,7 +16,8 @@ from cli.examples.command import EXAMPLES
 MECHANISMS = sorted(
     file.parent.name
     for file in EXAMPLES.glob("*/example.toml")
-    if " mechanism " in file.read_text() or " forces " in file.read_text() or " inspect " in file.read_text()
+    if not file.parent.name.startswith("exercise-")
+    and (" mechanism " in file.read_text() or " forces " in file.read_text() or " inspect " in file.read_text())
 )
 
 
