@@ -27,6 +27,9 @@ def drawn(m, rng, v, spread, only=None):
     }
 
 
+EPS = float(np.finfo(float).eps)
+
+
 def scale(unit, size):
     return size if unit == "m" else 1.0
 
@@ -71,6 +74,8 @@ def compared(m, numbers, angle, speed=None, acceleration=None):
             good = there & np.isfinite(its) & np.isfinite(bound)
             # both are rounded, and the guess has its own
             rounded = 20 * share[j % 3][good] * scale(name, size) + 4e-15 * np.abs(its[good]) + 1e-300
+            # to first order each order of derivatives takes the condition once more
+            rounded = rounded + 4 * EPS * alone.condition[good] ** (j % 3 + 1) * scale(name, size)
             error = np.abs(mine - its)[good] / rounded
             worst = max(worst, float(error.max(initial=0.0)))
     return worst, motion
