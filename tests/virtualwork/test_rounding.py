@@ -28,8 +28,9 @@ def example(name: str) -> Mechanism:
     folder = EXAMPLES / name
     (path,) = (p for p in folder.iterdir() if p.name.endswith(".toml") and p.name != "example.toml")
     m = Mechanism.from_toml(str(path))
-    # the truth takes the numbers as floats
-    rid = {"friction": (), "motors": (), "decimals": None}
+    # the truth takes the numbers as floats, points in polar form as the rounded coordinates that they have
+    links = {name: replace(link, polar={}) for name, link in m.links.items()}
+    rid = {"friction": (), "motors": (), "decimals": None, "links": links}
     return replace(m, **rid, forces=tuple(f for f in m.forces if not f.history))
 
 
