@@ -17,7 +17,9 @@ MECHANISMS = sorted(
     file.parent.name
     for file in EXAMPLES.glob("*/example.toml")
     if not file.parent.name.startswith("exercise-")
-    and (" mechanism " in file.read_text() or " forces " in file.read_text() or " inspect " in file.read_text())
+    and (
+        " mechanism " in file.read_text() or " forces " in file.read_text() or " inspect " in file.read_text()
+    )
 )
 
 

@@ -37,7 +37,9 @@ def runs(machines, seed=0):
         ),
         pytest.param(
             ("--reading-error", "2%,2deg"),
-            marks=pytest.mark.xfail(reason="machines solved together differ by two units of the last place in a sum"),
+            marks=pytest.mark.xfail(
+                reason="machines solved together differ by two units of the last place in a sum"
+            ),
         ),
     ],
 )
