@@ -274,7 +274,9 @@ class Command(TyperCommand):
             option = getattr(error, "option_name", None)
             from cli.renamed import renamed
 
-            line = None if option is None else renamed(ctx.info_name or "", option)
+            # one of its own lacks its value
+            own = option is None or any(option in param.opts for param in self.get_params(ctx))
+            line = None if own else renamed(ctx.info_name or "", option)
             if line is None:
                 raise
             typer.echo(line, err=True)

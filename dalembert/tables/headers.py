@@ -102,6 +102,8 @@ def rename_from(path: str) -> None:
 
     try:
         stored = tomllib.loads(load(path).decode("utf-8-sig"))
+    except OSError as error:
+        raise DataError(f"{path}: {error.strerror}") from None
     except ValueError as error:
         raise DataError(f"{path}: {error}") from None
     for name, header in stored.items():

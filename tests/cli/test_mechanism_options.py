@@ -65,3 +65,19 @@ def test_a_row_of_cases_sets_inputs_and_dimensions(dalembert: Dalembert, tmp_pat
         ).stdout.splitlines()[1]
         assert float(line.split(",")[-1]) == pytest.approx(float(alone.split(",")[-1]), rel=1e-13)
         assert float(line.split(",")[-2]) == angle
+
+
+def test_an_option_that_lacks_its_value_is_no_old_spelling(dalembert) -> None:
+    done = dalembert("tolerance", "m.toml", "--draws", "20", "--seed")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "requires an argument" in done.stderr
+
+
+def test_a_file_of_headers_that_is_not_there_is_one_line(dalembert, tmp_path) -> None:
+    (tmp_path / "r.csv").write_text("run,sensor,amplitude_um,phase_deg\n")
+    done = dalembert("field", "r.csv", "--columns", "nope.toml")
+    assert (done.returncode, done.stdout, done.stderr) == (
+        1,
+        "",
+        "dalembert: nope.toml: No such file or directory\n",
+    )
