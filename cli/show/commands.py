@@ -275,8 +275,8 @@ class Command(TyperCommand):
             from cli.renamed import renamed
 
             # one of its own lacks its value
-            own = option is None or any(option in param.opts for param in self.get_params(ctx))
-            line = None if own else renamed(ctx.info_name or "", option)
+            own = any(option in param.opts for param in self.get_params(ctx))
+            line = None if option is None or own else renamed(ctx.info_name or "", option)
             if line is None:
                 raise
             typer.echo(line, err=True)
