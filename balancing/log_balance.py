@@ -217,7 +217,8 @@ class LogBalance:
         """
         rng = np.random.default_rng(seed)
         masses = np.concatenate([[1.0], self.corrections])
-        share = np.vecmat(masses.conj(), self.fit.gain)
+        # of one machine among many the strides differ, and with them the order in which products are summed
+        share = np.vecmat(masses.conj(), np.ascontiguousarray(self.fit.gain))
         error = (share * self.errors.draw(self.fit.readings, n, rng, student=True)).sum(axis=-1)
         prior = self.fit.foreknown
         if prior is not None:
