@@ -35,12 +35,7 @@ def runs(machines, seed=0):
         pytest.param(
             ("--max-mass", "3g", "--reading-error", "2%,2deg", "--monte-carlo", "40"), marks=pytest.mark.slow
         ),
-        pytest.param(
-            ("--reading-error", "2%,2deg"),
-            marks=pytest.mark.xfail(
-                reason="machines solved together differ by two units of the last place in a sum"
-            ),
-        ),
+        ("--reading-error", "2%,2deg"),
     ],
 )
 def test_machines_of_several_processes_have_the_digits_of_one(dalembert, asked):
