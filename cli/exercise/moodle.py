@@ -9,10 +9,10 @@ import html
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 
+from cli.exercise.answers import unit_text
 from cli.exercise.description import Exercise
 from cli.exercise.sheets import Student, figures_text, label, problem_html
 from cli.exercise.slips import Candidates
-from cli.exercise.solving import unit_text
 from cli.exercise.variants import Variant
 from dalembert.figures import rounded
 

@@ -7,11 +7,11 @@ import json
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
 
+from cli.exercise.answers import unit_text
 from cli.exercise.description import Exercise
 from cli.exercise.moodle import accepted, expected_mistakes, plain
 from cli.exercise.sheets import figures_text, label, problem_html
 from cli.exercise.slips import Candidates
-from cli.exercise.solving import unit_text
 from cli.exercise.variants import Variant
 
 VERSION = "// Numbas version: finer_feedback_settings"

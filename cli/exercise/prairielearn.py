@@ -9,11 +9,11 @@ from collections.abc import Mapping, Sequence
 from math import lcm
 from uuid import NAMESPACE_URL, uuid5
 
+from cli.exercise.answers import unit_text
 from cli.exercise.description import Exercise
 from cli.exercise.moodle import expected_mistakes
 from cli.exercise.sheets import figures_text, label, problem_html
 from cli.exercise.slips import Candidates
-from cli.exercise.solving import unit_text
 from cli.exercise.variants import Variant
 
 SERVER = '''"""Written by dalembert exercise: takes a variant, and names likely mistakes."""

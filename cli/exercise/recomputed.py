@@ -10,9 +10,10 @@ from functools import cached_property
 
 import numpy as np
 
+from cli.exercise.answers import Answer, Solved
 from cli.exercise.description import Value
 from cli.exercise.slips import Slip
-from cli.exercise.solving import Answer, Problem, Solved
+from cli.exercise.solving import Problem
 from cli.exercise.variants import Variant
 from cli.exercise.work_slips import gravity
 from dalembert.errors import DataError

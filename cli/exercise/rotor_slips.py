@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import correct
+from cli.exercise.answers import Answer
 from cli.exercise.slips import Candidates, Change, Pairs, Slip, together
-from cli.exercise.solving import Answer
 from cli.exercise.variants import Variant
 from cli.exercise.work_slips import GRAVITIES
 from dalembert.angles import degrees

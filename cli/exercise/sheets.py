@@ -9,8 +9,9 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from cli.exercise.answers import Answer, unit_text
 from cli.exercise.description import Ask, Exercise, Value, cell_of
-from cli.exercise.solving import Answer, Sheet, Workshop, unit_text
+from cli.exercise.solving import Sheet, Workshop
 from cli.exercise.variants import Variant
 from dalembert.errors import DataError, quote
 from dalembert.figures import written

@@ -15,7 +15,7 @@ from math import isfinite, remainder
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.exercise.solving import Answer
+from cli.exercise.answers import Answer
 from dalembert.figures import Right, Typed
 from dalembert.units import unit_name
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
+from cli.exercise.answers import unit_text
 from cli.exercise.description import Exercise
 from cli.exercise.sheets import Student, label, page, problem_html
-from cli.exercise.solving import unit_text
 from cli.exercise.variants import Variant
 from cli.show.commands import ShowOptions
 from cli.show.report import html_part, report

@@ -12,35 +12,25 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
-from math import isfinite, isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cli.exercise.description import Ask, Exercise, Value, value_of
+from cli.exercise.answers import Solved
+from cli.exercise.description import Exercise, Value, cell_of, value_of
 from cli.show.taking import result_of
 from dalembert.errors import DataError, quote
 from dalembert.hints import nearest
 from dalembert.quantities import is_number
 from dalembert.tables.files import SUFFIXES, read_bytes, split_sheet
 from dalembert.tables.sources import open_source
-from dalembert.units import composed, parted, unit_name, written
+from dalembert.units import composed, parted
 
 if TYPE_CHECKING:
-    from dalembert.results.columns import Column, Document, Table
+    pass
 
 MECHANISM = ("mechanism", "forces", "inspect", "equilibrium", "simulate", "tolerance")
 """Commands on a mechanism's file: they take --set."""
 _FILES = (".csv", ".toml", ".txt", *SUFFIXES)
-
-
-@dataclass(frozen=True)
-class Answer:
-    """The right answer to a question, in the unit asked for."""
-
-    ask: Ask
-    value: float
-    unit: str
-    is_angle: bool = False
 
 
 @dataclass(eq=False, repr=False)
@@ -76,6 +66,14 @@ class Sheet:
             if column is not None and len({row[column] for row in self.rows}) == len(self.rows):
                 return [row[column] for row in self.rows]
         return [str(k) for k in range(1, len(self.rows) + 1)]
+
+    def text(self) -> str:
+        """Return the table as CSV."""
+        stream = io.StringIO()
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(self.header)
+        writer.writerows(self.rows)
+        return stream.getvalue()
 
 
 @dataclass(eq=False, repr=False)
@@ -190,16 +188,16 @@ class Workshop:
         """Return a datum by the name that stands in braces in the text; None where there is none."""
         if name in drawn:
             value = drawn[name]
-            cell = _cell(name)
-            return value if value.unit or cell is None else Value(value.number, _unit(cell[2]))
-        cell = _cell(name)
+            cell = cell_of(name)
+            return value if value.unit or cell is None else Value(value.number, parted(cell[2])[1])
+        cell = cell_of(name)
         if cell is not None and cell[0] in self.tables:
             sheet = self.sheet(cell[0])
             row, column = sheet.row(cell[1]), sheet.column(cell[2])
             if row is None or column is None:
                 return None
             text = sheet.rows[row][column].strip().replace(",", ".")
-            return Value(Decimal(text), _unit(cell[2])) if is_number(text) else None
+            return Value(Decimal(text), parted(cell[2])[1]) if is_number(text) else None
         if name in self.dimensions:
             return self._dimension(name)
         return None
@@ -235,16 +233,6 @@ class Workshop:
             else:
                 return None
         return value_of(here) if isinstance(here, str) and not is_number(here) else None
-
-
-def _cell(name: str) -> tuple[str, str, str] | None:
-    from cli.exercise.description import cell_of
-
-    return cell_of(name)
-
-
-def _unit(column: str) -> str:
-    return parted(column)[1]
 
 
 def _placeholders(word: str) -> list[str]:
@@ -315,14 +303,14 @@ class Problem:
             own = self.workshop.sheet(name)
             sheets[name] = Sheet(name, own.header, [list(row) for row in own.rows])
         for name, value in self.drawn.items():
-            cell = _cell(name)
+            cell = cell_of(name)
             if cell is None:
                 continue
             sheet = sheets[cell[0]]
             row, column = sheet.row(cell[1]), sheet.column(cell[2])
             assert row is not None
             assert column is not None
-            text = converted(value, _unit(cell[2]))
+            text = converted(value, parted(cell[2])[1])
             assert text is not None
             sheet.rows[row][column] = text
         for (name, r, c), text in self.cells.items():
@@ -337,7 +325,7 @@ class Problem:
     def command(self) -> list[str]:
         """The words of the command, files in place."""
         changed = (
-            {cell[0] for name in self.drawn if (cell := _cell(name))}
+            {cell[0] for name in self.drawn if (cell := cell_of(name))}
             | {name for name, *_ in self.cells}
             | set(self.added)
         )
@@ -349,7 +337,7 @@ class Problem:
             if word in changed:
                 # a folder of its own: the tables of other students and slips stay as they are
                 path = self.place / Path(word).with_suffix(".csv").name
-                path.write_text(_csv(self.sheets[word]), encoding="utf-8")
+                path.write_text(self.sheets[word].text(), encoding="utf-8")
                 words.append(str(path))
             elif (
                 split_sheet(word)[0].lower().endswith(_FILES) and not word.startswith("-") and "=" not in word
@@ -358,7 +346,7 @@ class Problem:
             else:
                 words.append(word)
         for name, value in self.drawn.items():
-            if _cell(name) is None and name in self.workshop.dimensions:
+            if cell_of(name) is None and name in self.workshop.dimensions:
                 words += ["--set", f"{name}={value.option}"]
         return [*words, *self.further]
 
@@ -384,104 +372,3 @@ class Problem:
             said = f": {result.warnings[0]}" if result.warnings else ""
             raise DataError(f"{self.exercise.file}: key command: no case of it can be solved{said}")
         return Solved(self.exercise, tables, document, result)
-
-
-def _csv(sheet: Sheet) -> str:
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(sheet.header)
-    writer.writerows(sheet.rows)
-    return stream.getvalue()
-
-
-@dataclass(eq=False, repr=False)
-class Solved:
-    """What the command computes of a student's numbers."""
-
-    exercise: Exercise
-    tables: list[Table]
-    document: Document
-    result: Any
-
-    @cached_property
-    def answers(self) -> list[Answer]:
-        """The right answers, in the order of the questions.
-
-        Raises
-        ------
-        DataError
-            A quantity or a row that the result does not have, or one without a number.
-        """
-        return [self.answer(k, ask) for k, ask in enumerate(self.exercise.asks, 1)]
-
-    def answer(self, number: int, ask: Ask) -> Answer:
-        place = f"{self.exercise.file}: [[ask]] {number}"
-        table, column, scale = self._column(place, ask)
-        row = self._row(place, ask, table)
-        value = column.values[row]
-        if value is None or isinstance(value, str) or isnan(value) or not isfinite(value):
-            raise DataError(f"{place}, key quantity: {ask.quantity} has no number in that row")
-        unit = column.unit
-        number_asked = float(value)
-        if scale is not None:
-            unit, factor = scale
-            number_asked = float(Fraction(number_asked) * factor)
-        angle = unit_name(unit) in ("deg", "rad") and composed(unit) is not None
-        return Answer(ask, number_asked, unit, angle)
-
-    def _column(self, place: str, ask: Ask) -> tuple[Table, Column, tuple[str, Fraction] | None]:
-        """Return the table and column asked for, and what turns its numbers into the unit asked for."""
-        for table in self.tables:
-            for column in table.columns:
-                if ask.quantity.lower() in (column.header.lower(), column.name.lower()):
-                    return table, column, self._scale(place, ask, column, ask.unit)
-        base, unit = parted(ask.quantity)
-        for table in self.tables:
-            for column in table.columns:
-                if unit and column.unit and column.name.lower() == base.lower():
-                    return table, column, self._scale(place, ask, column, ask.unit or unit)
-        every = [column.header for table in self.tables for column in table.columns if column.unit]
-        raise DataError(
-            f"{place}, key quantity: found {quote(ask.quantity)}, expected a column of the result: "
-            f"{', '.join(dict.fromkeys(every))}{nearest(ask.quantity, every)}"
-        )
-
-    def _scale(self, place: str, ask: Ask, column: Column, unit: str) -> tuple[str, Fraction] | None:
-        if not unit or unit_name(unit) == column.unit:
-            return None
-        own, wanted = composed(column.unit), composed(unit)
-        if own is None or wanted is None or own[1] != wanted[1]:
-            raise DataError(f"{place}, key unit: found {quote(unit)}, expected a unit of {column.header}")
-        (n, d), (wn, wd) = own[0], wanted[0]
-        return unit, Fraction(n) / Fraction(d) * Fraction(wd) / Fraction(wn)
-
-    def _row(self, place: str, ask: Ask, table: Table) -> int:
-        cells = table.cells
-        for key in ask.where:
-            if key not in cells:
-                raise DataError(
-                    f"{place}, key where: found {quote(key)}, expected some of {', '.join(table.keys)}{nearest(key, table.keys)}"
-                )
-        rows = [
-            row
-            for row in range(table.length)
-            if all(_same(cells[key][row], text) for key, text in ask.where.items())
-        ]
-        if len(rows) == 1:
-            return rows[0]
-        named = ", ".join(f"{key} {text}" for key, text in ask.where.items()) or "no key"
-        keys = ", ".join(key for key in table.keys if key in cells) or "none"
-        raise DataError(
-            f"{place}, key where: found {named}, which {len(rows)} rows of the result have, expected one row (keys: {keys})"
-        )
-
-
-def _same(cell: object, text: str) -> bool:
-    if isinstance(cell, str) or not is_number(text):
-        return str(cell) == text
-    return cell is not None and abs(float(cell) - float(text)) <= 1e-9 * max(1.0, abs(float(text)))  # type: ignore[arg-type]
-
-
-def unit_text(unit: str) -> str:
-    """Return a unit as people write it."""
-    return written(unit_name(unit)) if unit else ""

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cli.exercise.answers import Answer
 from cli.exercise.slips import Candidates, Change, Slip, of_sum
-from cli.exercise.solving import Answer
 from cli.exercise.variants import Variant
 from dalembert.units import unit_name
 

@@ -10,10 +10,11 @@ from functools import cached_property
 from math import pi
 
 from cli.exercise import rotor_slips
+from cli.exercise.answers import Answer
 from cli.exercise.description import Exercise
 from cli.exercise.mistakes import candidates
 from cli.exercise.slips import Candidates
-from cli.exercise.solving import Answer, Workshop
+from cli.exercise.solving import Workshop
 from cli.exercise.variants import Variant
 from cli.grade.answers import Student
 from dalembert.errors import DataError, quote

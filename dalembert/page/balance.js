@@ -83,26 +83,16 @@ function build() {
 drawSheet = () => {
   const host = $("answers");
   host.replaceChildren();
-  const listed = (caption, heads, rows) => {
-    const table = put(put(host, "div", { class: "scroll" }), "table");
-    put(table, "caption", {}, caption);
-    const head = put(put(table, "thead"), "tr");
-    for (const text of heads) put(head, "th", { scope: "col" }, text);
-    const body = put(table, "tbody");
-    for (const [name, ...cells] of rows) {
-      const line = put(body, "tr");
-      put(line, "th", { scope: "row" }, name);
-      for (const text of cells) put(line, "td", {}, text);
-    }
-  };
   const [mass, unbalance] = [sheet.shown.mass, sheet.shown.unbalance];
   const turn = Math.PI / 180;
   listed(
+    host,
     sheet.remove ? TEXTS.toRemove : TEXTS.toAdd,
     ["", `mass, ${mass.unit}`, "angle, deg", `unbalance, ${unbalance.unit}`],
     sheet.rotors.flatMap((rotor) => rotor.planes.map((plane) => [`${prefix(rotor)}${plane}`, shownAnswer(`${prefix(rotor)}${plane}.mass`, mass.si), shownAnswer(`${prefix(rotor)}${plane}.angle`, turn), shownAnswer(`${prefix(rotor)}${plane}.unbalance`, unbalance.si)])),
   );
   listed(
+    host,
     TEXTS.state,
     ["", `static, ${unbalance.unit}`, "angle, deg", ...(sheet.couple ? [`couple, ${sheet.shown.couple.unit}`, "angle, deg"] : []), `residual, ${unbalance.unit}`],
     sheet.rotors.map((rotor) => [
@@ -115,6 +105,7 @@ drawSheet = () => {
   );
   if (sheet.rotors.some((rotor) => rotor.tolerance)) {
     listed(
+      host,
       TEXTS.tolerance,
       ["", `permissible, ${unbalance.unit}`, `before, ${unbalance.unit}`, ""],
       sheet.rotors.flatMap((rotor) => (rotor.tolerance?.names ?? []).map((name, p) => {

@@ -131,19 +131,6 @@ function build() {
   }
   update();
 }
-
-function listed(host, caption, heads, rows) {
-  const table = put(put(host, "div", { class: "scroll" }), "table");
-  put(table, "caption", {}, caption);
-  const head = put(put(table, "thead"), "tr");
-  for (const text of heads) put(head, "th", { scope: "col" }, text);
-  const body = put(table, "tbody");
-  for (const [name, ...cells] of rows) {
-    const line = put(body, "tr");
-    put(line, "th", { scope: "row" }, name);
-    for (const text of cells) put(line, "td", {}, text);
-  }
-}
 function dial(parent, plane) {
   const host = put(parent, "figure");
   put(host, "figcaption", {}, TEXTS.dial(plane));
