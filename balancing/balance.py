@@ -88,7 +88,7 @@ class Balance:
         if self.influence.ndim > 2 or limited:
             raise ValueError("a sheet is of one machine, and computes least squares without limits")
         s, p = self.influence.shape
-        names = [list(given) or [str(i + 1) for i in range(n)] for given, n in ((sensors, s), (planes, p))]
+        names = [list(listed) or [str(i + 1) for i in range(n)] for listed, n in ((sensors, s), (planes, p))]
         more: dict[str, Any] = {"weights": self.weights, "ridge": self.ridge, "amplitude_unit": amplitude}
         return machine_sheet(self.influence, self.initial, *names, **more)
 
@@ -168,7 +168,7 @@ class Balance:
         influence_error: ArrayLike | None = None,
         initial_error: ArrayLike | None = None,
     ) -> Real:
-        """Return a bound of the rounding error of a result, in its units and shape.
+        """Return the rounding error of a result, in its units and shape.
 
         Parameters
         ----------
@@ -181,7 +181,7 @@ class Balance:
 
         Notes
         -----
-        Least squares: the componentwise perturbation bound of `balancing.rounding`. Limits and minimax: the optimality
+        Least squares: what the result and the same problem in 32 digits differ by (`balancing.rounding`). Limits and minimax: the optimality
         conditions at the corrections as found (`balancing.optimality`); inf where the optimum is not unique or not
         a smooth function of the data, with the reason in `error_reason`. Even then `residual_max` of minimax is
         bounded, by its distance from `bound`.
@@ -200,14 +200,20 @@ class Balance:
         if quantity == "residual":
             return bounds.residual
         if quantity == "residual_max":
-            largest = bounds.residual.max(axis=-1)
-            if self.of_largest and self.bound is not None and self.weights is None:
+            # the size of a complex number rounds once more
+            largest = bounds.residual.max(axis=-1) + EPS * self.residual_max
+            if (
+                not np.isfinite(largest).all()
+                and self.of_largest
+                and self.bound is not None
+                and self.weights is None
+            ):
                 # the true optimum lies between the dual bound, rounding taken off, and what the corrections truly leave
                 gap, own = (
                     max(float(self.residual_max) - self.bound, 0.0),
                     float(solved.evaluation_error.max()),
                 )
-                largest = np.minimum(largest, max(gap, own) if exact else gap + own)
+                largest = np.asarray(max(gap, own) if exact else gap + own)
             return np.asarray(largest)
         if quantity == "residual_rms":
             return np.asarray(np.sqrt(np.square(bounds.residual).mean(axis=-1)) + 8 * EPS * self.residual_rms)

@@ -148,8 +148,8 @@ def reciprocating_forces(
         *(np.asarray(each, dtype=float) for each in (crank, bank, z, throw, rod, mass))
     )
     ratios = (throw / rod).tolist()
-    known = {ratio: piston_orders(ratio, highest) for ratio in set(ratios)}
-    size = (mass * throw * speed**2)[:, None] * np.array([known[ratio] for ratio in ratios]) / 2
+    orders = {ratio: piston_orders(ratio, highest) for ratio in set(ratios)}
+    size = (mass * throw * speed**2)[:, None] * np.array([orders[ratio] for ratio in ratios]) / 2
     turn = np.arange(1, highest + 1) * (crank - bank)[:, None]
     return Forces(
         np.array(z),

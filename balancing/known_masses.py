@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing.correction import correct
-from balancing.tapes import Outputs, parts, size_and_angle, vector
+from balancing.tapes import Number, Outputs, parts, size_and_angle, vector
 from dalembert.arithmetic.recorded import RECORDED, Recorder
 from dalembert.arithmetic.tape import Tape
 
@@ -39,16 +39,18 @@ def known_masses(
     gravity: float | None,
     bearings: Real | None = None,
     remove: bool = False,
+    fixed: Real | None = None,
 ) -> dict[str, Tape]:
     """The tapes of a rotor whose masses are known.
 
     `mass` adds one entry (`amount`, kg, N or kg·m; `radius`; `angle`; `z`) to the sums and gives its share of every plane;
-    `result` has the corrections, the rotor's state before and after, and what the tolerance is held against.
+    `result` has the corrections, the rotor's state before and after, and what the tolerance is held against; `given` the state
+    after corrections as they are given out (`mass P`, `radius P`, `angle P`), rounded for one.
 
     Parameters
     ----------
     planes, radius : array (p,)
-        m.
+        m; a radius of NaN follows from the mass that is fixed.
     about : float
         The place of the couple, m.
     gravity : float, optional
@@ -57,6 +59,8 @@ def known_masses(
         The planes of the tolerance.
     remove : bool
         Whether corrections are material to remove.
+    fixed : array (p,), optional
+        The mass that stands in a plane, kg; NaN where it is free.
     """
     recorder = Recorder()
     amount, arm, angle, z = (recorder.input(name) for name in ("amount", "radius", "angle", "z"))
@@ -78,18 +82,36 @@ def known_masses(
     mass = recorder.tape(outputs)
 
     recorder = Recorder()
-    found: Outputs = {}
+    results: Outputs = {}
     made = [vector(recorder, f"sum plane {p}") for p in range(len(planes))]
     static, couple = (vector(recorder, f"sum {name}") for name in ("static", "couple"))
     for p, w in enumerate(made):
-        found |= size_and_angle(f"plane {p}", -w if remove else w)
-        found[f"mass {p}"] = abs(w) / float(radius[p])
-        found |= parts(f"made {p}", w)
-    found |= size_and_angle("static", static) | size_and_angle("couple", couple)
-    found |= {"left static": abs(sum(made, static))}
-    levers = [w * float(at - about) for w, at in zip(made, planes, strict=True)]
-    found |= {"left couple": abs(sum(levers, couple))}
+        results |= size_and_angle(f"plane {p}", -w if remove else w)
+        own = np.nan if fixed is None else float(fixed[p])
+        results[f"mass {p}"] = abs(w) / float(radius[p]) if np.isnan(own) else own
+        results[f"radius {p}"] = abs(w) / own if np.isnan(radius[p]) else float(radius[p])
+        results |= parts(f"made {p}", w)
+    results |= size_and_angle("static", static) | size_and_angle("couple", couple)
+    results |= _left(static, couple, made, planes - about)
     if bearings is not None:
         for p in range(len(bearings)):
-            found[f"before {p}"] = abs(vector(recorder, f"sum bearing {p}"))
-    return {"mass": mass, "result": recorder.tape(found)}
+            results[f"before {p}"] = abs(vector(recorder, f"sum bearing {p}"))
+    result = recorder.tape(results)
+
+    recorder = Recorder()
+    outputs = {}
+    put = []
+    for p in range(len(planes)):
+        size = recorder.input(f"mass {p}") * recorder.input(f"radius {p}")
+        w = size * RECORDED.turn(recorder.input(f"angle {p}"))
+        put.append(-w if remove else w)
+        outputs |= {f"plane {p} size": abs(w)} | parts(f"made {p}", put[p])
+    static, couple = (vector(recorder, f"sum {name}") for name in ("static", "couple"))
+    given = recorder.tape(outputs | _left(static, couple, put, planes - about))
+    return {"mass": mass, "result": result, "given": given}
+
+
+def _left(static: Number, couple: Number, made: list[Number], arms: Real) -> Outputs:
+    """What corrections leave of the unbalance and of its couple."""
+    levers = [w * float(arm) for w, arm in zip(made, arms, strict=True)]
+    return {"left static": abs(sum(made, static)), "left couple": abs(sum(levers, couple))}

@@ -36,6 +36,8 @@ CLOSED = 1e-12
 """An answer whose gap is at most this, or rounding, is not solved again."""
 DOUBTFUL = 1e-9
 """Above this gap an answer comes with a warning."""
+ROOM = 4.0
+"""Units of the last place of a row's terms that it keeps from its limit where an answer is solved again."""
 REFUSED = 1e-6
 """Above this gap there is no answer."""
 
@@ -132,6 +134,11 @@ def smallest_maximum(a: Complex, b: Complex, limit: Real) -> Optimum:
 
     Raises NotConverged.
     """
+    limited = bool((limit < np.inf).all())
+    if limited and (np.abs(b) > np.abs(a) @ limit).any():
+        # more than all masses together can do: something is left
+        return _Limited(limit, None, (a, b)).solved()
+    free: Complex | None = None
     try:
         free, _ = smallest_squares(a, b)
         largest = float(np.abs(b + np.matvec(a, free)).max())
@@ -139,9 +146,9 @@ def smallest_maximum(a: Complex, b: Complex, limit: Real) -> Optimum:
         if largest <= nothing and (np.abs(free) <= limit).all():
             return Optimum(free, 0.0, 0.0)
     except DependentPlanes:
-        if not np.isfinite(limit).all():
+        if not limited:
             raise
-    return _Limited(limit, None, (a, b)).solved()
+    return _Limited(limit, None, (a, b), start=None if limited else free).solved()
 
 
 def _rounding(a: Complex, b: Complex, w: Complex) -> float:
@@ -167,7 +174,10 @@ class _Limited:
         cones: tuple[Complex, Complex],
         inside: Complex | None = None,
         kept: Callable[[Complex], bool] | None = None,
+        start: Complex | None = None,
     ) -> None:
+        nothing = np.zeros(len(limit), dtype=complex)
+        self.start = inside if inside is not None else nothing if start is None else start
         self.limit, self.squares, self.cones, self.inside, self.kept = limit, squares, cones, inside, kept
         self.limited = np.flatnonzero(np.isfinite(limit))
         self.a, self.b = cones if squares is None else squares
@@ -179,11 +189,15 @@ class _Limited:
 
     def solved(self) -> Optimum:
         """Solve, again from what was reached where the gap is not closed; refuse what is not the optimum."""
-        start = self._start()
+        start = self.start
         best: Optimum | None = None
-        for _ in range(1 if self.tight else 3):
+        for again in range(1 if self.tight else 3):
             unit = float(np.abs(self.b + self.a @ start).max()) or 1.0
             problem = self._problem(start, unit)
+            if again and self.squares is not None:
+                # limits that leave room for rounding each row, so that the masses need not be moved away from all of them
+                own = np.abs(problem.offset) + np.abs(problem.e) @ np.abs(start)
+                problem.h -= np.minimum(ROOM * EPS * own, DOUBTFUL)
             w, force = solve(problem)
             w = self._within(w)
             reached = self._judged(
@@ -199,13 +213,6 @@ class _Limited:
             sigma = np.linalg.svd(columns_scaled(self.a)[0], compute_uv=False)
             raise NotConverged(best.gap, float(sigma[0] / sigma[-1]) if sigma[-1] > 0 else np.inf)
         return best
-
-    def _start(self) -> Complex:
-        if self.inside is not None:
-            return self.inside
-        if not len(self.limited):
-            return smallest_squares(self.a, self.b)[0]
-        return np.zeros(len(self.limit), dtype=complex)
 
     def _problem(self, start: Complex, unit: float) -> ConeProblem:
         """Put the problem into coordinates in which its rows are orthonormal, and neither κ(α) nor any unit is left.
@@ -270,10 +277,12 @@ class _Limited:
             value = float(np.square(np.abs(left)).sum())
             excused *= 2 * float(np.abs(left).sum()) + len(left) * excused
         bound = 0.0
-        # planes that do not touch their limit pull nothing at the optimum; y is made orthogonal to them
-        for loose in (np.abs(w) < (1 - 1e-9) * self.limit, ~np.isfinite(self.limit)):
+        # planes that do not touch their limit pull nothing at the optimum; where that is not so to rounding, y is made
+        # orthogonal to them
+        none = np.zeros(len(w), dtype=bool)
+        for loose in (none, np.abs(w) < (1 - 1e-9) * self.limit, ~np.isfinite(self.limit)):
             bound = max(bound, self._bound(w, y, unit, reach, loose))
-            if value - bound <= CLOSED * value:
+            if value - bound <= 32 * EPS * value:
                 break
         gap = max(value - bound - excused, 0.0) / value if value > 0 else 0.0
         return Optimum(w, bound, gap)

@@ -1,13 +1,13 @@
-"""Bounds of the rounding errors of corrections under limits and of the minimax problem.
+"""Rounding errors of corrections under limits and of the minimax problem: computed twice, with 16 and with 32 digits.
 
 Such an optimum is where its conditions hold (Karush, Kuhn, Tucker). With the rows E_k z + e_k of the limits and, in
 the minimax problem, of the readings, ρ_k their values and u_k = ρ_k/|ρ_k|, μ_k their multipliers, the conditions are
 
     Bᴴ(B w + b) + Σ μ_k E_kᴴ u_k = 0,    |ρ_k| = h_k + f_k t  for each row that is active,    Σ μ_k f_k = 1,
 
-the first sum for least squares, t and the last condition for minimax. Their values F at the corrections as given out,
-with the errors that evaluating them has, and the inverse of their Jacobian K, bound the distance from the true
-optimum: |δ| ≤ |K⁻¹F| + |K⁻¹| δF. Where K is singular, or the active rows are not sure, nothing is bounded: the optimum
+the first sum for least squares, t and the last condition for minimax. From the corrections as given out Newton's method
+goes on with their values F in 32 digits and the inverse of their Jacobian K in 16, to the optimum; where errors of the data
+are known, they move it by |K⁻¹| δF. Where K is singular, or the active rows are not sure, there is no estimate: the optimum
 is not unique, or not a smooth function of the data. The reason is given.
 """
 
@@ -21,6 +21,9 @@ from numpy.typing import NDArray
 from balancing.cone_problem import real_rows
 from balancing.dependence import adjoint, columns_scaled, roundings
 from balancing.rounding import Bounds, Solved
+from dalembert.arithmetic.doubled import Doubled
+from dalembert.arithmetic.doubled_functions import DOUBLED
+from dalembert.arithmetic.doubled_vectors import Vectors, part, total
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -37,14 +40,14 @@ SINGULAR = 1e11
 class _Rows:
     """The rows of a problem in w, all of size one: the objective's (least squares) and the constraints'."""
 
-    square: Complex
-    at: Complex
-    e: Complex
-    offset: Complex
+    square: Vectors
+    at: Vectors
+    e: Vectors
+    offset: Vectors
     h: Real
     f: Real
     square_error: tuple[Real, Real]
-    """Bounds of errors of `square` and `at`."""
+    """Bounds of errors of the data in `square` and `at`."""
     e_error: tuple[Real, Real]
 
 
@@ -58,8 +61,16 @@ def optimum_bounds(
     except _NotBounded as reason:
         nothing = Bounds(np.full(planes, np.inf), np.full(sensors, np.inf))
         return nothing, str(reason)
-    residual = optimum.bound(solved.influence) + solved.evaluation_error
-    return Bounds(optimum.bound(np.eye(planes, dtype=complex)), residual), ""
+    alpha = Vectors.of(solved.influence)
+    residual = Vectors.of(solved.initial) + (alpha * optimum.true[None]).total()
+    of_data = optimum.carried(solved.influence) + solved.carried_error
+    return (
+        Bounds(
+            optimum.true.apart(solved.corrections) + optimum.carried(np.eye(planes, dtype=complex)),
+            residual.apart(solved.residual) + of_data,
+        ),
+        "",
+    )
 
 
 class _NotBounded(Exception):
@@ -69,66 +80,71 @@ class _NotBounded(Exception):
 def _rows(solved: Solved, minimax: bool, max_mass: Real | None, max_residual: Real | None) -> _Rows:
     alpha, v, w = solved.influence, solved.initial, solved.corrections
     sensors, planes = alpha.shape
-    c = roundings(planes)
     da, db = solved.data_errors
     limit = np.broadcast_to(np.inf if max_mass is None else max_mass, (planes,))
     limited = np.flatnonzero(np.isfinite(limit))
-    caps = np.zeros((len(limited), planes), dtype=complex)
-    caps[np.arange(len(limited)), limited] = 1 / limit[limited]
-    weight = np.ones(sensors) if solved.weights is None else solved.weights
-    # readings that no plane moves are no part of it
-    if minimax:
-        e, at, de, dat = (x * (weight if x.ndim == 1 else weight[:, None]) for x in (alpha, v, da, db))
-        moved = np.abs(e).max(axis=1) > 0
-        e, at, de, dat = e[moved], at[moved], de[moved], dat[moved]
-        unit = float(np.abs(at + e @ w).max())
-        h, f = np.zeros(len(at)), np.ones(len(at))
-        square, of = np.zeros((0, planes), dtype=complex), np.zeros(0, dtype=complex)
-        none = np.zeros((0, planes)), np.zeros(0)
-        e, at, de, dat = (x / unit for x in (e, at, de, dat))
-        square_error = none
-    else:
-        root = np.sqrt(weight)
-        square, of = alpha * root[:, None], v * root
-        unit = float(np.abs(of + square @ w).max()) or 1.0
-        square, of = square / unit, of / unit
-        square_error = da * root[:, None] / unit, db * root / unit
-        ceiling = np.broadcast_to(np.inf if max_residual is None else max_residual, (sensors,))
-        capped = np.isfinite(ceiling)
-        e, at, de, dat = ((x[capped].T / ceiling[capped]).T for x in (alpha, v, da, db))
-        h, f = np.ones(len(at)), np.zeros(len(at))
     ones = np.ones(len(limited))
+    caps = Vectors.of(np.eye(planes)[limited]) / limit[limited, None]
+    weight = np.ones(sensors) if solved.weights is None else solved.weights
+    none = np.zeros((0, planes)), np.zeros(0)
+    if minimax:
+        # readings that no plane moves are no part of it
+        held = np.abs(alpha).max(axis=1) * weight > 0
+        unit = float((weight * np.abs(v + alpha @ w))[held].max())
+        by = np.full(int(held.sum()), unit)
+        h, f = np.zeros(len(by)), np.ones(len(by))
+        square, of, square_error = Vectors.of(none[0]), Vectors.of(none[1]), none
+    else:
+        root = DOUBLED.sqrt(Doubled(np.asarray(weight, dtype=float)))
+        unit = float((root.value * np.abs(v + alpha @ w)).max()) or 1.0
+        scale = root / unit
+        square, of = Vectors.of(alpha) * part(scale, (..., None)), Vectors.of(v) * scale
+        square_error = da * scale.value[:, None], db * scale.value
+        ceiling = np.broadcast_to(np.inf if max_residual is None else max_residual, (sensors,))
+        held = np.isfinite(ceiling)
+        weight, by = np.ones(sensors), ceiling[held]
+        h, f = np.ones(len(by)), np.zeros(len(by))
+    own = Doubled(weight[held]) / by
+    e, at = Vectors.of(alpha[held]) * part(own, (..., None)), Vectors.of(v[held]) * own
     return _Rows(
         square,
         of,
-        np.concatenate([e, caps]),
-        np.concatenate([at, np.zeros(len(limited))]),
+        Vectors.joined([e, caps]),
+        Vectors.joined([at, Vectors.of(0 * ones)]),
         np.concatenate([h, ones]),
         np.concatenate([f, 0 * ones]),
         square_error,
-        (np.concatenate([de, c * np.abs(caps)]), np.concatenate([dat, 0 * ones])),
+        (
+            np.concatenate([da[held] * own.value[:, None], np.zeros(caps.shape)]),
+            np.concatenate([db[held] * own.value, 0 * ones]),
+        ),
     )
 
 
 class _Optimum:
     """The conditions at the corrections as given out, and the inverse of their Jacobian."""
 
-    def __init__(self, w: Complex, with_t: bool, rows: _Rows) -> None:
+    def __init__(self, w: Complex, with_t: bool, exact: _Rows) -> None:
         planes = len(w)
-        value = rows.offset + rows.e @ w
+        rows_e, rows_square = exact.e.value, exact.square.value
+        start = Vectors.of(w)
+        value = (exact.offset + (exact.e * start[None]).total()).value
         size = np.abs(value)
         # of each value
-        wrong = rows.e_error[0] @ np.abs(w) + rows.e_error[1]
+        of_data = exact.e_error[0] @ np.abs(w) + exact.e_error[1]
+        wrong = of_data + roundings(planes) * (np.abs(rows_e) @ np.abs(w) + np.abs(exact.offset.value))
         # the unit is chosen so that t = 1
-        radius = rows.h + rows.f
+        radius = exact.h + exact.f
         active = size >= radius * (1 - ACTIVE) - 4 * wrong
         # a reading that stands twice holds the corrections once
         twice = np.ones(len(size), dtype=bool)
-        twice[np.unique(np.column_stack([rows.e, rows.offset, radius]), axis=0, return_index=True)[1]] = False
+        twice[
+            np.unique(np.column_stack([rows_e, exact.offset.value, radius]), axis=0, return_index=True)[1]
+        ] = False
         active &= ~twice
         if not active.any():
             raise _NotBounded("no limit is reached, and the optimum lies within rounding of the edge of one")
-        scaled, scale = columns_scaled(np.concatenate([rows.square, rows.e]))
+        scaled, scale = columns_scaled(np.concatenate([rows_square, rows_e]))
         order = np.argsort(-np.abs(scaled).max(axis=1), kind="stable")
         _, upper = np.linalg.qr(scaled[order])
         diagonal = np.abs(np.diag(upper))
@@ -136,8 +152,8 @@ class _Optimum:
             raise _NotBounded("the planes depend on each other, and no limit tells them apart")
         # w = undo z: coordinates without units or κ(α)
         undo: Complex = np.asarray(scale[:, None] * np.linalg.inv(upper), dtype=complex)
-        e, value, f = rows.e[active], value[active], rows.f[active]
-        self.wrong = wrong[active]
+        e, value, f = rows_e[active], value[active], exact.f[active]
+        self.wrong = of_data[active]
         self.e, self.size = e, size[active]
         turn = value / self.size
         along_rows = turn.conj()[:, None] * (e @ undo)
@@ -149,15 +165,15 @@ class _Optimum:
             self.gradient[:, -1] = -f
         self.across = np.zeros((m, n))
         self.across[:, : 2 * planes] = im
-        left = rows.at + rows.square @ w
+        left = (exact.at + (exact.square * start[None]).total()).value
         slope = np.zeros(n)
-        pull = adjoint(undo) @ (adjoint(rows.square) @ left)
+        pull = adjoint(undo) @ (adjoint(rows_square) @ left)
         slope[:planes], slope[planes : 2 * planes] = pull.real, pull.imag
         if with_t:
             slope[-1] = 1.0
         mu = np.linalg.lstsq(self.gradient.T, -slope, rcond=1e-13)[0]
         hessian = self.across.T @ ((mu / self.size)[:, None] * self.across)
-        squares = np.concatenate(real_rows(rows.square @ undo))
+        squares = np.concatenate(real_rows(rows_square @ undo))
         hessian[: 2 * planes, : 2 * planes] += squares.T @ squares
         # multipliers in units of their size: the condition number is then one without units
         unit = float(max(np.abs(hessian).max(), np.abs(mu).max()))
@@ -181,51 +197,69 @@ class _Optimum:
         inverse[n:, :] *= unit
         # the response of w, complex, to each condition
         self.response = undo @ (inverse[:planes] + 1j * inverse[planes : 2 * planes])
-        value_left = np.concatenate([slope + self.gradient.T @ mu, self.size - radius[active]])
-        self.value, self.mu, self.n, self.planes = value_left, mu, n, planes
-        self.rows, self.turn, self.undo, self.left = rows, turn, undo, left
-        self.squares, self.w = squares, np.abs(w)
-        self._check(rows, size, radius, active, twice)
+        self.mu, self.n, self.planes = mu, n, planes
+        self.rows, self.turn, self.undo, self.left = exact, turn, undo, left
+        self.squares, self.w, self.active = squares, np.abs(w), active
+        self.true = self._true(start, inverse, with_t)
+        self._check(size, radius, active | twice)
 
-    def bound(self, of: Complex) -> Real:
-        """Bound the error of a linear function of the corrections, its rows (..., p)."""
+    def _true(self, w: Vectors, inverse: NDArray[np.floating], with_t: bool) -> Vectors:
+        """Go on from the corrections to where the conditions hold in 32 digits."""
+        rows, active, p = self.rows, self.active, self.planes
+        e, offset, h, f = rows.e[active], rows.offset[active], rows.h[active], rows.f[active]
+        mu, t = Doubled(self.mu), Doubled(np.ones(1))
+        last = np.inf
+        for _ in range(40):
+            value = offset + (e * w[None]).total()
+            size = value.size
+            pull = (e.conj * (value * (mu / size))[:, None]).total(0)
+            if len(rows.at.x.high):
+                left = rows.at + (rows.square * w[None]).total()
+                pull = pull + (rows.square.conj * left[:, None]).total(0)
+            slope = adjoint(self.undo) @ pull.value
+            conditions = [slope.real, slope.imag, (size - (t * f + h)).value]
+            if with_t:
+                conditions.insert(2, (1.0 - total(mu * f)).value[None])
+            step = -inverse @ np.concatenate(conditions)
+            moved = self.undo @ (step[:p] + 1j * step[p : 2 * p])
+            w = w + Vectors.of(moved)
+            mu = mu + step[self.n :]
+            if with_t:
+                t = t + step[2 * p : 2 * p + 1]
+            reach = float(np.abs(step).max())
+            if reach < 1e-24 or (reach >= last / 2 and last < 1e-20):
+                return w
+            if not reach < 2 * last:
+                break
+            last = min(reach, last)
+        raise _NotBounded("the problem is so badly conditioned that its optimum in 32 digits is not reached")
+
+    def carried(self, of: Complex) -> Real:
+        """Bound what errors of the data do to a linear function of the corrections, its rows (..., p)."""
         response = of @ self.response
         n, p = self.n, self.planes
-        out = np.abs(response @ self.value)
         # an error of an active row's value: along it, and across it, where it turns its pull
-        out += np.abs(response[:, n:]) @ self.wrong
+        out = np.abs(response[:, n:]) @ self.wrong
         out += np.abs(response[:, :n] @ self.across.T) @ (self.mu / self.size * self.wrong)
         # of the residual of least squares
         da, db = self.rows.square_error
         off = da @ self.w + db
         out += np.abs(response[:, : 2 * p] @ self.squares.T) @ np.concatenate([off, off])
         # of the rows themselves in the sums of the pulls: in the coordinates of w
-        pulls = da.T @ np.abs(self.left) + self._of_active(self.rows.e_error[0]).T @ self.mu
+        pulls = da.T @ np.abs(self.left) + self.rows.e_error[0][self.active].T @ self.mu
         # zᵣ = Re Σ conj(undo) g …
         back = self.undo.conj()
         by_re = response[:, :p] @ back.real.T + response[:, p : 2 * p] @ back.imag.T
         by_im = -response[:, :p] @ back.imag.T + response[:, p : 2 * p] @ back.real.T
         out += (np.abs(by_re) + np.abs(by_im)) @ pulls
-        if n > 2 * p:
-            out += np.abs(response[:, 2 * p]) * roundings(len(self.mu)) * self.mu.sum()
         return np.asarray(out)
 
-    def _of_active(self, rows: Real) -> Real:
-        return rows[self.active]
-
-    def _check(
-        self,
-        rows: _Rows,
-        size: Real,
-        radius: Real,
-        active: NDArray[np.bool_],
-        twice: NDArray[np.bool_],
-    ) -> None:
+    def _check(self, size: Real, radius: Real, held: NDArray[np.bool_]) -> None:
         """See to it that what is inactive stays so, and that the values hardly turn: else first order is not enough."""
-        self.active = active
-        moved = self.bound(rows.e)
-        turned = moved[active] / self.size
-        if turned.max(initial=0.0) > 1e-3 or (size + moved >= radius)[~(active | twice)].any():
+        value = (self.rows.offset + (self.rows.e * self.true[None]).total()).value
+        moved = np.abs(np.abs(value) - size) + self.carried(self.rows.e.value)
+        turned = moved[self.active] / self.size
+        if turned.max(initial=0.0) > 1e-3 or (size + moved >= radius)[~held].any():
             raise _NotBounded(
                 "the problem is so badly conditioned that rounding decides which limits are active"
             )

@@ -1,19 +1,19 @@
-"""Bounds of the rounding errors of influence coefficients and of least-squares corrections.
+"""Rounding errors of influence coefficients and of least-squares corrections: computed twice, with 16 and with 32 digits.
 
-With r = A x + b at the computed x, the error is (AᴴA)⁻¹Aᴴr: what this is as computed, and what the roundings of
-computing it can hide, by the componentwise perturbation bound of least squares (Å. Björck, BIT 31 (1991) 238-244),
+The second run (`balancing.second_run`) takes the data as exact. Where bounds δA, δb of their own errors are known, these
+are carried on, to first order, by the componentwise perturbation bound of least squares (Å. Björck, BIT 31 (1991) 238-244),
 |·| of every component,
 
-    |δx| ≤ |(AᴴA)⁻¹ Aᴴ r| + |A⁺| (δA |x| + δb) + |(AᴴA)⁻¹| δAᴴ |r|,
-    |δr| ≤ |A (AᴴA)⁻¹ Aᴴ r| + |I − A A⁺| (δA |x| + δb) + |A⁺ᴴ| δAᴴ |r|.
+    |δx| ≤ |A⁺| (δA |x| + δb) + |(AᴴA)⁻¹| δAᴴ |r|,
+    |δr| ≤ |I − A A⁺| (δA |x| + δb) + |A⁺ᴴ| δAᴴ |r|.
 
-The same bound carries errors of the given data on, where they are known. The matrices stand in bounds only: nothing
-is solved with AᴴA. Corrections under limits, and those of the minimax problem, are in `balancing.optimality`.
+The matrices stand in bounds only: nothing is solved with AᴴA. Corrections under limits, and those of the minimax
+problem, are in `balancing.optimality`.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,10 +21,13 @@ from numpy.typing import ArrayLike, NDArray
 from balancing.dependence import adjoint, damping_norms, roundings
 from balancing.influence import influence_coefficients
 from balancing.qr import factors
+from balancing.second_run import smallest_squares
+from dalembert.arithmetic.doubled import Doubled
+from dalembert.arithmetic.doubled_functions import DOUBLED
+from dalembert.arithmetic.doubled_vectors import Vectors, part, total
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-Kind = TypeVar("Kind", np.float64, np.complex128)
 
 
 class Bounds(NamedTuple):
@@ -34,9 +37,9 @@ class Bounds(NamedTuple):
     residual: Real
 
 
-def perturbed(a: Complex, b: Complex, x: Complex, r: Complex, da: Real, db: Real) -> Bounds:
-    """Bound the errors of x, the least-squares solution of A x + b = r ≈ 0, and of r; da, db: errors of A and b."""
-    lead = np.broadcast_shapes(a.shape[:-2], b.shape[:-1], x.shape[:-1])
+def carried(a: Complex, x: Complex, r: Complex, da: Real, db: Real) -> Bounds:
+    """Bound what errors da of A and db of b do to x, the least-squares solution of A x + b = r ≈ 0, and to r."""
+    lead = np.broadcast_shapes(a.shape[:-2], r.shape[:-1], x.shape[:-1])
     # rows in the order of their size, columns of like size: then each row of A⁺ keeps its digits
     q, upper, scale = factors(a)
     inverse: Complex = np.asarray(np.linalg.inv(upper) * scale[..., None], dtype=complex)
@@ -44,15 +47,8 @@ def perturbed(a: Complex, b: Complex, x: Complex, r: Complex, da: Real, db: Real
     wrong = (da @ np.abs(x)[..., None])[..., 0] + db
     pull = (np.swapaxes(da, -1, -2) @ np.abs(r)[..., None])[..., 0]
     outside = np.eye(a.shape[-2]) - q @ adjoint(q)
-    # how far x is from the solution as far as it can be seen; R⁻ᴴ first: what is left is small there
-    off = np.matvec(inverse, np.matvec(adjoint(inverse), np.matvec(adjoint(a), r)))
-    solution = np.abs(off) + np.matvec(np.abs(pseudo), wrong)
-    solution = solution + np.matvec(np.abs(inverse @ adjoint(inverse)), pull)
-    left = (
-        np.abs(np.matvec(a, off))
-        + np.matvec(np.abs(outside), wrong)
-        + np.matvec(np.abs(adjoint(pseudo)), pull)
-    )
+    solution = np.matvec(np.abs(pseudo), wrong) + np.matvec(np.abs(inverse @ adjoint(inverse)), pull)
+    left = np.matvec(np.abs(outside), wrong) + np.matvec(np.abs(adjoint(pseudo)), pull)
     return Bounds(np.broadcast_to(solution, lead + x.shape[-1:]), np.broadcast_to(left, lead + r.shape[-1:]))
 
 
@@ -64,7 +60,7 @@ def influence_error(
     reading_error: tuple[ArrayLike, ArrayLike] | None = None,
     mass_error: ArrayLike | None = None,
 ) -> Real:
-    """Return a bound of the rounding error of `influence_coefficients`, (..., s, p), amplitude per kg.
+    """Return the rounding error of `influence_coefficients`, (..., s, p), amplitude per kg.
 
     Parameters
     ----------
@@ -94,17 +90,19 @@ def influence_error(
     v0, v = np.asarray(initial, dtype=complex), np.asarray(trials, dtype=complex)
     t = np.asarray(trial_masses, dtype=complex)
     alpha = influence_coefficients(v0, v, t)
+    each = t[..., None, :, :]
     # (..., s, r)
-    change = np.swapaxes(v - v0[..., None, :], -1, -2)
-    c = roundings(t.shape[-1])
-    off: Real = c * np.abs(change)
+    exact = Vectors.of(np.swapaxes(v0[..., None, :] + 0 * v, -1, -2)) - Vectors.of(np.swapaxes(v, -1, -2))
+    error = smallest_squares(Vectors.of(each), exact)[0].apart(alpha)
+    if reading_error is None and mass_error is None:
+        return error
+    off: Real = np.zeros(exact.shape)
     if reading_error is not None:
         e0, e = (np.asarray(part, dtype=float) for part in reading_error)
         off = off + np.swapaxes(e + e0[..., None, :], -1, -2)
-    of_masses = c * np.abs(t) + (0.0 if mass_error is None else np.asarray(mass_error, dtype=float))
-    each = t[..., None, :, :]
-    left = np.matvec(each, alpha) - change
-    return perturbed(each, -change, alpha, left, of_masses[..., None, :, :], off).solution
+    of_masses = np.zeros(t.shape) if mass_error is None else np.asarray(mass_error, dtype=float)
+    left = np.matvec(each, alpha) - np.swapaxes(v - v0[..., None, :], -1, -2)
+    return np.asarray(error + carried(each, alpha, left, of_masses[..., None, :, :], off).solution)
 
 
 class Solved(NamedTuple):
@@ -118,60 +116,79 @@ class Solved(NamedTuple):
     initial_error: Real | None
 
     @property
+    def residual(self) -> Complex:
+        """V + α w."""
+        return np.asarray(self.initial + np.matvec(self.influence, self.corrections))
+
+    @property
     def data_errors(self) -> tuple[Real, Real]:
-        """Bounds of the errors of coefficients and vibration, the rounding of the products with them included."""
-        c = roundings(self.influence.shape[-1])
-        of_influence = 0.0 if self.influence_error is None else self.influence_error
-        of_initial = 0.0 if self.initial_error is None else self.initial_error
-        return c * np.abs(self.influence) + of_influence, c * np.abs(self.initial) + of_initial
+        """Bounds of the errors of coefficients and vibration; zero where these are exact."""
+        of_influence, of_initial = self.influence_error, self.initial_error
+        return (
+            np.zeros(self.influence.shape) if of_influence is None else of_influence,
+            np.zeros(self.initial.shape) if of_initial is None else of_initial,
+        )
+
+    @property
+    def carried_error(self) -> Real:
+        """By how much errors of the data move V + α w at these very corrections, (..., s)."""
+        da, db = self.data_errors
+        return np.asarray(np.matvec(da, np.abs(self.corrections)) + db)
 
     @property
     def evaluation_error(self) -> Real:
         """By how much V + α w at these very corrections can be wrong, (..., s)."""
-        size = np.abs(self.corrections)
-        terms = np.abs(self.initial) + np.matvec(np.abs(self.influence), size)
-        own = roundings(self.influence.shape[-1]) * terms
-        if self.influence_error is not None:
-            own = own + np.matvec(self.influence_error, size)
-        return np.asarray(own if self.initial_error is None else own + self.initial_error)
+        terms = np.abs(self.initial) + np.matvec(np.abs(self.influence), np.abs(self.corrections))
+        return np.asarray(roundings(self.influence.shape[-1]) * terms + self.carried_error)
 
 
 def least_squares_bounds(solved: Solved, residual: Complex, ridge: float) -> Bounds:
-    """Bound the errors of the corrections of a least-squares problem without limits, and of its residual."""
+    """Return the errors of the corrections of a least-squares problem without limits, and of its residual."""
     alpha, v, w = solved.influence, solved.initial, solved.corrections
-    da, db = solved.data_errors
-    root = np.ones(v.shape) if solved.weights is None else np.sqrt(solved.weights)
-    a, b, r = alpha * root[..., None], v * root, residual * root
-    da, db = da * root[..., None], db * root
+    exact, at = Vectors.of(alpha), Vectors.of(v)
+    a, b = exact, at
+    if solved.weights is not None:
+        of_rows = DOUBLED.sqrt(Doubled(np.asarray(solved.weights, dtype=float)))
+        a, b = a * part(of_rows, (..., None)), b * of_rows
     if ridge:
-        a, b, r, da, db = _damped(ridge, a, b, r, da, db, w)
-    bounds = perturbed(a, b, w, r, da, db)
+        a, b = _damped(ridge, a, b)
+    true = smallest_squares(a, b)[0]
+    bounds = Bounds(true.apart(w), (at + (exact * true[..., None, :]).total()).apart(residual))
+    if solved.influence_error is None and solved.initial_error is None:
+        return bounds
+    root = np.ones(v.shape) if solved.weights is None else np.sqrt(solved.weights)
+    da, db = solved.data_errors
+    own, r = a.value, residual * root
+    if ridge:
+        norms = ridge * damping_norms(alpha * root[..., None])
+        r = np.concatenate([r, np.broadcast_to(norms * w, (*r.shape[:-1], w.shape[-1]))], axis=-1)
+    of_a, of_b = np.zeros(own.shape), np.zeros(r.shape)
+    of_a[..., : v.shape[-1], :], of_b[..., : v.shape[-1]] = da * root[..., None], db * root
+    if ridge:
+        of_a[..., v.shape[-1] :, :] = (
+            ridge * np.linalg.norm(da * root[..., None], axis=-2)[..., None] * np.eye(w.shape[-1])
+        )
+    more = carried(own, w, r, of_a, of_b)
     safe = np.where(root > 0, root, 1.0)
     # a reading without weight takes no part: its residual follows the corrections
-    follows = np.matvec(np.abs(alpha), bounds.solution)
-    left = np.where(root > 0, np.minimum(bounds.residual[..., : v.shape[-1]] / safe, follows), follows)
-    return Bounds(bounds.solution, left + solved.evaluation_error)
+    follows = np.matvec(np.abs(alpha), more.solution)
+    left = np.where(root > 0, np.minimum(more.residual[..., : v.shape[-1]] / safe, follows), follows)
+    return Bounds(bounds.solution + more.solution, bounds.residual + left + solved.carried_error)
 
 
-def _damped(
-    ridge: float, a: Complex, b: Complex, r: Complex, da: Real, db: Real, w: Complex
-) -> tuple[Complex, Complex, Complex, Real, Real]:
+def _damped(ridge: float, a: Vectors, b: Vectors) -> tuple[Vectors, Vectors]:
     """Return the problem with the rows λ‖α_p‖ w_p of `ridge` below it."""
-    norms = ridge * damping_norms(a)
-    of_norms = ridge * np.linalg.norm(da, axis=-2)
+    norms, planes = DOUBLED.sqrt(total(a.square, -2)), a.shape[-1]
+    given = norms.high > 0
+    norms = Doubled(np.where(given, norms.high, damping_norms(a.value)), np.where(given, norms.low, 0.0))
+    below = part(norms * ridge, (..., None)) * np.eye(planes)
     lead = np.broadcast_shapes(a.shape[:-2], b.shape[:-1])
 
-    def joined(one: NDArray[Kind], other: NDArray[Kind] | Real) -> NDArray[Kind]:
-        return np.concatenate([np.broadcast_to(x, lead + x.shape[-2:]) for x in (one, other)], axis=-2)
+    def spread(z: Vectors, *own: int) -> Vectors:
+        return z + Vectors.of(np.zeros((*lead, *own)))
 
-    def longer(one: NDArray[Kind], other: NDArray[Kind] | Real) -> NDArray[Kind]:
-        return joined(one[..., None], other[..., None])[..., 0]
-
-    below, zeros = np.eye(a.shape[-1]), np.zeros(a.shape[-1])
+    rows = Vectors(below, below * 0.0)
     return (
-        joined(a, norms[..., None] * below),
-        longer(b, zeros),
-        longer(r, norms * w),
-        joined(da, of_norms[..., None] * below),
-        longer(db, zeros),
+        Vectors.joined([spread(a, *a.shape[-2:]), spread(rows, planes, planes)], axis=-2),
+        Vectors.joined([spread(b, b.shape[-1]), Vectors.of(np.zeros((*lead, planes)))], axis=-1),
     )

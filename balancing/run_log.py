@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import DependentTrials, Unseen, adjoint, design, directions, roundings, threshold
+from balancing.dependence import DependentTrials, Unseen, adjoint, design, directions, threshold
 from balancing.loads import loads_of
 from balancing.qr import factors
 from balancing.reading_errors import Errors
@@ -186,7 +186,7 @@ class JointFit:
     def error_estimate(
         self, reading_error: ArrayLike | None = None, mass_error: ArrayLike | None = None
     ) -> Real:
-        """Return a bound of the rounding errors of the unknowns, (..., s, 1 + p), as `balancing.rounding` has it.
+        """Return the rounding errors of the unknowns, (..., s, 1 + p), as `balancing.rounding` has them.
 
         Bounds of the errors of readings (..., r, s) and masses (..., r, p) are carried on; None: they are exact.
 
@@ -194,39 +194,29 @@ class JointFit:
         >>> bool((fit.error_estimate() < 1e-14).all())
         True
         """
-        from balancing.rounding import influence_error, perturbed
+        from balancing.rounding import carried
+        from balancing.second_run import smallest_squares
+        from dalembert.arithmetic.doubled import Doubled
+        from dalembert.arithmetic.doubled_functions import DOUBLED
+        from dalembert.arithmetic.doubled_vectors import Vectors, part
 
-        loads = loads_of(self.masses, self.present) if self.weights is None and self.count is None else None
-        if loads is not None:
-            of_reading, of_mass = (
-                np.zeros(like.shape) if e is None else np.broadcast_to(np.asarray(e, dtype=float), like.shape)
-                for e, like in ((reading_error, self.readings), (mass_error, self.masses))
-            )
-            first, *others = np.moveaxis(
-                loads.means(of_reading + len(loads.of_run) * EPS / 2 * np.abs(self.readings)), -2, 0
-            )
-            base, *trials = np.moveaxis(loads.means(self.readings), -2, 0)
-            of_alpha = influence_error(
-                base,
-                np.stack(trials, axis=-2),
-                self.masses[..., loads.first[1:], :],
-                reading_error=(first, np.stack(others, axis=-2)),
-                mass_error=of_mass[..., loads.first[1:], :],
-            )
-            return np.concatenate([first[..., None], of_alpha], axis=-1)
-        root = np.where(self.present, 1.0 if self.weights is None else np.sqrt(self.weights), 0.0)
-        root = np.swapaxes(root, -1, -2)
-        off, of_masses = (
-            0.0 if e is None else np.asarray(e, dtype=float) for e in (reading_error, mass_error)
+        weights = np.where(self.present, 1.0 if self.weights is None else self.weights, 0.0)
+        of_rows = DOUBLED.sqrt(Doubled(np.swapaxes(weights, -1, -2)))
+        rows = Vectors.of(design(self.masses)[..., None, :, :]) * part(of_rows, (..., None))
+        y = np.swapaxes(np.where(self.present, self.readings, 0.0), -1, -2)
+        error = smallest_squares(rows, Vectors.of(-y) * of_rows)[0].apart(self.unknowns)
+        if reading_error is None and mass_error is None:
+            return error
+        root, own = of_rows.value, rows.value
+        of_reading, of_masses = (
+            np.zeros(like.shape) if e is None else np.broadcast_to(np.asarray(e, dtype=float), like.shape)
+            for e, like in ((reading_error, self.readings), (mass_error, self.masses))
         )
-        y = np.swapaxes(np.where(self.present, self.readings, 0.0), -1, -2) * root
-        rows = root[..., None] * design(self.masses)[..., None, :, :]
-        c = roundings(rows.shape[-1])
-        of_rows = c * np.abs(rows)
-        of_rows[..., 1:] += root[..., None] * np.broadcast_to(of_masses, self.masses.shape)[..., None, :, :]
-        of_y = c * np.abs(y) + root * np.swapaxes(np.broadcast_to(off, self.readings.shape), -1, -2)
-        left = np.matvec(rows, self.unknowns) - y
-        return perturbed(rows, -y, self.unknowns, left, of_rows, of_y).solution
+        of_own = np.zeros(own.shape)
+        of_own[..., 1:] = root[..., None] * of_masses[..., None, :, :]
+        left = np.matvec(own, self.unknowns) - root * y
+        of_y = root * np.swapaxes(of_reading, -1, -2)
+        return np.asarray(error + carried(own, self.unknowns, left, of_own, of_y).solution)
 
     def scatter(self) -> Errors:
         """Return the errors of readings as the residuals show them: s/√2 in each component."""
@@ -363,8 +353,8 @@ def initial_alone(readings: ArrayLike, influence: ArrayLike) -> JointFit:
     gain = np.zeros((*unknowns.shape, y.shape[-2]))
     gain[..., 0, :] = np.swapaxes(share, -1, -2)
     masses = np.zeros((*y.shape[:-1], alpha.shape[-1]), dtype=complex)
-    known = np.full(y.shape[:-2], y.shape[-1])
-    return JointFit(y, masses, None, unknowns, gain, share, known)
+    counts = np.full(y.shape[:-2], y.shape[-1])
+    return JointFit(y, masses, None, unknowns, gain, share, counts)
 
 
 def determined(masses: ArrayLike, present: ArrayLike) -> NDArray[np.bool_]:

@@ -42,6 +42,10 @@ def machine_sheet(
     channels: Sequence[tuple[str, float | None]] | None = None,
     speed_unit: str = "rpm",
     places: Sequence[float] | None = None,
+    spread: tuple[Real, Real] | None = None,
+    limits: Sequence[float | None] = (),
+    ceiling: float | None = None,
+    facts: Sequence[tuple[str, str]] = (),
 ) -> Page:
     """Return the sheet of one machine.
 
@@ -63,6 +67,14 @@ def machine_sheet(
         How the rows call the sensors; default: as `sensors`, without a speed.
     places : sequence of float
         Angles where masses go, rad.
+    spread : (along, across), arrays (s, p), optional
+        Standard deviations of the coefficients along themselves and across.
+    limits : sequence of float
+        The largest mass of each plane, kg or kg·m; None where it has no limit. The sheet names a plane that is beyond.
+    ceiling : float, optional
+        The largest vibration with which no trim is needed, in the amplitude unit.
+    facts : sequence of (name, text)
+        What is to be known of the machine.
     """
     tape = measured(influence, weights, ridge, RUNS, errors, runout, covariance)
     values: dict[str, float] = {}
@@ -72,9 +84,20 @@ def machine_sheet(
     kind, unit = mass
     amplitude = spelled(amplitude_unit)
     coefficients = [
-        [sensor, plane, float(abs(a)), float(degrees(a))]
-        for sensor, row in zip(sensors, influence, strict=True)
-        for plane, a in zip(planes, row, strict=True)
+        [
+            sensor,
+            plane,
+            float(abs(influence[s, p])),
+            float(degrees(influence[s, p])),
+            # where they are known: the standard deviations of size and angle
+            *(
+                []
+                if spread is None
+                else [float(spread[0][s, p]), float(spread[1][s, p] / abs(influence[s, p]))]
+            ),
+        ]
+        for s, sensor in enumerate(sensors)
+        for p, plane in enumerate(planes)
     ]
     whole: dict[str, Any] = {
         "runs": [first, *(f"run {k + 1}" for k in range(1, RUNS))],
@@ -92,6 +115,9 @@ def machine_sheet(
         "mass": {"kind": kind, "unit": spelled(unit), "header": unit, "si": float(to_si(1.0, kind, unit))},
         "word": kind,
         "coefficients": coefficients,
+        "limits": list(limits) or [None] * len(planes),
+        "ceiling": ceiling,
+        "facts": [list(fact) for fact in facts],
         "places": None if places is None else sorted(places),
         "units": {**units([kind, "angle"]), "amplitude": {amplitude: [1.0, 1.0]}},
     }

@@ -50,7 +50,8 @@ def measured(
     Inputs are `run K amplitude S`, `run K phase S` and `run K there S` (1 where it was read, else 0), `run K mass P` and
     `run K angle P` (what stands on the rotor in that run, nothing in the first). The initial vibration is the mean of what
     every run says of it that is there. Outputs: corrections, the vibration they leave, the trim after each run (the corrections
-    less what stands; `fresh`: what its own reading alone asks for), what each run's reading is off, and with stated errors of readings the standard deviations of the corrections.
+    less what stands; `fresh`: what its own reading alone asks for), what each run's reading is off, the vibration of each run as read
+    (without the run-out) and as the coefficients expect it, and with stated errors of readings the standard deviations of the corrections and the trims.
 
     Parameters
     ----------
@@ -111,8 +112,13 @@ def measured(
         for k in range(runs):
             expected = v + sum((a * w for a, w in zip(alpha[i], standing[k], strict=True)), 0j)
             outputs[f"off {k} {i}"] = abs(read[i][k] - expected)
+            outputs |= {f"read {k} {i}": abs(read[i][k]), f"expected {k} {i}": abs(expected)}
     if errors is not None:
-        for j, w in enumerate(corrections):
+        # of the corrections, and of the trims, which differ from them by masses that are exact
+        targets = {f"{j}": (j, w) for j, w in enumerate(corrections)} | {
+            f"{k} {j}": (j, w - standing[k][j]) for k in range(1, runs) for j, w in enumerate(corrections)
+        }
+        for name, (j, w) in targets.items():
             along, across = 0.0, 0.0
             way = w.conjugate() * (1.0 / abs(w))
             for i, v in enumerate(initial):
@@ -130,8 +136,8 @@ def measured(
                 a, b = turned * errors[0], turned * errors[1]
                 along = along + a.real * a.real + b.imag * b.imag
                 across = across + a.imag * a.imag + b.real * b.real
-            outputs[f"along {j}"] = RECORDED.sqrt(along)
-            outputs[f"across {j}"] = RECORDED.sqrt(across)
+            outputs[f"along {name}"] = RECORDED.sqrt(along)
+            outputs[f"across {name}"] = RECORDED.sqrt(across)
     return recorder.tape(outputs)
 
 

@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from cli.app import COMMANDS, build
-from cli.examples.command import describe
+from cli.examples import describe
 from cli.show.commands import SHARED, Command, help_lines
 
 _HEAD = """# Commands and options

@@ -17,59 +17,59 @@ from dalembert.errors import DataError, one_line
 # heading -> name -> (module with a function `run`, the line shown by `dalembert --help`)
 GROUPS = {
     "Rotors": {
-        "balance": ("cli.balance.command", "Balance rotors from a table of known eccentric masses."),
-        "field": ("cli.field.command", "Balance rotors from measured vibration and trial masses."),
-        "trial": ("cli.trial.command", "Suggest a trial mass for the first run in the field."),
-        "signal": ("cli.signal.command", "Compute amplitude and phase of a recorded vibration."),
+        "balance": ("cli.balance", "Balance rotors from a table of known eccentric masses."),
+        "field": ("cli.field", "Balance rotors from measured vibration and trial masses."),
+        "trial": ("cli.trial", "Suggest a trial mass for the first run in the field."),
+        "signal": ("cli.signal", "Compute amplitude and phase of a recorded vibration."),
         "place": (
-            "cli.place.command",
+            "cli.place",
             "Put a correction where masses can go: holes, blades, weights in stock.",
         ),
-        "index": ("cli.index.command", "Separate a rotor's unbalance from its mandrel's: index balancing."),
-        "engine": ("cli.engine.command", "Compute the shaking forces and couples of an engine."),
-        "flywheel": ("cli.flywheel.command", "Size the flywheel of a shaft from a table of its torque."),
+        "index": ("cli.index", "Separate a rotor's unbalance from its mandrel's: index balancing."),
+        "engine": ("cli.engine", "Compute the shaking forces and couples of an engine."),
+        "flywheel": ("cli.flywheel", "Size the flywheel of a shaft from a table of its torque."),
     },
     "Mechanisms": {
-        "mechanism": ("cli.mechanism.command", "Solve the poses: positions, velocities, accelerations."),
+        "mechanism": ("cli.mechanism", "Solve the poses: positions, velocities, accelerations."),
         "forces": (
-            "cli.forces.command",
+            "cli.forces",
             "Compute the effort at the inputs, joint forces, the shaking force.",
         ),
         "inspect": (
-            "cli.inspect.command",
-            "Inspect mobility, Grashof classes, limits, dead and change points.",
+            "cli.inspect",
+            "Inspect mobility, Grashof classes, limits, dead and change points, strokes.",
         ),
         "equilibrium": (
-            "cli.equilibrium.command",
-            "Find the positions of rest, and whether they are stable.",
+            "cli.equilibrium",
+            "Find the positions of rest, their stability and periods of oscillation.",
         ),
-        "simulate": ("cli.simulate.command", "Simulate the motion in time under the loads."),
-        "tolerance": ("cli.tolerance.command", "Compute what the tolerances of dimensions do."),
-        "fit": ("cli.fit.command", "Fit dimensions to a target."),
-        "work": ("cli.work.command", "Find the load that balances a table of link states, by virtual work."),
+        "simulate": ("cli.simulate", "Simulate the motion in time under the loads."),
+        "tolerance": ("cli.tolerance", "Compute what the tolerances of dimensions do."),
+        "fit": ("cli.fit", "Fit dimensions to a target."),
+        "work": ("cli.work", "Find the load that balances a table of link states, by virtual work."),
     },
     "Bodies": {
-        "body": ("cli.body.command", "Put a body together: inertia, angular momentum, shaft reactions."),
-        "spin": ("cli.spin.command", "Turn a body through time: free, under gravity, under a torque."),
+        "body": ("cli.body", "Put a body together: inertia, angular momentum, shaft reactions."),
+        "spin": ("cli.spin", "Turn a body through time: free, under gravity, under a torque."),
     },
     "Teaching": {
         "exercise": (
-            "cli.exercise.command",
+            "cli.exercise",
             "Make the variants of an exercise: sheets, key, solutions, questions.",
         ),
-        "grade": ("cli.grade.command", "Mark the answers to an exercise, and name likely mistakes."),
+        "grade": ("cli.grade", "Mark the answers to an exercise, and name likely mistakes."),
     },
     "Files": {
-        "import": ("cli.imports.command", "Import a mechanism drawn in another program."),
+        "import": ("cli.imports", "Import a mechanism drawn in another program."),
         "export": (
-            "cli.exports.command",
+            "cli.exports",
             "Write a mechanism for other programs: DXF, SVG, CSV, URDF, SDF, MJCF.",
         ),
         "examples": (
-            "cli.examples.command",
+            "cli.examples",
             "List the worked examples, or write one into the current folder.",
         ),
-        "completion": ("cli.completion.command", "Print the completion script for bash, zsh or fish."),
+        "completion": ("cli.completion", "Print the completion script for bash, zsh or fish."),
     },
 }
 COMPLETE = "_DALEMBERT_COMPLETE"
@@ -112,7 +112,7 @@ def _elsewhere() -> None:
 
 
 def _call_of(example: str) -> str:
-    from cli.examples.command import describe
+    from cli.examples import describe
 
     return str(describe(example)["command"])
 
@@ -136,7 +136,7 @@ def build(called: str | None) -> typer.Typer:
 
             file = import_module(module)
             if COMPLETE in os.environ:
-                from cli.completion.values import complete
+                from cli.completion import complete
 
                 complete(file.run, name)
             kind = with_help(getattr(file, "OPTIONS", ""), getattr(file, "EXAMPLE", ""), _call_of)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-# option -> what stands for it now; of all commands
+# option -> its new spelling; of all commands
 EVERYWHERE = {
     "--title": "--about title=…",
     "--machine": "--about machine=…",

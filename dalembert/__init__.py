@@ -22,9 +22,9 @@ Rotors (`balancing`):
     trial_effect, trial_unbalance, unseen_combination
 
 Mechanisms (`virtualwork`):
-    AssemblyError, Belt, Check, Cycle, DescriptionError, Equilibria, Equilibrium, Force, Friction, GROUND,
+    AssemblyError, Belt, Bound, Cam, Check, Cycle, DescriptionError, Equilibria, Equilibrium, Force, Friction, GROUND,
     Gear, Guess, Guide, Input, Link, LinkStates, Mechanism, MechanismError, MobilityError, Motion,
-    Motor, Rack, Spring, Target, Torque, TorsionSpring, UnitLoad, balance_virtual_power, block_on_bar,
+    Motor, Rack, Segment, Spring, Target, Torque, TorsionSpring, UnitLoad, balance_virtual_power, block_on_bar,
     counterweights, crank_rod_piston, direction_angle, equilibria, grashof_class, newton, on_incline,
     on_moving_ramp, rotation_of_point, second_point, work_ledger
 

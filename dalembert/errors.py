@@ -14,19 +14,19 @@ def needs(what: str, package: str, extra: str) -> DataError:
     return DataError(f"{what} needs {package}: install dalembert with its extra, dalembert[{extra}]")
 
 
-def cell_error(file: str, row: int, line: int, column: str, found: str, expected: str) -> DataError:
+def cell_error(file: str, row: int, line: int, column: str, value: str, expected: str) -> DataError:
     """Name file, row, column, the value found and what was expected.
 
     `row` counts the data rows from 1; `line` is the file's own line, header and blank lines included.
     """
     return DataError(
-        f"{file}: row {row} (line {line}), column {column}: found {quote(found)}, expected {expected}"
+        f"{file}: row {row} (line {line}), column {column}: found {quote(value)}, expected {expected}"
     )
 
 
-def quote(found: str) -> str:
+def quote(value: str) -> str:
     """Show a value from a file on one line, whatever it holds."""
-    text = ascii(found) if not found.isprintable() else f"'{found}'"
+    text = ascii(value) if not value.isprintable() else f"'{value}'"
     return text if len(text) <= 60 else text[:57] + "...'"
 
 

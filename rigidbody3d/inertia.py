@@ -227,7 +227,7 @@ def free_axes(moments: ArrayLike) -> NDArray[np.bool_]:
     return np.asarray(np.diff(m, axis=-1).min(axis=-1) <= RTOL * np.abs(m).max(axis=-1))
 
 
-def own_axes(found: Principal) -> Array:
+def own_axes(principal: Principal) -> Array:
     """Return principal axes (3, 3) that lie along the body's own axes where equal moments leave them free.
 
     Examples
@@ -239,7 +239,7 @@ def own_axes(found: Principal) -> Array:
            [0., 1., 0.],
            [0., 0., 1.]])
     """
-    moments, axes = found.moments, np.array(found.axes)
+    moments, axes = principal.moments, np.array(principal.axes)
     close = np.diff(moments) <= RTOL * np.abs(moments).max()
     if close.all():
         return np.eye(3)

@@ -32,6 +32,37 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
+def shaft_axes(axis: ArrayLike) -> Array:
+    """Return axes for a shaft along any vector (..., 3): two across it and its own as rows, right-handed, (..., 3, 3).
+
+    The first lies nearest to the coordinate axis that follows the largest component: y for a shaft along x, x for one along
+    z. A body turned by the matrix about the origin has its shaft along z: `Shaft(body.turned(axes, (0, 0, 0)), ...)`.
+
+    Raises
+    ------
+    ValueError
+        A vector of zeros, or one that is not finite.
+
+    Examples
+    --------
+    >>> shaft_axes([2.0, 0.0, 0.0])
+    array([[0., 1., 0.],
+           [0., 0., 1.],
+           [1., 0., 0.]])
+    """
+    n = np.asarray(axis, dtype=float)
+    largest = np.abs(n).max(axis=-1, keepdims=True)
+    if n.shape[-1:] != (3,) or not (np.isfinite(n).all() and (largest > 0).all()):
+        raise ValueError(f"the axis of a shaft is a vector of three numbers, not all 0, found {axis!r}")
+    n = n / largest
+    n = n / np.linalg.norm(n, axis=-1, keepdims=True)
+    following = (np.abs(n).argmax(axis=-1) + 1) % 3
+    first = np.eye(3)[following]
+    first = first - n * (n * first).sum(axis=-1, keepdims=True)
+    first = first / np.linalg.norm(first, axis=-1, keepdims=True)
+    return np.stack([first, np.cross(n, first), n], axis=-2) + 0.0
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class _Formulas:
     """The formulas of a shaft, on arrays of any kind of number, recorded ones for bounds too."""

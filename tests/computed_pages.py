@@ -21,16 +21,23 @@ def script_and_data(page: str) -> tuple[str, dict[str, Any]]:
 
 
 def machines(
-    pages: list[str], folder: Path, tries: list[list[dict[str, float]]], names: list[list[str]]
+    pages: list[str],
+    folder: Path,
+    tries: list[list[dict[str, float]]],
+    names: list[list[str]],
+    curves: bool = False,
+    drawn: bool = False,
 ) -> Any:
-    """What pages answer: of each page and each try the names at the free pose, and whether it can be assembled.
+    """What pages answer: of each page and each try the names at the free pose; with `curves` over the sweep.
+
+    With `drawn` the shapes of the drawing instead.
 
     Parameters
     ----------
     tries : of each page what is set, one after the other; `input` or an input's name is the free pose
     names : of each page what is asked for
     """
-    bodies, models = [], []
+    bodies, models, drawings = [], [], []
     shared = ""
     for page in pages:
         script, data = script_and_data(page)
@@ -42,6 +49,7 @@ def machines(
         shared = engine.replace('"use strict";', "") + unpack[0] + rest
         bodies.append(tape.replace("const tapes = ", "").rstrip().rstrip(";"))
         models.append(data["model"])
+        drawings.append(data["series"][0])
     every = ",\n".join(bodies)
     script = f"""{shared}
 const every = [{every}];
@@ -57,11 +65,17 @@ answer(every.map((tapes, p) => {{
       else numbers[name] = x;
     }}
     const state = machine.solve(numbers, free);
-    return names.map((name) => machine.value(state, model.quantities[name], model.n));
+    const curve = (name) => Array.from({{ length: model.n }}, (_, l) => machine.value(state, model.quantities[name], l));
+    if ({"true" if drawn else "false"}) {{
+      const series = structuredClone(given[p].series);
+      redraw(machine, state, series);
+      return series.shapes;
+    }}
+    return names.map((name) => ({"curve(name)" if curves else "machine.value(state, model.quantities[name], model.n)"}));
   }});
 }}));"""
     given = [
-        {"model": model, "tries": each, "names": wanted}
-        for model, each, wanted in zip(models, tries, names, strict=True)
+        {"model": model, "tries": each, "names": wanted, "series": series if drawn else None}
+        for model, each, wanted, series in zip(models, tries, names, drawings, strict=True)
     ]
     return run_script(script, folder, given)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.examples.command import names
+from cli.examples import names
 
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "docs" / "quality" / "coverage.md").read_text(encoding="utf-8")

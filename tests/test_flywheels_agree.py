@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from balancing import torque_cycle
-from cli.examples.command import EXAMPLES
+from cli.examples import EXAMPLES
 from virtualwork import Mechanism
 from virtualwork.study.cycle import Cycle
 

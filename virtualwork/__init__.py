@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from virtualwork.describe.parts import (
         GROUND,
         Belt,
+        Cam,
         Force,
         Friction,
         Gear,
@@ -17,10 +18,12 @@ if TYPE_CHECKING:
         Link,
         Motor,
         Rack,
+        Segment,
         Spring,
         Torque,
         TorsionSpring,
     )
+    from virtualwork.family.keep import Bound
     from virtualwork.family.target import Target
     from virtualwork.formulas.effort import ledger
     from virtualwork.mechanism import Mechanism, equilibria
@@ -45,6 +48,8 @@ __all__ = [
     "GROUND",
     "AssemblyError",
     "Belt",
+    "Bound",
+    "Cam",
     "Check",
     "Cycle",
     "DescriptionError",
@@ -64,6 +69,7 @@ __all__ = [
     "Motion",
     "Motor",
     "Rack",
+    "Segment",
     "Spring",
     "Target",
     "Torque",
@@ -87,11 +93,12 @@ __all__ = [
 # where each name stands; a room is loaded when one of its names is asked for
 _ROOMS = {
     "virtualwork.describe": "AssemblyError DescriptionError MechanismError MobilityError",
-    "virtualwork.describe.parts": "GROUND Belt Force Friction Gear Guess Guide Input Link Motor Rack Spring Torque TorsionSpring",
+    "virtualwork.describe.parts": "GROUND Belt Cam Force Friction Gear Guess Guide Input Link Motor Rack Segment Spring Torque TorsionSpring",
     "virtualwork.formulas.effort": "ledger",
     "virtualwork.mechanism": "Mechanism equilibria",
     "virtualwork.motion": "Motion",
     "virtualwork.study": "counterweights",
+    "virtualwork.family.keep": "Bound",
     "virtualwork.family.target": "Target",
     "virtualwork.study.check": "Check grashof_class",
     "virtualwork.study.cycle": "Cycle",

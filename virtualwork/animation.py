@@ -19,7 +19,7 @@ import numpy as np
 from dalembert.page import Page, Shown, fits, packed, page, rounded
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
-from virtualwork.drawing import Circle, Coil, Drawing, Line, Shape, tracers
+from virtualwork.drawing import Circle, Coil, Drawing, Line, Row, Shape, tracers
 from virtualwork.forces import Forces
 from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import xy
@@ -115,7 +115,7 @@ class Series:
             "points": points,
             "bodies": [self._body(name, names, unit) for name in order],
             "pins": [[order.index(body) for body in bodies] for bodies in m.pins.values()],
-            "shapes": [_shape(shape, order) for shape in self.drawing.shapes],
+            "shapes": [_shape(shape, order) for shape in self.drawing.parts],
             "labels": [
                 {"of": one.of, "b": order.index(one.body), "z": _pairs([one.at]), "t": one.text}
                 for one in self.drawing.labels
@@ -131,7 +131,12 @@ class Series:
             ],
             "fine": len(self._fine) if paths else 0,
             "timed": not unit,
+            **self._free(names),
         }
+
+    def _free(self, names: list[str]) -> dict[str, Any]:
+        """What the page draws of every link cut loose; nothing on a page that replays."""
+        return {}
 
     def _add(
         self, name: str, values: ArrayLike, header: str = "", owner: str = "", exact: bool = True
@@ -148,7 +153,7 @@ class Series:
     def _point(self, name: str, unit: bool) -> dict[str, Any]:
         m = self.mechanism
         body, place = m.points[name]
-        found: dict[str, Any] = {
+        entry: dict[str, Any] = {
             "name": name,
             "moves": body != GROUND,
             "trace": name in tracers(m),
@@ -158,17 +163,17 @@ class Series:
         for key, form in _RATES.items():
             columns = [f"{name}_{form.format(axis)}" for axis in "xy"]
             if all(column in self._index for column in columns):
-                found[key] = [self._index[column] for column in columns]
+                entry[key] = [self._index[column] for column in columns]
         if unit and body != GROUND:
             rates = self._unit_rates(("dpoint", body, place, name, 0, 1))
-            found["v"] = [
+            entry["v"] = [
                 self._add(f"{name} {axis}", v, exact=False) for axis, v in zip("xy", rates, strict=True)
             ]
-        return found
+        return entry
 
     def _body(self, name: str, names: list[str], unit: bool) -> dict[str, Any]:
         points = self.mechanism.bodies[name]
-        found: dict[str, Any] = {
+        entry: dict[str, Any] = {
             "name": name,
             "points": [names.index(p) for p in points],
             "point": names.index(next(iter(points))) if points else None,
@@ -178,14 +183,14 @@ class Series:
         }
         if name != GROUND:
             angles = (f"{name}_angle_deg", f"{name}_angle_rad")
-            known = next((a for a in angles if a in self._index), angles[1])
-            found["angle"] = self._column(known, lambda: self.poses.angle(name))
-            found["omega"] = self._index.get(f"{name}_omega_rad_s")
-            found["alpha"] = self._index.get(f"{name}_alpha_rad_s2")
+            angle = next((a for a in angles if a in self._index), angles[1])
+            entry["angle"] = self._column(angle, lambda: self.poses.angle(name))
+            entry["omega"] = self._index.get(f"{name}_omega_rad_s")
+            entry["alpha"] = self._index.get(f"{name}_alpha_rad_s2")
             if unit:
                 (rate,) = self._unit_rates(("dangle", name, 0, 1))
-                found["omega"] = self._add(f"{name} omega", rate, exact=False)
-        return found
+                entry["omega"] = self._add(f"{name} omega", rate, exact=False)
+        return entry
 
     def _unit_rates(self, key: Key) -> list[Any]:
         """Return the columns of a derivative to the one input, that of x and of y."""
@@ -217,17 +222,20 @@ def _pairs(points: Sequence[complex]) -> list[float]:
     return rounded(np.stack([z.real, z.imag], axis=-1))
 
 
-def _shape(shape: Shape, order: list[str]) -> dict[str, Any]:
-    found: dict[str, Any] = {"r": shape.role, "b": order.index(shape.body)}
+def _shape(shape: Shape | Row, order: list[str]) -> dict[str, Any]:
+    entry: dict[str, Any] = {"r": shape.role, "b": order.index(shape.body)}
     if isinstance(shape, Line):
-        found |= {"p": _pairs(shape.points)} | ({"c": 1} if shape.closed else {})
+        entry |= {"p": _pairs(shape.points)} | ({"c": 1} if shape.closed else {})
+    elif isinstance(shape, Row):
+        entry |= {"p": _pairs(shape.points), "d": _pairs([shape.step]), "n": shape.count}
+        entry |= {"j": 1} if shape.joined else {}
     elif isinstance(shape, Circle):
-        found |= {"z": _pairs([shape.centre]), "s": rounded([shape.radius])[0]}
+        entry |= {"z": _pairs([shape.centre]), "s": rounded([shape.radius])[0]}
     elif isinstance(shape, Coil):
         ends = [(order.index(body), *_pairs([z])) for body, z in shape.ends]
         # along 0 -> 1: the real part is the share of its length, the imaginary part a distance sideways
-        found |= {"p": _pairs(shape.along(0, 1)), "ends": [x for end in ends for x in end]}
-    return found
+        entry |= {"p": _pairs(shape.along(0, 1)), "ends": [x for end in ends for x in end]}
+    return entry
 
 
 def moving_page(

@@ -8,7 +8,7 @@ What a tape has not is left to a page that replays: `refused` says what.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,30 +16,33 @@ from typing import Any
 import numpy as np
 
 from dalembert.arithmetic.engines.javascript import engine, written
-from dalembert.arithmetic.recorded import Number, Real, bare
+from dalembert.arithmetic.recorded import Number
 from dalembert.arithmetic.tape import Tape
 from dalembert.page import Page, Shown, packed
 from dalembert.page.typed import units
 from virtualwork.animation import JointForce, Series, moving_page
 from virtualwork.branch.assembly import Assembly
+from virtualwork.branch.guess import informed
 from virtualwork.describe import DescriptionError
-from virtualwork.describe.description import Description
+from virtualwork.describe.description import Description, known_by_guess
 from virtualwork.describe.dimensions import Dimension, changed, dimensions, value
 from virtualwork.describe.text import toml_text
-from virtualwork.drawing import Circle, Coil, Drawing, Line, draw
+from virtualwork.dragged import cams, drawn_numbers, handles, profiles
+from virtualwork.drawing import Drawing, draw
 from virtualwork.family.written import Written
 from virtualwork.forces import Forces
-from virtualwork.formulas.asked import FORCES, Key, names
+from virtualwork.formulas.asked import FORCES, JOINTS, Key, names
+from virtualwork.formulas.balanced import Balanced
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.poses import Poses
 from virtualwork.picture.paper import travel_of
+from virtualwork.plan.steps import Group
 from virtualwork.quantities import Quantity, places
 from virtualwork.quantities import forces as quantities_of_forces
+from virtualwork.study.free_bodies import parts
 
 ORDERS = 2
 """How often places are differentiated in time."""
-# no page computes more poses at a step of the hand
-MOST = 4000
 # input, speed, acceleration, jerk, as an input of a description calls them
 RATES = ("value", "speed", "acceleration", "jerk")
 
@@ -49,6 +52,36 @@ class Computed(Series):
     """Poses of which the page computes every column: a column says where on the tape it stands."""
 
     of: Formulas | None = None
+
+    def _free(self, names: list[str]) -> dict[str, Any]:
+        """The links cut loose: of each what acts on it, as rows of the tape."""
+        if not self.forces:
+            return {}
+        assert self.of is not None
+        paths, reactions, _ = self.of.written.recording.forces
+        order = list(self.mechanism.bodies)
+        loose = [
+            {
+                "b": order.index(link),
+                "parts": [
+                    {
+                        "n": part.name,
+                        "k": part.kind,
+                        "s": part.sign,
+                        "f": self._hidden(part.key),
+                        **({} if part.at is None else {"at": self._hidden(part.at)}),
+                        **({} if part.along is None else {"along": self._hidden(part.along)}),
+                    }
+                    for part in every
+                ],
+            }
+            for link, every in parts(self.mechanism, paths.case, reactions.joints).items()
+        ]
+        return {"loose": loose}
+
+    def _hidden(self, key: Key) -> list[int]:
+        """Columns of a quantity that the page does not list."""
+        return [self._add(f"{key} {i}", column) for i, column in enumerate(self._unit_rates(key))]
 
     def _unit_rates(self, key: Key) -> list[Any]:
         assert self.of is not None
@@ -92,7 +125,7 @@ class Formulas:
         """The formulas with the dimensions as inputs."""
         fixed = [d for d in self.dimensions.values() if d.where[0] != "inputs"]
         moves = (True, True, self.order > ORDERS)
-        return Written(self.assembly, fixed, moves, own_signs=True, settled=False)
+        return Written(self.assembly, fixed, moves, True, settled=False, recording=Balanced)
 
     def refused(self, keys: Sequence[Key]) -> str:
         """Say why a page cannot compute these quantities; empty where it can."""
@@ -101,14 +134,10 @@ class Formulas:
         _ = own.track
         if not m.inputs:
             return "nothing drives it"
-        if self.poses.n > MOST:
-            return f"more than {MOST} poses are no matter of a moment"
         if own.geared:
             return "a gear needs angles with their whole turns"
         if own.folded:
             return "loops are singular in every pose"
-        if any(np.ndim(rate) and np.ptp(rate) for rates in self.poses.rates for rate in rates):
-            return "the speed follows a law in time"
         if forces and m.friction:
             return "friction is found by iteration"
         if {g.name: g.kind for g in self.written.plan.groups} != {g.name: g.kind for g in own.plan.groups}:
@@ -116,11 +145,10 @@ class Formulas:
         if self.written.open_gears:
             return "a gear's phase depends on links that the guess places"
         if not self.written.recording.takes(keys):
-            return "the joint forces are statically redundant"
+            return "the joint forces are statically redundant, and there are racks or cams"
         if forces:
-            loads = self.written.recording.forces[0].case.loads
-            if any(isinstance(load, Tabled) for load in loads):
-                return "a load is given by a table"
+            if any(load.axis == "time" for load in self.written.recording.tables) and self.poses.time is None:
+                return "a torque is given over the time, which the poses have not"
             if m.torsion_springs and len(m.inputs) > 1:
                 return "a torsion spring counts its turns along several inputs"
         return ""
@@ -159,8 +187,13 @@ class Formulas:
             "short": written.short,
             "drawn": written.recording.recorder.tape(dict(drawn)),
         }
+        found |= profiles(written.mechanism, written.recording.recorder)
+        if self._bears:
+            found["statics"] = self._bears.statics
+        if self._loaded and self.written.recording.tables:
+            found["over"] = written.tape([("over", i) for i in range(len(self.written.recording.tables))])
         if any(g.kind == "Newton" for g in groups):
-            found["steps"] = written.steps
+            found |= {"steps": written.steps, "guessed": written.guessed}
         if self.mechanism.torsion_springs:
             springs = range(len(self.mechanism.torsion_springs))
             found["twists"] = written.tape([("twist", i) for i in springs])
@@ -174,9 +207,7 @@ class Formulas:
         groups = [
             {
                 "name": g.name,
-                "sign": self.assembly.signs.get(g.name, 1),
-                **({"start": list(self.assembly.starts[g.name])} if g.name in iterated else {}),
-                **({"angles": len(g.angles)} if g.name in iterated else {}),
+                **(self._iterated(g) if g.name in iterated else {"sign": self.assembly.signs[g.name]}),
             }
             for g in written.plan.groups
             if g.name in closed or g.name in iterated
@@ -186,10 +217,64 @@ class Formulas:
             "inputs": [self._input(j) for j in range(len(m.inputs))],
             "groups": groups,
             "springs": [s.turns for s in m.torsion_springs],
+            "tables": [self._table(load) for load in self.written.recording.tables] if self._loaded else [],
+            "files": self._files(),
+            **({"statics": self._statics(self._bears)} if self._bears else {}),
+            **({} if self.poses.time is None else {"time": packed(self.poses.time)}),
             "size": float(m.size),
             "n": self.poses.n,
+            "comesBack": bool(iterated and len(m.inputs) == 1 and self.assembly.track.whole),
             "rates": [bool(np.any(rate)) for rate in self.poses.rates[0]],
             "toml": self._toml(),
+        }
+
+    @property
+    def _loaded(self) -> bool:
+        """Whether forces are among the quantities."""
+        return any(key[0] in FORCES for key in self.keys)
+
+    def _files(self) -> list[str]:
+        """The tables that stand beside the file."""
+        parts = (*self.mechanism.inputs, *self.mechanism.forces, *self.mechanism.torques)
+        tables = [getattr(part, "history", None) for part in parts]
+        return sorted({getattr(table, "name", "") for table in tables} - {""})
+
+    @property
+    def _bears(self) -> Balanced | None:
+        """The formulas, where joint forces are among the quantities and statics alone is redundant."""
+        recording = self.written.recording
+        assert isinstance(recording, Balanced)
+        return recording if any(key[0] in JOINTS for key in self.keys) and recording.redundant else None
+
+    @staticmethod
+    def _statics(of: Balanced) -> dict[str, Any]:
+        """Where the entries of the equations of all links stand: (row, column) each, the last column that of b."""
+        count = len(of.unknown_forces)
+        places = [[row, count if column is None else column] for row, column in of.system]
+        return {"count": count, "rows": 1 + max(row for row, _ in places), "places": places}
+
+    def _table(self, load: Tabled) -> dict[str, Any]:
+        """A load's table: its rows; whether it is periodic, and whether the whole turns of its angle are unknown."""
+        at, force = (np.array(column) for column in zip(*load.table, strict=True))
+        bases = load.axis == "angle" and self.written.plan.angles[load.body].bases
+        return {
+            "at": list(map(float, at)),
+            "x": list(map(float, force.real)),
+            "y": list(map(float, force.imag)),
+            "periodic": load.periodic,
+            "turns": bool(bases),
+        }
+
+    def _iterated(self, group: Group) -> dict[str, Any]:
+        """A group without a closed form: its unknowns at the guess, and what the guess says of them."""
+        known, _ = known_by_guess(self.mechanism)
+        return {
+            "start": list(self.assembly.starts[group.name]),
+            "angles": len(group.angles),
+            "rows": 2 * len(group.closures),
+            "free": self.written.free[group.name],
+            "sure": all(body in known for body in group.angles),
+            "informed": informed(self.mechanism, group),
         }
 
     def _dimension(self, d: Dimension) -> list[Any]:
@@ -203,7 +288,7 @@ class Formulas:
             for d in self.dimensions.values()
             if d.where[0] == "inputs" and d.where[1] == j
         }
-        rates = [float(np.ravel(np.asarray(rate[j], dtype=float))[0]) for rate in self.poses.rates]
+        rates = [packed(np.ravel(np.asarray(rate[j], dtype=float))) for rate in self.poses.rates]
         return {
             "name": str(entry.name),
             "slides": entry.is_slide,
@@ -258,56 +343,6 @@ def _keyed(text: str) -> list[tuple[str, str]]:
     return found
 
 
-def drawn_numbers(own: Drawing, live: Drawing, formulas: Formulas) -> tuple[list[Any], dict[str, Number]]:
-    """Which numbers of the drawing hang on dimensions: (shape, place in it, row of the tape), and the numbers by their rows."""
-    places: list[Any] = []
-    numbers: dict[str, Number] = {}
-
-    def note(shape: int, what: str, k: int, number: Any) -> None:
-        if isinstance(bare(number), Real):
-            places.append([shape, what, k, len(numbers)])
-            numbers[f"{len(numbers)}"] = bare(number)
-
-    def parts(z: Any) -> Iterator[Any]:
-        z = bare(z)
-        yield from (z.real, z.imag)
-
-    for i, (mine, shape) in enumerate(zip(own.shapes, live.shapes, strict=True)):
-        assert type(mine) is type(shape)
-        if isinstance(shape, Line):
-            for k, x in enumerate(x for z in shape.points for x in parts(z)):
-                note(i, "p", k, x)
-        elif isinstance(shape, Circle):
-            for k, x in enumerate(parts(shape.centre)):
-                note(i, "z", k, x)
-            note(i, "s", 0, shape.radius)
-        elif isinstance(shape, Coil):
-            for e, (_, z) in enumerate(shape.ends):
-                for k, x in enumerate(parts(z)):
-                    note(i, "ends", 3 * e + 1 + k, x)
-    for i, points in enumerate(formulas.written.mechanism.bodies.values()):
-        for k, x in enumerate(parts(next(iter(points.values()), 0j))):
-            note(i, "at", k, x)
-    for i, label in enumerate(live.labels):
-        for k, x in enumerate(parts(label.at)):
-            note(i, "label", k, x)
-    return places, numbers
-
-
-def handles(m: Description) -> list[list[Any]]:
-    """What can be dragged: the path of a point, its body, its name, and for a point in polar form the point it is counted from."""
-    found: list[list[Any]] = [[f"ground.{name}", "ground", name, None] for name in m.ground]
-    every = dimensions(m)
-    for link, part in m.links.items():
-        for point in part.points:
-            for path in (f"links.{link}.{point}", f"links.{link}.points.{point}"):
-                if f"{path}.x" in every:
-                    found.append([path, link, point, None])
-                elif point in part.polar and f"{path}.length" in every:
-                    found.append([path, link, point, part.polar[point].origin])
-    return found
-
-
 def computing_page(
     poses: Poses,
     columns: Mapping[str, tuple[Quantity | int, Shown]],
@@ -357,11 +392,14 @@ def computing_page(
         for each in sorted(named, key=lambda one: not one.key):
             for word in each.names:
                 quantities.setdefault(word, formulas.column(each))
-        places, numbers = drawn_numbers(drawing, draw(formulas.written.mechanism, travel), formulas)
+        places, numbers = drawn_numbers(
+            drawing, draw(formulas.written.mechanism, travel, cam_steps=1), formulas.written.mechanism
+        )
         tapes = ",\n".join(f"{key}: {written(tape)}" for key, tape in formulas.tapes(numbers).items())
         model = formulas.document() | {
             "quantities": quantities,
             "drawn": places,
+            "cams": cams(drawing, m),
             "handles": handles(m),
             "units": units(["length", "angle", *(d.kind for d in formulas.dimensions.values())]),
             "bare": dict(bare_units or {}),
@@ -403,7 +441,7 @@ def page_of(poses: Poses, drawing: Drawing, forces: Forces | None = None, over: 
         header = header if several else header.removeprefix(f"{entry.name}_")
         columns[header] = j, Shown((), header, 1.0 if entry.is_slide else degree)
     for each in listed:
-        columns[each.header] = each, Shown((), each.header, degree if each.turns else 1.0)
+        columns[each.header] = each, Shown((), each.header, degree if each.in_degrees else 1.0)
     made = computing_page(poses, columns, named, arrows, first=over or None)
     if isinstance(made, Page):
         return made

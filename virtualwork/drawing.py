@@ -15,16 +15,22 @@ from __future__ import annotations
 import cmath
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import chain
-from math import isfinite, pi, sqrt
-from typing import Any
+from math import isfinite, pi
 
-from dalembert.arithmetic.recorded import RECORDED, bare
-from dalembert.arithmetic.varied import Varied, heading, made, rotation
+from dalembert.arithmetic.varied import heading, root, rotation
+from virtualwork.describe.cams import CamDrive
 from virtualwork.describe.description import Description
 from virtualwork.describe.meshes import Belt, Gear, Rack
 from virtualwork.describe.parts import GROUND, Guide, Spring
 from virtualwork.describe.points import joined
+from virtualwork.formulas.profiles import STEPS, profile
+from virtualwork.shapes import Circle as Circle
+from virtualwork.shapes import Coil as Coil
+from virtualwork.shapes import Line as Line
+from virtualwork.shapes import Row as Row
+from virtualwork.shapes import Shape as Shape
 
 ROLES = {
     "rail": "the walls of a guide in the ground",
@@ -34,6 +40,8 @@ ROLES = {
     "wheel": "the pitch circle of a gear, or of a belt's pulley",
     "belt": "a belt or a chain where it runs between its wheels",
     "rack": "the pitch line of a rack, with its teeth",
+    "cam": "the profile of a cam",
+    "roller": "a follower's roller, or its flat face",
     "spoke": "a mark that shows how a wheel turns",
     "slot": "the outline of a slot",
     "block": "the block of a slider",
@@ -52,64 +60,6 @@ UNKNOWN_TRAVEL = 0.2
 
 
 @dataclass(frozen=True)
-class Line:
-    """A line through points (m) in the axes of its body; a closed one is an outline that may be filled."""
-
-    role: str
-    body: str
-    points: tuple[complex, ...]
-    closed: bool = False
-
-    @property
-    def reach(self) -> tuple[complex, ...]:
-        """Places that hold it between them."""
-        return self.points
-
-
-@dataclass(frozen=True)
-class Circle:
-    """A circle, m, in the axes of its body."""
-
-    role: str
-    body: str
-    centre: complex
-    radius: float
-
-    @property
-    def reach(self) -> tuple[complex, ...]:
-        """Corners that hold it between them."""
-        return self.centre - self.radius * (1 + 1j), self.centre + self.radius * (1 + 1j)
-
-
-@dataclass(frozen=True)
-class Coil:
-    """A spring between points of two bodies, each (body, point in its axes); `along` draws it."""
-
-    ends: tuple[tuple[str, complex], tuple[str, complex]]
-    width: float
-    """From its middle line to the turns, m."""
-    role: str = "spring"
-
-    @property
-    def body(self) -> str:
-        """The body of its first end."""
-        return self.ends[0][0]
-
-    def along(self, start: complex, end: complex) -> tuple[complex, ...]:
-        """Return the line of the spring between where its ends stand."""
-        way = end - start
-        across = 1j * self.width * (way / abs(way) if way else 1)
-        turns = [(0.2 + 0.06 * i, (-1) ** i) for i in range(11)]
-        return (
-            start,
-            start + 0.17 * way,
-            *(start + share * way + side * across for share, side in turns),
-            start + 0.83 * way,
-            end,
-        )
-
-
-@dataclass(frozen=True)
 class Label:
     """A name and where it stands, in the axes of its body; `of` is "point" or "link"."""
 
@@ -117,9 +67,6 @@ class Label:
     body: str
     at: complex
     text: str
-
-
-Shape = Line | Circle | Coil
 
 
 def standing(shape: Shape, at: Callable[[str, complex], complex], unit: float = 1.0) -> Line | Circle:
@@ -142,16 +89,26 @@ class Drawing:
 
     Attributes
     ----------
+    parts : tuple of Shape or Row
+        From the back to the front.
     symbol : float
         The radius of a pin, m: the measure of every symbol.
     """
 
-    shapes: tuple[Shape, ...]
+    parts: tuple[Shape | Row, ...]
     labels: tuple[Label, ...]
     symbol: float
 
+    @cached_property
+    def shapes(self) -> tuple[Shape, ...]:
+        """The shapes, with every line of a row on its own."""
+        rows = (part.lines() if isinstance(part, Row) else (part,) for part in self.parts)
+        return tuple(chain.from_iterable(rows))
 
-def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> Drawing:
+
+def draw(
+    mechanism: Description, travel: Sequence[tuple[float, float]] = (), cam_steps: int = STEPS
+) -> Drawing:
     """Return what a mechanism is drawn as.
 
     Parameters
@@ -159,6 +116,8 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
     travel : sequence of (least, largest)
         Of each guide, m: over which slides it is drawn. Default, and where NaN: some way about its `through`; of a guide
         that is hardly used some way about its block or pin.
+    cam_steps : int
+        Points of a cam's profile.
     """
     # symbols keep their size where the dimensions vary
     size = complex(mechanism.size).real
@@ -177,7 +136,7 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
     }
     # a slot hides its own link, and lies under the links that run in it
     order = [GROUND, *sorted(mechanism.links, key=lambda name: not slots[name])]
-    layers: list[Iterable[Shape]] = [
+    layers: list[Iterable[Shape | Row]] = [
         *(_in_ground(mechanism, guide, span, s) for guide, span in guides),
         *(_foot(z, s) for name, z in mechanism.ground.items() if name in mechanism.pins),
     ]
@@ -193,7 +152,9 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
             for w in wheels
             if w.body != GROUND and len(mechanism.bodies[w.body]) < 2
         ],
+        *(_cam(mechanism, drive, cam_steps) for drive in mechanism.cam_drives),
         *(_block(mechanism, guide, s) for guide, _ in guides if guide.is_slider),
+        *(_touching(mechanism, drive) for drive in mechanism.cam_drives),
         (_coil(mechanism, spring, s) for spring in mechanism.springs),
         *(_mass(body, own.center, s) for body, own in mechanism.rigid.items() if complex(own.mass)),
         _points(mechanism, s),
@@ -229,7 +190,9 @@ def _ends(mechanism: Description, guide: Guide, span: tuple[float, float], beyon
     return [start + (span[0] - beyond) * along, start + (span[1] + beyond) * along]
 
 
-def _in_ground(mechanism: Description, guide: Guide, span: tuple[float, float], s: float) -> Iterator[Shape]:
+def _in_ground(
+    mechanism: Description, guide: Guide, span: tuple[float, float], s: float
+) -> Iterator[Shape | Row]:
     """The walls along which a block of the ground's own guide slides."""
     if guide.on != GROUND or not guide.is_slider:
         return
@@ -238,24 +201,23 @@ def _in_ground(mechanism: Description, guide: Guide, span: tuple[float, float], 
     for side in (2, -2):
         wall = (low + side * 1j * s * along, high + side * 1j * s * along)
         yield Line("rail", GROUND, wall)
-        yield from _hatched(*wall, s * side / 2)
+        yield _hatched(*wall, s * side / 2)
 
 
-def _hatched(start: complex, end: complex, depth: float) -> Iterator[Line]:
+def _hatched(start: complex, end: complex, depth: float) -> Row:
     """Short strokes to the left of a line (to the right where the depth is negative)."""
     count = max(2, round(abs(complex(end - start)) / (1.8 * abs(depth))))
     way = (end - start) / count
     along = way / abs(way) if way else 1
-    for i in range(count):
-        root = start + (i + 0.7) * way
-        yield Line("hatch", GROUND, (root, root + (1j * depth - 0.7 * abs(depth)) * along))
+    first = start + 0.7 * way
+    return Row("hatch", GROUND, (first, first + (1j * depth - 0.7 * abs(depth)) * along), way, count)
 
 
-def _foot(z: complex, s: float) -> Iterator[Shape]:
+def _foot(z: complex, s: float) -> Iterator[Shape | Row]:
     left, right = z + (-1.9 - 3.2j) * s, z + (1.9 - 3.2j) * s
     yield Line("frame", GROUND, (z, left, right), closed=True)
     yield Line("frame", GROUND, (left - 0.9 * s, right + 0.9 * s))
-    yield from _hatched(left - 0.9 * s, right + 0.9 * s, -s)
+    yield _hatched(left - 0.9 * s, right + 0.9 * s, -s)
 
 
 def _link(
@@ -276,7 +238,9 @@ def _link(
     outline = hull(points)
     if len(outline) > 1:
         yield Line("link", name, outline, closed=len(outline) > 2)
-    elif name not in {w.body for w in wheels} and not any(name == g.link and g.is_slider for g, _ in guides):
+    elif name not in {w.body for w in wheels} | {cam.cam for cam in mechanism.cams} and not any(
+        name == g.link and g.is_slider for g, _ in guides
+    ):
         yield Circle("link", name, outline[0], 3 * s)
 
 
@@ -299,13 +263,15 @@ def _corners(ordered: list[complex]) -> Sequence[complex]:
     width = abs(ordered[-1] - ordered[0])
 
     def chain_of(line: Iterable[complex]) -> list[complex]:
-        found: list[complex] = []
+        corners: list[complex] = []
         for z in line:
             # what turns left by less than rounding lies on the line
-            while len(found) > 1 and _turn(found[-2], found[-1], z) <= 1e-9 * width * abs(z - found[-2]):
-                found.pop()
-            found.append(z)
-        return found[:-1]
+            while len(corners) > 1 and _turn(corners[-2], corners[-1], z) <= 1e-9 * width * abs(
+                z - corners[-2]
+            ):
+                corners.pop()
+            corners.append(z)
+        return corners[:-1]
 
     return (*chain_of(ordered), *chain_of(reversed(ordered)))
 
@@ -349,20 +315,13 @@ def _belt(mechanism: Description, belt: Belt) -> Iterator[Line]:
         return
     # from the line of centres to where the belt touches
     share = (first - side * second) / abs(way)
-    touch = heading(joined(share, _root(1 - share * share)))
+    touch = heading(joined(share, root(1 - share * share)))
     along = way / abs(way)
     behind, ahead = 2 * pi - 2 * touch, 2 * touch if side > 0 else 2 * pi - 2 * touch
     start = touch if side > 0 else touch - pi
     around = [there + second * along * rotation(start - side * ahead * (k / 24)) for k in range(25)]
     back = [here + first * along * rotation(-(touch + behind * (k / 24))) for k in range(25)]
     yield Line("belt", belt.arm, (*around, *back), closed=True)
-
-
-def _root(x: float) -> Any:
-    """The root of a number, plain or varied."""
-    if isinstance(x, Varied):
-        return made(sqrt(complex(x).real), RECORDED.sqrt(bare(x)))
-    return sqrt(x)
 
 
 def _pinion(mechanism: Description, rack: Rack) -> Iterator[Circle]:
@@ -373,7 +332,7 @@ def _pinion(mechanism: Description, rack: Rack) -> Iterator[Circle]:
         yield Circle("wheel", rack.gear, mechanism.bodies[rack.gear][axis], abs(rack.radius))
 
 
-def _teeth(mechanism: Description, rack: Rack, span: tuple[float, float], s: float) -> Iterator[Line]:
+def _teeth(mechanism: Description, rack: Rack, span: tuple[float, float], s: float) -> Iterator[Row]:
     """The pitch line of a rack with its teeth, as long as its wheel rolls on it."""
     guide = mechanism.guides[mechanism.guide_at(rack.slider)]
     d, start = rotation(guide.angle), mechanism.through(guide)
@@ -398,13 +357,38 @@ def _teeth(mechanism: Description, rack: Rack, span: tuple[float, float], s: flo
     depth *= 0.7 * tooth / abs(rack.radius)
     count = min(60, max(4, round(complex((high - low) / (2.4 * tooth)).real)))
     step = (high - low) / count
-    line = [origin + (low + step * (k + x)) * along + y * depth for k in range(count) for x, y in TOOTH]
-    yield Line("rack", body, tuple(line))
+    first = tuple(origin + (low + step * x) * along + y * depth for x, y in TOOTH)
+    yield Row("rack", body, first, step * along, count, joined=True)
 
 
 def _axis(mechanism: Description, body: str, arm: str) -> str:
     """The pin on which a wheel turns on the body that carries it; empty where there is none."""
     return next((p for p in mechanism.bodies[body] if p in mechanism.bodies[arm]), "")
+
+
+def _cam(mechanism: Description, drive: CamDrive, steps: int) -> Iterator[Shape]:
+    """The profile of a cam."""
+    points = profile(mechanism, drive, steps)
+    yield Line("cam", drive.cam.cam, tuple(point.profile for point in points), closed=True)
+
+
+def _touching(mechanism: Description, drive: CamDrive) -> Iterator[Shape]:
+    """A follower's roller, or its flat face as far as it touches."""
+    cam = drive.cam
+    body, name, along = str(cam.follower), str(cam.point), 1 + 0j
+    if drive.guide is not None:
+        guide = mechanism.guides[drive.guide]
+        body, name, along = guide.link, guide.point, 1j * rotation(-(guide.turned or 0.0))
+    trace = mechanism.bodies[body][name]
+    if cam.face == "roller":
+        yield Circle("roller", body, trace, cam.roller)
+    elif cam.face == "flat":
+        offsets = [point.offset for point in profile(mechanism, drive)]
+        offsets = sorted(offsets, key=lambda x: complex(x).real)
+        edge = 0.15 * cam.base_radius
+        yield Line(
+            "roller", body, (trace + (offsets[0] - edge) * along, trace + (offsets[-1] + edge) * along)
+        )
 
 
 def _slot(mechanism: Description, guide: Guide, span: tuple[float, float], s: float) -> Iterator[Shape]:

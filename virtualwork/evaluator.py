@@ -18,7 +18,6 @@ from virtualwork.describe import DescriptionError
 from virtualwork.formulas.asked import COMPLEX, Key
 from virtualwork.formulas.lanes import Lanes, Ready, ready, recorded, taped
 from virtualwork.formulas.numbers import xy
-from virtualwork.formulas.poses import Poses
 
 POINT = ("position", "velocity", "acceleration", "jerk")
 LINK = ("angle", "omega", "alpha", "jerk")
@@ -65,7 +64,7 @@ class Evaluator:
             NaN where the pose cannot be assembled.
         """
         if isinstance(angle, float):
-            given = angle, speed, acceleration, jerk
+            inputs = angle, speed, acceleration, jerk
             moves = speed != 0.0, acceleration != 0.0, jerk != 0.0
             if moves not in self._ready:
                 self._ready[moves] = ready(self.assembly, moves, self.keys)
@@ -73,7 +72,7 @@ class Evaluator:
             if made is not None:
                 function, places, vectors = made
                 try:
-                    values = iter(function(*[given[i] for i in places]))
+                    values = iter(function(*[inputs[i] for i in places]))
                 except (ZeroDivisionError, ValueError, OverflowError):
                     pass
                 else:
@@ -81,11 +80,10 @@ class Evaluator:
                         name: (next(values), next(values)) if vector else next(values)
                         for name, vector in zip(self.wanted, vectors, strict=True)
                     }
-        poses = Poses(self.assembly, angle, speed, acceleration, jerk)
-        found = Lanes(self.assembly, poses).values(self.keys)
+        numbers = Lanes(self.assembly, angle, speed, acceleration, jerk).values(self.keys)
         shown = {
             name: xy(value) if key[0] in COMPLEX else value
-            for name, key, value in zip(self.wanted, self.keys, found, strict=True)
+            for name, key, value in zip(self.wanted, self.keys, numbers, strict=True)
         }
         if np.ndim(angle):
             return shown
@@ -118,8 +116,8 @@ def key_of(assembly: Assembly, name: str) -> Key:
         return words.index(known(of[1], words, "derivative")) if len(of) > 1 else 0
 
     if kind == "points" and of:
-        where = {point: body for body, points in m.bodies.items() for point in points}
-        body = where[known(of[0], where, "point")]
+        # on the body on which a motion takes it too: an estimate is of that motion's own digits
+        body, _ = m.points[known(of[0], m.points, "point")]
         return "point", body, 0j, of[0], order(POINT)
     if kind == "links" and of:
         return "angle", known(of[0], m.links, "link"), order(LINK)

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from virtualwork.describe.dimensions import Dimension
     from virtualwork.evaluator import Evaluator
     from virtualwork.family.design import Design
-    from virtualwork.family.fitting import Fit
+    from virtualwork.family.fitted import Fit
+    from virtualwork.family.keep import Bound
     from virtualwork.family.target import Target
     from virtualwork.intime.run import Run
     from virtualwork.intime.variants import Variants
@@ -312,16 +313,18 @@ class Mechanism(Description):
         seed: int = 0,
         best: int = 1,
         executor: Executor | None = None,
+        keep: Sequence[Bound] = (),
     ) -> Fit[Mechanism]:
-        """Find the dimensions of which points, links or slides come nearest to targets, in the sense of least squares.
+        """Find the dimensions of which points, links, slides or the effort come nearest to targets, in the sense of least squares.
 
         Parameters
         ----------
         wanted : str, or sequence of Target
             `H` or `points.H`: a point along a path; `links.rocker`: a link's angle, `slides.B`: a slide's travel, over
-            the input (function generation). Targets hold their own places, inputs and weights.
+            the input (function generation); `effort.crank`: the input's torque or force. Targets hold their own places,
+            inputs and weights.
         target : array (n, 2), or complex (n,); array (n,)
-            Of the one name: places in m; angles in rad or travels in m. Two rows or more.
+            Of the one name: places in m; angles in rad, travels in m, efforts in N·m or N. Two rows or more.
         free : mapping of path to (low, high)
             The dimensions that are looked for, and their bounds, SI.
         inputs : array (n,), optional
@@ -334,13 +337,16 @@ class Mechanism(Description):
             So many distinct solutions, as far as there are: the further ones are `others` of the best.
         executor : concurrent.futures.Executor
             Refines the starts; the numbers are the same without it.
+        keep : sequence of Bound
+            What stays above or below a bound from the first to the last input of the target (a whole turn where the
+            input is free): the transmission angle, a coordinate, an angle, a travel, the effort.
 
         Raises
         ------
         DescriptionError
             Unknown names, a dimension that moves no point, bounds the wrong way round.
         MechanismError
-            Where no start within the bounds can be assembled at every row.
+            Where no start within the bounds can be assembled at every row, or none keeps what is to be kept.
         ValueError
             A target of fewer than two rows, or not as many inputs.
 
@@ -359,7 +365,7 @@ class Mechanism(Description):
             wanted = [Target({wanted: () if target is None else target}, inputs)]
         elif target is not None or inputs is not None:
             raise ValueError("fit: expected targets, or one name with its target and inputs")
-        return fit(self, wanted, free or {}, starts, seed, best, executor)
+        return fit(self, wanted, free or {}, starts, seed, best, executor, keep)
 
     def design(self, paths: Sequence[str], *wanted: str) -> Design:
         """Positions as a function of some dimensions: what an optimiser of one's own evaluates, with its gradient.
@@ -393,8 +399,8 @@ class Mechanism(Description):
         from virtualwork.describe.dimensions import named
         from virtualwork.family.design import Design, place_key
 
-        found = [dimension for path in paths for dimension in named(self, path)]
-        return Design(self, found, [place_key(self, name) for name in wanted])
+        dimensions = [dimension for path in paths for dimension in named(self, path)]
+        return Design(self, dimensions, [place_key(self, name) for name in wanted])
 
     @cached_property
     def check(self) -> Check:

@@ -24,10 +24,10 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import Point, as_point
-from virtualwork.formulas.asked import FORCES, Key, over_blocks, pays
+from virtualwork.formulas.asked import Key
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
-from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.positions import EvenSweep
+from virtualwork.formulas.one_pose import one_pose
 from virtualwork.parts_of_motion import LinkMotion, PointMotion, SlideMotion
 from virtualwork.pictured import Pictured
 from virtualwork.plan.steps import Step
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from virtualwork.digits.estimates import Estimates
     from virtualwork.family.sensitivity import Sensitivities
     from virtualwork.forces import Forces
-    from virtualwork.formulas.lanes import Lanes
     from virtualwork.study.cycle import Cycle
 
 # poses at each end of a motion that a notebook shows
@@ -55,8 +54,6 @@ class Motion(Pictured):
     ----------
     assembly : Assembly
         Which assembly moves.
-    poses : Poses
-        What has been solved of it, block by block.
     """
 
     def __init__(
@@ -66,12 +63,13 @@ class Motion(Pictured):
         speed: ArrayLike | None = None,
         acceleration: ArrayLike | None = None,
         jerk: ArrayLike | None = None,
-        block_of: EvenSweep | None = None,
+        block_of: int | None = None,
     ) -> None:
         self.assembly, self.lock = assembly, assembly.lock
-        self.poses = Poses(assembly, angle, speed, acceleration, jerk, block_of)
         self._units: dict[int, Motion] = {}
-        self._on_tape: dict[Key, bool] = {}
+        self._one = one_pose(assembly, (angle, speed, acceleration, jerk))
+        if self._one is None:
+            self.poses = Lanes(assembly, angle, speed, acceleration, jerk, block_of)
 
     def __repr__(self) -> str:
         m = self.mechanism
@@ -91,6 +89,13 @@ class Motion(Pictured):
         poses = self.poses
         own = self.inputs, poses.input_error, poses.input_rest
         return _again, (self.assembly, own, poses.rates, poses.block_of, poses.time)
+
+    @cached_property
+    def poses(self) -> Lanes:
+        """What has been solved of it."""
+        # only of one pose are they not made with the motion
+        assert self._one is not None
+        return Lanes(self.assembly, *self._one.numbers)
 
     # --- over what ------------------------------------------------------------------------------------------------
     @property
@@ -170,33 +175,23 @@ class Motion(Pictured):
                 return SlideMotion(self, i)
         raise DescriptionError(f"no slot or slider runs at a point named '{name}'")
 
-    @cached_property
-    def lanes(self) -> Lanes:
-        """The quantities from the tape."""
-        from virtualwork.formulas.lanes import Lanes
-
-        return Lanes(self.assembly, self.poses)
-
     def values(self, keys: Sequence[Key]) -> list[Any]:
-        """Quantities by their keys (`Recording.value`), (n,) each: from the tape where that pays, else over blocks."""
-        keys = tuple(keys)
-        new = tuple(key for key in keys if key not in self._on_tape)
-        if new:
-            way = pays(self.assembly.recordings.setdefault("asked", {}), self.poses.n, new)
-            taped = way == "lanes" or (way == "one" and self.lanes.one(new))
-            self._on_tape |= dict.fromkeys(new, taped)
-        # what was handed out once stays as it is, to its last digit
-        if len({self._on_tape[key] for key in keys}) > 1:
-            return [self.value(key) for key in keys]
-        if keys and self._on_tape[keys[0]]:
-            return [value.copy() for value in self.lanes.values(keys)]
-        if FORCES.isdisjoint(key[0] for key in keys):
-            return self.poses.values(keys)
-        return [over_blocks(self.poses, key, self.dynamics) for key in keys]
+        """Quantities by their keys (`Recording.value`), (n,) each."""
+        return self._values(tuple(keys))
 
     def value(self, key: Key) -> Any:
         """A quantity by its key, (n,)."""
-        return self.values((key,))[0]
+        return self._values((key,))[0]
+
+    def _values(self, keys: tuple[Key, ...]) -> list[Any]:
+        if self._one is not None:
+            result = self._one.values(keys)
+            if result is not None:
+                return result
+            # what was handed out once stays as it is, to its last digit
+            if len(keys) > 1 and not self._one.known.keys().isdisjoint(keys):
+                return [self._values((key,))[0] for key in keys]
+        return self.poses.values(keys, lambda: self.dynamics)
 
     @cached_property
     def rounding(self) -> Estimates:
@@ -233,12 +228,12 @@ class Motion(Pictured):
         keys = {name: key_of(self.assembly, name) for name in names}
         joints = {name: key for name, key in keys.items() if key[0] == "reaction"}
         self.rounding.together(key for name, key in keys.items() if name not in joints)
-        found = {name: self.rounding.of(key) for name, key in keys.items() if name not in joints}
+        estimates = {name: self.rounding.of(key) for name, key in keys.items() if name not in joints}
         if joints:
             errors = self.dynamics.error_estimate()
             errors.together(joints.values())
-            found |= {name: errors.reaction(*key[1:]) for name, key in joints.items()}
-        return {name: found[name] for name in names}
+            estimates |= {name: errors.reaction(*key[1:]) for name, key in joints.items()}
+        return {name: estimates[name] for name in names}
 
     # --- forces -----------------------------------------------------------------------------------------------
     @cached_property
@@ -254,12 +249,8 @@ class Motion(Pictured):
 
         Static where speed and acceleration are zero (Riul, unit II, eq. 3), else with inertia loads (eq. 5).
         """
-        k = self.inputs.shape[1]
-        return (
-            self.value(("effort", 0))
-            if k == 1
-            else np.stack([self.value(("effort", j)) for j in range(k)], axis=1)
-        )
+        result = self._values(tuple(("effort", j) for j in range(len(self.mechanism.inputs))))
+        return result[0] if len(result) == 1 else np.stack(result, axis=1)
 
     def reaction(self, joint: str, on: str) -> Reals:
         """The force of all others on a link at a joint, (n, 2) N (Ibrahim §2.2).
@@ -271,7 +262,7 @@ class Motion(Pictured):
         on : str
             A link that the joint holds.
         """
-        return xy(self.value(("reaction", joint, on)))
+        return xy(self._values((("reaction", joint, on),))[0])
 
     def applied(self, link: str) -> tuple[Complexes, Reals]:
         """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""
@@ -311,8 +302,8 @@ class Motion(Pictured):
 
     def derivative(self, key: Key, path: str) -> Any:
         """The derivative (n,) of a quantity, by its key (`Recording.value`), to the number at a path."""
-        known = self.sensitivities
-        return known.of([key], [known.dimension(path)])[0][0]
+        sensitivities = self.sensitivities
+        return sensitivities.of([key], [sensitivities.dimension(path)])[0][0]
 
     def sensitivity(self, what: str, path: str) -> Reals:
         """Return the derivative of a force of the whole mechanism to a number of the description.
@@ -341,8 +332,8 @@ class Motion(Pictured):
         """
         if what == "effort":
             k = self.inputs.shape[1]
-            found = [self.derivative(("effort", j), path) for j in range(k)]
-            return np.asarray(found[0]) if k == 1 else np.stack(found, axis=1)
+            slopes = [self.derivative(("effort", j), path) for j in range(k)]
+            return np.asarray(slopes[0]) if k == 1 else np.stack(slopes, axis=1)
         if what == "shaking force":
             return xy(self.derivative(("shaking",), path))
         if what == "shaking moment":
@@ -387,7 +378,7 @@ def _again(
     assembly: Assembly,
     own: tuple[Reals, ArrayLike, Any],
     rates: list[list[Number]],
-    block_of: EvenSweep | None,
+    block_of: int | None,
     time: Reals | None = None,
 ) -> Motion:
     """Make a motion again, as pickles and copies do; what it had solved is solved anew when asked for."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.lanes import Lanes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 class Pictured:
     """What a motion looks like: its drawing, pictures on paper, pages that move and that compute."""
 
-    poses: Poses
+    @property
+    def poses(self) -> Lanes:
+        """Its poses."""
+        raise NotImplementedError
 
     @property
     def dynamics(self) -> Forces:

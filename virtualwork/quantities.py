@@ -25,6 +25,9 @@ POINT = (("x_m", "y_m"), ("vx_m_s", "vy_m_s"), ("ax_m_s2", "ay_m_s2"), ("jx_m_s3
 LINK = ("angle_deg", "omega_rad_s", "alpha_rad_s2", "jerk_rad_s3")
 SLIDE = ("position_m", "speed_m_s", "acceleration_m_s2", "jerk_m_s3")
 FORCE = ("fx_N", "fy_N")
+# of a cam
+TOUCH = (("pressure angle", "deg"), ("curvature radius", "m"))
+CONTACT = (("contact force", "N"),)
 
 
 class Quantity(NamedTuple):
@@ -55,6 +58,11 @@ class Quantity(NamedTuple):
         """Whether it is an angle, shown in degrees."""
         return self.key[:1] == ("angle",) and not self.key[2]
 
+    @property
+    def in_degrees(self) -> bool:
+        """Whether it is shown in degrees: an angle, or one that has a sign."""
+        return self.turns or self.key[:1] == ("pressure angle",)
+
     def of(self, value: Any) -> Reals:
         """The number as it is shown, from the quantity or from its slope."""
         if self.polar == "length":
@@ -64,7 +72,7 @@ class Quantity(NamedTuple):
             angle = np.mod(np.degrees(np.angle(value)), 360.0)
             return np.where(np.asarray(value) == 0, np.nan, np.where(angle >= 360.0, 0.0, angle))
         part = value.imag if self.imaginary else value.real
-        return np.asarray(np.degrees(part) if self.turns else part)
+        return np.asarray(np.degrees(part) if self.in_degrees else part)
 
 
 def vector(path: tuple[Any, ...], lead: str, names: Sequence[str], key: Key) -> list[Quantity]:
@@ -72,9 +80,11 @@ def vector(path: tuple[Any, ...], lead: str, names: Sequence[str], key: Key) -> 
     return [Quantity((*path, name), f"{lead}{name}", key, imaginary=bool(i)) for i, name in enumerate(names)]
 
 
-def called(found: Iterable[Quantity], owner: str, order: int = 0) -> list[Quantity]:
+def called(quantities: Iterable[Quantity], owner: str, order: int = 0) -> list[Quantity]:
     """Quantities with the names that a point, link or slide has for them: `H.vx`."""
-    return [each._replace(names=(f"{owner}.{_word(each)}",), owners=(owner,), order=order) for each in found]
+    return [
+        each._replace(names=(f"{owner}.{_word(each)}",), owners=(owner,), order=order) for each in quantities
+    ]
 
 
 def _word(each: Quantity) -> str:
@@ -125,7 +135,23 @@ def places(m: Description, order: int, words: Iterable[str] = ()) -> list[Quanti
     guided = dict.fromkeys(g.point for g in m.guides)
     every = [*points(m, m.points, order), *slides(m, guided, order), *links(m.links, order)]
     pairs = dict.fromkeys(pair for word in words if (pair := _two_points(m, word)) is not None)
-    return [*every, *(part for pair in pairs for part in between(m, *pair, order))]
+    touches = [part for number in range(len(m.cams)) for part in cam(m, number, TOUCH)]
+    return [*every, *touches, *(part for pair in pairs for part in between(m, *pair, order))]
+
+
+def cam(m: Description, number: int, of: Iterable[tuple[str, str]]) -> list[Quantity]:
+    """What a cam has beside its follower's place, under the name of the follower."""
+    name = str(m.cams[number].slider or m.cams[number].follower)
+    return [
+        Quantity(
+            ("cams", name, f"{kind.replace(' ', '_')}_{unit}"),
+            f"{name}_{kind.replace(' ', '_')}_{unit}",
+            (kind.removesuffix(" force"), number),
+            names=(f"{name}.{kind.replace(' ', '_')}",),
+            owners=(name,),
+        )
+        for kind, unit in of
+    ]
 
 
 def _two_points(m: Description, word: str) -> tuple[str, str] | None:
@@ -145,15 +171,15 @@ def between(m: Description, p: str, q: str, order: int) -> list[Quantity]:
     >>> [each.header for each in between(m, "P", "O", 1)]
     ['P-O_x_m', 'P-O_y_m', 'P-O_length_m', 'P-O_angle_deg', 'P-O_vx_m_s', 'P-O_vy_m_s']
     """
-    name, found = f"{p}-{q}", []
+    name, parts_of = f"{p}-{q}", []
     for k in range(order + 1):
         to, start = (("point", m.points[point][0], 0j, point, k) for point in (p, q))
         parts = vector(("vectors", name), f"{name}_", POINT[k], to)
         if k == 0:
             for kind, header in (("length", "length_m"), ("angle", "angle_deg")):
                 parts.append(Quantity(("vectors", name, header), f"{name}_{header}", to, polar=kind))
-        found += [part._replace(less=start) for part in called(parts, name, k)]
-    return found
+        parts_of += [part._replace(less=start) for part in called(parts, name, k)]
+    return parts_of
 
 
 def effort_name(slide: bool) -> str:
@@ -181,7 +207,8 @@ def forces(m: Description, pairs: Iterable[tuple[Joint, str, str]]) -> list[Quan
             Quantity((), f"{lead}difference_{name}", euler, less=work, names=(f"{owner}.difference_{word}",)),
         ]
         result += [each._replace(owners=(owner,)) for each in every]
-    return result + reactions(m, pairs)
+    touches = [part for number in range(len(m.cams)) for part in cam(m, number, CONTACT)]
+    return [*result, *reactions(m, pairs), *touches]
 
 
 def reactions(m: Description, pairs: Iterable[tuple[Joint, str, str]]) -> list[Quantity]:

@@ -33,9 +33,9 @@ def moving_columns(m: Description, poses: Poses, orders: int) -> dict[str, Any]:
         if name not in m.ground
         for k in range(orders)
     ]
-    found = iter(poses.values([*links.values(), *(key for *_, key in points)]))
-    table: dict[str, Any] = {header: next(found) for header in links}
-    for (name, k, _), z in zip(points, found, strict=True):
+    values = iter(poses.values([*links.values(), *(key for *_, key in points)]))
+    table: dict[str, Any] = {header: next(values) for header in links}
+    for (name, k, _), z in zip(points, values, strict=True):
         x, y = POINT[k]
         table[f"{name}_{x}"], table[f"{name}_{y}"] = z.real, z.imag
     return table

@@ -13,7 +13,7 @@ import numpy as np
 import typer
 
 from benchmarks.fuzz.damage import TOKENS, damage
-from cli.examples.command import ABOUT, EXAMPLES, describe, names
+from cli.examples import ABOUT, EXAMPLES, describe, names
 
 ROTORS = "rotor,name,mass_g,radius_mm,angle_deg,z_mm\na,1,9,30,60,20\na,2,6,50,210,65\n07,1,3,20,10,5\n07,2,4,25,100,70\n"
 PLANES = "plane,z_mm,radius_mm,rotor\nA,0,20,a\nB,90,20,a\nA,0,25,07\nB,80,30,07\n"

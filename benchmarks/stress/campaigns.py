@@ -31,6 +31,7 @@ MODULES = tuple(
         "in_time",
         "let_go",
         "tapes",
+        "digits",
     )
 )
 

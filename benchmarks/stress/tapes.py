@@ -16,7 +16,7 @@ from virtualwork import Mechanism
 from virtualwork.describe import MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.formulas.asked import Key, names
-from virtualwork.formulas.lanes import Lanes, taped
+from virtualwork.formulas.lanes import taped
 from virtualwork.motion import Motion
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def near_the_guess(m: Mechanism, rng: Generator, n: int = POSES) -> Motion:
 def disagreement(motion: Motion, engines: tuple[str, ...]) -> tuple[float, float] | None:
     """The most that two engines differ by, of the largest value of the same dimension; and the poses' condition."""
     m, keys = motion.mechanism, every_key(motion)
-    lanes = Lanes(motion.assembly, motion.poses)
+    lanes = motion.poses
     if not lanes.takes(keys):
         return None
     tape = taped(motion.assembly, lanes.recording, tuple(keys))
@@ -126,7 +126,7 @@ def beside_fifty_digits(
 ) -> list[tuple[float, float]]:
     """Some quantities on each engine: the error, and the bound that the tape's adjoint gives."""
     keys = every_key(motion)
-    lanes = Lanes(motion.assembly, motion.poses)
+    lanes = motion.poses
     if not lanes.takes(keys):
         return []
     chosen = tuple(keys[i] for i in sorted(rng.choice(len(keys), FEW, replace=False)))

@@ -296,7 +296,8 @@ def rows(t: Topology) -> list[tuple[str, tuple[Any, ...]]]:
         a, b = part.links
         held = {b: 1.0, a: -part.ratio}
         held[part.arm] = held.get(part.arm, 0.0) + part.ratio - 1.0
-        found.append(("turn", (held, None, None)))
+        # with a ratio of 1 the arm's angle is no part of it
+        found.append(("turn", ({body: c for body, c in held.items() if c}, None, None)))
     for rack in m.racks:
         g = next(g for g in m.guides if g.point == rack.slider)
         line = g.link, m.bodies[g.link][g.point], g.on, g.through, g.angle

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from itertools import combinations
 from typing import Any
 
 import mpmath as mp
@@ -10,6 +12,8 @@ import numpy as np
 
 from benchmarks.stress.topologies import Topology, evaluate, generate, regularity
 from virtualwork import GROUND
+from virtualwork.plan.order import plan
+from virtualwork.plan.steps import turns
 
 DIGITS = 40
 ORDER = 2  # position, velocity, acceleration
@@ -48,8 +52,68 @@ def _series(value: Any) -> _Series:
     return _Series([mp.mpmathify(value), *[mp.mpf(0)] * ORDER])
 
 
+# rad: so near the guess a gear's constant that the program fixes is the guess's, but for rounding
+GUESSED = 1e-9
+
+
+def _constants(t: Topology, inputs: list[_Series]) -> list[Any]:
+    """The constants of gears and belts, Σ c·θ of the links as they are placed.
+
+    Guides, inputs and other gears place a link a rounding from where the guess has it. Where loops place it, the constant
+    is the program's own: it is a number of the mechanism then, which no digits of the guess say better.
+    """
+    placed, found = _placed(t, inputs), []
+    gears = [
+        held
+        for kind, (held, const, *_) in ((kind, data) for kind, data in t.rows if kind == "turn")
+        if const is None
+    ]
+    by_loops = {gear for turn in turns(plan(t.mechanism).steps) for gear, _ in turn.angle.gears}
+    for i, held in enumerate(gears):
+        stands = sum((mp.mpf(c) * placed.get(b, t.angles.get(b, 0.0)) for b, c in held.items()), mp.mpf(0))
+        own = (
+            t.mechanism.assembly.phases[i] if i in by_loops and not placed.keys() >= held.keys() else math.inf
+        )
+        found.append(mp.mpf(own) if abs(own - stands) < GUESSED else stands)
+    return found
+
+
+def _placed(t: Topology, inputs: list[_Series]) -> dict[str, Any]:
+    """The angles of the guess's pose that guides, inputs and gears fix without any loop."""
+    fixed: dict[str, Any] = {GROUND: mp.mpf(0)}
+    rows = [data for kind, data in t.rows if kind == "turn"]
+    while True:
+        rows = [row for row in rows if not fixed.keys() >= row[0].keys()]
+        choices = (some for k in range(1, len(rows) + 1) for some in combinations(rows, k))
+        found = next((some for some in choices if _fit(some, fixed)), None)
+        if found is None:
+            return fixed
+        new = list(dict.fromkeys(body for held, _, _ in found for body in held if body not in fixed))
+        matrix, right = mp.zeros(len(new)), mp.zeros(len(new), 1)
+        for i, (held, const, j) in enumerate(found):
+            there = sum(c * mp.mpf(t.angles[body]) for body, c in held.items() if body in new)
+            if const is None:
+                # the gear's constant takes up whatever the guess says
+                right[i] = there
+            else:
+                value = mp.arg(_exact_direction(const[0])) + mp.mpf(const[1])
+                value += 0 if j is None else inputs[j].c[0]
+                value -= sum(c * fixed[body] for body, c in held.items() if body not in new)
+                right[i] = value + 2 * mp.pi * mp.nint((there - value) / (2 * mp.pi))
+            for body, c in held.items():
+                if body in new:
+                    matrix[i, new.index(body)] = c
+        fixed |= dict(zip(new, mp.lu_solve(matrix, right), strict=True))
+
+
+def _fit(rows: Sequence[Any], fixed: Mapping[str, Any]) -> bool:
+    """Whether relations between angles fix as many as they are."""
+    return len({body for held, _, _ in rows for body in held} - fixed.keys()) == len(rows)
+
+
 def _exact_rows(t: Topology, x: list[_Series], inputs: list[_Series]) -> list[_Series]:
     """Every constraint along a motion."""
+    constants = iter(_constants(t, inputs))
     column = {body: 3 * i for i, body in enumerate(t.mechanism.links)}
     turns = {body: x[i + 2].turned() for body, i in column.items()} | {GROUND: _series(1)}
 
@@ -68,7 +132,7 @@ def _exact_rows(t: Topology, x: list[_Series], inputs: list[_Series]) -> list[_S
         elif kind == "turn":
             held, const, j = data
             if const is None:
-                const = sum((mp.mpf(c) * t.angles.get(b, 0.0) for b, c in held.items()), mp.mpf(0))
+                const = next(constants)
             else:
                 const = mp.arg(_exact_direction(const[0])) + mp.mpf(const[1])
             total = _series(-mp.mpmathify(const))

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import mpmath as mp
 import numpy as np
 
+from dalembert.arithmetic.varied import direction
 from virtualwork import GROUND
 from virtualwork.branch.assembly import Assembly
-from virtualwork.plan.topology import direction
 
 if TYPE_CHECKING:
     from virtualwork import Guide

@@ -1,1 +1,171 @@
 """`dalembert balance`: rotors whose eccentric masses are known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.read import options
+from cli.show.commands import ShowOptions, suffix_among
+from cli.show.output import command
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cli.read.planes import Planes
+    from cli.show.result import Result
+    from dalembert.results.way import Topic
+
+
+EXAMPLE = "riul-rotor"
+OPTIONS = """
+Arguments:
+  table TABLE  CSV of eccentric masses; - is standard input.
+What:
+  plane NAME[:Z]:RADIUS  A correction plane, such as A:0mm:20mm; once: static balancing.
+  planes FILE.csv  The planes as a table: plane, z_*, radius_*, rotor.
+  mass NAME:MASS  Mass of a plane's correction, such as A:7kg: its radius is found where the plane has ? for it.
+  gravity G  g for weights, m/s².
+How:
+  remove  Corrections as material to remove, not to add.
+  round_mass MASS  Round the corrections to this step, such as 0.1g.
+  round_angle ANGLE  Round the angles to this step, such as 1deg.
+  modes FILE.csv  Mode shapes (z_* and a column for each mode): their modal sums vanish.
+How: the tolerance:
+  center_z Z  Where the centre of mass lies: for the couple and the tolerance.
+  grade GRADE  Balance quality grade of ISO 21940-11, such as G2.5; or API (4W/N), or MIL (MIL-STD-167-1).
+  speed SPEED  Highest service speed, such as 3000rpm.
+  rotor_mass MASS  Mass of the rotor, such as 12kg.
+  permissible UNBALANCE  Permissible residual unbalance, such as 30g_mm, in place of a grade.
+  bearings Z1:Z2  The bearing planes, where the tolerance holds; with --speed also the forces in them.
+  page FILE.html  Write a page with the masses to edit, which computes the corrections itself.
+Further options (docs/commands.md describes them):
+  mode_count K  Take the first K modes of --modes.
+  rigid  With --modes: force and couple vanish too (N + 2 planes).
+  workers N  Processes that solve many rotors.
+"""
+
+
+@command(OPTIONS)
+def run(
+    table: str,
+    plane: list[str] | None = None,
+    planes: str | None = None,
+    mass: list[str] | None = None,
+    gravity: float = 9.80665,
+    remove: bool = False,
+    round_mass: str | None = None,
+    round_angle: str | None = None,
+    center_z: str | None = None,
+    grade: str | None = None,
+    speed: str | None = None,
+    rotor_mass: str | None = None,
+    permissible: str | None = None,
+    bearings: str | None = None,
+    modes: str | None = None,
+    mode_count: Annotated[int | None, typer.Option(min=1)] = None,
+    rigid: bool = False,
+    workers: Annotated[int, typer.Option(min=1)] = 1,
+    page: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None,
+    *,
+    show: ShowOptions,
+) -> Result:
+    """Balance rotors from a table of known eccentric masses, in one, two or more planes.
+
+    TABLE has the columns mass_* and radius_* (or weight_* and radius_*, or unbalance_*), angle_*, z_* (not
+    needed with one plane), and if wanted rotor and name; * is a unit: mass_kg, radius_mm, angle_deg, z_mm.
+    Angles are counter-clockwise as seen against +z.
+    """
+    # numpy and all that needs it are loaded only once the command line itself is in order
+    from cli.balance.rotors import Balancing, Carried, Request, read_rotors
+    from cli.balance.tables import METHOD, MODAL, tables, warnings
+    from cli.read.planes import from_options, from_table
+    from cli.read.tolerance import tolerance_of
+    from cli.show.result import Result
+
+    if (plane is None) == (planes is None):
+        raise options.bad("--plane", "expected --plane (once or more) or --planes FILE.csv")
+    if not 1e-9 < gravity < 1e9:
+        raise options.bad("--gravity", f"'{gravity:g}': expected a positive number of m/s²")
+    if modes is None:
+        options.refuse("needs --modes", mode_count=mode_count, rigid=rigid)
+    else:
+        options.refuse("shows rigid balancing: it does not go with --modes", mass=mass, page=page)
+    shapes = None
+    if modes is not None:
+        from cli.balance.modes import read_modes
+
+        shapes = read_modes(modes, mode_count, rigid)
+    chosen = from_table(planes) if planes is not None else from_options(plane or [], sought=True)
+    carried = None
+    if bearings is not None and speed is not None and shapes is None:
+        carried = Carried(
+            options.two_bearings("--bearings", bearings),
+            options.needed("--speed", speed, "speed", positive=True),
+            options.quantity("--rotor-mass", rotor_mass, "mass", positive=True),
+        )
+    only_forces = carried is not None and grade is None and permissible is None
+    request = Request(
+        gravity=gravity,
+        remove=remove,
+        mass_step=options.with_unit("--round-mass", round_mass, "mass", positive=True),
+        angle_step=options.with_unit("--round-angle", round_angle, "angle", positive=True),
+        center=options.quantity("--center-z", center_z, "length"),
+        tolerance=None if only_forces else tolerance_of(grade, speed, rotor_mass, permissible, bearings),
+        masses=_masses(mass or [], chosen),
+        carried=carried,
+        modes=shapes,
+    )
+    needs_z = chosen.several or carried is not None or shapes is not None
+    rotors = read_rotors(table, gravity, needs_z=needs_z)
+    if carried is not None and chosen.z is None:
+        raise options.bad("--bearings", "the forces need the place of the plane: --plane NAME:Z:RADIUS")
+    with options.processes(workers) as executor:
+        balancing = Balancing(rotors, chosen, request, executor)
+
+    def figure() -> Figure:
+        from cli.balance.picture import draw
+
+        return draw(balancing, polygons=show.steps)
+
+    def way() -> list[Topic]:
+        from cli.balance.way import way
+
+        return way(balancing)
+
+    def sheet() -> bytes:
+        from cli.balance.page import sheet
+
+        return sheet(balancing).html.encode()
+
+    return Result(
+        tables=tables(balancing),
+        beside={} if page is None else {page: sheet},
+        head={"correction": "remove" if remove else "add"},
+        figure=figure,
+        way=way,
+        method=METHOD if shapes is None else MODAL,
+        about={"title": "Balancing of known masses"},
+        warnings=[*rotors.table.warnings, *(shapes.warnings if shapes else []), *warnings(balancing)],
+    )
+
+
+def _masses(texts: list[str], planes: Planes) -> dict[str, float]:
+    """Read `NAME:MASS`, and refuse a radius that is sought without a mass."""
+    masses: dict[str, float] = {}
+    for text in texts:
+        name, colon, amount = text.rpartition(":")
+        if not colon or name.strip() not in planes.name:
+            names = ", ".join(dict.fromkeys(planes.name))
+            raise options.bad(
+                "--mass", f"'{text}': expected NAME:MASS with one of the planes {names}, such as A:7kg"
+            )
+        if name.strip() in masses:
+            raise options.bad("--mass", f"the mass of plane {name.strip()} is given twice")
+        masses[name.strip()] = options.needed("--mass", amount, "mass", positive=True)
+    for name, radius in zip(planes.name, planes.radius.tolist(), strict=True):
+        if radius != radius and name not in masses:
+            raise options.bad("--plane", f"the radius of plane {name} is ?: expected --mass {name}:MASS too")
+    return masses

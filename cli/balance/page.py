@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from dalembert.errors import DataError
 from dalembert.page import Page
 from dalembert.page import sheet as sheet_page
 from dalembert.page.typed import spelled, units
-from dalembert.units import to_si
+from dalembert.units import from_si, to_si
 
 MOST = 50
 """Rotors of a page."""
@@ -40,6 +41,7 @@ def sheet(b: Balancing) -> Page:
     documents, rows, values = [], [], dict[str, float]()
     named = rotors.table.texts.get("name")
     several = len(rotors.names) > 1
+    steps = _steps(b)
     for r, rotor in enumerate(rotors.names):
         here = b.rows_of(r)
         at = b.plane_of_row[here]
@@ -54,8 +56,9 @@ def sheet(b: Balancing) -> Page:
             request.gravity if rotors.weights else None,
             bearings,
             request.remove,
+            b.given_mass[here],
         )
-        text = f"{{ mass: {written(made['mass'])}, result: {written(made['result'])} }}"
+        text = f"{{ {', '.join(f'{name}: {written(tape)}' for name, tape in made.items())} }}"
         if text not in tapes:
             tapes[text] = len(tapes)
             outputs.append({name: list(tape.names) for name, tape in made.items()})
@@ -63,6 +66,8 @@ def sheet(b: Balancing) -> Page:
             "name": rotor,
             "planes": [b.planes.name[p] for p in at],
             "tapes": tapes[text],
+            # a mass and a radius that are both given leave something
+            "given": bool(steps or (~np.isnan(b.given_mass[here]) & ~b.sought[here]).any()),
         }
         if limit is not None:
             verdicts = b.verdicts(r)
@@ -104,13 +109,29 @@ def sheet(b: Balancing) -> Page:
         "units": units(KINDS[name] for name in columns),
         "couple": b.has_couple,
         "remove": request.remove,
+        "steps": steps,
+        "sought": bool(b.sought.any()),
         "shown": {
             "mass": _shown("mass", rotors.mass_unit),
+            "radius": _shown("length", rotors.radius_unit or b.planes.radius_unit),
             "unbalance": _shown("unbalance", rotors.unbalance_unit),
             "couple": _shown("inertia", couple),
         },
     }
     return sheet_page("Balancing of known masses", "balance", script, whole)
+
+
+def _steps(b: Balancing) -> dict[str, list[float]]:
+    """To what corrections are rounded, (one in SI, the step in such units) of mass and of angle."""
+    steps, unit = dict[str, list[float]](), b.rotors.mass_unit
+    if b.request.mass_step is not None:
+        step, of_step = b.request.mass_step
+        own = step if of_step == unit else float(from_si(to_si(step, "mass", of_step), "mass", unit))
+        steps["mass"] = [float(to_si(1.0, "mass", unit)), own]
+    if b.request.angle_step is not None:
+        step, of_step = b.request.angle_step
+        steps["angle"] = [math.pi / 180, step if of_step == "deg" else math.degrees(step)]
+    return steps
 
 
 def _shown(kind: str, unit: str) -> dict[str, Any]:

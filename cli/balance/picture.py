@@ -9,6 +9,7 @@ import numpy as np
 
 from balancing import correct
 from balancing.picture import MOST, KnownMasses, known_masses
+from cli.balance import modal_way
 from cli.balance.rotors import Balancing
 from cli.show.picture import blank
 from dalembert.units import from_si
@@ -17,15 +18,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, FigureBase
 
 
-def draw(found: Balancing, *, polygons: bool = False) -> Figure:
+def draw(balancing: Balancing, *, polygons: bool = False) -> Figure:
     """Draw the first rotors below each other, their planes beside each other; with --steps the closed polygons too."""
     figure = blank()
     if polygons:
         from cli.balance.way import polygons_below
 
-        polygons_below(found, figure, lambda part: _dials(found, part))
+        polygons_below(balancing, figure, lambda part: _dials(balancing, part))
     else:
-        _dials(found, figure)
+        _dials(balancing, figure)
     return figure
 
 
@@ -44,7 +45,10 @@ def _rotors(balancing: Balancing) -> Iterator[KnownMasses]:
         at = rotors.z[mine, None] if rotors.z is not None else np.zeros((len(mine), 1))
         plane_z = planes.z[here] if planes.z is not None else np.zeros(len(here))
         # each mass alone, carried to the planes as they will balance it
-        shares = -correct(rotors.moment[mine, None], at, plane_z).unbalance
+        if balancing.modal:
+            shares = modal_way.shares(balancing, r)
+        else:
+            shares = -correct(rotors.moment[mine, None], at, plane_z).unbalance
         yield KnownMasses(
             name if len(rotors.names) > 1 else "",
             [mass_names[i] for i in mine],

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from balancing import CoincidentPlanes, Correction, UnreachedMode, by_size, correct, modal_corrections
 from cli.read.planes import Planes
-from cli.read.rounding import EPS, vector_error
 from cli.read.tolerance import Tolerance, Verdict
 from dalembert.angles import degrees, phasor
 from dalembert.errors import DataError, quote
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
 
     from balancing import ModalCorrection
     from cli.balance.modes import Modes
+    from dalembert.arithmetic.doubled_vectors import Vectors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -43,10 +43,23 @@ class Rotors:
     radius_unit: str | None
     weights: bool
 
+    def exact(self, gravity: float) -> Vectors:
+        """The unbalances of the decimals of the file, in 32 digits."""
+        from cli.read.exact import vectors, written
+
+        read = self.table.numbers
+        amount = next(read[name] for name in ("mass", "weight", "unbalance") if name in read)
+        sizes = amount.exact
+        if "radius" in read and amount is not read.get("unbalance"):
+            sizes = [size * radius for size, radius in zip(sizes, read["radius"].exact, strict=True)]
+        if self.weights:
+            sizes = [size / written(gravity) for size in sizes]
+        return vectors(sizes, read["angle"])
+
 
 def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
     """Read masses or weights with their radii, or unbalances, with angles and, if needed, axial positions."""
-    known = {
+    dimensions = {
         "mass": "mass",
         "weight": "force",
         "unbalance": "unbalance",
@@ -54,7 +67,7 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
         "angle": "angle",
         "z": "length",
     }
-    table = read(path, numbers=known, texts=["rotor", "name"])
+    table = read(path, numbers=dimensions, texts=["rotor", "name"])
     amounts = [name for name in ("mass", "weight", "unbalance") if name in table.numbers]
     if len(amounts) > 1:
         both = " and ".join(table.numbers[name].header for name in amounts)
@@ -227,8 +240,8 @@ class Balancing:
             step, step_unit = request.angle_step
             step = step if step_unit == "deg" else float(np.degrees(step))
             angle = _to_step(angle, step) % 360.0
-        given = phasor(to_si(mass, "mass", unit) * radius, angle, "deg")
-        return mass, angle, -given if request.remove else given
+        rounded = phasor(to_si(mass, "mass", unit) * radius, angle, "deg")
+        return mass, angle, -rounded if request.remove else rounded
 
     @cached_property
     def given_mass(self) -> Real:
@@ -306,36 +319,32 @@ class Balancing:
         return list(map(Verdict, names, shares.tolist(), before.tolist(), after.tolist()))
 
     @cached_property
-    def bound(self) -> Real:
-        """Bounds of the rounding errors of the ideal corrections: of the solution, and of the masses' own vectors.
+    def exact(self) -> Vectors | None:
+        """The ideal corrections in 32 digits, of the decimals as they are written, one for each row.
 
-        NaN with modes: the shapes are read and interpolated, and none is known.
+        None with modes: the shapes are read and interpolated.
         """
-        if self.modal:
-            return np.full(len(self.rotor_of_row), np.nan)
-        rotors, row = self.rotors, self.rotor_of_row
-        angle = rotors.table.numbers["angle"]
-        wrong = np.bincount(rotors.rotor, vector_error(np.abs(rotors.moment), angle.values, angle.unit))
-        rounding = np.empty(len(row))
-        for _, rows, fix in self.solved:
-            rounding[rows] = fix.error_estimate()
-        return np.asarray(rounding + (wrong * self.growth)[row] + self._of_places()[row])
+        from fractions import Fraction
 
-    def _of_places(self) -> Real:
-        """Bounds of what the rounding of axial positions as written does to the corrections, for each rotor."""
-        rotors, n = self.rotors, len(self.rotors.names)
-        if rotors.z is None or self.planes.z is None:
-            return np.zeros(n)
-        z = self.planes.z[self.plane_of_row]
-        apart = np.maximum.reduceat(z, self.start) - np.minimum.reduceat(z, self.start)
-        # masses at one place are misplaced together
-        place = np.lexsort((rotors.z, rotors.rotor))
-        new = (np.diff(rotors.rotor[place]) != 0) | (np.diff(rotors.z[place]) != 0)
-        first = np.concatenate([[0], np.flatnonzero(new) + 1])
-        there = np.abs(np.add.reduceat(rotors.moment[place], first)) * np.abs(rotors.z[place[first]])
-        turned = np.bincount(rotors.rotor[place[first]], there, minlength=n)
-        turned += np.add.reduceat(np.abs(self.ideal) * np.abs(z), self.start)
-        return np.asarray(np.divide(2 * EPS * turned, apart, out=np.zeros(n), where=apart > 0))
+        from balancing.second_run import ExactMasses
+        from cli.read.exact import writtens
+        from dalembert.arithmetic.doubled import Doubled
+        from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array, part
+
+        if self.modal:
+            return None
+        rotors, none = self.rotors, Doubled(np.zeros(1))
+        # behind the masses nothing, which index -1 means
+        moment = Vectors.joined([rotors.exact(self.request.gravity), Vectors(none, none)])
+        column = rotors.table.numbers.get("z")
+        places = [Fraction(0)] * len(rotors.moment) if column is None or rotors.z is None else column.exact
+        z = doubled_array([*places, Fraction(0)], (len(places) + 1,))
+        planes = writtens(np.zeros(len(self.planes.name)) if self.planes.z is None else self.planes.z)
+        result = Vectors.of(np.zeros(len(self.rotor_of_row)))
+        for _, masses, rows in self._groups():
+            there = part(planes, self.plane_of_row[rows])
+            result[rows] = ExactMasses(moment[masses], part(z, masses), there).corrections
+        return result
 
 
 def _to_step(value: Real, step: float) -> Real:

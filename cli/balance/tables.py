@@ -1,4 +1,4 @@
-"""What is computed of rotors: corrections, their states before and after, the tolerance."""
+"""Results of rotors: corrections, their states before and after, the tolerance."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 
 from balancing import GRADES
 from cli.balance.rotors import Balancing
-from cli.read.rounding import angle_error, size_error
 from cli.read.tolerance import verdict_table
 from dalembert.angles import degrees
 from dalembert.results.columns import Column, Table, names, number, read_number, vector
@@ -19,6 +18,9 @@ from dalembert.units import from_si
 
 if TYPE_CHECKING:
     from cli.balance.rotors import Complex, Real
+    from dalembert.arithmetic.doubled import Doubled
+    from dalembert.arithmetic.doubled_vectors import Vectors
+
 
 NEAR = 20.0  # from this growth of errors on the planes are named as near each other
 
@@ -36,15 +38,15 @@ METHOD = (
 
 def tables(b: Balancing) -> dict[str, Callable[[], Table]]:
     """The tables of a result, the CSV's first."""
-    found: dict[str, Callable[[], Table]] = {
+    made: dict[str, Callable[[], Table]] = {
         "corrections": cache(lambda: corrections(b)),
         "rotors": lambda: states(b),
     }
     if b.request.carried is not None:
-        found["bearings"] = lambda: bearings(b)
+        made["bearings"] = lambda: bearings(b)
     if b.modal:
-        found["modes"] = lambda: modes(b)
-    return found | ({} if b.request.tolerance is None else {"tolerance": lambda: verdicts(b)})
+        made["modes"] = lambda: modes(b)
+    return made | ({} if b.request.tolerance is None else {"tolerance": lambda: verdicts(b)})
 
 
 def modes(b: Balancing) -> Table:
@@ -86,13 +88,43 @@ def corrections(b: Balancing) -> Table:
     z_unit = read["z"].unit if "z" in read else planes.z_unit
     radius, gravity = b.radius, b.request.gravity
 
-    @cache
-    def size() -> Real:
-        return size_error(b.ideal, b.bound)
+    def wrong(shown: Real, exact: Callable[[Vectors], Doubled]) -> Real:
+        """The errors of sizes as they are before they are rounded to a step; NaN where no second run is."""
+        from dalembert.arithmetic.doubled_vectors import off
 
-    weight = number("weight", "force", b.mass_kg * gravity, error=lambda: size() / radius * gravity)
+        return np.full(len(row), np.nan) if b.exact is None else off(shown, exact(b.exact))
+
+    def exactly_in(x: Doubled, dimension: str, unit: str) -> Doubled:
+        from cli.read.exact import in_unit
+
+        return in_unit(x, dimension, unit)
+
+    def mass_of(w: Vectors) -> Doubled:
+        from cli.read.exact import writtens
+
+        return w.size / writtens(radius)
+
+    def weight_of(w: Vectors) -> Doubled:
+        from cli.read.exact import writtens
+
+        return mass_of(w) * writtens(gravity)
+
+    def turn() -> Real:
+        return np.full(len(row), np.nan) if b.exact is None else b.exact.turned(b.ideal)
+
+    size, masses = np.abs(b.ideal), np.abs(b.ideal) / np.where(radius > 0, radius, np.nan)
+    unit, mass_unit = rotors.unbalance_unit, rotors.mass_unit
+    unbalance = number("unbalance", "unbalance", np.abs(b.made), unit)
+    unbalance.error = lambda: wrong(
+        from_si(size, "unbalance", unit), lambda w: exactly_in(w.size, "unbalance", unit)
+    ).tolist()
+    weight = number("weight", "force", b.mass_kg * gravity, error=lambda: wrong(masses * gravity, weight_of))
     mass = read_number("mass", "mass", b.mass, rotors.mass_unit)
-    mass.error = lambda: from_si(size() / radius, "mass", rotors.mass_unit)
+    mass.error = lambda: np.where(
+        np.isnan(b.given_mass),
+        wrong(from_si(masses, "mass", mass_unit), lambda w: exactly_in(mass_of(w), "mass", mass_unit)),
+        0.0,
+    ).tolist()
     at = np.full(len(row), np.nan) if planes.z is None else planes.z[row]
     z = number("z", "length", at, z_unit)
     columns = [
@@ -100,10 +132,10 @@ def corrections(b: Balancing) -> Table:
         names("plane", [planes.name[p] for p in row]),
         *([] if planes.z is None else [z]),
         number("radius", "length", radius, rotors.radius_unit or planes.radius_unit),
-        number("unbalance", "unbalance", np.abs(b.made), rotors.unbalance_unit, size),
+        unbalance,
         mass,
         *([weight] if rotors.weights else []),
-        number("angle", "angle", b.angle, error=lambda: angle_error(b.ideal, b.bound, b.angle)),
+        number("angle", "angle", b.angle, error=turn),
     ]
     return Table(
         columns,

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cli.balance import modal_way
+from cli.balance.equations import Scale, labels, plane_topic
 from dalembert.angles import degrees
 from dalembert.results.columns import Column, Table, names, number
 from dalembert.results.way import Topic, figures
@@ -23,55 +25,34 @@ if TYPE_CHECKING:
 COMPONENTS = ("x", "y", "zx", "zy")
 
 
-def quadrant(x: float, y: float) -> int | None:
-    """Return the quadrant of a vector, an axis with the quadrant that it begins; None of nothing.
-
-    >>> [quadrant(*v) for v in ((1, 0), (0, 1), (-1, 0), (0, -1), (-328.3, -1402.0))], quadrant(0, 0)
-    ([1, 2, 3, 4, 3], None)
-    """
-    if x == 0 and y == 0:
-        return None
-    if y >= 0:
-        return 1 if x > 0 and y >= 0 else 2 if y > 0 else 3
-    return 4 if x >= 0 else 3
-
-
 def way(b: Balancing) -> list[Topic]:
     """The topics of every rotor, one after the other."""
-    found = []
-    for group, rows, fix in b.solved:
-        for i, rotor in enumerate(group.tolist()):
-            found.append((rotor, _of_rotor(b, rotor, rows[i].tolist(), fix, i)))
-    return [topic for _, topics in sorted(found, key=lambda each: each[0]) for topic in topics]
+    every: list[tuple[int, list[Topic]]] = []
+    if b.modal:
+        for group, rows, modal in b.modal:
+            for i, rotor in enumerate(group.tolist()):
+                every.append((rotor, modal_way.of_rotor(b, rotor, rows[i].tolist(), modal, i)))
+    else:
+        for group, rows, fix in b.solved:
+            for i, rotor in enumerate(group.tolist()):
+                every.append((rotor, _of_rotor(b, rotor, rows[i].tolist(), fix, i)))
+    return [
+        _headed(b, rotor, topic)
+        for rotor, topics in sorted(every, key=lambda each: each[0])
+        for topic in topics
+    ]
 
 
-class _Scale:
-    """How the equations show an unbalance: as the document does, W·r in N·mm where the table has weights."""
-
-    def __init__(self, b: Balancing) -> None:
-        unit = b.rotors.unbalance_unit
-        self.length = b.length_unit
-        self.letter = "m"
-        if b.rotors.weights:
-            self.letter = "W"
-            length = self.length if self.length in ("mm", "m", "in") else "mm"
-            self.length, self.name = length, f"N·{length}"
-            self.factor = b.request.gravity * float(from_si(1.0, "length", length))
-        else:
-            self.name, self.factor = unit.replace("_", "·"), float(from_si(1.0, "unbalance", unit))
-        self.reach = float(from_si(1.0, "length", self.length))
-
-    def of(self, value: float) -> str:
-        return figures(value * self.factor)
-
-    def moment(self, value: float) -> str:
-        return figures(value * self.factor * self.reach)
+def _headed(b: Balancing, rotor: int, topic: Topic) -> Topic:
+    """The topic with the name of its rotor, where there are several."""
+    if len(b.rotors.names) > 1:
+        name = b.rotors.names[rotor]
+        topic.head, topic.title = {"rotor": name, **topic.head}, f"Rotor {name}: {topic.heading}"
+    return topic
 
 
 def _of_rotor(b: Balancing, rotor: int, rows: list[int], fix: Correction, i: int) -> list[Topic]:
-    head = {"rotor": b.rotors.names[rotor]} if len(b.rotors.names) > 1 else {}
-    title = f"Rotor {b.rotors.names[rotor]}: " if head else ""
-    scale = _Scale(b)
+    scale = Scale(b)
     planes = [b.planes.name[b.plane_of_row[row]] for row in rows]
     mine = np.flatnonzero(b.rotors.rotor == rotor)
     has_z = b.rotors.z is not None and b.planes.z is not None
@@ -87,16 +68,12 @@ def _of_rotor(b: Balancing, rotor: int, rows: list[int], fix: Correction, i: int
             f"  {_sum_of(scale, masses, 'x')} + x = 0,  x = {scale.of(-static.real)} {scale.name}",
             f"  {_sum_of(scale, masses, 'y')} + y = 0,  y = {scale.of(-static.imag)} {scale.name}",
         ]
-        topics.append(_plane(b, rows[0], planes[0], complex(made[0]), text, scale))
+        topics.append(plane_topic(b, rows[0], planes[0], complex(made[0]), text, scale))
     elif len(planes) == 2:
         topics += _two_planes(b, rows, planes, z_plane, made, masses, scale, fix, i)
     else:
         topics += _many_planes(b, rows, planes, z_plane, made, scale, fix, i)
-    for topic in topics:
-        topic.head = {**head, **topic.head}
-        topic.title = title + topic.heading
-    last = topics[-1]
-    last.figure = partial(_figure, b, rotor)
+    topics[-1].figure = partial(_figure, b, rotor)
     return topics
 
 
@@ -104,12 +81,7 @@ def _masses(b: Balancing, mine: Any) -> list[complex]:
     return [complex(u) for u in b.rotors.moment[mine]]
 
 
-def _names(b: Balancing, mine: Any) -> list[str]:
-    every = b.rotors.table.texts.get("name") or [str(k + 1) for k in range(b.rotors.table.rows)]
-    return [every[k] for k in mine]
-
-
-def _components(b: Balancing, mine: Any, about: float | None, plane: str, scale: _Scale) -> Topic:
+def _components(b: Balancing, mine: Any, about: float | None, plane: str, scale: Scale) -> Topic:
     rotors = b.rotors
     u = rotors.moment[mine]
     z = rotors.z[mine] if rotors.z is not None else np.full(len(mine), np.nan)
@@ -126,7 +98,7 @@ def _components(b: Balancing, mine: Any, about: float | None, plane: str, scale:
 
     shown = [c for c in COMPONENTS if about is not None or len(c) == 1]
     columns = [
-        names("name", _names(b, mine)),
+        names("name", labels(b, mine)),
         number("unbalance", "unbalance", np.abs(u), unit),
         number("angle", "angle", angle),
         *([number("z", "length", z, length)] if rotors.z is not None else []),
@@ -152,7 +124,7 @@ def _components(b: Balancing, mine: Any, about: float | None, plane: str, scale:
     return Topic("components", [*text, rows, total], "Components and sums", head={"about_z_m": about})
 
 
-def _sum_of(scale: _Scale, vectors: list[complex], axis: str, levers: list[float] | None = None) -> str:
+def _sum_of(scale: Scale, vectors: list[complex], axis: str, levers: list[float] | None = None) -> str:
     """A sum with its numbers: `(20·1 350 + 65·(−2 598.08))`; of many its first terms."""
     terms = []
     for k, v in enumerate(vectors[:6]):
@@ -162,51 +134,9 @@ def _sum_of(scale: _Scale, vectors: list[complex], axis: str, levers: list[float
     return f"({' + '.join(terms)}{' + …' if len(vectors) > 6 else ''})"
 
 
-def _plane(
-    b: Balancing, row: int, name: str, made: complex, text: list[str], scale: _Scale, heading: str = ""
-) -> Topic:
-    radius = float(b.radius[row])
-    mass = abs(made) / radius if radius else 0.0
-    x, y = (value + 0.0 for value in (made.real, made.imag))
-    q = quadrant(x, y)
-    angle = float(degrees(np.array([made]))[0])
-    amount = (
-        f"W = {figures(mass * b.request.gravity)} N"
-        if b.rotors.weights
-        else f"m = {figures(float(from_si(mass, 'mass', b.rotors.mass_unit)))} {b.rotors.mass_unit}"
-    )
-    length = b.length_unit
-    lines = [
-        *text,
-        f"  √(x² + y²) = {scale.of(abs(made))} {scale.name}; at r = {figures(float(from_si(radius, 'length', length)))} {length}: {amount}",
-    ]
-    if q is not None:
-        signs = (
-            f"x {'<' if x < 0 else '>' if x > 0 else '='} 0, y {'<' if y < 0 else '>' if y > 0 else '='} 0"
-        )
-        lines.append(f"  tan θ = y/x; {signs}: quadrant {q}, θ = {figures(angle)}°")
-    if b.request.remove:
-        lines.append(f"  to remove instead: on the other side, at {figures((angle + 180.0) % 360.0)}°")
-    unit = b.rotors.unbalance_unit
-    table = Table(
-        [],
-        (),
-        "",
-        documented=[
-            number("x", "unbalance", [x], unit),
-            number("y", "unbalance", [y], unit),
-            names("quadrant", [q]),
-            number("unbalance", "unbalance", [abs(made)], unit),
-            number("mass", "mass", [mass], b.rotors.mass_unit),
-            number("angle", "angle", [angle]),
-        ],
-    )
-    return Topic(f"plane {name}", [*lines, table], heading)
-
-
 def _two_planes(
     b: Balancing, rows: list[int], planes: list[str], z: list[float], made: Any, masses: list[complex],
-    scale: _Scale, fix: Correction, i: int,
+    scale: Scale, fix: Correction, i: int,
 ) -> list[Topic]:  # fmt: skip
     first, second = planes
     mine = np.flatnonzero(b.rotors.rotor == b.rotor_of_row[rows[0]])
@@ -226,23 +156,23 @@ def _two_planes(
         text.append(
             f"  {mark} = −{_sum_of(scale, masses, axis, levers)}/{apart} = −({scale.moment(total)})/{apart} = {scale.of(value)} {scale.name}"
         )
-    found = [_plane(b, rows[1], second, c, text, scale, f"Plane {second}: moments about plane {first}")]
+    topics = [plane_topic(b, rows[1], second, c, text, scale, f"Plane {second}: moments about plane {first}")]
     d = complex(made[0])
     text = [f"ΣF = 0: Σ {w}·r + {w}_{second}·r_{second} + {w}_{first}·r_{first} = 0 (Riul, eqs. 12, 20, 21):"]
     for axis, mark, other, value in (("x", "d1", c.real, d.real), ("y", "d2", c.imag, d.imag)):
         text.append(
             f"  {mark} = −({scale.of(other)} + {_sum_of(scale, masses, axis)}) = {scale.of(value)} {scale.name}"
         )
-    return [*found, _plane(b, rows[0], first, d, text, scale, f"Plane {first}: forces")]
+    return [*topics, plane_topic(b, rows[0], first, d, text, scale, f"Plane {first}: forces")]
 
 
 def _many_planes(
-    b: Balancing, rows: list[int], planes: list[str], z: list[float], made: Any, scale: _Scale, fix: Correction, i: int
+    b: Balancing, rows: list[int], planes: list[str], z: list[float], made: Any, scale: Scale, fix: Correction, i: int
 ) -> list[Topic]:  # fmt: skip
     """Of three planes and more the corrections of least norm."""
     square = sum((p - q) ** 2 for k, p in enumerate(z) for q in z[k + 1 :])
     moments = [complex(np.ravel(fix.couple(fix.planes[..., k]))[i]) for k in range(len(z))]
-    found = []
+    topics = []
     for k, (name, value) in enumerate(zip(planes, made, strict=True)):
         text = [
             "Least norm: W_p = −Σ_q (z_p − z_q)·M_q / Σ_(q<r) (z_q − z_r)², M_q the moment about plane q:"
@@ -256,8 +186,8 @@ def _many_planes(
             text.append(
                 f"  {mark} = −({terms})/{figures(square * scale.reach**2)} = {scale.of(getattr(complex(value), part))} {scale.name}"
             )
-        found.append(_plane(b, rows[k], name, complex(value), text, scale))
-    return found
+        topics.append(plane_topic(b, rows[k], name, complex(value), text, scale))
+    return topics
 
 
 def _figure(b: Balancing, rotor: int) -> Figure:
@@ -288,14 +218,17 @@ def polygons(b: Balancing, rotor: int, figure: FigureBase) -> None:
     """Draw the closed polygon of forces, and with several planes that of moments about the first."""
     from balancing.polygons import Polygon, closed
 
+    title = f"rotor {b.rotors.names[rotor]}: " if len(b.rotors.names) > 1 else ""
+    if b.modal:
+        closed(modal_way.polygons(b, rotor), title, figure)
+        return
     mine, rows = np.flatnonzero(b.rotors.rotor == rotor), b.rows_of(rotor)
     here = b.plane_of_row[rows]
     unit = b.rotors.unbalance_unit
-    labels = _names(b, mine)
     planes = [b.planes.name[p] for p in here]
-    given, made = b.rotors.moment[mine], b.ideal[rows]
+    moments, made = b.rotors.moment[mine], b.ideal[rows]
     every = [
-        Polygon("forces", labels, from_si(given, "unbalance", unit), planes, from_si(made, "unbalance", unit), unit)
+        Polygon("forces", labels(b, mine), from_si(moments, "unbalance", unit), planes, from_si(made, "unbalance", unit), unit)
     ]  # fmt: skip
     if b.rotors.z is not None and b.planes.z is not None and len(planes) > 1:
         z = b.planes.z[here]
@@ -306,12 +239,11 @@ def polygons(b: Balancing, rotor: int, figure: FigureBase) -> None:
         every.append(
             Polygon(
                 f"moments about plane {planes[0]}",
-                labels,
-                given * (b.rotors.z[mine] - about) * factor,
+                labels(b, mine),
+                moments * (b.rotors.z[mine] - about) * factor,
                 planes[1:],
                 (made * (z - about))[1:] * factor,
                 moment,
             )
         )
-    title = f"rotor {b.rotors.names[rotor]}: " if len(b.rotors.names) > 1 else ""
     closed(every, title, figure)

@@ -215,12 +215,12 @@ def table(every: Sequence[Check]) -> Table:
     return Table(columns, keys=("link",), place="bodies[]", documented=[nearest])
 
 
-def warnings(robot: Robot, found: Sequence[Check]) -> list[str]:
+def warnings(robot: Robot, checks: Sequence[Check]) -> list[str]:
     """Name what is broken, and what looks wrong though a body can have it."""
-    if not found:
+    if not checks:
         raise DataError(f"{robot.file}: no link has an inertia: nothing to check")
     lines = []
-    for c in found:
+    for c in checks:
         hint = f"; likely: {c.likely}" if c.likely else ""
         if not c.valid:
             I1, I2, I3 = c.moments

@@ -7,12 +7,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cli.read.parts import READ, Parts
 from cli.read.planes import Planes
 from dalembert.angles import degrees
-from rigidbody3d import Motion, Shaft
+from rigidbody3d import Body, Motion, Shaft
+from rigidbody3d.shaft import shaft_axes
 
 if TYPE_CHECKING:
     from balancing import Correction
@@ -20,13 +21,16 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
+AXES = "xyz"
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class ShaftRequest:
-    """A shaft turning about z."""
+    """A shaft turning about an axis through the origin."""
 
+    axis: Vector | None
+    """Its direction; None: z."""
     bearings: tuple[float, float]
     speed: float
     speed_rate: float
@@ -72,7 +76,11 @@ class MovingBody:
         w, body = self.request, self.parts.whole
         omega, alpha, point = w.omega or ORIGIN, w.alpha or ORIGIN, w.fixed
         if w.shaft is not None:
-            omega, alpha, point = (0.0, 0.0, w.shaft.speed), (0.0, 0.0, w.shaft.speed_rate), ORIGIN
+            x, y, z = self.shaft_axes[2].tolist()
+            omega, alpha = (
+                tuple(n * rate for n in (x, y, z)) for rate in (w.shaft.speed, w.shaft.speed_rate)
+            )
+            point = ORIGIN
         if point is None:
             velocity, acceleration = w.velocity or ORIGIN, w.acceleration or ORIGIN
             return Motion(
@@ -102,11 +110,50 @@ class MovingBody:
         )
 
     @cached_property
-    def shaft(self) -> Shaft:
-        """The shaft on its bearings."""
+    def shaft_axes(self) -> Array:
+        """Two axes across the shaft and its own, as rows; those drawn for a shaft along z."""
         s = self.request.shaft
         assert s is not None
-        return Shaft(self.parts.whole, s.bearings, s.speed, s.speed_rate, s.gravity)
+        return np.eye(3) if s.axis is None else shaft_axes(s.axis)
+
+    @property
+    def letters(self) -> str:
+        """The names of those three axes."""
+        for letters in ("xyz", "yzx", "zxy"):
+            if (self.shaft_axes == np.eye(3)[["xyz".index(a) for a in letters]]).all():
+                return letters
+        return "ξηζ"
+
+    def upright(self, body: Body) -> Body:
+        """Return a body, or parts, along the axes of the shaft."""
+        if self.letters == "xyz":
+            return body
+        return body.turned(self.shaft_axes, ORIGIN, self._axes_error)
+
+    @cached_property
+    def _axes_error(self) -> Array:
+        """What the entries of the shaft's axes may be off by: those along coordinate axes are exact."""
+        rough = 4 * READ * np.ones((3, 3))
+        return np.where(np.isin(self.shaft_axes, (-1.0, 0.0, 1.0)).all(), 0.0, rough)
+
+    @cached_property
+    def shaft(self) -> Shaft:
+        """The shaft on its bearings, along its own axes."""
+        s = self.request.shaft
+        assert s is not None
+        gravity = self.shaft_axes @ s.gravity + 0.0
+        return Shaft(self.upright(self.parts.whole), s.bearings, s.speed, s.speed_rate, gravity)
+
+    def drawn(self, across: ArrayLike, along: float = 0.0) -> Array:
+        """Return a vector of the shaft, its part across and that along, along the axes drawn, (3,)."""
+        return np.asarray(np.append(across, along) @ self.shaft_axes + 0.0)
+
+    def drawn_error(
+        self, across: ArrayLike, error: ArrayLike, along: float = 0.0, rest: float = 0.0
+    ) -> Array:
+        """Bound the errors of such a vector, from those of its part across and of that along."""
+        turned = np.append(error, rest) @ np.abs(self.shaft_axes)
+        return np.asarray(turned + np.abs(np.append(across, along)) @ self._axes_error)
 
     @cached_property
     def correction(self) -> Correction | None:
@@ -160,11 +207,11 @@ class MovingBody:
         assert fix is not None
         z = np.asarray(self.planes.z)
         # the planes' places are read too: as good as unbalances that are off by as much of the moment
-        given = shaft.error_estimate("unbalance", READ) + READ * np.abs(shaft.unbalance)
+        bound = shaft.error_estimate("unbalance", READ) + READ * np.abs(shaft.unbalance)
         share = correct(np.eye(2, dtype=complex), shaft.bearings, z).unbalance
         misplaced = READ * (np.abs(z).max() + np.abs(shaft.bearings).max()) / (np.ptp(z) or 1.0)
         several = len(z) > 1
-        own = fix.error_estimate() + given @ np.abs(share)
+        own = fix.error_estimate() + bound @ np.abs(share)
         return np.asarray(own + misplaced * np.abs(fix.unbalance).sum() * several)
 
     @cached_property

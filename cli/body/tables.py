@@ -2,30 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cli.body.moving import Array, MovingBody
-from cli.read.parts import READ
+from cli.body.moving import AXES, Array, MovingBody
+from cli.read.parts import READ, SEVERAL
 from cli.show.picture import blank
 from dalembert.angles import degrees
-from dalembert.results.columns import Column, Table, document_unit, names, number
+from dalembert.results.columns import Column, Table, document_unit, names, number, stacked
 from dalembert.units import G0
 from rigidbody3d.inertia import Principal
 from rigidbody3d.picture import views
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, FigureBase
 
 METHOD = (
     "Tensors of the parts moved by Steiner's theorem, turned and added; principal moments by the eigenvalues; angular momentum "
     "H = I·ω and its true rate in any axes; d'Alembert's inertia wrench (J. A. Riul, Dinâmica das Máquinas, unit II, eqs. "
     "22–47; F. P. Beer, E. R. Johnston, Vector Mechanics for Engineers: Dynamics, ch. 18)."
 )
+
+
+Bodies: TypeAlias = Sequence[MovingBody]
+DRAWN = 4
+"""So many of several bodies are drawn."""
 
 
 class Entry(NamedTuple):
@@ -104,21 +109,26 @@ def _of_shaft(b: MovingBody) -> Iterator[Entry]:
     """Forces of the bearings across the axis; the first takes the axial force."""
     shaft = b.shaft
 
-    def error(of: str, i: int) -> list[float]:
-        axial = float(shaft.error_estimate("axial", READ)) if of == "static" and i == 0 else 0.0
-        return [*shaft.error_estimate(of, READ)[i], axial]
+    def static_error(i: int) -> Array:
+        along, rest = (
+            (float(shaft.axial), float(shaft.error_estimate("axial", READ))) if i == 0 else (0.0, 0.0)
+        )
+        return b.drawn_error(shaft.static[i], shaft.error_estimate("static", READ)[i], along, rest)
 
-    def corrected_error(i: int) -> list[float]:
-        return [*b.corrected_error[[i, i]], 0.0]
+    def dynamic_error(i: int) -> Array:
+        return b.drawn_error(shaft.dynamic[i], shaft.error_estimate("dynamic", READ)[i])
+
+    def corrected_error(i: int) -> Array:
+        return b.drawn_error(b.corrected[i], b.corrected_error[[i, i]])
 
     for i in range(2):
         name = f"bearing{i + 1}"
-        static = [*shaft.static[i], float(shaft.axial) if i == 0 else 0.0]
-        yield Entry(f"{name}_static", "force", static, partial(error, "static", i), None)
-        dynamic = [*shaft.dynamic[i], 0.0]
-        yield Entry(f"{name}_dynamic", "force", dynamic, partial(error, "dynamic", i), None)
+        static = b.drawn(shaft.static[i], float(shaft.axial) if i == 0 else 0.0)
+        yield Entry(f"{name}_static", "force", static, partial(static_error, i), None)
+        dynamic = b.drawn(shaft.dynamic[i])
+        yield Entry(f"{name}_dynamic", "force", dynamic, partial(dynamic_error, i), None)
         if b.correction is not None:
-            corrected = [*b.corrected[i], 0.0]
+            corrected = b.drawn(b.corrected[i])
             yield Entry(f"{name}_corrected", "force", corrected, partial(corrected_error, i), None)
     torque_error = partial(shaft.error_estimate, "drive_torque", READ)
     yield Entry("drive_torque", "torque", shaft.drive_torque, torque_error, "shaft.drive_torque")
@@ -133,12 +143,19 @@ def _entries(b: MovingBody) -> list[Entry]:
     ]
 
 
-def tables(b: MovingBody) -> dict[str, Callable[[], Table]]:
+def tables(bodies: Bodies) -> dict[str, Callable[[], Table]]:
     """The tables of a result, the CSV's first."""
-    made = {"body": lambda: axes(b), "document": lambda: of_document(b)}
-    if b.request.shaft is not None:
-        made |= {"bearings": lambda: bearings(b), "corrections": lambda: corrections(b)}
-    return made
+    made = {"body": axes, "document": of_document}
+    if bodies[0].request.shaft is not None:
+        made |= {"bearings": bearings, "corrections": corrections}
+    return {name: partial(every, bodies, table) for name, table in made.items()}
+
+
+def every(bodies: Bodies, table: Callable[[MovingBody], Table]) -> Table:
+    """Return the table of one body, or those of several below each other."""
+    if not bodies[0].parts.several:
+        return table(bodies[0])
+    return stacked([table(b) for b in bodies], SEVERAL, [b.parts.body for b in bodies], "bodies[]")
 
 
 def axes(b: MovingBody) -> Table:
@@ -190,6 +207,27 @@ def quantities(b: MovingBody) -> Table:
     return Table(columns, above=conventions(b))
 
 
+def numbers_of(b: MovingBody) -> dict[str, tuple[float, str]]:
+    """Every number by its name, such as momentum.x, momentum.size, A.mass, and its unit."""
+    numbers = {}
+    for entry in _entries(b):
+        if entry.name.startswith("principal_axis"):
+            continue
+        unit = document_unit(entry.dimension)
+        values = _numbers(entry.value)
+        letters = "123" if entry.name == "principal" else AXES
+        if len(values) == 1:
+            numbers[entry.name] = values[0], unit
+            continue
+        for letter, value in zip(letters, values, strict=True):
+            numbers[f"{entry.name}.{letter}"] = value, unit
+        if letters == AXES and not entry.name.startswith("inertia_"):
+            numbers[f"{entry.name}.size"] = float(np.linalg.norm(values)), unit
+    for c in b.corrections:
+        numbers |= {f"{c.plane}.mass": (c.mass, "kg"), f"{c.plane}.angle": (c.angle, "deg")}
+    return numbers
+
+
 def of_document(b: MovingBody) -> Table:
     """The document without the lists of the shaft: every quantity, of a motion that is none too."""
     entries = [*_of_body(b), *_of_motion(b)]
@@ -204,6 +242,8 @@ def of_document(b: MovingBody) -> Table:
             _one("static", "unbalance", float(np.abs(shaft.static_unbalance)), "shaft.static_unbalance"),
             _one("static_angle", "angle", float(degrees(shaft.static_unbalance)), "shaft.static_angle"),
         ]
+        if b.letters != "xyz":
+            columns.append(_one("axes", "number", b.shaft_axes, "shaft.axes"))
     return Table([], place="", documented=columns)
 
 
@@ -211,12 +251,16 @@ def _one(name: str, dimension: str, value: ArrayLike, place: str = "") -> Column
     """A quantity of the document alone."""
     unit = document_unit(dimension)
     return Column(
-        name, unit, [None], place=f"{place or name}_{unit}", stored=[np.asarray(value, float).tolist()]
+        name,
+        unit,
+        [None],
+        place=f"{place or name}_{unit}".rstrip("_"),
+        stored=[np.asarray(value, float).tolist()],
     )
 
 
 def bearings(b: MovingBody) -> Table:
-    """The bearings' forces across the axis, of the document alone."""
+    """The bearings' forces, of the document alone: across a shaft along z, along the axes drawn for another."""
     shaft, request = b.shaft, b.request.shaft
     assert request is not None
     forces = {"static": shaft.static, "dynamic": shaft.dynamic}
@@ -224,7 +268,8 @@ def bearings(b: MovingBody) -> Table:
         forces["corrected_dynamic"] = b.corrected
     columns = [number("z", "length", request.bearings)]
     for name, of in forces.items():
-        values = (np.asarray(of) + 0.0).tolist()
+        shown = of if b.letters == "xyz" else np.array([b.drawn(force) for force in of])
+        values = (np.asarray(shown) + 0.0).tolist()
         columns.append(Column(name, "N", values, place=f"{name}_N", stored=values))
     return Table([], place="shaft.bearings[]", documented=columns)
 
@@ -244,7 +289,16 @@ def corrections(b: MovingBody) -> Table:
     return Table([], place="shaft.corrections[]", documented=columns)
 
 
-def warnings(b: MovingBody) -> list[str]:
+def warnings(bodies: Bodies) -> list[str]:
+    """What a reader of the tables has to know."""
+    lines = []
+    for b in bodies:
+        of = f"body {b.parts.body}: " if b.parts.several else ""
+        lines += [*b.parts.warnings, *(f"{of}{line}" for line in _warnings(b))]
+    return lines
+
+
+def _warnings(b: MovingBody) -> list[str]:
     """Warn where eq. 44 with a constant tensor would go wrong, and of a couple that stays."""
     lines = []
     motion = b.motion
@@ -273,23 +327,52 @@ def conventions(b: MovingBody) -> str:
         lines.append(f"momentum at the centre of mass, and about {about} m; rates are true ones")
     if b.request.shaft is not None:
         lines.append("bearing forces act on the shaft; dynamic ones leave the static part out")
+        if b.letters != "xyz":
+            lines.append(f"places and angles on the shaft: {axis_words(b)}")
     return "\n".join(lines)
 
 
-def draw(b: MovingBody) -> Figure:
-    """Draw the body in two views; below them, for a shaft, the forces of the bearings."""
-    figure, parts, motion = blank(), b.parts, b.motion
-    solids, whole = parts.each.solids(), parts.whole.whole()
+def axis_words(b: MovingBody) -> str:
+    """Say where places along a shaft and angles about it begin."""
+    letters = b.letters
+    if letters != "ξηζ":
+        return f"along {letters[2]} from the origin; angles from {letters[0]} towards {letters[1]}"
+    first, second, along = (
+        f"({', '.join(f'{x:.6g}' for x in axis)})" for axis in (b.shaft_axes + 0.0).tolist()
+    )
+    return f"along ζ = {along} from the origin; angles from ξ = {first} towards η = {second}"
+
+
+def draw(bodies: Bodies) -> Figure:
+    """Draw the body, or the first ones of several below each other."""
+    figure = blank()
+    if not bodies[0].parts.several:
+        _draw(bodies[0], figure)
+        return figure
+    shown = bodies[:DRAWN]
+    height = 5.6 if bodies[0].request.shaft is None else 7.4
+    figure.set_size_inches(11.5, height * len(shown))
+    figure.set_layout_engine("constrained")
+    for b, part in zip(shown, figure.subfigures(len(shown), 1, squeeze=False)[:, 0], strict=True):
+        part.suptitle(f"body {b.parts.body}", fontsize=11)
+        _draw(b, part)
+    return figure
+
+
+def _draw(b: MovingBody, figure: FigureBase) -> None:
+    """Draw a body in two views; below them, for a shaft, the forces of the bearings."""
+    parts, motion = b.parts, b.motion
     vectors = {"angular velocity": motion.omega, "angular momentum": motion.momentum, "its rate": motion.rate}
     if b.request.shaft is None:
-        views.body(solids, parts.name, whole, vectors, figure)
-        return figure
+        views.body(parts.each.solids(), parts.name, parts.whole.whole(), vectors, figure)
+        return
+    solids, whole = b.upright(parts.each).solids(), b.shaft.body.whole()
+    vectors = {name: b.shaft_axes @ vector for name, vector in vectors.items()}
     forces = {"static": b.shaft.static} if any(b.request.shaft.gravity) else {}
     forces["dynamic"] = b.shaft.dynamic
     if b.correction is not None:
         forces["dynamic, after correction"] = b.corrected
-    views.shaft(solids, parts.name, whole, b.shaft.bearings, forces, vectors, figure)
-    return figure
+    views.shaft(solids, parts.name, whole, b.shaft.bearings, forces, vectors, figure, b.letters)
 
 
 def _numbers(value: ArrayLike) -> list[float]:

@@ -2,21 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cli.body.moving import AXES, MovingBody
+from cli.body.tables import axis_words
+from cli.read.parts import SEVERAL
 from dalembert.results.columns import Column, Table, names, number, vector
 from dalembert.results.way import Topic, figures
 from rigidbody3d.inertia import free_axes, own_axes
 
 if TYPE_CHECKING:
-    from cli.body.moving import Array, MovingBody
-
-AXES = "xyz"
+    from cli.body.moving import Array
 
 
-def way(b: MovingBody) -> list[Topic]:
+def way(bodies: Sequence[MovingBody]) -> list[Topic]:
+    """The topics of every body, one after the other."""
+    if not bodies[0].parts.several:
+        return _of_body(bodies[0])
+    return [
+        replace(
+            topic,
+            title=f"Body {b.parts.body}: {topic.title[:1].lower()}{topic.title[1:]}",
+            head={SEVERAL: b.parts.body, **topic.head},
+        )
+        for b in bodies
+        for topic in _of_body(b)
+    ]
+
+
+def _of_body(b: MovingBody) -> list[Topic]:
     """The topics of a body, of its motion where it has one, and of the shaft that it may be."""
     result = [_inertia(b)]
     if b.moving:
@@ -180,9 +198,12 @@ def _bearings(b: MovingBody) -> Topic:
     z1, z2 = request.bearings
     w, rate = request.speed, request.speed_rate
     v1, v2 = complex(shaft.moment_unbalance(z1)), complex(shaft.moment_unbalance(z2))
-    text = [
-        "U = ∫(x + iy) dm; about each bearing V = ∫(x + iy)·(z − z_bearing) dm = I_xz + i·I_yz; a moment about the one over the "
-        "span is the force at the other: R2 = (−ω² + i·ω̇)·V1/(z2 − z1), R1 = (−ω² + i·ω̇)·V2/(z1 − z2) (Riul, example 4).",
+    x, y, z = list(b.letters)
+    text = [] if b.letters == "xyz" else [f"Places and angles on the shaft: {axis_words(b)}."]
+    text += [
+        f"U = ∫({x} + i{y}) dm; about each bearing V = ∫({x} + i{y})·({z} − {z}_bearing) dm = I_{x}{z} + i·I_{y}{z}; a moment about "
+        "the one over the span is the force at the other: "
+        f"R2 = (−ω² + i·ω̇)·V1/({z}2 − {z}1), R1 = (−ω² + i·ω̇)·V2/({z}1 − {z}2) (Riul, example 4).",
         f"  V1 = {_complex(v1)}, V2 = {_complex(v2)} kg·m²; −ω² + i·ω̇ = {_complex(complex(-w * w, rate))} 1/s²",
     ]
     for k, (v, span) in enumerate(((v2, z1 - z2), (v1, z2 - z1))):
@@ -195,9 +216,9 @@ def _bearings(b: MovingBody) -> Topic:
         text += [f"  static: R{k + 1} = {_complex(complex(*shaft.static[k]))} N" for k in (0, 1)]
     rows = [number("z", "length", np.array([z1, z2]))]
     about = np.array([v1, v2])
-    rows += vector("moment_unbalance", "inertia", np.stack([about.real, about.imag], axis=-1), "xy")
-    rows += vector("static", "force", shaft.static, "xy")
-    rows += vector("dynamic", "force", shaft.dynamic, "xy")
+    rows += vector("moment_unbalance", "inertia", np.stack([about.real, about.imag], axis=-1), x + y)
+    rows += vector("static", "force", shaft.static, x + y)
+    rows += vector("dynamic", "force", shaft.dynamic, x + y)
     return Topic("bearings", [*text, Table(rows, (), "bearings[]")], "Forces of the bearings on the shaft")
 
 

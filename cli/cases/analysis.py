@@ -16,6 +16,7 @@ from cli.read import options
 from dalembert.errors import DataError
 from dalembert.hints import nearest
 from dalembert.memory import memory
+from dalembert.results.way import figures
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -206,7 +207,7 @@ class Analysis:
             return
         if quantities.unknown(forces, [word]) is None:
             raise DataError(f"{self.file}: --only {word}: this is a force: dalembert forces shows it")
-        known = {name for each in here for name in (*each.names, *each.owners)}
+        names = {name for each in here for name in (*each.names, *each.owners)}
         owner = word.rpartition(".")[0]
         of_owner = [
             name.rpartition(".")[2] for each in here if owner in each.owners for name in each.names[:1]
@@ -215,10 +216,20 @@ class Analysis:
             choices = ", ".join(dict.fromkeys(of_owner))
             raise DataError(f"{self.file}: --only: '{word}': expected {owner}. with one of {choices}")
         raise DataError(
-            f"{self.file}: --only: no link or point is named '{owner or word}'{nearest(word, known)}"
+            f"{self.file}: --only: no link or point is named '{owner or word}'{nearest(word, names)}"
         )
 
     # --- inputs ---------------------------------------------------------------------------------------------------
+    def pose_text(self, i: int) -> str:
+        """Return the inputs of a pose as a sentence has them: 60°, 0.35 m; several with their names."""
+        values = [
+            f"{figures(float(value))}{'°' if key.endswith('_deg') else ' m'}"
+            for value, key in zip(self.inputs.shown[i], self.input_names.values(), strict=True)
+        ]
+        if len(values) == 1:
+            return values[0]
+        return ", ".join(f"{name} {text}" for name, text in zip(self.input_names, values, strict=True))
+
     @cached_property
     def input_names(self) -> dict[str, str]:
         """Each input and the name of its value: `input_deg`, or `input_m` of a slide."""

@@ -16,7 +16,8 @@ from cli.cases.loop import Loop
 from cli.cases.values import Driven, Varied, assigned, with_numbers
 from cli.read.about import about
 from cli.read.options import bad
-from cli.show.result import Result
+from cli.read.seeking import pair
+from cli.show.result import Result, with_found
 from dalembert.errors import DataError
 from dalembert.results.text import csv_text
 from dalembert.tables.files import note, read_bytes, remember, split_sheet
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
     from cli.cases.case import Case
     from cli.cases.options import Options
-    from cli.cases.sought import Found
+    from cli.read.seeking import Found
     from cli.show.commands import ShowOptions
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
@@ -41,7 +42,7 @@ class Described(NamedTuple):
     bare: dict[str, str]
     """The units of bare lengths and angles, as far as `[units]` names them."""
     warnings: list[str]
-    """Remarks about the tables beside the file."""
+    """Remarks about the tables that the file names."""
     about: dict[str, str]
     """What the file has for the head of a report."""
 
@@ -94,9 +95,11 @@ _KNOWN = {
     "fx": "force",
     "fy": "force",
     "torque": "torque",
+    "lift": "length",
+    "swing": "angle",
 }
 # what the library reads as it stands; anything else is put into the first of them
-_PLAIN = {"angle": ("rad", "deg"), "position": ("m", "mm")}
+_PLAIN = {"angle": ("rad", "deg"), "position": ("m", "mm"), "lift": ("m", "mm"), "swing": ("rad", "deg")}
 
 
 def beside(warnings: list[str], path: Path) -> bytes:
@@ -157,18 +160,13 @@ class Call:
                 mechanism = assigned(mechanism, bare, own.set)
             varied, moved = grids(mechanism, own.at, own.over, own.cases, bare, remarks)
             found = None
-            name, wanted = getattr(own, "find", None), getattr(own, "so_that", None)
-            if (name is None) != (wanted is None):
-                raise bad(
-                    "--find" if name is None else "--so-that", "expected --find NAME --so-that QUANTITY=VALUE"
-                )
-            if name is not None and wanted is not None:
+            both = pair(getattr(own, "find", None), getattr(own, "so_that", None))
+            if both is not None:
                 from cli.cases.sought import find
 
                 if varied is not None or (moved is not None and moved.n > 1):
                     raise bad("--find", "expected one pose of one mechanism, such as --at 60deg")
-                found = find(mechanism, bare, request, moved, name, wanted)
-                mechanism = found.mechanism
+                mechanism, found = find(mechanism, bare, request, moved, *both)
         workers = getattr(own, "workers", None) or 1
         return cls(request, show, mechanism, bare, remarks, about, varied, moved, workers, found)
 
@@ -259,7 +257,7 @@ class Call:
         if page is not None and drawn is not None:
             result = replace(result, beside={**result.beside, page: lambda: drawn(loop.every_case())})
         if self.found is not None:
-            result = _with_found(result, self.found)
+            result = with_found(result, self.found)
         title = {"title": self.mechanism.name or "Mechanism"}
         if self.show.steps:
             result = replace(result, way=lambda: self._way(loop))
@@ -318,14 +316,3 @@ class Call:
             notes=lambda: name,
             warnings=[*self.remarks, *loop.remarks.lines()],
         )
-
-
-def _with_found(result: Result, found: Found) -> Result:
-    """The result with the number that --find asked for: above the table, in JSON, beside a table alone."""
-    notes, document = result.notes, result.documented
-    return replace(
-        result,
-        notes=lambda: "\n".join(filter(None, (notes(), f"found: {found.text}"))),
-        document=lambda: {**document(), "found": {found.header: found.value}},
-        aside=lambda: [*result.aside(), f"found: {found.text}"],
-    )

@@ -141,7 +141,7 @@ class Study:
         return False
 
     def beside_table(self) -> Mapping[Path, Callable[[], Iterable[bytes]]]:
-        """Files that stand beside the table of the mechanism itself."""
+        """Further files of the mechanism itself."""
         return {}
 
     def check_size(self, show: ShowOptions, times: int) -> None:
@@ -206,13 +206,17 @@ class TableCase(Case):
         """The one table."""
         yield self.table()
 
-    def document(self) -> Document:
-        """What the JSON document has of it: the table, where that has a place."""
-        return result_document([self.table()])
+    def further(self) -> Mapping[str, Callable[[], Table]]:
+        """Further tables of a terminal, a workbook, a report; by name."""
+        return {}
 
-    def words(self) -> str:
-        """What a terminal shows below the table."""
-        return ""
+    def documented(self) -> Iterable[Table]:
+        """The tables that JSON has, as far as they have a place there."""
+        return [self.table(), *(table() for table in self.further().values())]
+
+    def document(self) -> Document:
+        """What the JSON document has of it."""
+        return result_document(self.documented())
 
     @property
     def is_drawn(self) -> bool:
@@ -238,9 +242,8 @@ class TableStudy(Study):
         document: Document = case.document()
         return Result(
             document=lambda: {"name": case.name, **document},
-            tables={self.title: case.table},
+            tables={self.title: case.table, **case.further()},
             notes=lambda: case.name,
-            afterword=case.words,
             figure=case.figure if case.is_drawn else None,
             method=self.method,
             warnings=case.warnings(),

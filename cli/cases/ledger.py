@@ -180,7 +180,7 @@ def ledger(
 def components(letter: str, unit: str, values: Sequence[complex | None]) -> list[Column]:
     """The two components of vectors, as they are shown."""
     return [
-        Column(f"{letter}{axis}", unit, [None if v is None else getattr(v, part) for v in values])
+        Column(f"{letter}{axis}", unit, [None if v is None else getattr(v, part) + 0.0 for v in values])
         for axis, part in (("x", "real"), ("y", "imag"))
     ]
 

@@ -81,11 +81,11 @@ def _computing(
         listed += [each for each in forces if each.key and not each.reverse]
     wanted: list[tuple[Quantity | int, str]] = list(enumerate(first.input_columns))
     wanted += [(each, each.header) for each in listed]
-    found = shown(Table([column(header, []) for _, header in wanted]), units)
+    table = shown(Table([column(header, []) for _, header in wanted]), units)
     arrows = [JointForce.of(*row) for row in pairs]
     made = computing_page(
         motion.poses,
-        {header: (what, found[header]) for what, header in wanted},
+        {header: (what, table[header]) for what, header in wanted},
         named,
         arrows,
         bare,

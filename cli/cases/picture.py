@@ -142,7 +142,7 @@ def posed(
 def counted(m: Mechanism) -> str:
     """Say what a mechanism is made of.
 
-    >>> from cli.examples.command import EXAMPLES
+    >>> from cli.examples import EXAMPLES
     >>> from virtualwork import Mechanism
     >>> counted(Mechanism.from_toml(EXAMPLES / "klann" / "klann.toml"))
     '5 links, 7 pins, driven by crank'

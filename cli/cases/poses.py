@@ -49,25 +49,25 @@ def pose_keys(analysis: Analysis) -> tuple[str, ...]:
     return ("step", "branch", "link", *analysis.input_columns)
 
 
-def table(analysis: Analysis, found: Sequence[Mapping[Key, Any]] = ()) -> Table:
+def table(analysis: Analysis, computed: Sequence[Mapping[Key, Any]] = ()) -> Table:
     """A row for each pose, one assembly after the other.
 
-    `found`: what the poses of each assembly have computed already; there are no bounds of it.
+    `computed`: what the poses of each assembly have computed already; there are no bounds of it.
     """
     wanted = analysis.tabled
-    n, shown, given = analysis.inputs.n, analysis.inputs.shown, analysis.set_angles
-    every = found or [solved(motion, keys_of(wanted)) for motion in analysis.motions]
+    n, shown, driven = analysis.inputs.n, analysis.inputs.shown, analysis.set_angles
+    every = computed or [solved(motion, keys_of(wanted)) for motion in analysis.motions]
     times = len(every)
-    parts = [cells_of(wanted, each, n, given) for each in every]
+    parts = [cells_of(wanted, each, n, driven) for each in every]
 
     @cache
     def formed() -> None:
         for motion in analysis.motions:
-            form_bounds(motion, wanted, given)
+            form_bounds(motion, wanted, driven)
 
     def error(each: Quantity) -> list[float]:
         formed()
-        bounds = [sum(bound(motion, key, given) for key in keys_of([each])) for motion in analysis.motions]
+        bounds = [sum(bound(motion, key, driven) for key in keys_of([each])) for motion in analysis.motions]
         if each.polar == "angle":
             # across the vector, over its length
             lengths = [np.abs(of[each.key] - of[each.less]) for of in every]
@@ -89,7 +89,7 @@ def table(analysis: Analysis, found: Sequence[Mapping[Key, Any]] = ()) -> Table:
         values = parts[0][each] if times == 1 else [v for part in parts for v in part[each]]
         if _has_column(analysis, each, values):
             columns.append(
-                column(each.header, values, None if found or not each.key else partial(error, each))
+                column(each.header, values, None if computed or not each.key else partial(error, each))
             )
     return Table(columns, keys=pose_keys(analysis))
 
@@ -144,10 +144,10 @@ def documents(analysis: Analysis) -> list[Document]:
     listed = []
     keys = keys_of(in_json(analysis))
     for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
-        found, whole = solved(motion, keys), analysis.assembled(motion)
+        computed, whole = solved(motion, keys), analysis.assembled(motion)
         condition = motion.condition if analysis.request.only is None else None
         marks = marks_of(analysis, motion)
-        listed.append(poses_of(analysis, assembly.number, found, whole, condition, marks))
+        listed.append(poses_of(analysis, assembly.number, computed, whole, condition, marks))
     return [pose for each in zip(*listed, strict=True) for pose in each]
 
 
@@ -158,20 +158,20 @@ def in_json(analysis: Analysis) -> list[Quantity]:
 
 def _moving(analysis: Analysis) -> list[Quantity]:
     return sorted(
-        analysis.places, key=lambda each: ("links", "points", "slides", "vectors").index(each.path[0])
+        analysis.places, key=lambda each: ("links", "points", "slides", "cams", "vectors").index(each.path[0])
     )
 
 
 def poses_of(
     analysis: Analysis,
     branch: int,
-    found: Mapping[Key, Any],
+    computed: Mapping[Key, Any],
     assembled: NDArray[np.bool_],
     condition: Reals | None,
     marks: list[list[str]],
 ) -> Iterator[Document]:
     """The poses of one assembly, from what they have computed."""
-    n, given, m = len(assembled), analysis.set_angles, analysis.mechanism
+    n, driven, m = len(assembled), analysis.set_angles, analysis.mechanism
     shown = {
         e.name: {analysis.input_names[e.name]: values.tolist()}
         for e, values in zip(m.inputs, analysis.inputs.shown.T, strict=True)
@@ -180,9 +180,9 @@ def poses_of(
     tree |= {"branch": [branch] * n, "assembled": assembled.tolist()}
     if condition is not None:
         tree["condition"] = cells(condition)
-    tree |= {"marks": marks} | nested(cells_of(_moving(analysis), found, n, given, assembled), n)
+    tree |= {"marks": marks} | nested(cells_of(_moving(analysis), computed, n, driven, assembled), n)
     if analysis.forces:
-        tree |= nested(cells_of(analysis.forces, found, n, given), n)
+        tree |= nested(cells_of(analysis.forces, computed, n, driven), n)
     return in_rows(tree, n)
 
 
@@ -223,12 +223,7 @@ def marks_of(analysis: Analysis, motion: Motion) -> list[list[str]]:
     return result
 
 
-# --- tables of what stands beside the poses ---------------------------------------------------------------------------
-def records(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """A table of rows with the names and units of a JSON document."""
-    return listed(list(rows[0]), [list(row.values()) for row in rows])
-
-
+# --- further tables ---------------------------------------------------------------------------
 def listed(names: Sequence[str], rows: Sequence[Sequence[Cell]]) -> Table:
     """A table of rows below headers."""
     columns = [column(name, [row[i] for row in rows]) for i, name in enumerate(names)]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dalembert.angles import degrees
-from virtualwork.formulas.asked import FORCES, Key, over_blocks
+from virtualwork.formulas.asked import FORCES, Key
 from virtualwork.quantities import (
     FORCE as FORCE,
 )
@@ -88,8 +88,8 @@ def chosen(every: Sequence[Quantity], words: Sequence[str] | None, order: int) -
 
 def unknown(every: Sequence[Quantity], words: Sequence[str]) -> str | None:
     """The first of some names that none of the quantities has."""
-    known = {name for each in every for name in (*each.names, *each.owners)}
-    return next((word for word in words if word not in known), None)
+    names = {name for each in every for name in (*each.names, *each.owners)}
+    return next((word for word in words if word not in names), None)
 
 
 # --- what they are ----------------------------------------------------------------------------------------------------
@@ -99,60 +99,54 @@ def keys_of(wanted: Iterable[Quantity]) -> list[Key]:
 
 
 def solved(motion: Motion, keys: Sequence[Key]) -> dict[Key, Any]:
-    """Quantities of a motion by their keys, (n,): places in one pass, forces in another."""
-    moving = [key for key in keys if key[0] not in FORCES]
-    result = dict(zip(moving, motion.values(moving), strict=True)) if moving else {}
-    if len(moving) < len(keys):
-        d = motion.dynamics
-        d.solve([(d.reactions.by_key[key[1]], key[2]) for key in keys if key[0] == "force"])
-        result |= {key: over_blocks(motion.poses, key, d) for key in keys if key[0] in FORCES}
-    return result
+    """Quantities of a motion by their keys, (n,), in one pass."""
+    return dict(zip(keys, motion.values(keys), strict=True))
 
 
-def cells(values: Reals, known: NDArray[np.bool_] | None = None) -> Numbers:
+def cells(values: Reals, finite: NDArray[np.bool_] | None = None) -> Numbers:
     """Numbers as Python's own; None where there is none; no −0."""
-    known = np.isfinite(values) if known is None else known
+    finite = np.isfinite(values) if finite is None else finite
     listed: list[float] = (values + 0.0).tolist()
-    if known.all():
+    if finite.all():
         return listed
-    return [v if there else None for v, there in zip(listed, known.tolist(), strict=True)]
+    return [v if there else None for v, there in zip(listed, finite.tolist(), strict=True)]
 
 
 def cells_of(
     wanted: Iterable[Quantity],
-    found: Mapping[Key, Any],
+    computed: Mapping[Key, Any],
     n: int,
-    given: Mapping[str, Reals],
+    driven: Mapping[str, Reals],
     where: NDArray[np.bool_] | None = None,
 ) -> dict[Quantity, Numbers]:
     """The numbers of n poses as they are shown.
 
     Parameters
     ----------
-    found : mapping
+    computed : mapping
         What the motion has computed.
-    given : mapping
+    driven : mapping
         Of driven links the angles as requested, degrees.
     where : array (n,) of bool, optional
         The poses that have any.
     """
     shown: dict[Quantity, Numbers] = {}
-    known = np.ones(n, dtype=bool)
+    finite = np.ones(n, dtype=bool)
     for each in wanted:
         if not each.key:
             # the moment of a pin is zero where there is a force in it
-            shown[each] = cells(np.zeros(n), known)
+            shown[each] = cells(np.zeros(n), finite)
             continue
-        value = found[each.key] - found[each.less] if each.less else found[each.key]
+        value = computed[each.key] - computed[each.less] if each.less else computed[each.key]
         # a vector is known where both its components are
-        known = np.isfinite(value)
+        finite = np.isfinite(value)
         if each.turns:
             name = each.key[1]
-            part = exact_degrees(given[name]) if name in given else degrees(np.exp(1j * value))
+            part = exact_degrees(driven[name]) if name in driven else degrees(np.exp(1j * value))
         else:
             part = each.of(value)
-            known = known & np.isfinite(part)
-        shown[each] = cells(part, known if where is None else known & where)
+            finite = finite & np.isfinite(part)
+        shown[each] = cells(part, finite if where is None else finite & where)
     return shown
 
 
@@ -162,17 +156,17 @@ def exact_degrees(angle: Reals) -> Reals:
     return np.where(reduced >= 360.0, 0.0, reduced)
 
 
-def form_bounds(motion: Motion, wanted: Iterable[Quantity], given: Mapping[str, Reals]) -> None:
+def form_bounds(motion: Motion, wanted: Iterable[Quantity], driven: Mapping[str, Reals]) -> None:
     """Form the bounds of all numbers, which have most of the work in common."""
     keys = keys_of(wanted)
     moving = [key for key in keys if key[0] not in FORCES]
     if len(moving) < len(keys):
         motion.dynamics.error_estimate().together()
     # an angle that was given is as it was given
-    motion.rounding.together([key for key in moving if key[0] != "angle" or key[2] or key[1] not in given])
+    motion.rounding.together([key for key in moving if key[0] != "angle" or key[2] or key[1] not in driven])
 
 
-def bound(motion: Motion, key: Key, given: Mapping[str, Reals]) -> Reals:
+def bound(motion: Motion, key: Key, driven: Mapping[str, Reals]) -> Reals:
     """Bound the error of a quantity, as it is shown."""
     kind, *of = key
     if kind in FORCES:
@@ -185,12 +179,16 @@ def bound(motion: Motion, key: Key, given: Mapping[str, Reals]) -> Reals:
             return bounds.shaking[kind != "shaking"]
         if kind.startswith("applied"):
             return bounds.applied(of[0])[kind != "applied"]
+        if kind == "contact":
+            return bounds.contact(of[0])
         joint = motion.dynamics.reactions.by_key[of[0]]
         return (bounds.joint_force if kind == "force" else bounds.joint_moment)(joint, of[1])
+    if kind == "pressure angle":
+        return np.asarray(np.degrees(motion.rounding.of(key)))
     if kind != "angle" or of[1]:
         return motion.rounding.of(key)
-    if of[0] in given:
-        return TURNED * np.abs(given[of[0]])
+    if of[0] in driven:
+        return TURNED * np.abs(driven[of[0]])
     from dalembert.arithmetic.doubled import PI, Doubled
 
     # what the degrees as they are shown round besides

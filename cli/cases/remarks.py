@@ -15,22 +15,24 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from virtualwork.branch.assembly import Assembly
+    from virtualwork.describe.cams import CamDrive
     from virtualwork.describe.description import Description
+    from virtualwork.motion import Motion
 
 GROUND = "ground"
 # of many change points or limits a warning names so many, and how many there are
 NAMED = 10
 
 
-def _on_branch(analysis: Analysis, assembly: Assembly, found: list[float], digits: int) -> list[float]:
+def _on_branch(analysis: Analysis, assembly: Assembly, inputs: list[float], digits: int) -> list[float]:
     """Inputs as they are shown, each once, deg in [0, period of the branch) or m."""
     if analysis.mechanism.inputs[0].is_slide:
-        return sorted({round(v, digits) for v in found})
+        return sorted({round(v, digits) for v in inputs})
     turns = assembly.reach.turns
     if turns is None:
-        return sorted({round(math.degrees(v), digits) for v in found})
+        return sorted({round(math.degrees(v), digits) for v in inputs})
     full = 360.0 * turns
-    return sorted({round(math.degrees(v) % full, digits) % full for v in found})
+    return sorted({round(math.degrees(v) % full, digits) % full for v in inputs})
 
 
 def _listed(values: list[float], digits: int) -> str:
@@ -71,17 +73,17 @@ def limits(analysis: Analysis, counted: list[tuple[int, int]] | None = None) -> 
 def _shortfall(analysis: Analysis, assembly: Assembly, i: int) -> str:
     """By how much a pose does not close, and the nearest input where it would."""
     pose = analysis.inputs.part(i, i + 1)
-    found = assembly.reach.shortfall(tuple(pose.values[0].tolist()))
-    if found is None:
+    gap = assembly.reach.shortfall(tuple(pose.values[0].tolist()))
+    if gap is None:
         return ""
     factor, unit = (1e3, "mm") if analysis.mechanism.size < 2 else (1.0, "m")
     shown = ", ".join(
         f"{v:.10g} {'m' if e.is_slide else 'deg'}"
         for e, v in zip(analysis.mechanism.inputs, pose.shown[0], strict=True)
     )
-    text = f"; at {shown}: {found.text(lambda v: f'{v * factor:.6g} {unit}')}"
-    if found.nearest is not None:
-        there = found.nearest if analysis.unit == "m" else math.degrees(found.nearest)
+    text = f"; at {shown}: {gap.text(lambda v: f'{v * factor:.6g} {unit}')}"
+    if gap.nearest is not None:
+        there = gap.nearest if analysis.unit == "m" else math.degrees(gap.nearest)
         text += f"; it would close at {there:.10g} {analysis.unit}"
     return text
 
@@ -152,9 +154,28 @@ def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
         ):
             if not motion.assembly.track.folded:  # singular in every pose: that is warned of once
                 note(there & ~np.isfinite(values).all(axis=1) & ~d.locked, what)
+        for number, drive in enumerate(analysis.mechanism.cam_drives):
+            press = d.contact(number)
+            with np.errstate(invalid="ignore"):
+                pulls = press < -1e-12 * np.nanmax(np.abs(press), initial=0.0)
+            if (there & pulls).any():
+                note(there & pulls, contact_lost(motion, drive))
         if d.scene.friction:
             note(there & d.locked, "friction locks the mechanism: no reaction balances its own friction")
     return troubles
+
+
+def contact_lost(motion: Motion, drive: CamDrive) -> str:
+    """What to know of a cam that would have to pull its follower."""
+    from virtualwork.study.cams import lift_off
+
+    off = lift_off(motion.assembly, drive.number)
+    text = f"contact lost: {drive.label} would have to pull its follower"
+    if off is None or not np.isfinite(off.speed):
+        return text
+    if off.speed == 0:
+        return f"{text}: it does at rest too"
+    return f"{text}: at constant speed it does from {off.speed:.6g} rad/s on, first at {np.degrees(off.at) % 360:.6g} deg"
 
 
 def statements(analysis: Analysis) -> list[str]:

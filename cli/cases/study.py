@@ -19,7 +19,7 @@ from cli.show.terminal import progress
 from dalembert.results.columns import Table
 from dalembert.results.columns import document as result_document
 from dalembert.results.text import heading
-from virtualwork.formulas.positions import BLOCK, EvenSweep
+from virtualwork.formulas.positions import BLOCK
 from virtualwork.motion import Motion
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ METHOD = (
 
 @dataclass(frozen=True)
 class Further:
-    """What a command shows beside the poses of one mechanism.
+    """What a command shows in addition to the poses of one mechanism.
 
     Attributes
     ----------
@@ -50,18 +50,15 @@ class Further:
         Those with a place in JSON stand in the document and on the terminal, below the poses.
     words : str
         What the terminal shows below them.
-    others : dict
-        What the document has in addition to the tables.
     """
 
     tables: Mapping[str, Table] = field(default_factory=dict)
     words: str = ""
-    others: Document = field(default_factory=dict)
 
     @property
     def document(self) -> Document:
         """Beside `poses` in JSON."""
-        return result_document(self.tables.values()) | self.others
+        return result_document(self.tables.values())
 
 
 @dataclass
@@ -105,12 +102,6 @@ class PoseCase(Case):
         """An analysis for each block of poses, with the digits of the sweep solved whole."""
         a, q = self.analysis, self.analysis.inputs
         starts = range(0, q.n, BLOCK)
-        sweep = EvenSweep(0.0, 0.0, q.n, even=False)
-        if len(a.mechanism.inputs) == 1:
-            first, last = (float(q.part(i, i + 1).values[0, 0]) for i in (0, q.n - 1))
-            sweep = EvenSweep(first, last, q.n)
-            looked = starts if q.listed else sorted({0, *starts[-2:]})
-            sweep.even = all(sweep.off(q.part(i, i + BLOCK).values[:, 0]) is not None for i in looked)
         self.missing.clear()
         self.there.clear()
         work = ((assembly, i) for assembly in a.assemblies for i in starts)
@@ -122,7 +113,7 @@ class PoseCase(Case):
             block = replace(a, inputs=q.part(i, i + BLOCK), warnings=[], block_of=a)
             block.assemblies = (assembly,)
             its = block.inputs
-            motion = Motion(assembly, its.values, its.speed, its.acceleration, block_of=sweep)
+            motion = Motion(assembly, its.values, its.speed, its.acceleration, block_of=q.n)
             motion.poses.input_rest = its.rest
             motion.poses.time = its.time
             block.motions = (motion,)
@@ -148,11 +139,11 @@ class PoseCase(Case):
 
     @cached_property
     def further(self) -> Further:
-        """What stands beside the poses."""
+        """What is shown in addition to the poses."""
         return self.study.further(self.analysis)
 
     def document(self) -> Document:
-        """The poses, and what stands beside them."""
+        """The poses, and what is shown in addition."""
         return {"poses": poses.documents(self.analysis), **self.further.document}
 
     def way(self) -> list[Topic]:
@@ -191,7 +182,7 @@ class PoseStudy(Study):
     method = METHOD
 
     def further(self, analysis: Analysis) -> Further:
-        """What stands beside the poses of one mechanism."""
+        """What is shown in addition to the poses of one mechanism."""
         return Further()
 
     def way(self, analysis: Analysis) -> list[Topic]:
@@ -237,7 +228,7 @@ class PoseStudy(Study):
 
     @property
     def beside_each(self) -> bool:
-        """Whether something stands beside the poses of each variant."""
+        """Whether each variant has more than its poses."""
         return False
 
     def result(self, case: Case) -> Result:

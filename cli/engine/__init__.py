@@ -1,1 +1,79 @@
-"""`dalembert engine`: shaking forces of engines of several cylinders."""
+"""`dalembert engine`: shaking forces and couples of engines of several cylinders."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.read import options
+from cli.show.output import command
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cli.show.result import Result
+    from dalembert.results.way import Topic
+
+
+EXAMPLE = "inline-four"
+OPTIONS = """
+Arguments:
+  cylinders CYLINDERS  CSV with a row for each cylinder; - is standard input.
+What:
+  speed SPEED  Speed of the crankshaft, such as 3000rpm.
+  order K  The highest order.
+How: what balances it:
+  counterweight_share SHARE  Counterweights for the rotating masses and this share of the reciprocating ones, such as 0.5.
+  plane NAME:Z:RADIUS  A plane of the counterweights, such as A:0mm:60mm, once or more; without: opposite each crank pin.
+  shaft ORDER:Z:with|against  A balance shaft at ORDER times the speed, with or against the crank, such as 2:150mm:against; repeatable.
+"""
+
+
+@command(OPTIONS)
+def run(
+    cylinders: str,
+    speed: str | None = None,
+    order: Annotated[int, typer.Option(min=1, max=100)] = 8,
+    counterweight_share: Annotated[float | None, typer.Option(min=0.0, max=1.0)] = None,
+    plane: list[str] | None = None,
+    shaft: list[str] | None = None,
+) -> Result:
+    """Find the shaking forces and couples of an engine by exact orders, and what counterweights and balance shafts leave.
+
+    CYLINDERS has the columns cylinder, crank_deg, bank_deg, z_*, throw_*, rod_*, reciprocating_* and rotating_* (masses); * is a
+    unit. The crank pin stands at θ + crank_deg; bank_deg is the direction of the cylinder's axis, counter-clockwise from
+    +x (default 90). Forces are those on the frame, couples are Σ z·F about z = 0. One shaft balances a force; two of one
+    order and sense balance force and couple.
+    """
+    from cli.engine.cylinders import Engine, read_cylinders, read_shafts
+    from cli.engine.tables import METHOD, tables, warnings
+    from cli.read.planes import from_options
+    from cli.show.result import Result
+
+    if speed is None:
+        raise options.bad("--speed", "expected the speed of the crankshaft, such as --speed 3000rpm")
+    omega = options.needed("--speed", speed, "speed", positive=True)
+    planes = None if plane is None else from_options(plane)
+    engine = Engine(
+        read_cylinders(cylinders), omega, order, counterweight_share, planes, read_shafts(shaft or [], order)
+    )
+
+    def figure() -> Figure:
+        from cli.engine.tables import draw
+
+        return draw(engine)
+
+    def way() -> list[Topic]:
+        from cli.engine.tables import way
+
+        return way(engine)
+
+    return Result(
+        way=way,
+        tables=tables(engine),
+        figure=figure,
+        method=METHOD,
+        about={"title": "Balance of an engine"},
+        warnings=[*engine.cylinders.table.warnings, *warnings(engine)],
+    )

@@ -1,19 +1,28 @@
-"""Results of an engine: orders, rotating part, counterweights, shafts, residuals."""
+"""Results of an engine: orders, rotating part, counterweights, shafts, residuals; the picture, the worked solution."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.engine import Forces
+from balancing.engine import Forces, piston_orders, reciprocating_forces
 from cli.engine.cylinders import Engine
+from cli.show.picture import blank
 from dalembert.angles import degrees
+from dalembert.drawing.amounts import prefixed
+from dalembert.drawing.polar import head
+from dalembert.drawing.sheet import plain, sheet
 from dalembert.results.columns import Column, Table, names, number
+from dalembert.results.way import Topic, figures
 
 if TYPE_CHECKING:
-    from cli.engine.cylinders import Counterweights, Real
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cli.engine.cylinders import Complex, Counterweights, Engine, Real
+
 
 METHOD = (
     "Each piston's inertia force m·r·ω²·Σ A_k cos kφ with the exact orders A_k of the slider-crank; forces of an order are parts "
@@ -170,3 +179,200 @@ def warnings(e: Engine) -> list[str]:
     if e.share and not e.cylinders.rotating.any() and "rotating" not in e.cylinders.table.numbers:
         lines.append("no column rotating_*: the counterweights are for the reciprocating masses alone")
     return lines
+
+
+ROWS = 3
+"""So many orders are drawn, the lowest of those with forces."""
+NAMED = 12
+"""So many cylinders are named."""
+
+
+def draw(e: Engine) -> Figure:
+    """Draw the vectors of the cylinders one behind the other, and what they add up to."""
+    f = e.reciprocating
+    sizes = np.abs(f.with_crank).sum(axis=0)
+    # an order far below the first is no polygon that anybody needs
+    shown = np.flatnonzero(sizes > 1e-4 * sizes.max())[:ROWS]
+    parallel = bool((e.cylinders.bank == e.cylinders.bank[0]).all())
+    figure = blank()
+    columns = 2 if parallel else 4
+    sheet(3.6 * columns, 3.5 * max(len(shown), 1) + 0.7, figure)
+    figure.suptitle(
+        "order polygons of the reciprocating masses: vectors "
+        + ("from the cylinders' axis" if parallel else "from +x")
+        + " at θ = 0; red: their sum",
+        fontsize=10,
+    )
+    panels = figure.subplots(max(len(shown), 1), columns, squeeze=False)
+    z = e.cylinders.z
+    for row, k in zip(panels, shown, strict=False):
+        if parallel:
+            # of a force along one axis the two halves are mirror images
+            vectors = 2 * f.with_crank[:, k] * np.exp(-1j * np.radians(e.cylinders.bank))
+            parts = [("", vectors)]
+        else:
+            parts = [(" with the crank", f.with_crank[:, k]), (" against it", f.against[:, k])]
+        for j, (sense, of) in enumerate(parts):
+            for axes, name, values, unit, couple in (
+                (row[j], "force", of, "N", False),
+                (row[len(parts) + j], "couple", of * z, "N·m", True),
+            ):
+                _polygon(
+                    axes,
+                    f"order {k + 1}: {name}{sense}",
+                    values,
+                    e.cylinders.names,
+                    unit,
+                    f.rounding(couple),
+                    k,
+                )
+    return figure
+
+
+def _polygon(
+    axes: Axes, title: str, vectors: Complex, names: list[str], unit: str, rounding: Real, k: int
+) -> None:
+    """Draw vectors one behind the other."""
+    factor, unit = prefixed(float(max(np.abs(vectors).max(initial=0.0), abs(vectors.sum()))), unit)
+    ends = np.concatenate([[0.0], np.cumsum(vectors)]) * factor
+    total = complex(ends[-1]) if abs(vectors.sum()) > rounding[k] else 0.0
+    axes.set_title(f"{title}, {unit}", fontsize=9)
+    middle = ends.mean()
+    size = float(np.abs(ends[:, None] - ends[None, :]).max()) or 1.0
+    placed: list[complex] = []
+    for start, stop, name in zip(ends[:-1], ends[1:], names, strict=True):
+        if abs(stop - start) < 1e-9 * size:
+            continue
+        axes.annotate("", (stop.real, stop.imag), (start.real, start.imag), arrowprops=head("0.25", 1.4))
+        if len(names) > NAMED:
+            continue
+        along = (stop - start) / abs(stop - start)
+        out = (
+            1j * along
+            if (((start + stop) / 2 - middle) * (1j * along).conjugate()).real >= 0
+            else -1j * along
+        )
+        at = (start + stop) / 2 + 0.075 * size * out
+        # vectors that lie on each other have their names side by side
+        while any(abs(at - other) < 0.1 * size for other in placed):
+            at += 0.11 * size * out
+        placed.append(at)
+        axes.annotate(
+            name,
+            (at.real, at.imag),
+            ha="center",
+            va="center",
+            fontsize=8,
+            bbox={"fc": "white", "ec": "none", "pad": 0.6},
+            zorder=5,
+        )
+    if total:
+        axes.annotate("", (total.real, total.imag), (0.0, 0.0), arrowprops=head("tab:red", 2.2))
+    caption = (
+        f"sum {abs(total):.4g} {unit}" if total else "sum 0: closed" if np.abs(vectors).any() else "none"
+    )
+    axes.set_xlabel(caption, fontsize=9, color="tab:red" if total else "black")
+    points = np.array([*ends, *placed])
+    center = complex(points.real.max() + points.real.min(), points.imag.max() + points.imag.min()) / 2
+    reach = 0.62 * max(float(np.ptp(points.real)), float(np.ptp(points.imag)), 0.3 * size)
+    axes.set_xlim(center.real - reach, center.real + reach)
+    axes.set_ylim(center.imag - reach, center.imag + reach)
+    axes.set_aspect("equal")
+    plain(axes)
+    axes.tick_params(labelsize=7)
+    axes.locator_params(nbins=5)
+
+
+SHOWN = 1e-12
+"""An order whose coefficient is below this share of the first is not listed."""
+
+
+def way(e: Engine) -> list[Topic]:
+    """The topics."""
+    c, names_of = e.cylinders, e.cylinders.names
+    ratios = (c.throw / c.rod).tolist()
+    orders = np.array([piston_orders(ratio, e.highest) for ratio in ratios])
+    used = [k for k in range(e.highest) if np.abs(orders[:, k]).max() > SHOWN]
+    text: list[str | Table] = [
+        "Piston: F = m·r·ω²·Σ A_k·cos k(θ + crank − bank) along its axis, A_1 = 1, A_2 = λ + λ³/4 + …, λ = r/l:"
+    ]
+    size = c.reciprocating * c.throw * e.speed**2
+    text.append(
+        Table(
+            [
+                names("cylinder", names_of),
+                number("ratio", "number", np.array(ratios)),
+                number("m_r_omega2", "force", size, place="size"),
+                *(number(f"A{k + 1}", "number", orders[:, k]) for k in used),
+            ],
+            ("cylinder",),
+            "cylinders[]",
+        )
+    )
+    result = [Topic("orders", text, "Orders of each piston")]
+    rows: list[tuple[Any, ...]] = []
+    for i, name in enumerate(names_of):
+        one = slice(i, i + 1)
+        force = reciprocating_forces(
+            c.crank[one],
+            c.bank[one],
+            c.z[one],
+            c.throw[one],
+            c.rod[one],
+            c.reciprocating[one],
+            e.speed,
+            e.highest,
+        )
+        f = force.coefficients()
+        rows += [(name, k + 1, *f[k].ravel().tolist()) for k in used]
+    whole = e.reciprocating.coefficients()
+    sums = [("sum", k + 1, *whole[k].ravel().tolist()) for k in used]
+    heads = ("x_cos", "x_sin", "y_cos", "y_sin")
+    every = [*rows, *sums]
+    table = Table(
+        [
+            names("cylinder", [row[0] for row in every]),
+            Column("order", "", [row[1] for row in every], place="order"),
+            *(
+                Column(head, "N", [row[2 + j] for row in every], place=f"{head}_N")
+                for j, head in enumerate(heads)
+            ),
+        ],
+        ("cylinder", "order"),
+        "shares[]",
+    )
+    result.append(
+        Topic("forces", ["Coefficients of cos kθ and sin kθ of each cylinder's force, and their sums:", table], "Shares and sums")
+    )  # fmt: skip
+    if e.rotating.any():
+        u = complex(e.rotating.sum())
+        result.append(
+            Topic(
+                "rotating",
+                [f"Rotating masses: Σ m·r·e^(i·crank) = ({figures(u.real)}, {figures(u.imag)}) kg·m"],
+                "Rotating masses",
+                {"x_kg_m": u.real, "y_kg_m": u.imag},
+            )
+        )
+    weights = e.counterweights
+    if weights is not None:
+        lines = [
+            f"  {name}: ({figures(w.real)}, {figures(w.imag)}) kg·m at z = {figures(z)} m"
+            for name, w, z in zip(weights.names, weights.unbalance.tolist(), weights.z.tolist(), strict=True)
+        ]
+        result.append(
+            Topic(
+                "counterweights",
+                ["Against the rotating masses and the share of the reciprocating ones:", *lines],
+            )
+        )
+    left = e.residual.coefficients()
+    lines = [
+        f"  order {k + 1}: {', '.join(f'{head} {figures(v)} N' for head, v in zip(heads, left[k].ravel().tolist(), strict=True))}"
+        for k in used
+    ]
+    if e.balanced:
+        result.append(
+            Topic("residual", ["Residual forces with counterweights and balance shafts:", *lines], "Residual")
+        )
+    return result

@@ -1,1 +1,38 @@
-"""`dalembert equilibrium`."""
+"""`dalembert equilibrium`: the positions of rest and their stability."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cli.cases.options import CASES, FILE, WORKERS, Options
+from cli.show.output import declared_command
+
+if TYPE_CHECKING:
+    from cli.show.commands import ShowOptions
+    from cli.show.result import Result
+
+EXAMPLE = "desk-lamp"
+OPTIONS = f"{FILE}{CASES}{WORKERS}"
+
+
+@declared_command(OPTIONS, Options)
+def run(own: Options, show: ShowOptions) -> Result:
+    """Find the positions in which a mechanism rests under its loads without effort, and whether stably.
+
+    About a stable position: the period of small oscillations, without dampers and friction.
+    --over or --cases of an input give the range that is searched; without them it is a whole turn, of a slide two sizes
+    of the mechanism either way.
+    """
+    from cli.cases.analysis import Request
+    from cli.cases.call import Call
+    from cli.equilibrium.rest import Equilibria
+
+    call = Call.of(own, show, Request(own.file))
+    if own.at:
+        from cli.read.options import bad
+
+        raise bad(
+            "--at",
+            "equilibrium searches a range of the input: expected --over, such as --over 0deg:90deg:1deg",
+        )
+    return call.result(call.study(Equilibria))

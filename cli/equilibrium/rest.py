@@ -1,4 +1,4 @@
-"""The positions of rest of a mechanism: as a table, as JSON, and drawn."""
+"""The positions of rest of a mechanism: as a table, as JSON, drawn; the worked solution."""
 
 from __future__ import annotations
 
@@ -12,15 +12,21 @@ import numpy as np
 from cli.cases.analysis import Analysis
 from cli.cases.case import TableCase, TableStudy
 from cli.cases.inputs import Inputs
+from cli.cases.ledger import Entry, entries_of, ledger
 from cli.cases.poses import column
-from dalembert.results.columns import Table, names, number
+from dalembert.results.columns import Column, Table, names, number
+from dalembert.results.way import Topic, figures
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.figure import Figure
 
+    from cli.cases.analysis import Analysis
     from cli.cases.case import Rows
     from dalembert.results.way import Topic
     from virtualwork.study.equilibrium import Equilibria as Found
+    from virtualwork.study.equilibrium import Equilibrium
 
 
 @dataclass
@@ -53,32 +59,38 @@ class Rest(TableCase):
 
     def table(self) -> Table:
         """A row for each position."""
-        m, found = self.analysis.mechanism, self.equilibria.found
+        m, positions = self.analysis.mechanism, self.equilibria.found
         one = len(m.inputs) == 1
         columns = []
         for j, (entry, header) in enumerate(zip(m.inputs, self.analysis.input_columns, strict=True)):
-            values = [e.inputs[j] if entry.is_slide else math.degrees(e.inputs[j]) % 360.0 for e in found]
+            values = [e.inputs[j] if entry.is_slide else math.degrees(e.inputs[j]) % 360.0 for e in positions]
             place = self.analysis.input_names[entry.name]
             columns.append(column(header, values))
             columns[-1].place = place if one else f"inputs.{entry.name}.{place}"
-        columns.append(names("stable", [e.stable for e in found]))
-        columns.append(number("potential", "energy", np.array([e.potential for e in found], dtype=float)))
+        columns.append(names("stable", [e.stable for e in positions]))
+        columns.append(number("potential", "energy", np.array([e.potential for e in positions], dtype=float)))
+        for i in range(len(m.inputs)):
+            periods = [e.periods[i] if i < len(e.periods) else None for e in positions]
+            name = "period" if i == 0 else f"period_{i + 1}"
+            columns.append(number(name, "time", np.array(periods, dtype=float)))
         return Table(columns, place="equilibria[]")
 
     def warnings(self) -> list[str]:
         """What the table cannot tell."""
-        found, lines = self.equilibria, list(self.analysis.warnings)
-        if not found.loaded:
+        equilibria, lines = self.equilibria, list(self.analysis.warnings)
+        if not equilibria.loaded:
             lines.append("nothing acts at rest: every position is one of equilibrium")
-        elif found.region:
+        elif equilibria.region:
             lines.append("positions of rest fill a part of the range: they are not isolated, and not listed")
-        elif found.everywhere:
+        elif equilibria.everywhere:
             lines.append(
                 "the loads balance in every position: equilibrium everywhere, neither stable nor unstable"
             )
-        elif not found.found:
+        elif not equilibria.found:
             lines.append("no equilibrium: the loads balance at no position of the range")
-        if any(e.stable is None for e in found.found):
+        if any(e.stable and e.period is None for e in equilibria.found):
+            lines.append("no period of oscillation: nothing that moves there has a mass or an inertia")
+        if any(e.stable is None for e in equilibria.found):
             lines.append(
                 "stable null: the second variation of the potential vanishes there and does not decide"
             )
@@ -86,8 +98,6 @@ class Rest(TableCase):
 
     def way(self) -> list[Topic]:
         """The virtual work of every load at each position."""
-        from cli.equilibrium.way import way
-
         return way(self.analysis, self.equilibria.found)
 
     def figure(self) -> Figure:
@@ -109,7 +119,8 @@ class Equilibria(TableStudy):
     title = "equilibria"
     method = (
         "Positions where the generalized force of the loads vanishes; stable where the second variation of the potential "
-        "is positive (Lagrange and Dirichlet)."
+        "is positive (Lagrange and Dirichlet). Periods are those of small oscillations without dampers and friction, from "
+        "the generalized mass."
     )
 
     def case(self, row: Rows | None = None) -> Rest:
@@ -118,3 +129,35 @@ class Equilibria(TableStudy):
         _ = m.assembly
         ranged = self.moved is not None and self.moved.axes[0].option != "[input] law"
         return Rest(Analysis(self.request, m, self.inputs(m, row)), ranged)
+
+
+def way(a: Analysis, positions: Sequence[Equilibrium]) -> list[Topic]:
+    """The topics: the condition, and the ledger at every position found."""
+    m = a.mechanism
+    text = [
+        "At rest no virtual displacement of an input does work: Q_j = Σ F·∂P/∂q_j + Σ T·∂θ/∂q_j = 0 (Riul, unit II, eq. 3);",
+        "stable where the potential is least there: its second variation is positive (Lagrange and Dirichlet).",
+    ]
+    topics = [Topic("condition", text, "Condition of equilibrium", {"positions": len(positions)})]
+    if not positions:
+        return topics
+    motion = m.motion(np.array([e.inputs for e in positions]), *([[0.0] * len(m.inputs)] * 2))
+    every = [entries_of(motion, j) for j in range(len(m.inputs))]
+    instants: list[tuple[list[Column], list[Entry]]] = []
+    for i, e in enumerate(positions):
+        head = []
+        for entry, value in zip(m.inputs, e.inputs, strict=True):
+            key = a.input_names[entry.name]
+            shown = value if entry.is_slide else float(np.degrees(value)) % 360.0
+            one = len(m.inputs) == 1
+            place = key if one else f"inputs.{entry.name}.{key}"
+            name = "input" if one else f"{entry.name}_input"
+            head.append(Column(name, key.removeprefix("input_"), [shown], place=place))
+        loads = [load for each in every for load in each[i] if load.kind not in ("unknown", "joint force")]
+        instants.append((head, loads))
+    sums = [
+        f"  {', '.join(f'{column.name} {figures(column.values[0])}' for column in head)}: ΣF·V + ΣT·ω = "  # type: ignore[arg-type]
+        f"{' + '.join(f'({figures(load.power)})' for load in loads if load.power) or '0'}"
+        for head, loads in instants
+    ]
+    return [*topics, ledger("poses[]", instants, ["For a unit speed of the input:", *sums])]

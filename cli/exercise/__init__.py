@@ -1,1 +1,159 @@
-"""`dalembert exercise`: variants of an exercise for every student, their sheets, key and solutions."""
+"""`dalembert exercise`: a class's variants of an exercise, with sheets, key, solutions and question banks."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cli.read import options
+from cli.show.commands import with_options
+from cli.show.output import show
+from dalembert.errors import DataError
+from dalembert.quantities import is_number
+
+if TYPE_CHECKING:
+    from cli.exercise.sheets import Student
+    from cli.show.commands import ShowOptions
+    from cli.show.result import Result
+
+
+EXAMPLE = "exercise-rotor"
+OPTIONS = """
+Arguments:
+  file FILE.toml  The exercise.
+What:
+  students NUMBER|ROSTER.csv  How many students, or a table with a column student; others are kept (default 1).
+  seed N  Random seed of the draws (default 1).
+  folder -o --output FOLDER  Where the sheets, answers.csv, key.csv, solutions.html and moodle.xml go.
+  system --for prairielearn|numbas  Write the questions for this system too; repeatable.
+"""
+SYSTEMS = ("prairielearn", "numbas")
+MOST = 2000
+
+
+def _run(
+    file: str,
+    students: str = "1",
+    seed: int = 1,
+    folder: str | None = None,
+    system: list[str] | None = None,
+) -> Result:
+    """Make the variants of an exercise for a class: a sheet for each student, a table for the answers, key and solutions.
+
+    FILE.toml has command (what solves it), title, text with {links.crank.B.x} or {rotor.csv:W1.mass_kg} in it, a table
+    [draw] of values by steps such as "50mm:80mm:5mm" or lists, and [[ask]] with quantity (a column of the command's
+    CSV), where (its key columns), figures, points, unit. Only variants that can be assembled, lie away from limits and
+    are well conditioned are drawn.
+    """
+    from cli.exercise.description import read_exercise
+    from cli.exercise.drawings import figure
+    from cli.exercise.files import put
+    from cli.exercise.mistakes import candidates
+    from cli.exercise.moodle import moodle
+    from cli.exercise.sheets import answers_csv, filled, key_csv, sheet_page
+    from cli.exercise.solutions import solutions
+    from cli.exercise.solving import workshop
+    from cli.exercise.tables import tables
+    from cli.exercise.variants import variants
+    from cli.show.result import Result
+
+    if folder is None:
+        raise options.bad("-o", "expected -o FOLDER, where the sheets go")
+    for name in system or ():
+        if name not in SYSTEMS:
+            raise options.bad("--for", f"'{name}': expected {' or '.join(SYSTEMS)}")
+    exercise = read_exercise(file)
+    warnings = list(exercise.warnings)
+    people = _students(students)
+    with workshop(exercise) as shop:
+        drawn = variants(shop, len(people), seed, warnings)
+        filled(shop, drawn[0].drawn)
+        drawings = {id(variant): "" for variant in drawn}
+        for variant in drawn:
+            drawings[id(variant)] = drawings[id(variant)] or figure(variant)
+        files = {
+            f"sheet-{student.file}.html": sheet_page(exercise, student, variant, drawings[id(variant)])
+            for student, variant in zip(people, drawn, strict=True)
+        }
+        files["answers.csv"] = answers_csv(exercise, people, drawn)
+        files["key.csv"] = key_csv(exercise, people, drawn)
+        files["solutions.html"] = solutions(exercise, people, drawn, drawings)
+        slips = {id(variant): candidates(variant) for variant in dict.fromkeys(drawn)}
+        files["moodle.xml"] = moodle(exercise, people, drawn, drawings, slips)
+        for name in system or ():
+            # cli.exercise.prairielearn, cli.exercise.numbas
+            questions = getattr(import_module(f"cli.exercise.{name}"), name)
+            files |= questions(exercise, drawn, drawings, slips)
+        put(Path(folder), files)
+        made = len({id(variant) for variant in drawn})
+        result = Result(
+            tables=tables(exercise, people, drawn),
+            head={"title": exercise.title, "folder": folder, "variants": made, "files": sorted(files)},
+            notes=lambda: (
+                f"wrote {len(files)} files to {folder}: {made} variant{'s' * (made != 1)} for {len(people)} student{'s' * (len(people) != 1)}\n"
+            ),
+            warnings=warnings,
+        )
+        # the temporary folder goes, with all its files
+        for table in result.tables.values():
+            table()
+    return result
+
+
+def _students(text: str) -> list[Student]:
+    """Read a number of students, or the roster with their names.
+
+    Raises
+    ------
+    DataError
+        A roster without the column, or with a name twice.
+    """
+    from cli.exercise.sheets import Student
+    from dalembert.tables.table import read
+
+    if is_number(text):
+        if not text.strip().isdecimal() or not 1 <= int(text) <= MOST:
+            raise options.bad("--students", f"'{text}': expected a whole number from 1 to {MOST}, or a file")
+        return [Student(str(k), {}) for k in range(1, int(text) + 1)]
+    table = read(text, texts=None)
+    named = {name.strip().lower(): name for name in table.texts}
+    if "student" not in named:
+        raise DataError(f"{text}: no column student: expected one, found {', '.join(table.texts)}")
+    column = table.texts[named["student"]]
+    seen: dict[str, int] = {}
+    for row, name in enumerate(column):
+        if not name:
+            raise table.error(row, named["student"], name, "a name or number")
+        if name in seen:
+            raise table.error(
+                row, named["student"], name, f"each student once (row {seen[name] + 1} has it too)"
+            )
+        seen[name] = row
+    others = [name for name in table.texts if name != named["student"]]
+    people = [
+        Student(name, {each: table.texts[each][row] for each in others}) for row, name in enumerate(column)
+    ]
+    files: dict[str, str] = {}
+    for person in people:
+        twin = files.setdefault(person.file.lower(), person.name)
+        if twin != person.name:
+            raise DataError(
+                f"{text}: column student: found '{twin}' and '{person.name}', expected names that make two file names"
+            )
+    return people
+
+
+def _show(result: Result, given: ShowOptions, asked: object) -> None:
+    """Say what was written; with --json the document with the key, with --expect its check."""
+    import typer
+
+    if given.json or given.expect is not None:
+        show(result, given, {})
+        return
+    for line in result.warnings:
+        typer.echo(f"warning: {line}", err=True)
+    typer.echo(result.notes(), nl=False)
+
+
+run = with_options(_run, OPTIONS, ("json", "expect", "rtol"), _show)

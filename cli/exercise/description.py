@@ -147,8 +147,8 @@ class _Place:
 
     file: str
 
-    def error(self, where: str, found: object, expected: str) -> DataError:
-        return DataError(f"{self.file}: {where}: found {quote(str(found))}, expected {expected}")
+    def error(self, where: str, value: object, expected: str) -> DataError:
+        return DataError(f"{self.file}: {where}: found {quote(str(value))}, expected {expected}")
 
     def known(self, table: object, keys: tuple[str, ...], where: str) -> None:
         """Refuse a key that means nothing."""
@@ -195,33 +195,33 @@ def _command(place: _Place, text: str) -> tuple[str, ...]:
 def _draws(place: _Place, table: object) -> Iterator[Draw]:
     if not isinstance(table, dict):
         raise place.error("[draw]", table, 'a table such as "links.crank.B.x" = "50mm:80mm:5mm"')
-    for name, given in table.items():
+    for name, entry in table.items():
         where = f"[draw], {name}"
-        if isinstance(given, dict):
+        if isinstance(entry, dict):
             raise place.error(
-                where, given, f'a path with dots stands in quotes: "{name}.…" = "50mm:80mm:5mm"'
+                where, entry, f'a path with dots stands in quotes: "{name}.…" = "50mm:80mm:5mm"'
             )
-        if isinstance(given, str):
-            values = _steps(place, where, given)
-        elif isinstance(given, list) and given:
-            values = [_value(place, where, each) for each in given]
+        if isinstance(entry, str):
+            values = _steps(place, where, entry)
+        elif isinstance(entry, list) and entry:
+            values = [_value(place, where, each) for each in entry]
         else:
-            raise place.error(where, given, 'steps such as "50mm:80mm:5mm" or a list such as ["5kg", "6kg"]')
+            raise place.error(where, entry, 'steps such as "50mm:80mm:5mm" or a list such as ["5kg", "6kg"]')
         if len({(value.number, value.unit) for value in values}) < len(values):
-            raise place.error(where, given, "each value once")
+            raise place.error(where, entry, "each value once")
         yield Draw(name, tuple(values))
 
 
-def _value(place: _Place, where: str, given: object) -> Value:
-    if isinstance(given, (int, float)) and not isinstance(given, bool):
-        text = str(given)
-    elif isinstance(given, str):
-        text = given.strip()
+def _value(place: _Place, where: str, entry: object) -> Value:
+    if isinstance(entry, (int, float)) and not isinstance(entry, bool):
+        text = str(entry)
+    elif isinstance(entry, str):
+        text = entry.strip()
     else:
-        raise place.error(where, given, 'a number with its unit, such as "5kg"')
+        raise place.error(where, entry, 'a number with its unit, such as "5kg"')
     value = value_of(text)
     if value is None:
-        raise place.error(where, given, 'a number with its unit, such as "5kg"')
+        raise place.error(where, entry, 'a number with its unit, such as "5kg"')
     return value
 
 
@@ -255,13 +255,13 @@ def _steps(place: _Place, where: str, text: str) -> list[Value]:
     return [Value(first.number + k * step.number, unit) for k in range(count)]
 
 
-def _asks(place: _Place, given: object) -> Iterator[Ask]:
-    if not isinstance(given, list) or not given:
+def _asks(place: _Place, entries: object) -> Iterator[Ask]:
+    if not isinstance(entries, list) or not entries:
         raise DataError(
             f'{place.file}: no [[ask]]: expected one or more, such as [[ask]] with quantity = "mass_kg", figures = 3'
         )
     seen = set()
-    for k, table in enumerate(given, 1):
+    for k, table in enumerate(entries, 1):
         where = f"[[ask]] {k}"
         place.known(table, ASK, where)
         quantity = table.get("quantity")
@@ -294,13 +294,13 @@ def _asks(place: _Place, given: object) -> Iterator[Ask]:
         yield ask
 
 
-def _where(place: _Place, where: str, given: object) -> dict[str, str]:
+def _where(place: _Place, where: str, entry: object) -> dict[str, str]:
     """Read the keys of a row: a table, or `plane=B,rotor=1`."""
-    if isinstance(given, str) and given.strip():
-        pairs = [part.partition("=") for part in given.split(",")]
+    if isinstance(entry, str) and entry.strip():
+        pairs = [part.partition("=") for part in entry.split(",")]
         if any(not sign for _, sign, _ in pairs):
-            raise place.error(f"{where}, key where", given, 'a row\'s keys, such as { plane = "B" }')
+            raise place.error(f"{where}, key where", entry, 'a row\'s keys, such as { plane = "B" }')
         return {name.strip(): value.strip() for name, _, value in pairs}
-    if not isinstance(given, dict) or any(isinstance(value, (dict, list, bool)) for value in given.values()):
-        raise place.error(f"{where}, key where", given, 'a row\'s keys, such as { plane = "B" }')
-    return {key: str(value) for key, value in given.items()}
+    if not isinstance(entry, dict) or any(isinstance(value, (dict, list, bool)) for value in entry.values()):
+        raise place.error(f"{where}, key where", entry, 'a row\'s keys, such as { plane = "B" }')
+    return {key: str(value) for key, value in entry.items()}

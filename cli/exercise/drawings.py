@@ -22,6 +22,7 @@ STROKES = {
     "frame": 'stroke="#444" stroke-width="1.2" fill="#eee"', "link": 'stroke="#1d4f91" stroke-width="3" fill="#1d4f9118"',
     "wheel": 'stroke="#6a3d9a" stroke-width="1.2" stroke-dasharray="9 3"', "spoke": 'stroke="#6a3d9a" stroke-width="1.2"',
     "slot": 'stroke="#1d4f91" stroke-width="1" fill="#fff"', "block": 'stroke="#1d4f91" stroke-width="1.6" fill="#dfe8f4"',
+    "cam": 'stroke="#1d4f91" stroke-width="1.6" fill="#1d4f9118"', "roller": 'stroke="#6a3d9a" stroke-width="1.2"',
     "spring": 'stroke="#444" stroke-width="1"', "mass": 'stroke="#666" stroke-width="1"',
     "pin": 'stroke="#000" stroke-width="1.2" fill="#fff"', "tip": 'stroke="#000" stroke-width="1.2" fill="#000"',
 }  # fmt: skip
@@ -157,10 +158,10 @@ def _inputs(variant: Variant, m: Mechanism) -> Any:
         return radians(first["input_deg"])
     if "input_m" in first:
         return first["input_m"]
-    given = first.get("inputs")
-    if isinstance(given, dict) and len(given) == len(m.inputs):
+    inputs = first.get("inputs")
+    if isinstance(inputs, dict) and len(inputs) == len(m.inputs):
         return [
-            radians(each["input_deg"]) if "input_deg" in each else each["input_m"] for each in given.values()
+            radians(each["input_deg"]) if "input_deg" in each else each["input_m"] for each in inputs.values()
         ]
     return m.at[0] if len(m.inputs) == 1 else list(m.at)
 

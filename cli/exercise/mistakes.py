@@ -1,25 +1,27 @@
-"""The slips of every question of a variant: of its terms, where the command has a sum of them, else by running it again."""
+"""The slips of every question of a variant: of the terms of its sum, where it is one, and of the data, by running the command again."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from functools import partial
 
-from cli.exercise import rotor_slips, work_slips
+from cli.exercise import motion_slips, rotor_slips, work_slips
 from cli.exercise.recomputed import Recomputed
-from cli.exercise.slips import Candidates
+from cli.exercise.slips import Candidates, joined
 from cli.exercise.variants import Variant
 
 PROVIDERS = {"work": work_slips.slips, "forces": work_slips.slips, "balance": rotor_slips.slips}
 
 
-def candidates(variant: Variant) -> list[Candidates]:
-    """Return the slips of every question of a variant."""
-    return list(_each(variant))
+def candidates(variant: Variant, again: Recomputed | None = None) -> list[Candidates]:
+    """Return the slips of every question of a variant; `again`: its runs with slips in the data."""
+    runs = again or Recomputed(variant)
+    return [_of_question(variant, k, runs) for k in range(len(variant.answers))]
 
 
-def _each(variant: Variant) -> Iterator[Candidates]:
+def _of_question(variant: Variant, k: int, runs: Recomputed) -> Candidates:
     provider = PROVIDERS.get(variant.problem.exercise.command[0])
-    again = Recomputed(variant)
-    for k, answer in enumerate(variant.answers):
-        result = None if provider is None else provider(variant, k)
-        yield Candidates(answer, again.slips(k)) if result is None else result
+    own = None if provider is None else provider(variant, k)
+    if own is not None:
+        return own
+    singles, pairs = motion_slips.slips(variant, k)
+    return Candidates(variant.answers[k], [*singles, *runs.slips(k)], joined([pairs, partial(runs.pairs, k)]))

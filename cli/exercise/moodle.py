@@ -81,8 +81,8 @@ def question_html(variant: Variant, candidates: Candidates, drawing: str) -> str
     """Return the text of a question: the problem, and what is asked."""
     answer = candidates.answer
     unit = unit_text(answer.unit)
-    asked = f"{label(answer.ask)}{f' in {unit}' if unit else ''}, {figures_text(answer.ask.figures)}"
-    return f"{problem_html(variant, drawing)}<p><b>Find: {html.escape(asked)}.</b></p>"
+    question = f"{label(answer.ask)}{f' in {unit}' if unit else ''}, {figures_text(answer.ask.figures)}"
+    return f"{problem_html(variant, drawing)}<p><b>Find: {html.escape(question)}.</b></p>"
 
 
 def accepted(candidates: Candidates) -> list[tuple[Decimal, Decimal]]:

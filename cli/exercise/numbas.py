@@ -77,7 +77,7 @@ def _part(own: Candidates) -> dict[str, object]:
     marks = float(answer.ask.points)
     (value, half), *others = accepted(own)
     unit = unit_text(answer.unit)
-    asked = f"{label(answer.ask)}{f' in {unit}' if unit else ''}, {figures_text(answer.ask.figures)}"
+    question = f"{label(answer.ask)}{f' in {unit}' if unit else ''}, {figures_text(answer.ask.figures)}"
     alternatives = [
         {
             **_number(at - room, at + room, marks),
@@ -96,7 +96,7 @@ def _part(own: Candidates) -> dict[str, object]:
     ]
     return {
         **_number(value - half, value + half, marks),
-        "prompt": content(f"<p>{html.escape(asked)}</p>"),
+        "prompt": content(f"<p>{html.escape(question)}</p>"),
         "alternatives": alternatives,
     }
 

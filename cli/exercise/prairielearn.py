@@ -124,11 +124,11 @@ def weights(exercise: Exercise) -> list[int]:
 def _question(exercise: Exercise) -> str:
     parts = ["<pl-question-panel>\n  {{{params.problem}}}\n</pl-question-panel>\n"]
     for k, (ask, weight) in enumerate(zip(exercise.asks, weights(exercise), strict=True), 1):
-        said = html.escape(f"{label(ask)}, {figures_text(ask.figures)}")
+        caption = html.escape(f"{label(ask)}, {figures_text(ask.figures)}")
         unit = html.escape(unit_text(ask.unit or _unit(exercise, k - 1)))
         suffix = f' suffix="{unit}"' if unit else ""
         parts.append(
-            f"<p>{said}:</p>\n"
+            f"<p>{caption}:</p>\n"
             f'<pl-number-input answers-name="answer{k}" comparison="relabs" rtol="0" '
             f'atol="{{{{params.answer{k}.tolerance}}}}" weight="{weight}"{suffix} show-help-text="false"></pl-number-input>\n'
         )

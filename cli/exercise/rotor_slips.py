@@ -19,6 +19,7 @@ from dalembert.units import parted, unit_name
 
 Complexes = NDArray[np.complex128]
 Real = NDArray[np.float64]
+Range = tuple[float, float]
 
 
 @dataclass(eq=False, repr=False)
@@ -192,14 +193,12 @@ def _final(own: Rotor, kind: str, p: int, answer: Answer, right: complex) -> Ite
     yield Slip("the answer is ten times too small", value / 10)
 
 
-def carried(
-    variant: Variant, number: int, given: Mapping[int, tuple[float, float]]
-) -> tuple[float, float] | None:
-    """Return the range of the answer that follows from earlier answers as they were given, in its unit.
+def carried(variant: Variant, number: int, typed: Mapping[int, tuple[float, float]]) -> Range | None:
+    """Return the range of the answer that follows from earlier answers as they were typed, in its unit.
 
     Parameters
     ----------
-    given
+    typed
         Of earlier questions by their number: the value typed, in the unit asked for, and half a unit of its last digit.
     """
     answer = variant.answers[number]
@@ -210,11 +209,11 @@ def carried(
     here = answer.ask.where.get("plane", own.planes[0])
     p = list(own.planes).index(here)
     same = {
-        kind_of(variant.answers[k]): pair for k, pair in given.items()
+        kind_of(variant.answers[k]): pair for k, pair in typed.items()
         if _plane(variant.answers[k], own) == here and _rotor(variant.answers[k]) == _rotor(answer)
     }  # fmt: skip
     other = {
-        kind_of(variant.answers[k]): (variant.answers[k], pair) for k, pair in given.items()
+        kind_of(variant.answers[k]): (variant.answers[k], pair) for k, pair in typed.items()
         if _plane(variant.answers[k], own) not in (here, None) and _rotor(variant.answers[k]) == _rotor(answer)
     }  # fmt: skip
     right = own.corrections[p]
@@ -224,7 +223,7 @@ def carried(
             if earlier != kind and earlier in same:
                 k = next(
                     k
-                    for k in given
+                    for k in typed
                     if kind_of(variant.answers[k]) == earlier and _plane(variant.answers[k], own) == here
                 )
                 share = answer.value / variant.answers[k].value
@@ -245,16 +244,19 @@ def carried(
     # what the other plane leaves of the forces
     made = right - (u - own.corrections[q])
     if kind == "angle":
-        middle = degrees(made[len(made) // 2 : len(made) // 2 + 1])
-        off = np.remainder(degrees(made) - middle + 180.0, 360.0) - 180.0
-        low, high = float(middle[0] + off.min()), float(middle[0] + off.max())
-        return (
-            (low, high)
-            if unit_name(answer.unit) == "deg"
-            else (float(np.radians(low)), float(np.radians(high)))
-        )
+        return polar_range(made, answer)
     values = np.abs(made) * (answer.value / abs(right))
     return float(values.min()), float(values.max())
+
+
+def polar_range(made: Complexes, answer: Answer) -> Range:
+    """Return the range of the angles of vectors, about that in the middle, in the unit of the answer."""
+    middle = degrees(made[len(made) // 2 : len(made) // 2 + 1])
+    off = np.remainder(degrees(made) - middle + 180.0, 360.0) - 180.0
+    low, high = float(middle[0] + off.min()), float(middle[0] + off.max())
+    return (
+        (low, high) if unit_name(answer.unit) == "deg" else (float(np.radians(low)), float(np.radians(high)))
+    )
 
 
 def _plane(answer: Answer, own: Rotor) -> str | None:

@@ -47,6 +47,28 @@ class Pairs:
     """Where one of the two is a sign."""
 
 
+def joined(every: Sequence[Callable[[], Pairs | None]]) -> Callable[[], Pairs | None]:
+    """Put pairs of several kinds together, the likelier kind first; they are formed on request."""
+
+    def pairs() -> Pairs | None:
+        made = [each for one in every if (each := one()) is not None]
+        if not made:
+            return None
+        starts = np.cumsum([0, *(len(each.values) for each in made)])
+
+        def text(k: int) -> str:
+            of = int(np.searchsorted(starts, k, side="right")) - 1
+            return made[of].texts(k - int(starts[of]))
+
+        return Pairs(
+            np.concatenate([each.values for each in made]),
+            text,
+            np.concatenate([each.likely for each in made]),
+        )
+
+    return pairs
+
+
 @dataclass(eq=False, repr=False)
 class Candidates:
     """The slips of one question."""

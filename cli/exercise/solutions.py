@@ -5,8 +5,6 @@ from __future__ import annotations
 import html
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
-from typing import Any
 
 from cli.exercise.answers import unit_text
 from cli.exercise.description import Exercise
@@ -14,7 +12,6 @@ from cli.exercise.sheets import Student, label, page, problem_html
 from cli.exercise.variants import Variant
 from cli.show.commands import ShowOptions
 from cli.show.report import html_part, report
-from cli.show.taking import options_of
 from dalembert.figures import written
 
 STYLE = """
@@ -52,7 +49,7 @@ def _solution(variant: Variant, names: Sequence[str], drawing: str) -> Iterator[
         '<h3>Answers</h3><div class="wide"><table><thead><tr><th>quantity</th><th>answer</th><th>unit</th>'
         f"<th>unrounded</th></tr></thead><tbody>{rows}</tbody></table></div>\n"
     )
-    result = _worked(variant)
+    result = variant.worked.result
     with result.within():
         # the way, where there is one, has what the tables have
         shown = (
@@ -61,20 +58,8 @@ def _solution(variant: Variant, names: Sequence[str], drawing: str) -> Iterator[
             else replace(result, shows_input=True)
         )
         for each in report(shown, ShowOptions(), {}, None).pages:
-            for name, found in each.sections:
+            for name, parts in each.sections:
                 yield f"<h3>{html.escape(name)}</h3>\n"
-                yield from map(html_part, found)
+                yield from map(html_part, parts)
     if result.method:
         yield f'<p class="small">{html.escape(result.method)}</p>\n'
-
-
-@cache
-def _has_steps(command: str) -> bool:
-    return "--steps" in options_of(command)
-
-
-def _worked(variant: Variant) -> Any:
-    """The result with its way, where the command can show it."""
-    if not _has_steps(variant.problem.exercise.command[0]):
-        return variant.solved.result
-    return variant.problem.result("--steps").result

@@ -206,9 +206,9 @@ class Workshop:
         from dalembert.units import LISTED, from_si
         from virtualwork.describe.dimensions import value
 
-        said = self._written(name)
-        if said is not None:
-            return said
+        text = self._written(name)
+        if text is not None:
+            return text
         m, bare, *_ = self.described
         kind = self.dimensions[name].kind
         unit = {"length": bare.get("length", "m"), "angle": bare.get("angle", "deg")}.get(kind)
@@ -369,6 +369,6 @@ class Problem:
             text = str(error).replace(f"{self.place}/", "")
             raise DataError(f"{self.exercise.file}: key command: {text}") from None
         if failed:
-            said = f": {result.warnings[0]}" if result.warnings else ""
-            raise DataError(f"{self.exercise.file}: key command: no case of it can be solved{said}")
+            reason = f": {result.warnings[0]}" if result.warnings else ""
+            raise DataError(f"{self.exercise.file}: key command: no case of it can be solved{reason}")
         return Solved(self.exercise, tables, document, result)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import cached_property
 from math import isfinite, prod, radians, remainder
 from random import Random
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 from cli.exercise.answers import Answer, Solved
 from cli.exercise.description import Exercise, Value
 from cli.exercise.solving import Problem, Workshop
+from cli.show.taking import options_of
 from dalembert.errors import DataError
 from dalembert.figures import Right
 from dalembert.units import unit_name
@@ -43,6 +45,13 @@ class Variant:
     def answers(self) -> list[Answer]:
         """The right answers, in the order of the questions."""
         return self.solved.answers
+
+    @cached_property
+    def worked(self) -> Solved:
+        """The result with its worked solution, where the command has one."""
+        if "--steps" not in options_of(self.problem.exercise.command[0]):
+            return self.solved
+        return self.problem.result("--steps")
 
 
 def variants(workshop: Workshop, count: int, seed: int, warnings: list[str]) -> list[Variant]:

@@ -56,7 +56,7 @@ def _ledger(variant: Variant, answer: Answer) -> tuple[list[Term], float] | None
     else:
         if not answer.ask.quantity.startswith(("input_torque", "input_force", "virtual_work")):
             return None
-        way = _way(variant)
+        way = way_of(variant)
         ledger = next((topic for topic in way if topic.get("topic") == "ledger"), {})
         found = _instant(ledger.get("poses"), "input_deg", answer.ask.where)
     if found is None:
@@ -75,12 +75,9 @@ def _ledger(variant: Variant, answer: Answer) -> tuple[list[Term], float] | None
     return (terms, unknown[0]) if len(unknown) == 1 else None
 
 
-def _way(variant: Variant) -> Sequence[Mapping[str, Any]]:
-    from cli.show.taking import options_of
-
-    if "--steps" not in options_of(variant.problem.exercise.command[0]):
-        return ()
-    way: Any = variant.problem.result("--steps").document.get("way")
+def way_of(variant: Variant) -> Sequence[Mapping[str, Any]]:
+    """Return the worked solution as JSON has it; empty where the command has none."""
+    way: Any = variant.worked.document.get("way")
     return way or ()
 
 

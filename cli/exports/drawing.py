@@ -26,7 +26,7 @@ LAYERS = {
     "GROUND": (8, "#777777", "hatch frame"),
     "GUIDES": (3, "#1c8a3c", "rail slot block"),
     "LINKS": (5, "#1f4fd8", "link"),
-    "GEARS": (6, "#8e24aa", "wheel spoke belt rack"),
+    "GEARS": (6, "#8e24aa", "wheel spoke belt rack cam roller"),
     "SPRINGS": (30, "#d2691e", "spring"),
     "MASSES": (2, "#b8860b", "mass"),
     "CURVES": (1, "#c62828", ""),
@@ -100,7 +100,7 @@ def _run(z: Complexes) -> Line:
     return Line("CURVES", GROUND, tuple((z[:-1] if closed else z).tolist()), closed)
 
 
-def svg(drawing: Drawing, said: str, millimetres: float) -> bytes:
+def svg(drawing: Drawing, comment: str, millimetres: float) -> bytes:
     """Return the drawing as SVG, in its true size; `millimetres` are one of its unit."""
     low, high = drawing.extent()
     extent = max(high.real - low.real, high.imag - low.imag) or 1.0
@@ -127,10 +127,10 @@ def svg(drawing: Drawing, said: str, millimetres: float) -> bytes:
         else:
             text = add(into, "text", s.text, x=s.at.real, y=-s.at.imag)
             text.set("font-size", digits(s.height))
-    return document(root, said)
+    return document(root, comment)
 
 
-def dxf(drawing: Drawing, said: str) -> bytes:
+def dxf(drawing: Drawing, comment: str) -> bytes:
     """Return the drawing as DXF (AutoCAD 2010), by ezdxf."""
     try:
         from ezdxf.filemanagement import new
@@ -155,4 +155,4 @@ def dxf(drawing: Drawing, said: str) -> bytes:
     text = io.StringIO()
     made.write(text)
     # 999: a comment, which every reader skips
-    return f"999\n{said}\n{text.getvalue()}".encode()
+    return f"999\n{comment}\n{text.getvalue()}".encode()

@@ -37,11 +37,11 @@ def comment(text: str) -> str:
     return f"<!-- {re.sub('-(?=-|$)', '- ', FORBIDDEN.sub('_', text))} -->"
 
 
-def document(root: Element, said: str) -> bytes:
+def document(root: Element, source: str) -> bytes:
     """Return the file."""
     for element in root.iter():
         element.attrib = {k: FORBIDDEN.sub("_", v) for k, v in element.attrib.items()}
         element.text = element.text and FORBIDDEN.sub("_", element.text)
     indent(root)
     body = tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{comment(said)}\n{body}\n'.encode()
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{comment(source)}\n{body}\n'.encode()

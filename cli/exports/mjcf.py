@@ -13,7 +13,7 @@ PLURAL = {"gear": "gears", "belt": "belt", "rack": "rack"}
 LIGHTEST = 2e-15
 
 
-def mjcf(s: Skeleton, travel: Travel, said: str) -> bytes:
+def mjcf(s: Skeleton, travel: Travel, comment: str) -> bytes:
     """Return the file of a mechanism."""
     m = s.m
     root = Element("mujoco", model=m.name or "mechanism")
@@ -61,7 +61,7 @@ def mjcf(s: Skeleton, travel: Travel, said: str) -> bytes:
             motor.set("ctrlrange", digits(-travel.peak, travel.peak))
     root.extend(e for e in (equality, tendon, actuator) if len(e))
     _key(s, add(root, "keyframe"))
-    return document(root, said)
+    return document(root, comment)
 
 
 def _fixed(tendon: Element, name: str, terms: dict[str, float]) -> Element:

@@ -15,7 +15,7 @@ PLUGIN = {"filename": "gz-sim-joint-controller-system", "name": "gz::sim::system
 AXES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
-def sdf(s: Skeleton, travel: Travel, said: str) -> bytes:
+def sdf(s: Skeleton, travel: Travel, comment: str) -> bytes:
     """Return the file of a mechanism."""
     m = s.m
     root = Element("sdf", {"version": "1.9", "xmlns:dalembert": SPACE})
@@ -31,7 +31,7 @@ def sdf(s: Skeleton, travel: Travel, said: str) -> bytes:
     welds(model, s)
     gearboxes(model, (*m.gears, *m.belts), WORLD)
     plugins(model, s)
-    return document(root, said)
+    return document(root, comment)
 
 
 def at(element: Element, z: complex, turn: float = 0.0) -> None:

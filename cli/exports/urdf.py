@@ -14,7 +14,7 @@ from virtualwork.describe.parts import GROUND, Belt, Gear, Rack
 LARGE = 1e9
 
 
-def urdf(s: Skeleton, travel: Travel, said: str) -> bytes:
+def urdf(s: Skeleton, travel: Travel, comment: str) -> bytes:
     """Return the file of a mechanism."""
     root = Element("robot", name=s.m.name or "mechanism")
     # where each link's axes begin: at the joint on which it hangs, in its own axes of the mechanism's file
@@ -36,7 +36,7 @@ def urdf(s: Skeleton, travel: Travel, said: str) -> bytes:
     sdf.plugins(gazebo, s)
     if len(gazebo):
         root.append(gazebo)
-    return document(root, said)
+    return document(root, comment)
 
 
 def _link(s: Skeleton, root: Element, part: Part, origin: complex) -> None:

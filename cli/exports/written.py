@@ -30,7 +30,7 @@ def written(
     if suffix == ".csv":
         return _curves(travel, length, metres, bare.get("angle", "rad")), []
     s = Skeleton(m, inputs, travel.limits)
-    said = _said(m, inputs, file)
+    comment = _said(m, inputs, file)
     if suffix in (".dxf", ".svg"):
         if length not in DXF_UNITS:
             length, metres = "m", 1.0
@@ -41,14 +41,14 @@ def written(
             else ["curves are left out: they need one input, and it has several"]
         )
         if suffix == ".svg":
-            return svg(drawing, said, metres * 1000), notes
-        return dxf(drawing, said), notes
+            return svg(drawing, comment, metres * 1000), notes
+        return dxf(drawing, comment), notes
     from cli.exports.mjcf import mjcf
     from cli.exports.sdf import sdf
     from cli.exports.urdf import urdf
 
     write: Callable[[Skeleton, Travel, str], bytes] = {".xml": mjcf, ".sdf": sdf, ".urdf": urdf}[suffix]
-    return write(s, travel, said), _left_out(s, suffix)
+    return write(s, travel, comment), _left_out(s, suffix)
 
 
 def _said(m: Mechanism, inputs: tuple[float, ...], file: str) -> str:
@@ -96,6 +96,8 @@ def _left_out(s: Skeleton, suffix: str) -> list[str]:
     ):
         if loads and not (suffix == ".xml" and "springs" in what):
             result.append(f"{what} are left out: {len(loads)}")
+    if m.cams:
+        result.append(f"cams are left out: {len(m.cams)}: the format has no such joint")
     if m.racks and suffix == ".sdf":
         result.append(f"racks are left out: {len(m.racks)}: the format has no such joint")
     light = [name for name, part in s.parts.items() if part.mass <= 0 and name in m.links]

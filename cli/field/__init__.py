@@ -1,1 +1,299 @@
 """`dalembert field`: rotors whose vibration was measured, with trial masses."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from cli.read import options
+from cli.show.commands import suffix_among
+from cli.show.output import command
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from types import ModuleType
+
+    from matplotlib.figure import Figure
+
+    from cli.field.field_balancing import FieldBalancing
+    from cli.field.tables import Tables
+    from cli.show.result import Result, Sheet
+    from dalembert.results.columns import Column, Table
+    from dalembert.results.way import Topic
+
+
+EXAMPLE = "fan-one-plane"
+FEWEST_DRAWS = 40  # they give a standard deviation to a ninth
+OPTIONS = """
+Arguments:
+  runs RUNS  CSV of runs; - is standard input.
+What:
+  influence FILE.csv  Stored coefficients, in place of trial runs.
+  runout FILE.csv  Run-out vectors: sensor, amplitude_*, phase_deg.
+  phase_lag  The instrument's phase lags.
+How:
+  objective  Smallest squares or largest residual.
+  max_mass [PLANE=]MASS  Limit of each correction: 5g or A=5g.
+  max_residual AMPLITUDE  Limit of each residual, such as 76um.
+  from_here  Correct the rotor as it stands now.
+  reading_error 2%,2deg  Standard deviations of amplitude, phase.
+  grade GRADE  Tolerance: G6.3 (ISO 21940-11), API or MIL.
+  blades N  Split onto N places, evenly spaced.
+  save_influence FILE.csv  Store the coefficients.
+  page FILE.html  Write the machine's sheet: readings are typed in, corrections come out.
+Further options (docs/commands.md describes them):
+  fit  Fit all runs, even where few are needed.
+  predict MASS@ANGLE,…  Predict a run: 10kg@-90deg or A=1g@0deg.
+  columns FILE.toml  Read columns by other headers: lines such as mass_g = "Masse", as --column has them.
+  rotation  Direction of rotation seen against +z: phases lead in that direction, mass angles are ccw.
+  exclude RUN  Leave a run out of the fit; repeatable.
+  method  By influence coefficients, or by amplitudes only (an initial run, then three trial runs in each plane).
+  monte_carlo N  Uncertainties from N drawn sets of readings, 40 at least.
+  ridge NUMBER  Damp the corrections of nearly dependent planes, such as 0.1.
+  robust  In addition to the fit a robust one, on which outliers have little influence (Huber).
+  speed SPEED  Highest service speed, such as 3000rpm, for --grade.
+  rotor_mass MASS  Mass of the rotor, such as 120kg, for --grade.
+  permissible UNBALANCE  Permissible residual unbalance in place of a grade.
+  radius LENGTH  Radius of the trial masses, for the tolerance.
+  positions ANGLES  Split the corrections onto these places: 0deg,30deg,60deg.
+  first ANGLE  Angle of the first of --blades.
+  numbering  Whether the blades are numbered in the angles' sense or against it.
+  suggest  Suggest the next run within --max-mass that tells most about the corrections.
+  view  static-couple: the corrections of two planes as a static part and a couple.
+  zone_class  Zone A to D of ISO 10816-3 for velocities: group 1 (above 300 kW) or 2 (15 to 300 kW), rigid or flexible support.
+  workers N  Processes that solve many machines.
+Moved:
+  signal  Now dalembert signal.
+  pulses  Now dalembert signal.
+  suggest_trial  Now dalembert trial.
+  planes  Now dalembert trial.
+"""
+MOVED = {
+    "signal": "dalembert signal FILE.csv",
+    "pulses": "dalembert signal FILE.csv --pulses N",
+    "suggest_trial": "dalembert trial --rotor-mass MASS --speed SPEED --radius LENGTH",
+    "planes": "dalembert trial --planes N",
+}
+
+
+@command(OPTIONS)
+def run(
+    runs: Annotated[str | None, typer.Argument(show_default=False)] = None,
+    influence: list[str] | None = None,
+    save_influence: Annotated[Path | None, typer.Option(callback=suffix_among(".csv"))] = None,
+    objective: Literal["least-squares", "minimax"] = "least-squares",
+    max_mass: list[str] | None = None,
+    max_residual: str | None = None,
+    from_here: bool = False,
+    runout: str | None = None,
+    reading_error: str | None = None,
+    monte_carlo: Annotated[int, typer.Option(min=0, max=100000)] = 0,
+    method: Literal["influence", "four-run"] = "influence",
+    ridge: Annotated[float, typer.Option(min=0.0)] = 0.0,
+    phase_lag: bool = False,
+    rotation: Literal["ccw", "cw"] | None = None,
+    grade: str | None = None,
+    speed: str | None = None,
+    rotor_mass: str | None = None,
+    permissible: str | None = None,
+    radius: str | None = None,
+    blades: Annotated[int | None, typer.Option(min=1, max=options.PLACES)] = None,
+    positions: str | None = None,
+    first: str = "0deg",
+    numbering: Literal["with", "against"] = "with",
+    fit: bool = False,
+    exclude: list[str] | None = None,
+    predict: str | None = None,
+    suggest: bool = False,
+    robust: bool = False,
+    view: Literal["static-couple"] | None = None,
+    zone_class: Literal["1-rigid", "1-flexible", "2-rigid", "2-flexible"] | None = None,
+    columns: str | None = None,
+    workers: Annotated[int, typer.Option(min=1)] = 1,
+    page: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None,
+    signal: Annotated[str | None, typer.Option(hidden=True)] = None,
+    pulses: Annotated[str | None, typer.Option(hidden=True)] = None,
+    suggest_trial: Annotated[bool, typer.Option(hidden=True)] = False,
+    planes: Annotated[str | None, typer.Option(hidden=True)] = None,
+) -> Result:
+    """Balance rotors from measured vibration and trial masses (influence coefficients).
+
+    RUNS has a row for each run and sensor: run, sensor, amplitude_*, phase_deg, trial_plane, trial_mass_* (or
+    trial_unbalance_*), trial_angle_deg, trial_kept (yes: it stays on). In the initial run the last four are empty. Phase
+    and mass angle are counted in one sense. docs/field-balancing.md has more.
+    """
+    old = {"signal": signal, "suggest_trial": suggest_trial, "pulses": pulses, "planes": planes}
+    for name in options.given(**old):
+        raise options.bad(name, f"is a command of its own: {MOVED[name[2:].replace('-', '_')]}")
+    if columns is not None:
+        from dalembert.tables.headers import rename_from
+
+        rename_from(columns)
+    four_run = method == "four-run"
+    needs_phase: dict[str, object] = {"influence": influence, "runout": runout}
+    needs_phase |= {"reading_error": reading_error, "phase_lag": phase_lag, "rotation": rotation}
+    limited = objective == "minimax" or max_mass or max_residual is not None
+    options.refuse("expected a finite number", ridge=not ridge < float("inf"))
+    options.refuse("goes with the least-squares objective without limits", ridge=ridge and limited)
+    if four_run:
+        options.refuse("has no meaning with --method four-run, which uses no phase", **needs_phase)
+    no_trials = "has no meaning with --influence: there are no trial masses"
+    options.refuse(no_trials, from_here=from_here and influence)
+    options.refuse("needs --reading-error", monte_carlo=monte_carlo and reading_error is None)
+    if 0 < monte_carlo < FEWEST_DRAWS:
+        spread = 100 / (2 * monte_carlo) ** 0.5
+        few = f"{monte_carlo} drawn set{'s' * (monte_carlo > 1)} of readings give a standard deviation to {spread:.0f} % only"
+        raise options.bad("--monte-carlo", f"{few}: expected {FEWEST_DRAWS} at least")
+    arm = options.quantity("--radius", radius, "length", positive=True)
+    if runs is None:
+        raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
+
+    from cli.field import request as read
+    from cli.field.field_balancing import FieldBalancing
+    from cli.field.reading import read_measured
+    from cli.read.tolerance import tolerance_of
+
+    request = read.Request(
+        reading_error=read.reading_error(reading_error),
+        tolerance=tolerance_of(grade, speed, rotor_mass, permissible, None),
+        max_mass=read.limits(max_mass or []),
+        max_residual=options.with_unit("--max-residual", max_residual, "amplitude", positive=True),
+        objective=objective,
+        from_here=from_here,
+        monte_carlo=monte_carlo,
+        four_run=four_run,
+        ridge=ridge,
+        radius=arm,
+        phase_lag=phase_lag,
+        rotation=rotation,
+        places=options.places(positions, blades, first, numbering),
+        fit=fit,
+        exclude=exclude or (),
+        predict=predict,
+        suggest=suggest,
+        robust=robust,
+        view=view,
+        zone_class=zone_class,
+    )
+    measured, stored = read_measured(runs, request, influence or (), runout)
+    with options.processes(workers) as executor:
+        balancing = FieldBalancing(measured, request, stored, executor)
+    return _result(balancing, save_influence, page)
+
+
+def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -> Result:
+    from cli.field.doubts import warnings
+    from cli.field.rows import latest
+    from cli.field.tables import METHOD, sense
+    from cli.show.result import Result
+
+    if b.runs.fitted:
+        from cli.field.fits import check
+
+        check(b)
+    remarks = warnings(b)
+    day = latest(b.runs.table)
+    tables = _tables(b, remarks)
+
+    def stored() -> bytes:
+        from dalembert.results.text import csv_text
+
+        return csv_text(tables["influence"]().cells).encode()
+
+    def sheets() -> Iterator[Sheet]:
+        from cli.field.report import sheets
+
+        return sheets(b, tables)
+
+    def figure() -> Figure:
+        from cli.field.picture import draw
+
+        return draw(b, range(min(len(b.runs.rotors), 3)))
+
+    def way() -> list[Topic]:
+        from cli.field.way import way
+
+        return way(b)
+
+    def aside() -> list[str]:
+        if b.predict is None:
+            return []
+        from cli.field.fits import prediction_lines
+
+        return prediction_lines(b)
+
+    beside: dict[Path, Callable[[], bytes]] = {} if save_influence is None else {save_influence: stored}
+    if page is not None:
+        from cli.field.page import sheet
+
+        html = sheet(b).html.encode()
+        beside[page] = lambda: html
+    return Result(
+        tables=tables,
+        head={
+            "correction": "add",
+            "state": "as it stands" if b.request.from_here else "initial",
+            "convention": sense(b),
+            "amplitude_unit": b.runs.amplitude_unit,
+        },
+        aside=aside,
+        companions=[name for name in ("prediction", "split", "predict", "zones") if name in tables],
+        figure=figure,
+        method=METHOD,
+        sheets=sheets,
+        shows_input=True,
+        about={"title": "Balancing in the field"} | ({} if day is None else {"date": day}),
+        way=way,
+        beside=beside,
+        warnings=remarks,
+    )
+
+
+def _tables(b: FieldBalancing, warnings: list[str]) -> Tables:
+    """The tables of a result, the CSV's first. `warnings` takes in why --digits leaves a correction whole."""
+    from cli.field import tables as of
+
+    def influence() -> Table:
+        # loaded where it is asked for
+        from cli.field.coefficients import coefficients
+
+        return coefficients(b)
+
+    fits: Tables = {}
+    further: list[Column] = []
+    if b.runs.fitted:
+        from cli.field.fits import tables, unsuggested
+
+        fits = tables(b)
+        further = [unsuggested(b)] if b.request.suggest else []
+    made: Tables = {
+        "corrections": cache(lambda: of.corrections(b, warnings)),
+        "influence": influence,
+        "prediction": lambda: of.prediction(b),
+    }
+    if b.request.places is not None:
+        made |= {"split": lambda: of.split(b), "trim_split": lambda: of.trim_split(b)}
+    made |= {
+        "trim": lambda: of.trim(b),
+        "standing": lambda: of.standing(b),
+        "rotors": lambda: of.rotors(b, further),
+    }
+    if b.request.tolerance is not None:
+        made["tolerance"] = lambda: _limits().tolerance(b)
+    if b.request.zone_class is not None:
+        made["zones"] = lambda: _limits().zones(b)
+    if b.request.four_run:
+        made |= {"misfit": lambda: of.misfit(b), "alternatives": lambda: of.alternatives(b)}
+    if b.request.view is not None:
+        made |= {"static": lambda: of.static_couple(b, 0), "couple": lambda: of.static_couple(b, 1)}
+    return {**made, **fits}
+
+
+def _limits() -> ModuleType:
+    """What is held against limits, loaded where it is asked for."""
+    from cli.field import limits
+
+    return limits

@@ -23,9 +23,9 @@ def near_speeds(table: Table, rotor: Rows) -> tuple[list[Channel], Rows]:
     speed = table.numbers.get("speed")
     if speed is None:
         return [Channel(one, None, state=of) for one, of in kinds], kind
-    given, si = speed.values, speed.si
+    written, si = speed.values, speed.si
     of_rotor = numbered(rotor * len(kinds) + kind)[0]
-    value = np.where(np.isnan(given), -np.inf, given)
+    value = np.where(np.isnan(written), -np.inf, written)
     near, left, many = np.zeros(table.rows, dtype=np.intp), np.arange(table.rows), int(of_rotor.max()) + 1
     while len(left):
         slowest = np.full(many, np.inf)
@@ -36,15 +36,15 @@ def near_speeds(table: Table, rotor: Rows) -> tuple[list[Channel], Rows]:
         left = left[~inside]
     number, first = numbered(near + of_rotor)
     count = np.bincount(number)
-    means = [np.bincount(number, of) / count for of in (given, np.asarray(si))]
+    means = [np.bincount(number, of) / count for of in (written, np.asarray(si))]
     alike = np.ones(len(first), dtype=bool)
     np.logical_and.at(alike, number, value == value[first[number]])
     out: dict[Channel, int] = {}
     code = []
     for k, i in enumerate(first.tolist()):
         one, of = kinds[kind[i]]
-        mean = (given[i], si[i]) if alike[k] else (means[0][k], means[1][k])
-        none = given[i] != given[i]
+        mean = (written[i], si[i]) if alike[k] else (means[0][k], means[1][k])
+        none = written[i] != written[i]
         channel = Channel(one, None if none else float(mean[1]), None if none else float(mean[0]), state=of)
         code.append(out.setdefault(channel, len(out)))
     return list(out), np.array(code)[number]
@@ -69,13 +69,13 @@ class OfInitialRun:
             if missing.any():
                 raise self._not_there(int(np.argmax(missing)), sensors, sensor, initial, channels, sensor)
             return channels, sensor
-        given, si = speed.values, np.asarray(speed.si)
+        written, si = speed.values, np.asarray(speed.si)
         out: dict[Channel, int] = {}
         exact: dict[tuple[int, float | None], int] = {}
         of: dict[int, list[int]] = {}
         code = np.full(table.rows, -1)
         for i in np.flatnonzero(initial).tolist():
-            value = None if given[i] != given[i] else float(given[i])
+            value = None if written[i] != written[i] else float(written[i])
             channel = Channel(sensors[sensor[i]], None if value is None else float(si[i]), value)
             code[i] = out.setdefault(channel, len(out))
             if exact.setdefault((int(of_sensor[i]), value), code[i]) == code[i]:
@@ -83,13 +83,15 @@ class OfInitialRun:
                 mine += [] if code[i] in mine else [int(code[i])]
         channels = list(out)
         for i in np.flatnonzero(~initial).tolist():
-            value = None if given[i] != given[i] else float(given[i])
-            found = exact.get((int(of_sensor[i]), value))
-            if found is None:
-                found = self._nearest(i, given[i], [(c, channels[c]) for c in of.get(int(of_sensor[i]), ())])
-            if found is None:
+            value = None if written[i] != written[i] else float(written[i])
+            match = exact.get((int(of_sensor[i]), value))
+            if match is None:
+                match = self._nearest(
+                    i, written[i], [(c, channels[c]) for c in of.get(int(of_sensor[i]), ())]
+                )
+            if match is None:
                 raise self._not_there(i, sensors, sensor, initial, channels, code)
-            code[i] = found
+            code[i] = match
         return channels, code
 
     def _nearest(self, row: int, speed: float, same: list[tuple[int, Channel]]) -> int | None:
@@ -109,9 +111,9 @@ class OfInitialRun:
         self, row: int, sensors: list[str], sensor: Rows, initial: Flags, channels: list[Channel], code: Rows
     ) -> DataError:
         mine = np.flatnonzero(initial & (self.rotor == self.rotor[row]))
-        known = ", ".join(dict.fromkeys(str(channels[code[i]]) for i in mine.tolist()))
+        present = ", ".join(dict.fromkeys(str(channels[code[i]]) for i in mine.tolist()))
         speed = self.table.numbers.get("speed")
         name = sensors[sensor[row]]
         at = np.nan if speed is None else speed.values[row]
         what = name if at != at else f"{name} at {at:g}"
-        return self.table.error(row, "sensor", what, f"a sensor and speed of the initial run ({known})")
+        return self.table.error(row, "sensor", what, f"a sensor and speed of the initial run ({present})")

@@ -60,7 +60,7 @@ def _spread(fit: JointFit, errors: Errors) -> Spread | None:
         return None
     size = np.sqrt(np.diagonal(shared, axis1=-2, axis2=-1).real)
     both = size[..., :, None] * size[..., None, :]
-    known = np.isfinite(errors.degrees_of_freedom)
+    finite = np.isfinite(errors.degrees_of_freedom)
     square = np.where(fit.present, np.square(errors.along) + np.square(errors.across), 0.0)
     sd = np.sqrt(square.sum(axis=(-2, -1)) / fit.present.sum(axis=(-2, -1)))
     return Spread(
@@ -68,7 +68,7 @@ def _spread(fit: JointFit, errors: Errors) -> Spread | None:
         np.sqrt(covariance[..., 1, 1]),
         np.where(both > 0, shared / np.where(both > 0, both, 1.0), 0.0),
         sd,
-        np.where(known, errors.degrees_of_freedom, np.inf),
+        np.where(finite, errors.degrees_of_freedom, np.inf),
     )
 
 
@@ -112,13 +112,13 @@ def coefficients(b: FieldBalancing) -> Table:
 
 def _errors(b: FieldBalancing, rows: Rows, size: Real) -> list[Column]:
     """Return the columns that say how well the coefficients are known; none where nothing tells."""
-    known = {id(solved): spread(b, solved) for solved in b.solved}
-    if not any(of is not None for of in known.values()):
+    spreads = {id(solved): spread(b, solved) for solved in b.solved}
+    if not any(of is not None for of in spreads.values()):
         return []
 
     def cells(of: Callable[[Spread], ArrayLike]) -> Any:
         def of_group(solved: Solved) -> ArrayLike:
-            one = known[id(solved)]
+            one = spreads[id(solved)]
             empty = np.full(solved.alpha.shape, None, dtype=object)
             return empty if one is None else np.broadcast_to(np.asarray(of(one)), solved.alpha.shape)
 

@@ -1,4 +1,4 @@
-"""What is said of a balancing in the field as warnings."""
+"""Warnings about a balancing in the field."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from cli.field.runs import SHOWN, Group
 from cli.field.solution import Solved
 from dalembert.angles import degrees
 
-NEARLY = 0.1  # a plane whose effect others bring about but for this share is said to be nearly dependent
+NEARLY = 0.1  # a plane whose effect others bring about but for this share counts as nearly dependent
 
 
-def warnings(found: FieldBalancing) -> list[str]:
+def warnings(balancing: FieldBalancing) -> list[str]:
     """What was done otherwise than a reader might think, each once."""
-    said = (sentence for solved in found.solved for sentence in _remarks(found, solved))
-    fits = _fits(found) if found.runs.fitted else ()
-    return [*dict.fromkeys([*found.runs.warnings, *found.warnings, *said]), *fits]
+    sentences = (sentence for solved in balancing.solved for sentence in _remarks(balancing, solved))
+    fits = _fits(balancing) if balancing.runs.fitted else ()
+    return [*dict.fromkeys([*balancing.runs.warnings, *balancing.warnings, *sentences]), *fits]
 
 
 def _remarks(found: FieldBalancing, solved: Solved) -> Iterator[str]:
@@ -61,10 +61,10 @@ def _remarks(found: FieldBalancing, solved: Solved) -> Iterator[str]:
         unknown = np.isnan(solved.unbalance)
         lost = np.flatnonzero(unknown.any(axis=1))
         for i in lost[:SHOWN]:
-            told = [planes[p] for p in np.flatnonzero(unknown[i])]
+            uncertain = [planes[p] for p in np.flatnonzero(unknown[i])]
             yield (
-                f"{found.of(group, int(i))}the initial unbalance is not determined in plane{'s' * (len(told) > 1)} "
-                f"{' and '.join(told)}: {_why(group, planes, told)}; whether it is within the tolerance is not known"
+                f"{found.of(group, int(i))}the initial unbalance is not determined in plane{'s' * (len(uncertain) > 1)} "
+                f"{' and '.join(uncertain)}: {_why(group, planes, uncertain)}; whether it is within the tolerance is not known"
             )
         yield from _more(len(lost), "the initial unbalance is not determined in every plane")
         # from here on means with the trial masses that were left on the rotor
@@ -88,7 +88,7 @@ def _remarks(found: FieldBalancing, solved: Solved) -> Iterator[str]:
                 yield f"a correction at {degrees(w):.4g}° cannot be reached from the places given"
 
 
-def _thirty(found: FieldBalancing, group: Group) -> Iterator[str]:
+def _thirty(balancing: FieldBalancing, group: Group) -> Iterator[str]:
     """The 30/30 rule."""
     standing = group.initial
     for j, trial in enumerate(group.trials):
@@ -101,7 +101,7 @@ def _thirty(found: FieldBalancing, group: Group) -> Iterator[str]:
             most = np.max(effect.amplitude[i])
             turn = np.degrees(np.max(effect.phase[i]))
             yield (
-                f"{found.of(group, int(i))}run {trial.run}: the trial mass changed the vibration by {most:.0%} and {turn:.0f}° "
+                f"{balancing.of(group, int(i))}run {trial.run}: the trial mass changed the vibration by {most:.0%} and {turn:.0f}° "
                 "at most: less than 30 % and 30°, its coefficients may be noise; expected a larger trial mass"
             )
         yield from _more(
@@ -114,11 +114,11 @@ def _more(count: int, what: str) -> Iterator[str]:
         yield f"… and the same of {count - SHOWN} further rotors: {what}"
 
 
-def _why(group: Group, planes: list[str], told: list[str]) -> str:
-    """Why the readings do not determine the unbalance in the planes `told`."""
+def _why(group: Group, planes: list[str], doubtful: list[str]) -> str:
+    """Why the readings do not determine the unbalance in the planes `doubtful`."""
     if len(group.channels) < len(planes):
         return f"{len(group.channels)} readings for {len(planes)} planes"
-    return "no reading responds to it" if len(told) == 1 else "the readings cannot tell them apart"
+    return "no reading responds to it" if len(doubtful) == 1 else "the readings cannot tell them apart"
 
 
 def _fits(b: FieldBalancing) -> Iterator[str]:
@@ -131,10 +131,10 @@ def _fits(b: FieldBalancing) -> Iterator[str]:
         if fit is None or solved.balance is None:
             continue
         bare = np.flatnonzero(fit.degrees_of_freedom == 0)
-        known = group.before is not None and group.before.reading is not None
-        if len(bare) and b.request.reading_error is None and not known:
+        uncertain = group.before is not None and group.before.reading is not None
+        if len(bare) and b.request.reading_error is None and not uncertain:
             yield (
-                f"{b.of(group, int(bare[0]))}as many readings as unknowns: nothing is left over to show their scatter; expected "
+                f"{b.of(group, int(bare[0]))}as many readings as unknowns: no readings remain to show their scatter; expected "
                 "a further run, or --reading-error, for uncertainties"
             )
         with_outliers = np.flatnonzero((group.chance < LEVEL).any(axis=(1, 2))).tolist()
@@ -162,11 +162,11 @@ def _repeats(b: FieldBalancing, solved: Solved, i: int) -> Iterator[str]:
     group, one = solved.group, solved.balance.machine(i)
     fit = one.fit
     largest = np.abs(np.where(fit.present, fit.readings, 0.0)).max(axis=0)
-    said = 0
+    count = 0
     for pair in repeats(fit, one.errors):
         far = pair.difference > 0.3 * largest[pair.channel]
-        if (pair.probability < LEVEL or far) and said < SHOWN:
-            said += 1
+        if (pair.probability < LEVEL or far) and count < SHOWN:
+            count += 1
             runs = [group.logs[i].rows[j][0] for j in pair.runs]
             where = f"runs {runs[0]} and {runs[1]}" if runs[0] != runs[1] else f"run {runs[0]}"
             figures = [
@@ -187,13 +187,13 @@ def _drifts(b: FieldBalancing, group: Group) -> Iterator[str]:
     if of_time is None:
         return
     for i in np.flatnonzero(of_time.probability < LEVEL)[:SHOWN].tolist():
-        told = [
+        drifting = [
             f"sensor {channel} by {abs(rate):.4g} {b.runs.amplitude_unit} at {degrees(rate):.4g}°"
             for channel, rate in zip(group.channels, of_time.rate[i].tolist(), strict=True)
             if rate == rate
         ]
         yield (
-            f"{b.of(group, i)}the vibration drifts with time, in a year {', '.join(told)}: by chance in "
+            f"{b.of(group, i)}the vibration drifts with time, in a year {', '.join(drifting)}: by chance in "
             f"{of_time.probability[i]:.2g} of logs (F test at {LEVEL:.0%}); all runs count alike, --exclude leaves out those of "
             "another time"
         )

@@ -23,10 +23,17 @@ from balancing import (
     place,
     unseen,
 )
-from cli.field.one_rotor import Sought, confidence, least_maximum, within_limits
 from cli.field.request import Request, ceiling_in, limits_in, masses_at
 from cli.field.runs import SHOWN, Complex, Group, Real, Runs
-from cli.field.solution import Problem, Solved, errors_of_means
+from cli.field.solution import (
+    Problem,
+    Solved,
+    Sought,
+    confidence,
+    errors_of_means,
+    least_maximum,
+    within_limits,
+)
 from cli.field.stored import Stored
 from cli.read.options import bad
 from dalembert.angles import degrees
@@ -110,8 +117,8 @@ class FieldBalancing:
         unbalance = None
         if request.tolerance is not None:
             unbalance = initial_unbalance(alpha, initial, group.weights, singular=SINGULAR)
-        given = (group, planes, fit, fits, initial, standing, start, problem.limit)
-        solved = Solved(*given, corrections, residual, condition, bound, unbalance)
+        arguments = (group, planes, fit, fits, initial, standing, start, problem.limit)
+        solved = Solved(*arguments, corrections, residual, condition, bound, unbalance)
         if self.runs.fitted or request.reading_error is not None or self._repeats_tell(group):
             self._doubt(solved)
         return solved
@@ -163,11 +170,11 @@ class FieldBalancing:
         return False
 
     def _limits(self, planes: list[str]) -> Real | None:
-        given = self.max_mass
-        for name in given:
+        bound = self.max_mass
+        for name in bound:
             if name and name not in planes:
                 raise bad("--max-mass", f"no plane {name}: expected one of {', '.join(planes)}")
-        limit = np.array([given.get(plane, given.get("", np.inf)) for plane in planes])
+        limit = np.array([bound.get(plane, bound.get("", np.inf)) for plane in planes])
         return limit if np.isfinite(limit).any() else None
 
     def _corrections(self, problem: Problem) -> tuple[Complex, Real | None, Real]:
@@ -224,7 +231,7 @@ class FieldBalancing:
         parts = (
             (problem.alpha[i], problem.here[i], problem.limit, ceiling, group.own_weights(i)) for i in rotors
         )
-        results, found = in_parts(solve, parts, self.executor), []
+        results, answers = in_parts(solve, parts, self.executor), []
         for i in rotors:
             fix, beyond = self._one(problem, lambda: next(results), i)
             if beyond:
@@ -233,11 +240,11 @@ class FieldBalancing:
                 )
             if fix.status != "optimal":
                 self.warnings.append(f"{self.of(group, i)}{fix.status}")
-            found.append(fix)
-        return found
+            answers.append(fix)
+        return answers
 
     def _one(self, problem: Problem, solve: Callable[[], Result], i: int | None = None) -> Result:
-        """Solve for one rotor, or for all; what cannot be done is said with the rotor's name."""
+        """Solve for one rotor, or for all; an error names the rotor."""
         try:
             return solve()
         except DependentPlanes as error:
@@ -315,10 +322,10 @@ class FieldBalancing:
         if before is None or before.reading is None:
             return fit.scatter()
         # where the runs leave nothing over, the readings scatter as those of the sisters did
-        told = fit.degrees_of_freedom > 0
+        estimated = fit.degrees_of_freedom > 0
         return fit.known(
-            np.where(told, fit.residual_sd, before.reading[0]),
-            np.where(told, fit.degrees_of_freedom, before.reading[1]),
+            np.where(estimated, fit.residual_sd, before.reading[0]),
+            np.where(estimated, fit.degrees_of_freedom, before.reading[1]),
         )
 
     def _doubt(self, solved: Solved) -> None:
@@ -341,9 +348,9 @@ class FieldBalancing:
         tasks = (
             (balance.machine(i), solved.corrections[i], solved.start[i], sought, self.limited) for i in rotors
         )
-        found = list(in_parts(confidence, tasks, self.executor))
-        solved.covariance = np.stack([covariance for covariance, _ in found])
-        solved.residual_95 = np.array([left for _, left in found])
+        doubts = list(in_parts(confidence, tasks, self.executor))
+        solved.covariance = np.stack([covariance for covariance, _ in doubts])
+        solved.residual_95 = np.array([left for _, left in doubts])
         self._unknown(solved)
 
     def _unknown(self, solved: Solved) -> None:
@@ -408,13 +415,13 @@ def _combination(names: list[str], combination: Complex) -> str:
 
 def planes_say(planes: list[str], combination: Complex) -> str:
     """Say which planes the readings cannot tell apart."""
-    told = [name for name, share in zip(planes, combination, strict=True) if abs(share) > 1e-6]
-    if len(told) == 1:
+    unseen = [name for name, share in zip(planes, combination, strict=True) if abs(share) > 1e-6]
+    if len(unseen) == 1:
         return (
-            f"plane {told[0]} has no effect on any reading: its correction cannot be found; expected sensors that "
+            f"plane {unseen[0]} has no effect on any reading: its correction cannot be found; expected sensors that "
             "respond to it, or the plane left out"
         )
     return (
-        f"the readings cannot tell the planes {' and '.join(told)} apart (singular): masses in the ratio "
+        f"the readings cannot tell the planes {' and '.join(unseen)} apart (singular): masses in the ratio "
         f"{_combination(planes, combination)} leave no trace; leave one of these planes out, or damp with --ridge"
     )

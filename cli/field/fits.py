@@ -1,4 +1,4 @@
-"""What a fit of all runs gives beside the corrections: its residuals, a prediction, the next run, a robust fit, drift."""
+"""What a fit of all runs gives in addition to the corrections: its residuals, a prediction, the next run, a robust fit, drift."""
 
 from __future__ import annotations
 
@@ -120,8 +120,8 @@ def robust(b: FieldBalancing, solved: Solved) -> tuple[JointFit, Complex]:
         fit = robust_fit(fit)
     else:
         # where the runs leave nothing over, the readings scatter as those of the sisters did
-        known = 0.0 if before.reading is None else before.reading[0]
-        deviation = np.where(fit.degrees_of_freedom > 0, np.nan, known)[:, None, None]
+        scatter = 0.0 if before.reading is None else before.reading[0]
+        deviation = np.where(fit.degrees_of_freedom > 0, np.nan, scatter)[:, None, None]
         if (error := b.request.reading_error) is not None:
             deviation = float(np.hypot(*error)) * np.abs(np.where(fit.present, readings, 0.0))
         fit = robust_fit(fit, before.prior, deviation)
@@ -203,14 +203,14 @@ def of_fit(b: FieldBalancing) -> Table:
             "phase_sense", "", [sense or "not determined" for sense in senses], None, "phase_sense", senses
         ),
     ]
-    known = [s.group.before for s, _ in rotors]
+    priors = [s.group.before for s, _ in rotors]
 
     def prior(name: str, unit: str, of: Callable[[Before], float | None]) -> None:
-        stored = [ABSENT if before is None else of(before) for before in known]
+        stored = [ABSENT if before is None else of(before) for before in priors]
         cells = [None if cell is ABSENT else cell for cell in stored]
         columns.append(Column(f"prior_{name}", unit, cells, None, f"prior.{name}", stored))
 
-    if any(before is not None for before in known):
+    if any(before is not None for before in priors):
         prior("machines", "", lambda before: before.machines)
         prior("scatter_between_machines", "", lambda before: before.scatter)
         prior("reading_sd", b.runs.amplitude_unit, lambda before: before.reading and before.reading[0])

@@ -30,27 +30,27 @@ def _sense(
     runs: Runs, rotors: Rows, fit: JointFit, lagging: bool | None, again: Callable[[Complex], JointFit]
 ) -> tuple[JointFit, list[str | None]]:
     """Tell the sense of the phase, and fit again where the runs tell another than was taken and no option says it."""
-    told, taken, other = phase_sense(fit.alone)
+    certain, taken, other = phase_sense(fit.alone)
     turn = -1 if lagging else 1
-    against = np.flatnonzero(told < 0)
+    against = np.flatnonzero(certain < 0)
     nu = np.maximum(fit.degrees_of_freedom, 1)
     for i in against[:SHOWN].tolist():
         sds = [float(np.sqrt(square[i] / nu[i])) for square in (taken, other)]
         word = "lags" if turn > 0 else "leads"
-        said = (
+        message = (
             f"{runs.of(rotors[i])}the runs say that the instrument's phase {word}: residuals of {sds[1]:.4g} {runs.amplitude_unit} (standard "
             f"deviation), in the other sense {sds[0]:.4g}"
         )
         runs.warnings.append(
-            f"{said}: it was turned round"
+            f"{message}: it was turned round"
             if lagging is None
-            else f"{said}; the option says otherwise, and was obeyed"
+            else f"{message}; the option says otherwise, and was obeyed"
         )
     if lagging is None and len(against):
-        fit = again(np.where((told < 0)[:, None, None], fit.readings.conj(), fit.readings))
+        fit = again(np.where((certain < 0)[:, None, None], fit.readings.conj(), fit.readings))
         runs.lags = True
     words = {1: "lead", -1: "lag", 0: None}
-    return fit, [words[int(turn * sense)] for sense in told.tolist()]
+    return fit, [words[int(turn * sense)] for sense in certain.tolist()]
 
 
 def read_groups(rows: Sorted, request: Request, sisters: Sisters | None, stored: bool) -> None:
@@ -129,9 +129,9 @@ class _Groups:
         """Say which repeats contradict each other, with their figures."""
         if not group.repeats:
             return
-        found = np.argwhere(group.contradictory & (group.counts > 1))
+        contradictory = np.argwhere(group.contradictory & (group.counts > 1))
         unit, against = self.runs.amplitude_unit, self.request.against
-        for i, j, s in found[:SHOWN].tolist():
+        for i, j, s in contradictory[:SHOWN].tolist():
             trial = group.trials[j]
             read = group.readings[i, trial.lines, s]
             read = read[np.isfinite(read)]
@@ -147,9 +147,9 @@ class _Groups:
                 f"readings contradict each other: {', '.join(figures)}{more}; their mean has the size "
                 f"{abs(group.means[i, j, s]):.4g}: read again, or leave out what is wrong"
             )
-        if len(found) > SHOWN:
+        if len(contradictory) > SHOWN:
             self.runs.warnings.append(
-                f"… and {len(found) - SHOWN} further readings that contradict each other"
+                f"… and {len(contradictory) - SHOWN} further readings that contradict each other"
             )
 
     def fit(self, part: Part) -> None:
@@ -172,19 +172,19 @@ class _Groups:
 
     def _group(self, part: Part) -> None:
         channels, readings, masses = part.channels, part.readings, part.masses
-        known = None
+        prior = None
         if self.sisters is not None:
-            known = self.sisters.known(self.runs.rotors[part.rotors[0]], channels, self.runs)
-        fit = self._fitted(readings, masses, known)
-        if known is None or determined(masses, np.isfinite(readings)).all():
+            prior = self.sisters.known(self.runs.rotors[part.rotors[0]], channels, self.runs)
+        fit = self._fitted(readings, masses, prior)
+        if prior is None or determined(masses, np.isfinite(readings)).all():
             fit, part.lines.senses = _sense(
                 self.runs,
                 part.rotors,
                 fit,
                 self.request.lagging,
-                lambda turned: self._fitted(turned, masses, known),
+                lambda turned: self._fitted(turned, masses, prior),
             )
-        self._made(part, fit).before = known
+        self._made(part, fit).before = prior
 
     def _made(self, part: Part, fit: JointFit | None) -> Group:
         """Add a group."""
@@ -202,41 +202,41 @@ class _Groups:
         self.runs.groups.append(group)
         return group
 
-    def _fitted(self, readings: Complex, masses: Complex, known: Before | None) -> JointFit:
+    def _fitted(self, readings: Complex, masses: Complex, prior: Before | None) -> JointFit:
         """Fit runs, with what is known before."""
-        if known is None:
+        if prior is None:
             return joint_fit(readings, masses)
         if self.request.reading_error is not None:
             size = np.abs(np.where(np.isfinite(readings), readings, 0.0))
             return fit_with_prior(
-                readings, masses, known.prior, float(np.hypot(*self.request.reading_error)) * size
+                readings, masses, prior.prior, float(np.hypot(*self.request.reading_error)) * size
             )
-        fit = fit_with_prior(readings, masses, known.prior)
-        if known.reading is not None and (fit.degrees_of_freedom == 0).any():
-            sd = np.where(fit.degrees_of_freedom > 0, fit.residual_sd, known.reading[0])
-            fit = fit_with_prior(readings, masses, known.prior, sd[:, None, None])
+        fit = fit_with_prior(readings, masses, prior.prior)
+        if prior.reading is not None and (fit.degrees_of_freedom == 0).any():
+            sd = np.where(fit.degrees_of_freedom > 0, fit.residual_sd, prior.reading[0])
+            fit = fit_with_prior(readings, masses, prior.prior, sd[:, None, None])
         return fit
 
     def _in_known_planes(self, part: Part) -> Part:
         """Return rotors with the planes whose coefficients are known before; a log that names none has the only one."""
         assert self.sisters is not None
-        known = self.sisters.planes(self.runs.rotors[part.rotors[0]])
+        covered = self.sisters.planes(self.runs.rotors[part.rotors[0]])
         planes = part.planes
-        if len(known) == 1 and "trial_plane" not in self.runs.table.texts:
-            planes = known[: len(planes)]
+        if len(covered) == 1 and "trial_plane" not in self.runs.table.texts:
+            planes = covered[: len(planes)]
         for plane in planes:
-            if plane not in known:
+            if plane not in covered:
                 raise DataError(
                     f"{self.runs.table.file}: {self.runs.of(part.rotors[0])}a mass in plane {plane}, of which no coefficient is stored: "
-                    f"expected {', '.join(known)}"
+                    f"expected {', '.join(covered)}"
                 )
-        at = [known.index(plane) for plane in planes]
+        at = [covered.index(plane) for plane in planes]
         masses, sizes, standing = (
-            np.zeros((*of.shape[:-1], len(known)), dtype=of.dtype)
+            np.zeros((*of.shape[:-1], len(covered)), dtype=of.dtype)
             for of in (part.masses, part.sizes, part.standing)
         )
         masses[..., at], sizes[..., at], standing[..., at] = part.masses, part.sizes, part.standing
-        return part._replace(planes=known, masses=masses, sizes=sizes, standing=standing)
+        return part._replace(planes=covered, masses=masses, sizes=sizes, standing=standing)
 
     def _say_lost(self, part: Part, keep: Flags) -> None:
         """Say which channels (g, s) the runs do not determine, and which run would; refuse a rotor without others."""
@@ -255,11 +255,11 @@ class _Groups:
         masses = part.masses[i, read]
         rows = part.lines[i].rows
         runs = [rows[j][0] for j in read]
-        known = "its vibration without masses is known, " if not masses.any() else ""
+        clause = "its vibration without masses is known, " if not masses.any() else ""
         times = "once" if len(read) == 1 else f"{len(read)} times"
         return (
             f"{self.runs.of(part.rotors[i])}sensor {part.channels[s]} was read {times} (run{'s' * (len(runs) > 1)} {', '.join(runs)}), which "
-            f"does not determine {1 + len(part.planes)} unknowns: {known}{_missing(part.planes, masses)}"
+            f"does not determine {1 + len(part.planes)} unknowns: {clause}{_missing(part.planes, masses)}"
         )
 
 
@@ -288,8 +288,8 @@ def _not_told(part: Part, error: DependentTrials | Undetermined) -> str:
             "for every plane"
         )
     shares = error.combination[-len(part.planes) :]
-    told = [name for name, share in zip(part.planes, shares, strict=True) if abs(share) > 1e-6]
+    unseen = [name for name, share in zip(part.planes, shares, strict=True) if abs(share) > 1e-6]
     return (
-        f"the trial runs do not tell the planes {' and '.join(told)} apart: expected each plane tried by itself, or in "
+        f"the trial runs do not tell the planes {' and '.join(unseen)} apart: expected each plane tried by itself, or in "
         "different proportions"
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -13,7 +14,8 @@ from cli.field.wide import is_wide, long_form
 from dalembert.angles import phasor
 from dalembert.errors import DataError
 from dalembert.quantities import parse_number
-from dalembert.tables.sources import LINE, Source, open_source
+from dalembert.tables.files import read_bytes, remember, split_sheet
+from dalembert.tables.sources import LINE, decoded, open_source
 from dalembert.tables.table import Cells, Numbers, Table, read
 
 NAMES = {
@@ -74,7 +76,7 @@ def runs_table(
 
 
 def headed(header: list[str]) -> list[str]:
-    """Return the columns of a table of runs that a log's header means; `phase` is told apart by its place.
+    """Return the columns of a table of runs that a log's header means; `phase` is known by its place.
 
     >>> headed(["", "DoubleA", "phase", "mass", "phase", "ref"])
     ['state', 'amplitude_um_pp', 'phase_deg', 'trial_mass_kg', 'trial_angle_deg', 'ref']
@@ -99,9 +101,9 @@ def headed(header: list[str]) -> list[str]:
 
 def is_log(path: str) -> bool:
     """Tell by its first line whether a file is a log in a layout of its own, and no table of runs."""
-    source = open_source(path, {}, None)
-    if _keyed_text(source) is not None:
+    if _keyed_file(path)[1] is not None:
         return True
+    source = open_source(path, {}, None)
     if is_wide(source):
         return False
     columns = {each.name.lower() for each in source.headings}
@@ -122,31 +124,24 @@ class Alpha(NamedTuple):
 
 def alpha_of(path: str) -> Alpha | None:
     """Return the coefficients of a file of vectors; None where it is none, or has no ALPHA."""
-    source = open_source(path, {}, None)
-    text = _keyed_text(source)
-    given = {} if text is None else _values(source.file, text)
-    if "ALPHA" not in given:
+    file, text = _keyed_file(path)
+    values = {} if text is None else _values(file, text)
+    if "ALPHA" not in values:
         return None
     rows = [
-        [
-            (float(size), float(turn))
-            for size, turn in (_polar(source.file, "ALPHA", cell) for cell in _flat(row))
-        ]
-        for row in _listed(given["ALPHA"])
+        [(float(size), float(turn)) for size, turn in (_polar(file, "ALPHA", cell) for cell in _flat(row))]
+        for row in _listed(values["ALPHA"])
     ]
     if len({len(row) for row in rows}) > 1:
-        raise DataError(
-            f"{source.file}: ALPHA has rows of different lengths: expected a column for each plane"
-        )
-    return Alpha(source.file, rows, "B" in given)
+        raise DataError(f"{file}: ALPHA has rows of different lengths: expected a column for each plane")
+    return Alpha(file, rows, "B" in values)
 
 
 def log_table(path: str) -> Layout:
     """Read a log in any of the layouts, and what it states besides."""
-    source = open_source(path, {}, None)
-    text = _keyed_text(source)
+    file, text = _keyed_file(path)
     if text is not None:
-        return _vectors(source.file, text)
+        return _vectors(file, text)
     texts = ("rotor", "run", "sensor", "state", "trial_plane", "trial_kept", "ref", "use", "date")
     table = runs_table(path, texts, headed)
     states = [WITH.fullmatch(state.lower()) for state in table.texts.get("state", ())]
@@ -174,10 +169,16 @@ def _states_are_masses(table: Table, states: list[re.Match[str]]) -> None:
     del table.texts["state"]
 
 
-def _keyed_text(source: Source) -> str | None:
-    """Return the text of a file of vectors; of a sheet with its lines, or with a key before the cells of a row; or None."""
+def _keyed_file(path: str) -> tuple[str, str | None]:
+    """Return a file's name, and its text where it holds vectors: `KEY:` and lists, or a sheet or an object of JSON like it."""
+    file, data = read_bytes(split_sheet(path)[0])
+    # quotes of JSON are no quotes of a table
+    if re.match(rb'(?:\xef\xbb\xbf)?\s*\{\s*"\w+"\s*:', data):
+        remember(path)
+        return file, decoded(file, data, [])
+    source = open_source(path, {}, None)
     text = source.text if source.sheet is None else _sheet_text(source.sheet.rows)
-    return text if _keyed(text) else None
+    return source.file, text if _keyed(text) else None
 
 
 def _sheet_text(rows: list[list[str]]) -> str:
@@ -199,31 +200,31 @@ def _sheet_text(rows: list[list[str]]) -> str:
 def _keyed(text: str) -> bool:
     """Tell whether the first line that says something is `KEY:` and a list."""
     for line in LINE.finditer(text):
-        said = line.group().split("#")[0].strip()
-        if said and said != "---":
-            return re.match(r"[A-Za-z_]\w*\s*[:=]\s*(\[|$|[-+\d.]+\s*@)", said) is not None
+        head = line.group().split("#")[0].strip()
+        if head and head != "---":
+            return re.match(r"[A-Za-z_]\w*\s*[:=]\s*(\[|$|[-+\d.]+\s*@)", head) is not None
     return False
 
 
 def _vectors(file: str, text: str) -> Layout:
     """Read `A`, `B`, `U` … whose cells are `amplitude@phase`."""
-    given = _values(file, text)
+    values = _values(file, text)
     # with coefficients no trial run is needed
-    known = "ALPHA" in given and "B" not in given
-    for key in ("A",) if known else ("A", "B", "U"):
-        if key not in given:
-            more = ": its coefficients are for --influence" if key == "A" and "ALPHA" in given else ""
+    stored = "ALPHA" in values and "B" not in values
+    for key in ("A",) if stored else ("A", "B", "U"):
+        if key not in values:
+            more = ": its coefficients are for --influence" if key == "A" and "ALPHA" in values else ""
             raise DataError(
                 f"{file}: no {key}: expected A (initial vectors), B (trial runs) and U (trial masses), or A and ALPHA{more}"
             )
-    first = [_polar(file, "A", cell) for cell in _flat(given["A"])]
+    first = [_polar(file, "A", cell) for cell in _flat(values["A"])]
     trials = (
         [[] for _ in first]
-        if known
-        else [[_polar(file, "B", cell) for cell in _flat(row)] for row in _listed(given["B"])]
+        if stored
+        else [[_polar(file, "B", cell) for cell in _flat(row)] for row in _listed(values["B"])]
     )
-    masses = [] if known else [_polar(file, "U", cell) for cell in _flat(given["U"])]
-    slow = [_polar(file, "A0", cell) for cell in _flat(given.get("A0", []))]
+    masses = [] if stored else [_polar(file, "U", cell) for cell in _flat(values["U"])]
+    slow = [_polar(file, "A0", cell) for cell in _flat(values.get("A0", []))]
     if len(trials) != len(first) or any(len(row) != len(masses) for row in trials):
         raise DataError(
             f"{file}: B has {len(trials)} rows of {len(trials[0]) if trials else 0}: expected a row for each of {len(first)} sensors "
@@ -231,11 +232,11 @@ def _vectors(file: str, text: str) -> Layout:
         )
     if slow and len(slow) != len(first):
         raise DataError(f"{file}: A0 has {len(slow)} vectors: expected one for each of {len(first)} sensors")
-    kept = "yes" if "".join(_flat(given.get("keep_trial", ""))).lower() in ("true", "yes", "1") else "no"
+    kept = "yes" if "".join(_flat(values.get("keep_trial", ""))).lower() in ("true", "yes", "1") else "no"
     runs = [(0, s, first[s]) for s in range(len(first))]
     runs += [(j + 1, s, row[j]) for j in range(len(masses)) for s, row in enumerate(trials)]
     on = [masses[j - 1] if j else ("", "") for j, _, _ in runs]
-    table = Table(file, list(given), len(runs))
+    table = Table(file, list(values), len(runs))
     table.texts = {
         "run": [str(j) if j else "initial" for j, _, _ in runs],
         "sensor": [str(s + 1) for _, s, _ in runs],
@@ -252,19 +253,19 @@ def _vectors(file: str, text: str) -> Layout:
         "phase": Numbers("A", "deg", turn, "angle"),
     }
     table.warnings.append(f"{file}: no units: amplitudes are taken as um, masses as kg, angles as deg")
-    for key in set(given) - {
+    for key in set(values) - {
         "A",
         "B",
         "U",
         "A0",
         "keep_trial",
         "weight_const",
-        *(["ALPHA"] if known else []),
+        *(["ALPHA"] if stored else []),
     }:
         why = ": the trial runs tell the coefficients" if key == "ALPHA" else ""
         table.warnings.append(f"{file}: {key} is not used{why}")
     rest, around = (np.array([float(one[k]) for one in slow]) for k in (0, 1))
-    limits = re.findall(r"([\d.]+)\s*:\s*([\d.]+)", str(given.get("weight_const", "")))
+    limits = re.findall(r"([\d.]+)\s*:\s*([\d.]+)", str(values.get("weight_const", "")))
     # planes are numbered from 0 there
     return Layout(
         table,
@@ -274,19 +275,52 @@ def _vectors(file: str, text: str) -> Layout:
 
 
 def _values(file: str, text: str) -> dict[str, object]:
-    """Return key -> text, or nested lists of texts: YAML as far as such files use it."""
+    """Return key -> text, or nested lists of texts: JSON, and YAML as far as such files use it."""
+    if text.lstrip().startswith("{"):
+        return _of_json(file, text)
     whole = "\n".join(line.split("#")[0].rstrip() for line in text.splitlines())
-    found = re.split(r"^([A-Za-z_]\w*)\s*[:=]", whole, flags=re.MULTILINE)
+    parts = re.split(r"^([A-Za-z_]\w*)\s*[:=]", whole, flags=re.MULTILINE)
     out: dict[str, object] = {}
-    for key, value in zip(found[1::2], found[2::2], strict=True):
-        said = value.strip()
+    for key, value in zip(parts[1::2], parts[2::2], strict=True):
+        value_text = value.strip()
         if key in out:
             raise DataError(f"{file}: {key} stands twice: expected it once")
-        if said.startswith("-"):
-            said = _dashed(said)
-        listed = said.startswith("[") or (key in ("A", "B", "U", "A0", "ALPHA") and "@" in said)
-        out[key] = _nested(file, key, said if said.startswith("[") else f"[{said}]") if listed else said
+        if value_text.startswith("-"):
+            value_text = _dashed(value_text)
+        listed = value_text.startswith("[") or (key in ("A", "B", "U", "A0", "ALPHA") and "@" in value_text)
+        out[key] = (
+            _nested(file, key, value_text if value_text.startswith("[") else f"[{value_text}]")
+            if listed
+            else value_text
+        )
     return out
+
+
+def _of_json(file: str, text: str) -> dict[str, object]:
+    """Return key -> text, or nested lists of texts, of an object of JSON."""
+
+    def leaves(value: object) -> object:
+        if isinstance(value, list):
+            return [leaves(each) for each in value]
+        if isinstance(value, dict):
+            return ", ".join(f"{key}: {leaves(each)}" for key, each in value.items())
+        return value if isinstance(value, str) else json.dumps(value)
+
+    def once(pairs: list[tuple[str, object]]) -> dict[str, object]:
+        for k, (key, _) in enumerate(pairs):
+            if key in (name for name, _ in pairs[:k]):
+                raise DataError(f"{file}: {key} stands twice: expected it once")
+        return dict(pairs)
+
+    try:
+        values: dict[str, object] = json.loads(text, object_pairs_hook=once)
+    except json.JSONDecodeError as error:
+        raise DataError(
+            f"{file}: line {error.lineno}: no JSON: {error.msg[:1].lower()}{error.msg[1:]}"
+        ) from None
+    except RecursionError:
+        raise DataError(f"{file}: lists too deep: expected rows of vectors such as 80@40") from None
+    return {key: leaves(value) for key, value in values.items()}
 
 
 def _dashed(text: str) -> str:
@@ -294,16 +328,16 @@ def _dashed(text: str) -> str:
     rows: list[list[str]] = []
     nested = False
     for line in text.splitlines():
-        said = line.strip()
-        if said.startswith("- -"):
-            rows.append([said[3:].strip()])
+        stripped = line.strip()
+        if stripped.startswith("- -"):
+            rows.append([stripped[3:].strip()])
             nested = True
-        elif said.startswith("-"):
+        elif stripped.startswith("-"):
             inner = nested and line.startswith((" ", "\t")) and rows
             if inner and line.index("-") > 0:
-                rows[-1].append(said[1:].strip())
+                rows[-1].append(stripped[1:].strip())
             else:
-                rows.append([said[1:].strip()])
+                rows.append([stripped[1:].strip()])
     return "[" + ", ".join(f"[{', '.join(row)}]" if nested else row[0] for row in rows) + "]"
 
 

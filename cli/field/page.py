@@ -7,8 +7,14 @@ import numpy as np
 from balancing.sheet import machine_sheet
 from cli.field.coefficients import spread
 from cli.field.field_balancing import FieldBalancing
+from cli.field.tables import sense
 from cli.read.options import bad
 from dalembert.page import Page
+
+LEAST_SQUARES = (
+    "this sheet computes least squares without limits; where a mass is beyond its limit, or the least maximum is wanted, "
+    "dalembert field solves the problem with limits from the rows of this sheet"
+)
 
 
 def sheet(b: FieldBalancing) -> Page:
@@ -17,20 +23,28 @@ def sheet(b: FieldBalancing) -> Page:
     Raises
     ------
     typer.BadParameter
-        Where the corrections are not those of plain least squares, or there are several machines.
+        Where no phases are read, or there are several machines.
     """
     runs, request = b.runs, b.request
     if len(runs.rotors) > 1:
         raise bad("--page", f"a sheet is of one machine, found {len(runs.rotors)}")
-    if b.limited or request.four_run:
-        raise bad("--page", "a sheet computes least squares without limits, from amplitudes with phases")
+    if request.four_run:
+        raise bad("--page", "a sheet computes from amplitudes with phases")
     solved = b.solved[0]
     group = solved.group
-    known = spread(b, solved)
-    covariance = None
-    if known is not None:
-        size = np.sqrt(np.square(known.along[0]) + np.square(known.across[0]))
-        covariance = size[:, :, None] * size[:, None, :] * known.correlation[0]
+    spreads = spread(b, solved)
+    covariance, deviations = None, None
+    if spreads is not None:
+        deviations = spreads.along[0], spreads.across[0]
+        size = np.sqrt(np.square(spreads.along[0]) + np.square(spreads.across[0]))
+        covariance = size[:, :, None] * size[:, None, :] * spreads.correlation[0]
+    elif b.stored is not None:
+        stored = b.stored.coefficients(runs.rotors[0], group.channels, list(solved.planes), runs)
+        covariance = stored.covariance
+        if covariance is not None:
+            # in any direction alike
+            each = np.sqrt(np.einsum("spp->sp", covariance).real / 2)
+            deviations = each, each
     weights = group.own_weights(0)
     return machine_sheet(
         np.asarray(solved.alpha[0]),
@@ -48,5 +62,9 @@ def sheet(b: FieldBalancing) -> Page:
         mass=(runs.per, runs.mass_unit),
         channels=[(channel.sensor, channel.speed_given) for channel in group.channels],
         speed_unit=runs.speed_unit,
+        spread=deviations,
+        limits=[b.max_mass.get(plane, b.max_mass.get("")) for plane in solved.planes] if b.max_mass else (),
+        ceiling=b.ceiling,
+        facts=[("Convention", sense(b)), *([("Objective", LEAST_SQUARES)] if b.limited else [])],
         places=None if request.places is None else [float(np.radians(x)) for x in request.places],
     )

@@ -35,73 +35,73 @@ BEFORE, AFTER, READ, FITTED, NEXT = "0.45", "tab:red", "tab:blue", "tab:orange",
 SUGGESTED = "tab:purple"
 
 
-def draw(found: FieldBalancing, rotors: Sequence[int]) -> Figure:
+def draw(balancing: FieldBalancing, rotors: Sequence[int]) -> Figure:
     """Draw for each rotor the vibration before and after, and the corrections; of a fit with all that it was found from."""
-    if found.runs.fitted:
-        return _fits(found, rotors, blank())
-    return dials(found, rotors)
+    if balancing.runs.fitted:
+        return _fits(balancing, rotors, blank())
+    return dials(balancing, rotors)
 
 
-def dials(found: FieldBalancing, rotors: Sequence[int], *, trims: bool = False) -> Figure:
+def dials(balancing: FieldBalancing, rotors: Sequence[int], *, trims: bool = False) -> Figure:
     """Draw for each rotor the vibration before and after, and the corrections, as dials; or what to add as it stands."""
     figure = blank()
-    shown = [_rotor(found, rotor, trims=trims) for rotor in rotors]
-    vibration(shown, amplitude_unit(found), found.unit, figure=figure)
+    shown = [_rotor(balancing, rotor, trims=trims) for rotor in rotors]
+    vibration(shown, amplitude_unit(balancing), balancing.unit, figure=figure)
     return figure
 
 
-def _rotor(found: FieldBalancing, rotor: int, *, trims: bool = False) -> Vibration:
-    k, i = found.place[rotor]
-    solved = found.solved[k]
+def _rotor(balancing: FieldBalancing, rotor: int, *, trims: bool = False) -> Vibration:
+    k, i = balancing.place[rotor]
+    solved = balancing.solved[k]
     fix, start = (solved.trim, 0 * solved.standing) if trims else (solved.corrections, solved.start)
-    places = found.request.places or ()
-    split = [_on_places(found, w) for w in fix[i].tolist()] if places else []
+    places = balancing.request.places or ()
+    split = [_on_places(balancing, w) for w in fix[i].tolist()] if places else []
     return Vibration(
-        found.runs.rotors[rotor] if found.runs.several else "",
+        balancing.runs.rotors[rotor] if balancing.runs.several else "",
         [str(channel) for channel in solved.group.channels],
         solved.initial[i],
         solved.residual[i],
         solved.planes,
-        found.amount(fix[i]),
-        found.amount(start[i]),
+        balancing.amount(fix[i]),
+        balancing.amount(start[i]),
         places=np.radians(places).tolist(),
         split=split,
     )
 
 
-def _on_places(found: FieldBalancing, w: complex) -> list[float]:
+def _on_places(balancing: FieldBalancing, w: complex) -> list[float]:
     """Return what of a correction goes on each of the places, in the unit of the trial masses."""
-    masses = [0.0] * len(found.request.places or ())
-    for name, _, mass in found.split(w):
-        masses[int(name) - 1] = float(found.amount(mass))
+    masses = [0.0] * len(balancing.request.places or ())
+    for name, _, mass in balancing.split(w):
+        masses[int(name) - 1] = float(balancing.amount(mass))
     return masses
 
 
-def _fits(found: FieldBalancing, rotors: Sequence[int], figure: Figure) -> Figure:
+def _fits(balancing: FieldBalancing, rotors: Sequence[int], figure: Figure) -> Figure:
     """Draw the history of each rotor, its corrections with their 95 % regions, and its residuals."""
     blocks = []
     for rotor in rotors:
-        k, i = found.place[rotor]
-        blocks.append((rotor, found.solved[k], i))
+        k, i = balancing.place[rotor]
+        blocks.append((rotor, balancing.solved[k], i))
     heights = [
-        -(-(min(len(solved.group.channels), CIRCLES) + len(_dials(found, solved)) + 2) // ACROSS)
+        -(-(min(len(solved.group.channels), CIRCLES) + len(_dials(balancing, solved)) + 2) // ACROSS)
         for _, solved, _ in blocks
     ]
     sheet(11.4, 3.9 * sum(heights) + 0.5, figure)
     parts = figure.subfigures(len(blocks), 1, height_ratios=heights, squeeze=False)[:, 0]
     labels = []
     for part, count, (rotor, solved, i) in zip(parts, heights, blocks, strict=True):
-        if found.runs.several:
-            part.suptitle(f"rotor {found.runs.rotors[rotor]}")
-        labels += _block(part, count, found, solved, i)
+        if balancing.runs.several:
+            part.suptitle(f"rotor {balancing.runs.rotors[rotor]}")
+        labels += _block(part, count, balancing, solved, i)
     figure.get_layout_engine().set(rect=(0, 0, 1, 0.985), h_pad=0.07, w_pad=0.06)  # type: ignore[union-attr, call-arg]
-    figure.legend(handles=_handles(found), loc="outside lower center", ncols=4, fontsize=9, frameon=False)
+    figure.legend(handles=_handles(balancing), loc="outside lower center", ncols=4, fontsize=9, frameon=False)
     place(labels)
     return figure
 
 
 def _block(
-    part: SubFigure, height: int, found: FieldBalancing, solved: Solved, i: int
+    part: SubFigure, height: int, balancing: FieldBalancing, solved: Solved, i: int
 ) -> list[tuple[Axes, list[Label]]]:
     grid = part.add_gridspec(height, ACROSS)
     cells = [grid[k // ACROSS, k % ACROSS] for k in range(height * ACROSS)]
@@ -109,15 +109,15 @@ def _block(
     labels: list[tuple[Axes, list[Label]]] = []
     for s in range(shown):
         axes: PolarAxes = part.add_subplot(cells[s], projection="polar")  # type: ignore[assignment]
-        labels.append((axes, _circle(axes, found, solved, i, s)))
+        labels.append((axes, _circle(axes, balancing, solved, i, s)))
     last = shown
-    for planes in _dials(found, solved):
+    for planes in _dials(balancing, solved):
         dial: PolarAxes = part.add_subplot(cells[last], projection="polar")  # type: ignore[assignment]
-        labels.append((dial, _corrections(dial, found, solved, i, planes)))
+        labels.append((dial, _corrections(dial, balancing, solved, i, planes)))
         last += 1
-    _regions(part.add_subplot(cells[last]), found, solved, i)
+    _regions(part.add_subplot(cells[last]), balancing, solved, i)
     last += 1
-    _residuals(part.add_subplot(grid[last // ACROSS, last % ACROSS :]), found, solved, i, shown)
+    _residuals(part.add_subplot(grid[last // ACROSS, last % ACROSS :]), balancing, solved, i, shown)
     return labels
 
 
@@ -153,7 +153,7 @@ def _label(text: str, at: complex, color: str, size: float) -> Label:
     return Label(text, (angle, float(abs(at))), color, size, float(np.degrees(angle)))
 
 
-def _circle(axes: PolarAxes, found: FieldBalancing, solved: Solved, i: int, s: int) -> list[Label]:
+def _circle(axes: PolarAxes, balancing: FieldBalancing, solved: Solved, i: int, s: int) -> list[Label]:
     """Draw the runs of one sensor and state, what was fitted to them, and what is to be expected."""
     assert solved.balance is not None
     balance, group = solved.balance, solved.group
@@ -163,9 +163,9 @@ def _circle(axes: PolarAxes, found: FieldBalancing, solved: Solved, i: int, s: i
     fitted = read - fit.residuals[i, here, s]
     before, after = complex(solved.initial[i, s]), complex(solved.residual[i, s])
     regions = [(after, balance.vibration_spread(solved.total), AFTER)]
-    if found.predict is not None:
-        value, _ = predicted(found, solved)
-        on = np.broadcast_to(run_to_predict(found, solved.planes), solved.corrections.shape)
+    if balancing.predict is not None:
+        value, _ = predicted(balancing, solved)
+        on = np.broadcast_to(run_to_predict(balancing, solved.planes), solved.corrections.shape)
         regions.append((complex(value[i, s]), balance.vibration_spread(on, reading=True), NEXT))
     outlines = [
         _ellipse(value, spread.covariance[i, s], float(region_factor(0.95, spread.degrees_of_freedom[i, s])))
@@ -188,7 +188,7 @@ def _circle(axes: PolarAxes, found: FieldBalancing, solved: Solved, i: int, s: i
     outliers = [row.value for row in rows(group, i) if row.channel == group.channels[s] and row.outlier]
     for outlier in outliers:
         _points(axes, [outlier], "o", AFTER, mfc="none", ms=9, mew=1.2)
-    _finished(axes, f"sensor {group.channels[s]}, {amplitude_unit(found)}", scale, vectors)
+    _finished(axes, f"sensor {group.channels[s]}, {amplitude_unit(balancing)}", scale, vectors)
     runs = group.logs[i].rows
     names = list(_names(read, [runs[j][0] for j in here], 0.06 * scale))
     return [_label(name, near, READ, 7.5) for near, name in (names if len(names) <= NAMED else ())]
@@ -218,78 +218,80 @@ def _ellipse(center: complex, covariance: Real, k: float) -> Complex:
     return np.asarray(center + unit * (along + 1j * across))
 
 
-def _dials(found: FieldBalancing, solved: Solved) -> list[list[int]]:
+def _dials(balancing: FieldBalancing, solved: Solved) -> list[list[int]]:
     """Return the planes of each dial of corrections: where masses go onto places, each has its own."""
     planes = list(range(len(solved.planes)))
-    return [[p] for p in planes] if found.request.places else [planes]
+    return [[p] for p in planes] if balancing.request.places else [planes]
 
 
 def _corrections(
-    axes: PolarAxes, found: FieldBalancing, solved: Solved, i: int, planes: list[int]
+    axes: PolarAxes, balancing: FieldBalancing, solved: Solved, i: int, planes: list[int]
 ) -> list[Label]:
     """Draw the corrections of planes and their 95 % regions, the places with their masses, and the next run's masses."""
-    every = found.amount(solved.corrections[i])
-    spreads = _spread(found, solved, i)
+    every = balancing.amount(solved.corrections[i])
+    spreads = _spread(balancing, solved, i)
     masses, spreads = every[planes], [spreads[p] for p in planes] if spreads else []
-    known = zip(masses, spreads, strict=False)
-    outlines = [_ellipse(complex(w), *region) for w, region in known]
+    spreads_of = zip(masses, spreads, strict=False)
+    outlines = [_ellipse(complex(w), *region) for w, region in spreads_of]
     scale = min(_largest(masses, *outlines), 2.5 * _largest(masses))
     for outline in outlines:
         _region(axes, outline, AFTER)
     for w in masses:
         arrow(axes, w, scale, Look(AFTER, 2.2))
-    run = suggested(solved, i) if found.request.suggest else None
+    run = suggested(solved, i) if balancing.request.suggest else None
     if run is not None:
-        at = found.amount(run.masses)[planes]
+        at = balancing.amount(run.masses)[planes]
         scale = max(scale, float(np.abs(at).max()))
         _points(axes, at, "s", SUGGESTED, ms=6)
     names = [solved.planes[p] for p in planes]
-    places = found.request.places
+    places = balancing.request.places
     if not places:
-        _finished(axes, f"corrections to ADD, {found.unit}", scale, list(masses))
+        _finished(axes, f"corrections to ADD, {balancing.unit}", scale, list(masses))
         return [_label(plane, w, AFTER, 8.0) for plane, w in zip(names, masses, strict=True)]
     (plane,) = planes
     named = f"plane {names[0]}: " if len(solved.planes) > 1 else ""
-    _finished(axes, f"{named}correction to ADD, {found.unit}", RIM_ROOM / 1.15 * scale, list(masses))
-    split = _on_places(found, complex(solved.corrections[i, plane]))
-    return rim(axes, np.radians(places), split, found.unit, scale)
+    _finished(axes, f"{named}correction to ADD, {balancing.unit}", RIM_ROOM / 1.15 * scale, list(masses))
+    split = _on_places(balancing, complex(solved.corrections[i, plane]))
+    return rim(axes, np.radians(places), split, balancing.unit, scale)
 
 
-def _spread(found: FieldBalancing, solved: Solved, i: int) -> list[tuple[Real, float]]:
+def _spread(balancing: FieldBalancing, solved: Solved, i: int) -> list[tuple[Real, float]]:
     """Return for each plane the covariance of the correction, in its unit, and the factor of its 95 % region."""
     if solved.covariance is None or solved.balance is None:
         return []
     factors = region_factor(0.95, solved.balance.degrees_of_freedom[i])
-    unit = found.amount(1.0) ** 2
+    unit = balancing.amount(1.0) ** 2
     return [
         (covariance * unit, float(k)) for covariance, k in zip(solved.covariance[i], factors, strict=True)
     ]
 
 
-def _regions(axes: Axes, found: FieldBalancing, solved: Solved, i: int) -> None:
+def _regions(axes: Axes, balancing: FieldBalancing, solved: Solved, i: int) -> None:
     """Draw the 95 % regions of the corrections enlarged, each about its own correction."""
-    known = _spread(found, solved, i)
-    for k, (plane, region) in enumerate(zip(solved.planes, known, strict=False)):
+    spreads = _spread(balancing, solved, i)
+    for k, (plane, region) in enumerate(zip(solved.planes, spreads, strict=False)):
         outline = _ellipse(0j, *region)
         color = AFTER if len(solved.planes) == 1 else f"C{k}"
         axes.fill(outline.real, outline.imag, color=color, alpha=0.12, lw=0)
         axes.plot(outline.real, outline.imag, color=color, lw=1.2, label=plane)
-    if known and len(solved.planes) > 1:
+    if spreads and len(solved.planes) > 1:
         axes.legend(fontsize=7.5, frameon=False, loc="upper left", title="plane", title_fontsize=8)
     axes.plot([0], [0], "+", color="0.2", ms=8)
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel(f"along the correction, {found.unit}", fontsize=9)
-    axes.set_ylabel(f"across, {found.unit}", fontsize=9)
+    axes.set_xlabel(f"along the correction, {balancing.unit}", fontsize=9)
+    axes.set_ylabel(f"across, {balancing.unit}", fontsize=9)
     axes.tick_params(labelsize=8, colors="0.3")
     plain(axes)
-    told = bool(known) and bool(np.isfinite([np.sum(covariance) * k for covariance, k in known]).all())
+    bounded = bool(spreads) and bool(np.isfinite([np.sum(covariance) * k for covariance, k in spreads]).all())
     title = (
-        "95 % region of each correction, enlarged" if told else "nothing tells how sure the corrections are"
+        "95 % region of each correction, enlarged"
+        if bounded
+        else "nothing tells how sure the corrections are"
     )
     axes.set_title(title, pad=8, fontsize=10)
 
 
-def _residuals(axes: Axes, found: FieldBalancing, solved: Solved, i: int, shown: int) -> None:
+def _residuals(axes: Axes, balancing: FieldBalancing, solved: Solved, i: int, shown: int) -> None:
     """Draw the standardised residuals, run by run, and from where on one is an outlier."""
     group = solved.group
     read = list(rows(group, i))
@@ -302,9 +304,9 @@ def _residuals(axes: Axes, found: FieldBalancing, solved: Solved, i: int, shown:
         axes.plot(at, [row.standardized for row in mine], style, ms=4.5, label=str(channel))
     assert group.fit is not None
     nu = int(group.fit.degrees_of_freedom[i])
-    told = int(np.isfinite([row.standardized for row in read]).sum())
-    if nu >= 2 and told:
-        limit = float(np.sqrt(nu * (1 - (LEVEL / told) ** (1 / (nu - 1)))))
+    judged = int(np.isfinite([row.standardized for row in read]).sum())
+    if nu >= 2 and judged:
+        limit = float(np.sqrt(nu * (1 - (LEVEL / judged) ** (1 / (nu - 1)))))
         axes.axhline(limit, color=AFTER, lw=1.0, ls="--")
         axes.annotate(
             f"outliers lie above ({LEVEL:.0%})",
@@ -324,15 +326,15 @@ def _residuals(axes: Axes, found: FieldBalancing, solved: Solved, i: int, shown:
     axes.set_xlabel("run", fontsize=9)
     axes.tick_params(labelsize=8, colors="0.3")
     axes.grid(axis="y", color="0.88")
-    axes.set_title("standardised residuals" if nu else "nothing left over for residuals", pad=8, fontsize=10)
+    axes.set_title("standardised residuals" if nu else "no readings remain for residuals", pad=8, fontsize=10)
     if 1 < len(group.channels) <= CIRCLES:
         axes.legend(fontsize=7.5, frameon=False, loc="upper left", ncols=2)
 
 
-def _handles(found: FieldBalancing) -> list[Line2D]:
+def _handles(balancing: FieldBalancing) -> list[Line2D]:
     from matplotlib.lines import Line2D
 
-    outlier = any((solved.group.chance < LEVEL).any() for solved in found.solved)
+    outlier = any((solved.group.chance < LEVEL).any() for solved in balancing.solved)
     shown: list[tuple[bool, str, str, dict[str, object]]] = [
         (True, "reading, named by its run", READ, {"marker": "o", "ls": "", "ms": 4}),
         (True, "vibration fitted to it", FITTED, {"marker": "o", "mfc": "none", "lw": 1.1, "ms": 5}),
@@ -340,12 +342,12 @@ def _handles(found: FieldBalancing) -> list[Line2D]:
         (True, "with the corrections; with its 95 % region", AFTER, {"lw": 1.8}),
         (outlier, "outlier", AFTER, {"marker": "o", "mfc": "none", "ls": "", "ms": 8}),
         (
-            found.predict is not None,
+            balancing.predict is not None,
             "predicted run, 95 % region of a reading",
             NEXT,
             {"marker": "D", "ls": "", "ms": 5},
         ),
-        (found.request.suggest, "masses of the next run", SUGGESTED, {"marker": "s", "ls": "", "ms": 6}),
+        (balancing.request.suggest, "masses of the next run", SUGGESTED, {"marker": "s", "ls": "", "ms": 6}),
     ]
     return [
         Line2D([], [], color=color, label=label, **look)  # type: ignore[arg-type]

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.field.channels import OfInitialRun, near_speeds
-from cli.field.dates import YEAR, years
 from cli.field.groups import read_groups
 from cli.field.layouts import Layout, alpha_of, is_log, log_table, runs_table
 from cli.field.request import Request
-from cli.field.rows import NoInitialRun, Sorted, numbered
+from cli.field.rows import YEAR, NoInitialRun, Sorted, numbered, years
 from cli.field.runs import YES, LogRows, Masses, Real, Rows, Runs
 from cli.field.stored import Sisters, Stored, read_runout, read_stored, stored_alpha
 from cli.read import options
@@ -33,11 +32,11 @@ def read_measured(
 ) -> tuple[Runs, Stored | None]:
     """Read the runs, and the stored coefficients that stand for trial runs."""
     files = [read_stored(file) for file in influence]
-    asked = {name: getattr(request, name) for name in ("fit", "exclude", "predict", "suggest", "robust")}
+    requests = {name: getattr(request, name) for name in ("fit", "exclude", "predict", "suggest", "robust")}
     if request.four_run:
-        options.refuse("fits all runs: it does not go with --method four-run", **asked)
+        options.refuse("fits all runs: it does not go with --method four-run", **requests)
     log = not request.four_run and is_log(path)
-    fitted = log or any(asked.values()) or len(files) > 1 or any(one.along is not None for one in files)
+    fitted = log or any(requests.values()) or len(files) > 1 or any(one.along is not None for one in files)
     fitted = fitted and not request.four_run
     if fitted and not files and (own := alpha_of(path)) is not None and not own.trials:
         files = [stored_alpha(own)]
@@ -86,11 +85,11 @@ def more_than_unknowns(table: Table) -> bool:
 
     most = max(map(len, each))
     several = np.array([one + one[-1:] * (most - len(one)) if one else [-1] * most for one in each])[plane]
-    told = several[:, 0] >= 0 if most else np.zeros(table.rows, dtype=bool)
-    if not told.any():
+    loaded = several[:, 0] >= 0 if most else np.zeros(table.rows, dtype=bool)
+    if not loaded.any():
         return False
-    known = count(several[told].ravel(), np.repeat(rotor[told], most))
-    return bool(((count(run, rotor) > 1 + known) & (known > 0)).any())
+    unknowns = count(several[loaded].ravel(), np.repeat(rotor[loaded], most))
+    return bool(((count(run, rotor) > 1 + unknowns) & (unknowns > 0)).any())
 
 
 class _Reading:
@@ -139,8 +138,8 @@ class _Reading:
                 if name in table.texts:
                     table.warnings.append(f"{table.file}: ignored the column {name}")
         run_names, run = table.numbered("run", "initial")
-        named, told = self._told(run_names, run)
-        masses, mass_share = self._masses(told)
+        named, loaded = self._told(run_names, run)
+        masses, mass_share = self._masses(loaded)
         if self.fitted:
             if "ref" in table.texts:
                 masses = Masses.of(_on_top(table, self.rotor, masses.by_row()))
@@ -188,17 +187,17 @@ class _Reading:
     def _told(self, run_names: list[str], run: Rows) -> tuple[Flags, Flags]:
         """Tell which rows name a plane, or a mass where there is but one; and which are to be read for their masses."""
         table, size = self.table, self.size
-        told = np.array([bool(cell) for cell in size.values])
+        loaded = np.array([bool(cell) for cell in size.values])
         planes, plane = table.numbered("trial_plane")
         if self.fitted:
-            return told, told | np.array([bool(name) for name in planes])[plane]
+            return loaded, loaded | np.array([bool(name) for name in planes])[plane]
         if "run" not in table.texts and self.stored is None:
             raise DataError(f"{table.file}: no column run {table.told}")
-        named = np.array([bool(name) for name in planes])[plane] if "trial_plane" in table.texts else told
+        named = np.array([bool(name) for name in planes])[plane] if "trial_plane" in table.texts else loaded
         of_run = numbered(self.rotor * len(run_names) + run)[0]
         self._kept(named, of_run, run_names, run)
         tried = np.isin(of_run, of_run[named])
-        if (loose := told & ~tried).any():
+        if (loose := loaded & ~tried).any():
             raise self._wrong(int(np.argmax(loose)), "trial_plane", "", "the plane of the trial mass")
         if size.unit not in UNITS[self.read.per]:
             # what stored coefficients of masses are for is no unbalance
@@ -214,7 +213,7 @@ class _Reading:
                 f"joined by ';' ({one};{planes[plane[i]]})",
             )
         # the row that states the mass: the others may leave it out
-        stated = _first_of_run(of_run, named & told)
+        stated = _first_of_run(of_run, named & loaded)
         bare = named & (stated < 0)
         if bare.any():
             raise self._wrong(int(np.argmax(bare)), size.header, "", "a trial mass, positive")
@@ -235,16 +234,16 @@ class _Reading:
             expected = f"the trial mass that is kept after run {run_names[run[i]]}"
             raise self._wrong(i, "trial_plane", "", expected)
 
-    def _wrong(self, row: int, column: str, found: str, expected: str) -> DataError:
-        return self.table.error(row, column, found, expected)
+    def _wrong(self, row: int, column: str, value: str, expected: str) -> DataError:
+        return self.table.error(row, column, value, expected)
 
-    def _masses(self, told: Flags) -> tuple[Masses, float]:
+    def _masses(self, loaded: Flags) -> tuple[Masses, float]:
         """Read the masses of each row, several joined by ';', and by what share of it one may be off as it is rounded."""
         table, size, per = self.table, self.size, self.read.per
         angle = table.cells.get("trial_angle")
-        if angle is None and not self.fitted and told.any():
+        if angle is None and not self.fitted and loaded.any():
             raise DataError(f"{table.file}: no column trial_angle_deg {table.told}")
-        if not told.any():
+        if not loaded.any():
             return Masses.of([None] * table.rows), 0.0
         names, code = table.numbered("trial_plane")
         planes: dict[str, int] = {}
@@ -253,7 +252,7 @@ class _Reading:
                 planes.setdefault(part.strip(), len(planes))
         plane = np.array([planes.get(name or "1", -1) for name in names])[code]
         # one mass in a row, its numbers in order: all these rows together, and the others one by one
-        plain = told & np.array([bool(cell) for cell in size.values])
+        plain = loaded & np.array([bool(cell) for cell in size.values])
         plain &= np.array([";" not in name for name in names])[code]
         sizes, angles = size.parsed, None if angle is None else angle.parsed
         if sizes is None or angles is None:
@@ -264,7 +263,7 @@ class _Reading:
         )
         others = [
             (i, planes[name], mass, turn)
-            for i in np.flatnonzero(told & ~plain).tolist()
+            for i in np.flatnonzero(loaded & ~plain).tolist()
             for name, mass, turn in self._of_row(i, names[code[i]], angle)
         ]
         row, where, more, turns = (
@@ -280,7 +279,7 @@ class _Reading:
         value = np.zeros(len(first), dtype=complex)
         np.add.at(value, entry, on)
         share = float(vector_error(np.ones(len(around)), around, unit).max(initial=0.0))
-        says = np.array([bool(cell) for cell in size.values]) if self.fitted else told
+        says = np.array([bool(cell) for cell in size.values]) if self.fitted else loaded
         return Masses(list(planes), row[first], where[first], value, says), share
 
     def _of_row(self, i: int, name: str, angle: Cells | None) -> Iterator[tuple[str, float, float]]:
@@ -294,8 +293,8 @@ class _Reading:
         if "" in names:
             raise self._wrong(i, "trial_plane", name, "a plane's name before and after each ';'")
         parts, around = cell.split(";"), turn.split(";") if turn else [""] * len(names)
-        for cells, found in ((size, parts), (angle or size, around)):
-            if len(found) != len(names):
+        for cells, target in ((size, parts), (angle or size, around)):
+            if len(target) != len(names):
                 joined = f"{len(names)} joined by ';' as in trial_plane"
                 raise self._wrong(i, cells.header, cells.values[i], f"masses and angles, {joined}")
         for one, part, at in zip(names, parts, around, strict=True):
@@ -307,11 +306,11 @@ class _Reading:
             if not at.strip() and mass:
                 header = angle.header if angle is not None else "trial_angle_deg"
                 raise self._wrong(i, header, turn, f"the angle of the {what}")
-            given = at.strip() and angle is not None
+            angled = at.strip() and angle is not None
             yield (
                 one,
                 mass,
-                self._number(angle, i, at, f"the angle of the {what}") if given and angle else 0.0,
+                self._number(angle, i, at, f"the angle of the {what}") if angled and angle else 0.0,
             )
 
     def _number(self, cells: Cells, row: int, text: str, expected: str) -> float:

@@ -19,11 +19,14 @@ from cli.show.bars import Bar, Bars
 from cli.show.result import Section, Sheet
 from dalembert.angles import degrees
 from dalembert.results.columns import Column, Table
-from dalembert.results.text import as_list, with_uncertainty
+from dalembert.results.text import with_uncertainty
 from dalembert.units import from_si
 
 MOST = 24  # rotors of one report
 BARS = 6  # sensors of one page
+FEW = 4  # sensors whose phases stand on the first page
+COEFFICIENTS = 16  # on that page
+READINGS = 8  # of a log, on the page of how it was computed
 
 
 def sheets(b: FieldBalancing, tables: Tables) -> Iterator[Sheet]:
@@ -34,7 +37,7 @@ def sheets(b: FieldBalancing, tables: Tables) -> Iterator[Sheet]:
         of = _Rotor(b, made, b.runs.rotors[rotor], solved, i)
         history = partial(picture.draw, b, [rotor]) if b.runs.fitted else None
         yield Sheet(title, list(of.sections()), partial(picture.dials, b, [rotor], trims=of.trims))
-        yield Sheet(title, list(of.method()), history)
+        yield Sheet(title, list(of.method()), history, dense=True)
     if len(b.runs.rotors) > MOST:
         yield Sheet("", [Section("Further rotors", [f"{len(b.runs.rotors) - MOST} are not shown here."])])
 
@@ -74,6 +77,14 @@ class _Rotor:
         yield Section("What to add now", list(self._add()))
         if expected := self.parts("predict", "suggest", "suggest_gain"):
             yield Section("What to expect", expected)
+        if self.few:
+            yield self._phases()
+
+    @property
+    def few(self) -> bool:
+        """Whether the first page has room for the phases of its sensors."""
+        more = self.parts("predict", "suggest", "suggest_gain", "zones", "split", "trim_split")
+        return len(self.solved.group.channels) <= FEW and not more
 
     @property
     def trims(self) -> bool:
@@ -110,6 +121,21 @@ class _Rotor:
 
     def method(self) -> Iterator[Section]:
         """Yield the vibration with its phases, the corrections in full, and how they were computed."""
+        if not self.few:
+            yield self._phases()
+        fix = self.tables["corrections"]
+        amounts = replace(fix, columns=[c for c in fix.columns if not c.name.startswith("trim_")])
+        state = (
+            "as it stands in its last run"
+            if self.b.request.from_here
+            else "in its initial state, all trial masses off"
+        )
+        parts = [amounts, f"To ADD to the rotor {state}.", *self.parts("static", "couple", "robust", "trim")]
+        yield Section("Corrections in full", parts)
+        yield Section("How it was computed", self._computed())
+
+    def _phases(self) -> Section:
+        """Return the vibration with its phases, as the instrument shows them."""
         b, solved, i, last = self.b, self.solved, self.i, self.last
         sentences = [_convention(b)]
         if first_reading(b, solved, i) is None:
@@ -118,17 +144,7 @@ class _Rotor:
             sentences.append(
                 f"Run {last.run}: with {masses_text(b, solved.planes, last.on, '.6g')} on the rotor."
             )
-        yield Section("Vibration and phase", [_vibration(b, solved, self.states()), *sentences])
-        fix = self.tables["corrections"]
-        amounts = replace(fix, columns=[c for c in fix.columns if not c.name.startswith("trim_")])
-        state = (
-            "as it stands in its last run"
-            if b.request.from_here
-            else "in its initial state, all trial masses off"
-        )
-        parts = [amounts, f"To ADD to the rotor {state}.", *self.parts("static", "couple", "robust")]
-        yield Section("Corrections in full", [*parts, *self.parts("trim")])
-        yield Section("How it was computed", self._computed())
+        return Section("Vibration and phase", [_vibration(b, solved, self.states()), *sentences])
 
     def _computed(self) -> list[str | Table]:
         """Return readings, coefficients, figures of merit."""
@@ -136,29 +152,55 @@ class _Rotor:
         group, parts = solved.group, list[str | Table]()
         if b.runs.fitted:
             fit, residuals = self.tables["fit"], self.tables["residuals"]
-            parts += [as_list(fit), fit.below, self._as_read(residuals)]
+            parts += [fit, fit.below, *self._as_read(residuals)]
+        runs = {}
         for j, trial in enumerate(group.trials[1:], 1):
             on = masses_text(b, solved.planes, group.on[i, j], ".6g")
-            parts += [f"Run {trial.run}{': ' + on if on else ''}{', kept' if trial.kept else ''}", _vibration(b, solved, {"amplitude": group.means[i, j]})]  # fmt: skip
-        influence = self.tables["influence"]
-        shown = [c for c in influence.columns if c.name not in ("correlation", "amplitude_unit")]
-        parts += ["Influence coefficients:", replace(influence, columns=[c for c in shown if any(v == v and v is not None for v in c.values)])]  # fmt: skip
+            parts.append(f"Run {trial.run}{': ' + on if on else ''}{', kept' if trial.kept else ''}")
+            runs[f"run {trial.run}"] = group.means[i, j]
+        if runs:
+            parts.append(_vibration(b, solved, runs))
+        if not b.stored:
+            parts += ["Influence coefficients:", *self._coefficients()]
         figures = self.tables["rotors"]
         return [
             *parts,
             "Figures of merit:",
-            as_list(figures),
+            figures,
             figures.below,
             *self.parts("misfit", "alternatives"),
         ]
 
-    def _as_read(self, residuals: Table) -> Table:
-        """Return the readings of a fit with phases as the instrument shows them."""
-        columns = list(residuals.columns)
-        for k, column in enumerate(columns):
+    def _coefficients(self) -> list[str | Table]:
+        """Return the coefficients, of many the first."""
+        influence = self.tables["influence"]
+        shown = [c for c in influence.columns if c.name not in ("correlation", "amplitude_unit")]
+        columns = [
+            replace(c, values=c.values[:COEFFICIENTS], error=None)
+            for c in shown
+            if any(v == v and v is not None for v in c.values)
+        ]
+        left = len(shown[0].values) - COEFFICIENTS
+        return [
+            replace(influence, columns=columns),
+            f"… and {left} more (--json has all)" if left > 0 else "",
+        ]
+
+    def _as_read(self, residuals: Table) -> list[str | Table]:
+        """Return the readings of a fit with phases as the instrument shows them; of a long log those that fit worst."""
+        far = next(c for c in residuals.columns if c.name == "standardized").values
+        worst = sorted(range(len(far)), key=lambda k: -float(far[k] or 0))[:READINGS]
+        rows, columns = sorted(worst), []
+        for column in residuals.columns:
+            values = [column.values[k] for k in rows]
             if column.name == "phase" and self.b.against:
-                columns[k] = replace(column, values=[round(-float(v or 0) % 360, 2) for v in column.values])
-        return replace(residuals, columns=columns)
+                values = [round(-float(v or 0) % 360, 2) for v in values]
+            elif column.name in ("residual", "residual_phase", "standardized"):
+                values = [v if v is None else float(f"{float(v):.3g}") for v in values]
+            columns.append(replace(column, values=values, error=None))
+        left = len(far) - len(rows)
+        rest = f"{left} further readings lie nearer to the fit than these (--json has all)." if left else ""
+        return [replace(residuals, columns=columns), rest]
 
 
 def _bars(b: FieldBalancing, solved: Solved, states: dict[str, Complex]) -> Bars:
@@ -172,9 +214,9 @@ def _bars(b: FieldBalancing, solved: Solved, states: dict[str, Complex]) -> Bars
                 label = f"{channel} {name}" if len(solved.group.channels) > 1 else name
                 rows.append(Bar(label, size, f"{size:.3g} {unit}", name != "before"))
     ceiling, more = b.ceiling, len(solved.group.channels) - len(few)
-    said = [] if ceiling is None else [f"Limit: {ceiling:.4g} {unit}."]
-    said += [f"{more} further readings stand on the next page."] if more > 0 else []
-    return Bars(rows, ceiling, " ".join(said))
+    captions = [] if ceiling is None else [f"Limit: {ceiling:.4g} {unit}."]
+    captions += [f"{more} further readings stand on the next page."] if more > 0 else []
+    return Bars(rows, ceiling, " ".join(captions))
 
 
 def _people(b: FieldBalancing, solved: Solved, i: int, here: bool) -> Table:

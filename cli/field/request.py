@@ -87,11 +87,11 @@ def limits(texts: Sequence[str]) -> dict[str, Given]:
         if mark and not plane.strip():
             raise options.bad("--max-mass", f"'{text}': expected a plane's name before =, such as A=5g")
         dimension = "unbalance" if "_" in value or "*" in value or "·" in value else "mass"
-        given = options.with_unit("--max-mass", value, dimension, positive=True)
-        assert given is not None
+        limit = options.with_unit("--max-mass", value, dimension, positive=True)
+        assert limit is not None
         if plane.strip() in limits:
             raise options.bad("--max-mass", f"'{text}': this limit is given twice")
-        limits[plane.strip()] = given
+        limits[plane.strip()] = limit
     return limits
 
 
@@ -105,11 +105,11 @@ def limits_in(limits: Mapping[str, Given], runs: Runs) -> dict[str, float]:
     return {plane: float(to_si(value, runs.per, unit)) for plane, (value, unit) in limits.items()}
 
 
-def ceiling_in(given: Given | None, runs: Runs) -> float | None:
+def ceiling_in(limit: Given | None, runs: Runs) -> float | None:
     """Return the residual limit in the table's unit; without a tag it is meant as the table's amplitudes are."""
-    if given is None:
+    if limit is None:
         return None
-    value, unit = given
+    value, unit = limit
     if not amplitude_kind(unit)[1]:
         unit += amplitude_kind(runs.amplitude_unit)[1]
     return runs.in_unit(value, unit, "--max-residual")

@@ -13,14 +13,14 @@ from cli.field.solution import Solved
 from cli.read.rounding import EPS
 
 
-def fit_errors(found: FieldBalancing, solved: Solved) -> Real:
+def fit_errors(balancing: FieldBalancing, solved: Solved) -> Real:
     """Bound the errors of initial vibration and coefficients, (g, s, 1 + p)."""
     readings, masses = solved.group.errors()
-    if found.stored is None and not solved.fits:
+    if balancing.stored is None and not solved.fits:
         return solved.fit.error_estimate(readings, masses)
     first = readings[:, solved.group.trials[0].lines].mean(axis=1)
-    if found.stored is not None:
-        phase = found.stored.table.require("phase", "angle")
+    if balancing.stored is not None:
+        phase = balancing.stored.table.require("phase", "angle")
         turn = float(np.abs(phase.si).max())
         of_alpha = EPS * (6 + turn / 2) * np.abs(solved.alpha)
     else:
@@ -36,18 +36,18 @@ def fit_errors(found: FieldBalancing, solved: Solved) -> Real:
     return np.concatenate([first[..., None], of_alpha], axis=-1)
 
 
-def correction_errors(found: FieldBalancing, solved: Solved, warnings: list[str]) -> Real:
+def correction_errors(balancing: FieldBalancing, solved: Solved, warnings: list[str]) -> Real:
     """Bound the errors of the corrections, (g, p), SI; NaN where they cannot be bounded."""
-    request, group = found.request, solved.group
+    request, group = balancing.request, solved.group
     if solved.fit.foreknown is not None:
-        said = "--digits: the corrections are given in full, for no bound of the rounding of a fit with --influence is known"
-        if said not in warnings:
-            warnings.append(said)
+        sentence = "--digits: the corrections are given in full, for no bound of the rounding of a fit with --influence is known"
+        if sentence not in warnings:
+            warnings.append(sentence)
         return np.full(solved.corrections.shape, np.nan)
-    of_all = fit_errors(found, solved)
+    of_all = fit_errors(balancing, solved)
     initial, of_alpha = of_all[..., 0], of_all[..., 1:]
-    here, limit, ceiling = solved.here, solved.limit, found.ceiling
-    of_here = initial + 8 * EPS * (np.abs(found.runout(group)) + np.abs(solved.initial))
+    here, limit, ceiling = solved.here, solved.limit, balancing.ceiling
+    of_here = initial + 8 * EPS * (np.abs(balancing.runout(group)) + np.abs(solved.initial))
     if solved.start.any():
         size = np.abs(solved.start)
         of_standing = group.errors()[1].max(axis=1) + 4 * EPS * size
@@ -73,7 +73,7 @@ def correction_errors(found: FieldBalancing, solved: Solved, warnings: list[str]
         bounds.append(one.error_estimate(influence_error=of_alpha[i], initial_error=of_here[i]))
         if one.error_reason:
             warnings.append(
-                f"{found.of(group, i)}--digits: the corrections are given in full, for no bound of their error is known: "
+                f"{balancing.of(group, i)}--digits: the corrections are given in full, for no bound of their error is known: "
                 f"{one.error_reason}"
             )
     return np.where(np.isfinite(bounds), bounds, np.nan)
@@ -87,7 +87,7 @@ def trim_errors(solved: Solved, bound: Real) -> Real:
     return np.asarray(bound + of_masses + 8 * EPS * (np.abs(solved.total) + np.abs(solved.standing)))
 
 
-def uncertainty_share(found: FieldBalancing, solved: Solved, bound: Real) -> Real:
+def uncertainty_share(balancing: FieldBalancing, solved: Solved, bound: Real) -> Real:
     """Bound the relative errors of the uncertainties, (g, p).
 
     To first order: the pseudo-inverses of coefficients and trial masses are right to their condition numbers times
@@ -95,21 +95,23 @@ def uncertainty_share(found: FieldBalancing, solved: Solved, bound: Real) -> Rea
     """
     if solved.fit.foreknown is not None:
         return np.full(bound.shape, np.nan)
-    of_all = fit_errors(found, solved)
+    of_all = fit_errors(balancing, solved)
     of_alpha = np.linalg.norm(of_all[..., 1:], axis=-2)
     norms = np.linalg.norm(solved.alpha, axis=-2)
     relative = 8 * EPS + (of_alpha / np.where(norms > 0, norms, 1.0)).max(axis=-1)
     share = condition_number(solved.alpha, solved.group.weights) * relative
     fit = solved.fit
-    if found.runs.fitted:
+    if balancing.runs.fitted:
         # the scatter of the residuals is a difference of readings, and the design is that of the masses
         of_fit = of_all.max(axis=1) / np.abs(fit.unknowns).max(axis=1)
         scatter = np.where(fit.residual_sd > 0, fit.residual_sd, np.inf)
         rounding = 32 * EPS * np.nanmax(np.abs(fit.readings), axis=(1, 2))
         share = (
-            share + of_fit.max(axis=-1) + (rounding / scatter if found.request.reading_error is None else 0.0)
+            share
+            + of_fit.max(axis=-1)
+            + (rounding / scatter if balancing.request.reading_error is None else 0.0)
         )
-    elif found.stored is None:
+    elif balancing.stored is None:
         share = share + 8 * EPS * condition_number(solved.group.on[:, 1:])
     # the scatter of repeats is a difference of readings
     sd = solved.group.reading_sd

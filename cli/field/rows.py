@@ -1,14 +1,17 @@
-"""The rows of a table of runs side by side: rotors of like shape become arrays together."""
+"""The rows of a table of runs side by side: rotors of like shape become arrays together; the dates of a log's rows."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Sequence
+from datetime import datetime
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cli.field.runs import NO, SHOWN, YES, Complex, Lines, LogRows, Part, Real, Rows, Trial
 from dalembert.errors import DataError, quote
+from dalembert.tables.table import Table
 
 
 def numbered(codes: Rows) -> tuple[Rows, Rows]:
@@ -77,11 +80,11 @@ class Sorted:
         at = place[masses.row]
         by_rotor = np.argsort(at, kind="stable")
         at, plane, value = at[by_rotor], masses.plane[by_rotor], masses.value[by_rotor]
-        told = np.flatnonzero(masses.told[self.order])
+        loaded = np.flatnonzero(masses.told[self.order])
         first = np.full(len(self.runs.first), -1)
-        first[self.run[told[::-1]]] = told[::-1]
+        first[self.run[loaded[::-1]]] = loaded[::-1]
         counts = at == first[self.run[at]]
-        self._agree(told, first, at, plane, value, counts)
+        self._agree(loaded, first, at, plane, value, counts)
         at, plane, value = at[counts], plane[counts], value[counts]
         # planes in the order of the runs
         by_run = np.argsort(self.run[at], kind="stable")
@@ -154,7 +157,7 @@ class Sorted:
         """Which rows are of it."""
 
     def _agree(
-        self, told: Rows, first: Rows, at: Rows, plane: Rows, value: Complex, counts: NDArray[np.bool_]
+        self, loaded: Rows, first: Rows, at: Rows, plane: Rows, value: Complex, counts: NDArray[np.bool_]
     ) -> None:
         """Refuse rows that put on other masses than the first one of their run that tells them."""
         rows = self.rows
@@ -165,8 +168,8 @@ class Sorted:
         start = np.cumsum(entries) - entries
         # each mass of a row beside that of the row that counts
         twin = start[first[self.run[at]]] + np.arange(len(at)) - start[at]
-        many = entries[told] != entries[first[self.run[told]]]
-        bad = told[many]
+        many = entries[loaded] != entries[first[self.run[loaded]]]
+        bad = loaded[many]
         if not len(bad):
             own, twin = np.flatnonzero(~counts), twin[~counts]
             bad = at[own[(plane[twin] != plane[own]) | (value[twin] != value[own])]]
@@ -239,9 +242,9 @@ class Sorted:
             codes = (self.runs.code[of_line] * 2 + self.stays[of_line]) * repeats + again[lines.first]
             label = lines.told_apart(label, numbered(codes)[0])
         if named is not None:
-            known: dict[str | None, int] = {}
-            of_name = np.array([known.setdefault(name, len(known)) for name in named])
-            label = np.unique(label, return_inverse=True)[1] * len(known) + of_name
+            numbers: dict[str | None, int] = {}
+            of_name = np.array([numbers.setdefault(name, len(numbers)) for name in named])
+            label = np.unique(label, return_inverse=True)[1] * len(numbers) + of_name
         label, begin = numbered(label)
         members, rows_of = (np.argsort(of, kind="stable") for of in (label, label[rotor]))
         many, many_rows = (np.bincount(of, minlength=len(begin)) for of in (label, label[rotor]))
@@ -296,10 +299,10 @@ class Sorted:
 
     def _weights(self, group: Rows, at: Rows) -> Real | None:
         """Return the weights of the channels (g, s), written in these rows."""
-        given = self.rows.of.table.numbers.get("weight")
-        if given is None:
+        weight = self.rows.of.table.numbers.get("weight")
+        if weight is None:
             return None
-        weights = np.where(np.isnan(given.values[at]), 1.0, given.values[at])
+        weights = np.where(np.isnan(weight.values[at]), 1.0, weight.values[at])
         wrong = ~(weights > 0).any(axis=1) | (weights < 0).any(axis=1)
         if wrong.any():
             of = self.rows.of.of(int(group[np.argmax(wrong)]))
@@ -313,10 +316,10 @@ class Sorted:
         if self.rows.years is None:
             return None
         years = self.rows.years[self.order[mine]]
-        given = np.flatnonzero(np.isfinite(years))[::-1]
+        dated = np.flatnonzero(np.isfinite(years))[::-1]
         of_run, of_line = np.full(len(self.runs.first), np.nan), np.full(len(lines.first), np.nan)
-        of_run[run[given]] = years[given]
-        of_line[lines.number[given]] = years[given]
+        of_run[run[dated]] = years[dated]
+        of_line[lines.number[dated]] = years[dated]
         return np.where(np.isnan(of_line), of_run[run[lines.first]], of_line)
 
     def _lacking(self, group: Rows, years: Real, run: Rows) -> None:
@@ -343,3 +346,48 @@ def _again(codes: Rows) -> Rows:
     out = np.empty_like(order)
     out[order] = np.arange(len(order)) - np.maximum.accumulate(np.where(begin, np.arange(len(order)), 0))
     return out
+
+
+_ISO = re.compile(
+    r"(\d{4})[-/](\d{1,2})(?:[-/](\d{1,2}))?(?:[T ]+(\d{1,2}):(\d{2})(?::(\d{2})(?:\.\d+)?)?Z?)?"
+)
+_POINTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?:,?\s+(\d{1,2}):(\d{2})(?::(\d{2}))?)?")
+DATE = "a date such as 2019-03-14, 2019-03-14 08:30 or 14.03.2019"
+YEAR = 365.25
+
+
+def years(table: Table) -> Real | None:
+    """Return the date of each row in years, from any origin; NaN where there is none, None without a column of dates."""
+    written = table.texts.get("date")
+    if written is None or not any(written):
+        return None
+    return np.array([_year(table, i, text) if text else np.nan for i, text in enumerate(written)])
+
+
+def _year(table: Table, row: int, text: str) -> float:
+    iso, points = _ISO.fullmatch(text), _POINTS.fullmatch(text)
+    match = iso or points
+    if match is None:
+        raise table.error(row, "date", text, DATE)
+    first, month, last, *clock = match.groups()
+    year, day = (first, last or "1") if iso else (last, first)
+    try:
+        hour, minute, second = (int(part or 0) for part in clock)
+        at = datetime(int(year), int(month), int(day), hour, minute, second)
+    except ValueError:
+        raise table.error(row, "date", text, DATE) from None
+    # in days first, so that no digit is lost
+    return (at - datetime(2000, 1, 1)).total_seconds() / 86400 / YEAR
+
+
+def latest(table: Table) -> str | None:
+    """Return the last date of a table, as 2019-03-14; None where none can be read."""
+    matches = [
+        _ISO.fullmatch(text) or _POINTS.fullmatch(text) for text in table.texts.get("date", ()) if text
+    ]
+    days = []
+    for match in filter(None, matches):
+        first, month, last = match.groups()[:3]
+        year, day = (first, last or "01") if match.re is _ISO else (last, first)
+        days.append(f"{year}-{int(month):02}-{int(day):02}")
+    return max(days, default=None)

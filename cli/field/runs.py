@@ -22,7 +22,7 @@ YES = ("yes", "y", "true", "1", "kept", "on", "ja", "j", "bleibt")
 NO = ("no", "n", "false", "0", "", "removed", "off", "nein")
 NEAR_SPEED = 0.05  # speeds are one within this share
 
-SHOWN = 5  # of so many rotors, readings … the same is said; of the others how many they are
+SHOWN = 5  # a remark names so many rotors, readings …; of the others it gives the number
 
 
 @dataclass(frozen=True)

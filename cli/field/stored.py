@@ -26,16 +26,16 @@ def read_runout(path: str, runs: Runs, *, lagging: bool) -> dict[str, complex]:
     size = runs.in_unit(amplitude.values, amplitude.unit, f"{table.file}: the run-out")
     vectors = phasor(size, -phase.values if lagging else phase.values, phase.unit).tolist()
     sensors = table.named("sensor")
-    known = {channel.sensor for group in runs.groups for channel in group.channels}
+    measured = {channel.sensor for group in runs.groups for channel in group.channels}
     out: dict[str, complex] = {}
     for i, (sensor, vector) in enumerate(zip(sensors, vectors, strict=True)):
         if sensor in out:
             raise table.error(i, "sensor", sensor, "each sensor once")
-        if sensor not in known:
-            raise table.error(i, "sensor", sensor, f"a sensor of the runs ({', '.join(sorted(known))})")
+        if sensor not in measured:
+            raise table.error(i, "sensor", sensor, f"a sensor of the runs ({', '.join(sorted(measured))})")
         out[sensor] = vector
     runs.warnings += table.warnings
-    for sensor in sorted(known - set(out)):
+    for sensor in sorted(measured - set(out)):
         runs.warnings.append(f"{table.file}: no run-out of sensor {sensor}: taken as zero")
     return out
 
@@ -155,11 +155,11 @@ class Stored:
         share = np.zeros((*at.shape, planes), dtype=complex) + np.eye(planes)
         for s, p in np.argwhere(np.ones(at.shape)).tolist():
             cell = self.table.texts["correlation"][at[s, p]] if "correlation" in self.table.texts else ""
-            given = cell.split(";") if cell else []
+            cells = cell.split(";") if cell else []
             try:
-                if given and len(given) != p:
+                if cells and len(cells) != p:
                     raise ValueError
-                for q, one in enumerate(given):
+                for q, one in enumerate(cells):
                     part, turn = (parse_number(number) for number in one.split("@"))
                     share[s, p, q] = complex(phasor(np.array([part]), np.array([turn]), "deg")[0])
                     share[s, q, p] = share[s, p, q].conjugate()
@@ -175,9 +175,9 @@ class Stored:
 
 def read_stored(path: str) -> Stored:
     """Read stored coefficients: sensor, speed_*, plane, magnitude_per_*, phase_deg, and how well they are known."""
-    given = alpha_of(path)
-    if given is not None:
-        return stored_alpha(given)
+    alpha = alpha_of(path)
+    if alpha is not None:
+        return stored_alpha(alpha)
     table = read(
         path,
         numbers={
@@ -222,9 +222,9 @@ def read_stored(path: str) -> Stored:
     )
 
 
-def stored_alpha(given: Alpha) -> Stored:
+def stored_alpha(alpha: Alpha) -> Stored:
     """Return the coefficients `ALPHA` of a file of vectors, per kg."""
-    file, rows, _ = given
+    file, rows, _ = alpha
     table = Table(file, ["ALPHA"], sum(map(len, rows)))
     places = [(s, p) for s, row in enumerate(rows) for p in range(len(row))]
     table.texts = {"sensor": [str(s + 1) for s, _ in places], "plane": [str(p + 1) for _, p in places]}
@@ -304,13 +304,13 @@ class Sisters:
                 )
             elif not stated:
                 runs.warnings.append("--influence: the coefficients state no uncertainty and count as exact")
-        told = [(one.reading_sd, one.degrees_of_freedom) for one in each if one.reading_sd > 0]
+        spreads = [(one.reading_sd, one.degrees_of_freedom) for one in each if one.reading_sd > 0]
         scatter = None
-        if told:
-            sds, nus = (np.array(part) for part in zip(*told, strict=True))
-            known = np.isinf(nus).any()
-            weight = np.isinf(nus).astype(float) if known else nus
+        if spreads:
+            sds, nus = (np.array(part) for part in zip(*spreads, strict=True))
+            exact = np.isinf(nus).any()
+            weight = np.isinf(nus).astype(float) if exact else nus
             sd = float(np.sqrt((weight * np.square(sds)).sum() / weight.sum()))
-            scatter = (sd, np.inf if known else float(nus.sum()))
+            scatter = (sd, np.inf if exact else float(nus.sum()))
         between = float(prior.scatter)
         return Before(prior, len(each), between if between == between else None, scatter)

@@ -57,10 +57,10 @@ class Rows:
 
     def some(self, of: Callable[[Solved], ArrayLike | None]) -> tuple[Real, list[Any]]:
         """Put numbers that not every group has into the order of the rows: as shown, and as JSON has them."""
-        given = [of(solved) for solved in self.solved]
+        tables = [of(solved) for solved in self.solved]
         sizes = [len(solved.group.rotors) * n for solved, n in zip(self.solved, self.count, strict=True)]
-        parts = [np.full(n, np.nan) if v is None else np.broadcast_to(v, n) for v, n in zip(given, sizes, strict=True)]  # fmt: skip
-        there = np.repeat([v is not None for v in given], sizes)[self.order].tolist()
+        parts = [np.full(n, np.nan) if v is None else np.broadcast_to(v, n) for v, n in zip(tables, sizes, strict=True)]  # fmt: skip
+        there = np.repeat([v is not None for v in tables], sizes)[self.order].tolist()
         values = np.concatenate(parts).astype(float)[self.order]
         return values, [v if has else ABSENT for v, has in zip(values.tolist(), there, strict=True)]
 
@@ -247,16 +247,16 @@ def trim(b: FieldBalancing) -> Table:
         number(f"{b.runs.per}_uncertainty", b.runs.per, along, b.runs.mass_unit),
         number("angle_uncertainty", "angle", across),
     ]
-    known = bool(np.isfinite(along).any())
+    finite = bool(np.isfinite(along).any())
     needed = Column("needed", "", ["no" if why else "yes" for why in reasons], None, "needed", [not why for why in reasons])  # fmt: skip
     stands = [
         names("last_run", run, place=None),
         *(replace(c, name=f"standing_{c.name}", place=None) for c in masses(b, on)),
     ]
-    columns = [*rows.shown, plane, *stands, size, angle, *(uncertainty if known else []), needed]
+    columns = [*rows.shown, plane, *stands, size, angle, *(uncertainty if finite else []), needed]
     if any(reasons):
         columns.append(names("reason", reasons, place=None))
-    hidden = [*rows.hidden, *([] if known else uncertainty)]
+    hidden = [*rows.hidden, *([] if finite else uncertainty)]
     above = "what to ADD to the rotor as it stands in its last run"
     if not on.any():
         # nothing to show: the trim is the correction
@@ -286,8 +286,8 @@ def prediction(b: FieldBalancing) -> Table:
         if ceiling is not None:
             chance = rows.numbers(lambda s: s.fitted.probability_within(ceiling))
             spread.append(number("probability_within", "number", chance))
-        known = bool(np.isfinite(deviation).any())
-        (columns if known else hidden).extend(spread)
+        finite = bool(np.isfinite(deviation).any())
+        (columns if finite else hidden).extend(spread)
     above = "vibration before, and as predicted with the corrections"
     return Table(columns, READINGS, "rotors[].residual[]", above, documented=hidden)
 

@@ -21,8 +21,8 @@ Flags = NDArray[np.bool_]
 class Trim:
     """The trims of a group of rotors."""
 
-    def __init__(self, found: FieldBalancing, solved: Solved) -> None:
-        self.found, self.solved = found, solved
+    def __init__(self, balancing: FieldBalancing, solved: Solved) -> None:
+        self.found, self.solved = balancing, solved
         self.masses: Complex = solved.trim
         """(g, p), SI."""
         self.along, self.angle = solved.uncertainty_of(self.masses)
@@ -86,41 +86,41 @@ class LastRun(NamedTuple):
     """As read, run-out off, (s,); NaN where a sensor was not read."""
 
 
-def last_run(found: FieldBalancing, solved: Solved, i: int) -> LastRun | None:
+def last_run(balancing: FieldBalancing, solved: Solved, i: int) -> LastRun | None:
     """Return a rotor's last run, where it tells how well it is balanced; None where it was a trial run."""
-    group, request = solved.group, found.request
-    if found.runs.fitted:
+    group, request = solved.group, balancing.request
+    if balancing.runs.fitted:
         names, masses = _of_fit(solved, i)
         on = masses[names[-1]]
         if not on.any() or sum(mass.any() for mass in masses.values()) <= len(solved.planes):
             return None
-        return LastRun(names[-1], on, _read(found, solved, i, names[-1]))
+        return LastRun(names[-1], on, _read(balancing, solved, i, names[-1]))
     if request.four_run or len(group.trials) < 2:
         return None
     on = group.standing[i]
     if not (request.from_here and on.any()):
         return None
-    return LastRun(group.last[i], on, last_reading(found, solved, i))
+    return LastRun(group.last[i], on, last_reading(balancing, solved, i))
 
 
-def last_reading(found: FieldBalancing, solved: Solved, i: int) -> Complex:
+def last_reading(balancing: FieldBalancing, solved: Solved, i: int) -> Complex:
     """Return what was read in a rotor's last run, run-out off, (s,); NaN where a sensor was not read."""
     group = solved.group
-    if found.runs.fitted:
-        return _read(found, solved, i, group.last[i])
+    if balancing.runs.fitted:
+        return _read(balancing, solved, i, group.last[i])
     if len(group.trials) > 1 and group.trials[-1].run == group.last[i]:
-        return np.asarray(group.means[i, -1] - found.runout(group))
+        return np.asarray(group.means[i, -1] - balancing.runout(group))
     bare = not group.standing[i].any()
     return np.asarray(solved.initial[i] if bare else np.full_like(solved.initial[i], np.nan))
 
 
-def first_reading(found: FieldBalancing, solved: Solved, i: int) -> Complex | None:
+def first_reading(balancing: FieldBalancing, solved: Solved, i: int) -> Complex | None:
     """Return what was read in the first run without masses, run-out off, (s,); None where there is no such run."""
-    if not found.runs.fitted:
+    if not balancing.runs.fitted:
         return np.asarray(solved.initial[i])
     names, masses = _of_fit(solved, i)
     bare = next((name for name in names if not masses[name].any()), None)
-    return None if bare is None else _read(found, solved, i, bare)
+    return None if bare is None else _read(balancing, solved, i, bare)
 
 
 def _of_fit(solved: Solved, i: int) -> tuple[list[str], dict[str, Complex]]:
@@ -129,7 +129,7 @@ def _of_fit(solved: Solved, i: int) -> tuple[list[str], dict[str, Complex]]:
     return log.runs, {run: fit.masses[i, j] for j, (run, _) in enumerate(log.rows)}
 
 
-def _read(found: FieldBalancing, solved: Solved, i: int, run: str) -> Complex:
+def _read(balancing: FieldBalancing, solved: Solved, i: int, run: str) -> Complex:
     """The mean readings of a run of a fit, run-out off."""
     fit = solved.fit.machine(i)
     rows = [j for j, (name, _) in enumerate(solved.group.logs[i].rows) if name == run]
@@ -137,33 +137,33 @@ def _read(found: FieldBalancing, solved: Solved, i: int, run: str) -> Complex:
     sums = np.where(there, fit.readings[rows], 0).sum(axis=0)
     mean = np.full_like(sums, np.nan)
     np.divide(sums, there.sum(axis=0), out=mean, where=there.any(axis=0))
-    return np.asarray(mean - found.runout(solved.group))
+    return np.asarray(mean - balancing.runout(solved.group))
 
 
-def verdicts(found: FieldBalancing, solved: Solved, i: int) -> list[Verdict]:
+def verdicts(balancing: FieldBalancing, solved: Solved, i: int) -> list[Verdict]:
     """Return each plane's tolerance, as predicted; none where no tolerance is asked for."""
-    if found.request.tolerance is None or solved.unbalance is None:
+    if balancing.request.tolerance is None or solved.unbalance is None:
         return []
     own = solved.unbalance[i]
     left = own + solved.total[i]
-    return _of_planes(found, solved, own, np.where(np.abs(left) <= 1e-12 * np.abs(own), 0, left))
+    return _of_planes(balancing, solved, own, np.where(np.abs(left) <= 1e-12 * np.abs(own), 0, left))
 
 
-def measured_verdicts(found: FieldBalancing, solved: Solved, i: int, last: LastRun) -> list[Verdict]:
+def measured_verdicts(balancing: FieldBalancing, solved: Solved, i: int, last: LastRun) -> list[Verdict]:
     """Return each plane's tolerance with the unbalance that the last run shows."""
-    if found.request.tolerance is None or solved.unbalance is None:
+    if balancing.request.tolerance is None or solved.unbalance is None:
         return []
     read = np.isfinite(last.vibration)
     own = solved.group.own_weights(i)
     weights = None if own is None else own[read]
     left = initial_unbalance(solved.alpha[i][read], last.vibration[read], weights, singular=SINGULAR)
-    return _of_planes(found, solved, solved.unbalance[i], left)
+    return _of_planes(balancing, solved, solved.unbalance[i], left)
 
 
-def _of_planes(found: FieldBalancing, solved: Solved, before: Complex, after: Complex) -> list[Verdict]:
-    assert found.request.tolerance is not None
-    shares = found.request.tolerance.shares(len(solved.planes)).tolist()
-    sizes = zip(found.in_kg_m(before).tolist(), found.in_kg_m(after).tolist(), strict=True)
+def _of_planes(balancing: FieldBalancing, solved: Solved, before: Complex, after: Complex) -> list[Verdict]:
+    assert balancing.request.tolerance is not None
+    shares = balancing.request.tolerance.shares(len(solved.planes)).tolist()
+    sizes = zip(balancing.in_kg_m(before).tolist(), balancing.in_kg_m(after).tolist(), strict=True)
     return [
         Verdict(plane, share, *size) for plane, share, size in zip(solved.planes, shares, sizes, strict=True)
     ]

@@ -20,7 +20,7 @@ from cli.show.picture import blank
 from cli.show.result import Result
 from dalembert.angles import read_degrees
 from dalembert.errors import DataError
-from dalembert.results.columns import Column, Table
+from dalembert.results.columns import ABSENT, Column, Table, names, number
 from dalembert.tables.files import read_bytes
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.dimensions import Dimension, value
@@ -28,12 +28,13 @@ from virtualwork.describe.units import Units
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from cli.cases.case import Rows
-    from dalembert.results.columns import Document, Json
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
-    from virtualwork.family.fitting import Fit
+    from virtualwork.family.fitted import Fit
+    from virtualwork.family.keep import Bound, Kept
     from virtualwork.family.target import Reached, Target
 
 STARTS = 256
@@ -59,7 +60,7 @@ class Fitted(TableCase):
         try:
             with options.processes(s.workers) as pool:
                 return self.mechanism.fit(
-                    s.aims, free=s.free, starts=s.starts, seed=s.seed, best=s.best, executor=pool
+                    s.aims, free=s.free, starts=s.starts, seed=s.seed, best=s.best, executor=pool, keep=s.keep
                 )
         except DescriptionError as error:
             raise options.bad("--free", error) from None
@@ -69,13 +70,26 @@ class Fitted(TableCase):
         """All distinct solutions that are requested, as far as there are."""
         return [self.best, *self.best.others]
 
-    def document(self) -> Document:
-        """What the JSON document has of it."""
-        return {"fit": _document(self.solutions)}
-
     def table(self) -> Table:
         """A row for each solution."""
         return _numbers(self.solutions)
+
+    def further(self) -> dict[str, Callable[[], Table]]:
+        """Of several targets how near the best comes to each."""
+        several, tables = len(self.best.reached) > 1, dict[str, Callable[[], Table]]()
+        if several:
+            tables["misses"] = lambda: _misses_by_target([self.best], "fit")
+        if self.best.kept:
+            tables["kept"] = lambda: _kept([self.best], "fit")
+        return tables
+
+    def documented(self) -> list[Table]:
+        """The best solution, and below it the others."""
+        best, *others = self.solutions
+        tables = [_numbers([best], "fit"), _misses_by_target([best], "fit"), _kept([best], "fit")]
+        if others:
+            tables += [each(others, "fit.others[]") for each in (_numbers, _misses_by_target, _kept)]
+        return [table for table in tables if table.columns]
 
     def warnings(self) -> list[str]:
         """Fewer solutions than requested, and what is doubtful about each."""
@@ -87,15 +101,11 @@ class Fitted(TableCase):
             lines += [f"solution {i}: {remark}" for remark in other.remarks]
         return lines
 
-    def words(self) -> str:
-        """How near it comes."""
-        return _sentence(self.best)
-
     def way(self) -> list[Topic]:
         """What is minimised, and what is left."""
         from cli.fit.way import way
 
-        return way(_document(self.solutions))
+        return way(self.best, self.table(), _misses_by_target([self.best], "fit"))
 
     def figure(self) -> Figure:
         """The target, and the fitted mechanism."""
@@ -110,11 +120,13 @@ class Fits(TableStudy):
     ----------
     aims : list of Target
     free : dict of path to (low, high), SI
+    keep : list of Bound
     starts, seed, best, workers : int
     """
 
     aims: Sequence[Target] = ()
     free: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    keep: Sequence[Bound] = ()
     starts: int = STARTS
     seed: int = 0
     best: int = 1
@@ -178,25 +190,18 @@ def _drawn(fit: Fit[Mechanism]) -> Figure:
     return figure
 
 
-def _sentence(fit: Fit[Mechanism]) -> str:
-    parts = [
-        f"{_name(each)} comes within {_size(each, each.max):.3g} {_unit(each)} of all {len(each.target)} rows of its "
-        f"target, {_size(each, each.rms):.3g} {_unit(each)} in the root of the mean square"
-        for each in fit.reached
-    ]
-    return f"{'; '.join(parts)}. The file's own numbers and {fit.starts - 1} others were starts."
-
-
 def _name(each: Reached) -> str:
     return each.name.rpartition(".")[2]
 
 
-def _unit(each: Reached) -> str:
-    return "deg" if each.kind == "angle" else "m"
+def _dimension(fit: Fit[Mechanism], each: Reached) -> str:
+    if each.kind == "effort":
+        return "force" if fit.before.inputs[0].is_slide else "torque"
+    return "angle" if each.kind == "angle" else "length"
 
 
 def _size(each: Reached, value: Any) -> Any:
-    """A distance as it is shown."""
+    """A distance in the unit of JSON."""
     return np.degrees(value) if each.kind == "angle" else value
 
 
@@ -204,50 +209,98 @@ def _shown(dimension: Dimension, si: float) -> float:
     return read_degrees(si) if dimension.unit == "deg" else si
 
 
-def _parameters(fit: Fit[Mechanism]) -> dict[str, float]:
-    return {d.header: _shown(d, si) for d, si in zip(fit.dimensions, fit.values.tolist(), strict=True)}
+def _misses(fit: Fit[Mechanism], every: Sequence[Sequence[Reached]]) -> list[Column]:
+    """Root of the mean square and largest distance of lengths together, of angles and of efforts; a row for each group."""
+    columns = []
+    for dimension in ("length", "angle", "torque", "force"):
+        rows = [[_size(r, r.distances) for r in group if _dimension(fit, r) == dimension] for group in every]
+        if any(rows):
+            parts = [np.concatenate(row) if row else np.array([np.nan]) for row in rows]
+            # a target of the other kind has none
+            rms, most = ([norm(part) for part in parts] for norm in (_rms, np.max))
+            absent = [not row for row in rows]
+            for name, values in (("rms", rms), ("max", most)):
+                column = number(name, dimension, values)
+                cells = zip(column.documented, absent, strict=True)
+                column.stored = [ABSENT if none else value for value, none in cells]
+                columns.append(column)
+    return columns
 
 
-def _misses(reached: Sequence[Reached]) -> dict[str, float]:
-    """Root of the mean square and largest distance of lengths together, and of angles."""
-    misses: dict[str, float] = {}
-    for unit in ("m", "deg"):
-        parts = [_size(each, each.distances) for each in reached if _unit(each) == unit]
-        if parts:
-            every = np.concatenate(parts)
-            misses |= {
-                f"rms_{unit}": float(np.sqrt(np.mean(every**2))),
-                f"max_{unit}": float(every.max()),
-            }
-    return misses
+def _rms(distances: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(distances**2)))
 
 
-def _document(solutions: Sequence[Fit[Mechanism]]) -> Document:
-    def one(found: Fit[Mechanism]) -> Document:
-        each: list[Json] = [{"name": _name(r), **_misses([r])} for r in found.reached]
-        return {"parameters": _parameters(found), **_misses(found.reached), "targets": each}
-
-    best, *others = solutions
-    document = one(best) | {"starts": best.starts, "evaluations": best.evaluations}
-    return document | ({"others": [one(other) for other in others]} if others else {})
-
-
-def _numbers(solutions: Sequence[Fit[Mechanism]]) -> Table:
+def _numbers(solutions: Sequence[Fit[Mechanism]], place: str | None = None) -> Table:
     """A row for each solution: the dimensions, and how near they come."""
-    best = solutions[0]
+    best, others = solutions[0], place is not None and place.endswith("[]")
     columns = [
-        Column(d.path, d.unit, [_parameters(found)[d.header] for found in solutions]) for d in best.dimensions
+        Column(
+            d.path,
+            d.unit,
+            [_shown(d, float(found.values[i])) for found in solutions],
+            place=("parameters", d.header),
+        )
+        for i, d in enumerate(best.dimensions)
     ]
-    misses = [_misses(found.reached) for found in solutions]
-    for header in misses[0]:
-        name, unit = header.split("_")
-        columns.append(Column(name, unit, [each[header] for each in misses]))
-    columns.append(Column("starts", "", [float(best.starts)] * len(solutions)))
-    columns.append(Column("evaluations", "", [float(best.evaluations)] * len(solutions)))
-    if len(solutions) == 1:
-        return Table(columns)
-    numbers = [str(i) for i in range(1, len(solutions) + 1)]
-    return Table([Column("solution", "", numbers), *columns], keys=("solution",))
+    columns += _misses(best, [found.reached for found in solutions])
+    if not others:
+        counts = {"starts": best.starts, "evaluations": best.evaluations}
+        columns += [
+            Column(name, "", [float(count)] * len(solutions), place=name, stored=[count])
+            for name, count in counts.items()
+        ]
+    if len(solutions) == 1 and not others:
+        return Table(columns, place=place)
+    return Table([_solution(solutions), *columns], ("solution",), place)
+
+
+def _solution(solutions: Sequence[Fit[Mechanism]]) -> Column:
+    return names("solution", [str(i) for i in range(1, len(solutions) + 1)], None)
+
+
+def _misses_by_target(solutions: Sequence[Fit[Mechanism]], place: str) -> Table:
+    """A row for each solution and target."""
+    every = [r for found in solutions for r in found.reached]
+    columns = [names("name", [_name(r) for r in every]), *_misses(solutions[0], [[r] for r in every])]
+    keys: tuple[str, ...] = ("name",)
+    if place.endswith("[]"):
+        numbers = [str(i) for i, found in enumerate(solutions, 1) for _ in found.reached]
+        columns, keys = [names("solution", numbers, None), *columns], ("solution", "name")
+    return Table(columns, keys, f"{place}.targets[]")
+
+
+def _kept(solutions: Sequence[Fit[Mechanism]], place: str) -> Table:
+    """A row for each solution and bound: the extreme of the quantity over the sweep; no columns where nothing is kept."""
+    every = [(str(i), kept) for i, found in enumerate(solutions, 1) for kept in found.kept]
+    if not every:
+        return Table([])
+    effort = ".force" if solutions[0].before.inputs[0].is_slide else ".torque"
+    columns = [names("quantity", [_of_bound(kept, effort) for _, kept in every])]
+    for title in ("least", "most"):
+        cells = [
+            _shown_extreme(kept) if getattr(kept.bound, title) is not None else None for _, kept in every
+        ]
+        if any(cell is not None for cell in cells):
+            stored = [ABSENT if cell is None else cell for cell in cells]
+            columns.append(Column(title, "", cells, place=title, stored=stored))
+    columns.append(names("met", [kept.met for _, kept in every]))
+    keys: tuple[str, ...] = ("quantity",)
+    if place.endswith("[]"):
+        columns, keys = [names("solution", [i for i, _ in every], None), *columns], ("solution", "quantity")
+    return Table(columns, keys, f"{place}.kept[]")
+
+
+def _of_bound(kept: Kept, effort: str) -> str:
+    """What --keep calls it."""
+    kind, _, name = kept.bound.name.partition(".")
+    part = {"links": ".angle", "slides": ".position", "effort": effort}.get(kind, "")
+    return f"{name}{part}" if name else kind
+
+
+def _shown_extreme(kept: Kept) -> float:
+    turns = kept.bound.name == "transmission" or kept.bound.name.startswith("links.")
+    return math.degrees(kept.extreme) if turns else kept.extreme
 
 
 def _places(fit: Fit[Mechanism]) -> dict[str, Callable[[], Table]]:
@@ -259,17 +312,18 @@ def _places(fit: Fit[Mechanism]) -> dict[str, Callable[[], Table]]:
 
     def table(reached: Sequence[Reached]) -> Table:
         inputs = reached[0].inputs
-        columns = [Column("input", "deg" if turning else "m", np.degrees(inputs) if turning else inputs)]
+        columns = [
+            number("input", "angle", np.degrees(inputs)) if turning else number("input", "length", inputs)
+        ]
         for each in reached:
             name = "" if len(fit.reached) == 1 else f"{_name(each)}_"
+            what = {"angle": "angle", "point": "", "slide": "position"}.get(each.kind, _dimension(fit, each))
             for title, values in (("", each.values), ("target_", each.target)):
-                if each.kind == "point":
-                    columns.append(Column(f"{name}{title}x", "m", values.real))
-                    columns.append(Column(f"{name}{title}y", "m", values.imag))
-                else:
-                    what = "angle" if each.kind == "angle" else "position"
-                    columns.append(Column(f"{name}{title}{what}", _unit(each), _size(each, values)))
-            columns.append(Column(f"{name}distance", _unit(each), _size(each, each.distances)))
+                parts = {what: _size(each, values)} if what else {"x": values.real, "y": values.imag}
+                columns += [
+                    number(f"{name}{title}{part}", _dimension(fit, each), its) for part, its in parts.items()
+                ]
+            columns.append(number(f"{name}distance", _dimension(fit, each), _size(each, each.distances)))
         return Table(columns)
 
     names = ["points" if i == 0 else f"points {i + 1}" for i in range(len(by_target))]
@@ -300,12 +354,16 @@ def _text(file: str, fit: Fit[Mechanism], bare: Mapping[str, str]) -> str:
 def _write(document: Any, dimension: Dimension, si: float, units: Units) -> None:
     """Put a number where it stands in the document, in the unit of the file."""
     path, where = dimension.path.split("."), dimension.where
-    if where[0] in ("guides", "gears", "belts", "racks"):
+    if where[0] not in ("links", "ground"):
         # lists count from 1, and slots apart from sliders
         rows = document[path[0]]
         of, rest = (rows[int(path[1]) - 1] if isinstance(rows, list) else rows), where[2:]
+        if where[0] == "cams":
+            # the keys of a segment are not its fields
+            rest = tuple(int(word) - 1 if word.isdigit() else word for word in path[2:])
     elif where[0] == "links":
-        of, rest = document["links"][where[1]]["points"], where[3:]
+        link, weight = document["links"][where[1]], where[2] in ("mass", "center", "inertia")
+        of, rest = (link, where[2:]) if weight else (link["points"], where[3:])
     else:
         of, rest = document[where[0]], where[1:]
     *way, last = (0 if key == "x" else 1 if key == "y" else key for key in rest)

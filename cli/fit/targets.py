@@ -1,19 +1,24 @@
-"""The target of a fit: tables of places, angles and travels, read into the library's targets."""
+"""The target of a fit: tables of places, angles, travels and efforts, read into the library's targets."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cli.cases.values import place_or_angle
 from cli.read import options
 from dalembert.errors import DataError
 from dalembert.hints import nearest
+from dalembert.quantities import is_number, parse_number
 
 if TYPE_CHECKING:
     from virtualwork import Mechanism
+    from virtualwork.family.keep import Bound
     from virtualwork.family.target import Target
 
 # of each kind: the columns that it has behind its name, the room of the library's names
@@ -21,12 +26,14 @@ KINDS = {
     "point": ({"x": "length", "y": "length"}, "points"),
     "link": ({"angle": "angle"}, "links"),
     "slide": ({"position": "length"}, "slides"),
+    "torque": ({"torque": "torque"}, "effort"),
+    "force": ({"force": "force"}, "effort"),
 }
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """A point, the angle of a link or the position of a slide that `--want` names."""
+    """A point, the angle of a link, the position of a slide or the input's effort that `--want` names."""
 
     kind: str
     name: str
@@ -46,7 +53,7 @@ class Wanted:
         """What the options call it."""
         parts = KINDS[self.kind][0]
         full = tuple(f"{self.name}.{part}" for part in parts) if len(parts) == 1 else ()
-        return (self.name, *full) if self.kind != "slide" else full
+        return (self.name, *full) if self.kind in ("point", "link") else full
 
 
 def every_wanted(m: Mechanism) -> list[Wanted]:
@@ -57,6 +64,7 @@ def every_wanted(m: Mechanism) -> list[Wanted]:
         *(Wanted("point", name) for name in points),
         *(Wanted("link", name) for name in m.links),
         *(Wanted("slide", name) for name in slides),
+        *(Wanted("force" if entry.is_slide else "torque", entry.name) for entry in m.inputs),
     ]
 
 
@@ -98,6 +106,45 @@ def weights(texts: Sequence[str] | None, aims: Sequence[Wanted]) -> dict[str, fl
             raise options.bad("--weight", f"'{text}': expected one of {names}")
         weights |= dict.fromkeys((each.path for each in of), weight)
     return weights
+
+
+def kept(m: Mechanism, texts: Sequence[str] | None, bare: Mapping[str, str]) -> list[Bound]:
+    """Every `--keep QUANTITY>=VALUE` (or `<=`), SI."""
+    from virtualwork.family.keep import Bound
+
+    every = every_wanted(m)
+    known: dict[str, tuple[str, str]] = {"transmission": ("transmission", "angle")}
+    for each in reversed(every):
+        for part, kind in KINDS[each.kind][0].items():
+            path = f"{each.path}.{part}" if each.kind == "point" else each.path
+            known[f"{each.name}.{part}"] = path, kind
+    result = []
+    for text in texts or ():
+        found = re.fullmatch(r"\s*(\S+?)\s*(>=|<=|≥|≤)\s*(\S.*?)\s*", text)
+        if found is None:
+            raise options.bad(
+                "--keep",
+                f"'{text}': expected QUANTITY>=VALUE or QUANTITY<=VALUE, such as transmission>=40deg",
+            )
+        name, sense, value = found.groups()
+        if name not in known:
+            raise options.bad(
+                "--keep",
+                f"no quantity is named '{name}'{nearest(name, known)}: expected one of {', '.join(known)}",
+            )
+        path, kind = known[name]
+        if kind in ("length", "angle"):
+            number = place_or_angle(value, kind, "--keep", bare)
+            number = math.radians(number) if kind == "angle" else number
+        elif is_number(value):
+            number = parse_number(value)
+        else:
+            number = options.needed("--keep", value, kind)
+        least = sense in (">=", "≥")
+        if name == "transmission" and not (least and 0 <= number <= math.pi / 2):
+            raise options.bad("--keep", f"'{text}': expected transmission>=ANGLE, from 0deg to 90deg")
+        result.append(Bound(path, number if least else None, None if least else number))
+    return result
 
 
 def targets(

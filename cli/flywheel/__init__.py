@@ -1,1 +1,80 @@
 """`dalembert flywheel`: a flywheel from a table of torque."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cli.read import options
+from cli.show.output import command
+from dalembert.quantities import parse_number
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cli.show.result import Result
+    from dalembert.results.way import Topic
+
+
+EXAMPLE = "flywheel-engine"
+OPTIONS = """
+Arguments:
+  table TABLE  CSV of torque over the angle of the shaft, whole turns; - is standard input.
+What:
+  speed SPEED  Mean speed of the shaft, such as 600rpm.
+  fluctuation COEFFICIENT  Largest less smallest speed over the mean, such as 0.02 or 2%.
+"""
+
+
+def coefficient(text: str) -> float:
+    """Read a coefficient of fluctuation, a number or a percentage."""
+    try:
+        value = parse_number(text.strip().removesuffix("%"))
+    except ValueError:
+        value = 0.0
+    value = value / 100 if text.strip().endswith("%") else value
+    if not 1e-60 < value <= 2:
+        raise options.bad(
+            "--fluctuation",
+            f"'{text}': expected a number above 0 and at most 2, where the shaft comes to rest, such as 0.02 or 2%",
+        )
+    return value
+
+
+@command(OPTIONS)
+def run(table: str, speed: str | None = None, fluctuation: str | None = None) -> Result:
+    """Find the flywheel that keeps the speed of a shaft within a fluctuation, from a table of its torque.
+
+    TABLE has the columns angle_* and torque_*; * is a unit. The torque is linear between rows; two rows at one angle are a
+    step. The rows span whole turns of the shaft, the last row included: 0 to 360 deg, or 0 to 720 deg of a four-stroke
+    engine. The load is constant, the mean of the torque.
+    """
+    from cli.flywheel.tables import METHOD, tables, warnings
+    from cli.flywheel.turns import read_torque
+    from cli.show.result import Result
+
+    if speed is None or fluctuation is None:
+        missing = "--speed" if speed is None else "--fluctuation"
+        raise options.bad(
+            missing, "expected --speed and --fluctuation, such as --speed 600rpm --fluctuation 0.02"
+        )
+    omega = options.needed("--speed", speed, "speed", positive=True)
+    wheel = read_torque(table, omega, coefficient(fluctuation))
+
+    def figure() -> Figure:
+        from cli.flywheel.tables import draw
+
+        return draw(wheel)
+
+    def way() -> list[Topic]:
+        from cli.flywheel.tables import way
+
+        return way(wheel)
+
+    return Result(
+        way=way,
+        tables=tables(wheel),
+        figure=figure,
+        method=METHOD,
+        about={"title": "Flywheel"},
+        warnings=[*wheel.table.warnings, *warnings(wheel)],
+    )

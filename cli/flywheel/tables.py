@@ -1,13 +1,24 @@
-"""Results of a flywheel: one row of results, and the energy along the turns."""
+"""Results of a flywheel: its numbers, the energy along the turns; the picture, the worked solution."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cli.flywheel.turns import Flywheel
+from cli.show.picture import blank
+from dalembert.drawing.curves import Curve, panel, spread
+from dalembert.drawing.sheet import sheet
 from dalembert.results.columns import Table, names, number
+from dalembert.results.way import Topic, figures
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cli.flywheel.turns import Flywheel
+
 
 METHOD = (
     "The load is constant, the mean torque T̄. E(θ) = ∫ (T − T̄) dθ with T linear between rows; the flywheel's moment of "
@@ -75,3 +86,75 @@ def warnings(wheel: Flywheel) -> list[str]:
             "and the next"
         )
     return lines
+
+
+def draw(wheel: Flywheel) -> Figure:
+    """Draw torque and energy over the angle."""
+    figure = blank()
+    sheet(7.5, 5.6, figure)
+    above, below = figure.subplots(2, 1, sharex=True)
+    c, angle = wheel.cycle, wheel.angle
+    first = panel(
+        above,
+        angle,
+        [Curve("torque", wheel.torque), Curve("mean", np.full(len(angle), c.mean))],
+        "torque",
+        "N·m",
+    )
+    # parabolas between rows
+    fine = np.unique(
+        np.concatenate([np.linspace(angle[0], angle[-1], 721), angle, np.degrees([c.fastest, c.slowest])])
+    )
+    k = np.clip(np.searchsorted(angle, fine, side="right") - 1, 0, len(angle) - 2)
+    width = angle[k + 1] - angle[k]
+    share = np.divide(fine - angle[k], width, out=np.zeros_like(fine), where=width > 0)
+    over = wheel.torque - c.mean
+    here = over[k] + share * (over[k + 1] - over[k])
+    values = c.energy[k] + (over[k] + here) / 2 * np.radians(fine - angle[k])
+    second = panel(below, fine, [Curve("energy", values)], "energy of the flywheel", "J", c.rounding)
+    low, high = float(values.min()), float(values.max())
+    scale = below.lines[0].get_ydata()
+    if low < high:
+        for level in (np.min(scale), np.max(scale)):
+            below.axhline(float(level), color="0.5", lw=0.8, ls=":")
+    below.set_title(f"between the dotted lines: {c.fluctuation:.4g} J", fontsize=9, loc="left")
+    below.set_xlabel("angle of the shaft, deg")
+    # quarter turns of one or two turns
+    below.set_xticks(angle[0] + 90.0 * np.ceil(wheel.turns / 2) * np.arange(0, 9))
+    below.set_xlim(angle[0], angle[-1])
+    spread([first, second])
+    return figure
+
+
+def way(wheel: Flywheel) -> list[Topic]:
+    """The topics."""
+    cycle = wheel.cycle
+    span = float(np.radians(wheel.angle[-1] - wheel.angle[0]))
+    mean = [
+        f"W = ∫ T dθ = {figures(cycle.work)} J over {figures(span)} rad (between rows T is a straight line)",
+        f"T̄ = W/θ = {figures(cycle.work)}/{figures(span)} = {figures(cycle.mean)} N·m",
+    ]
+    rows = Table(
+        [
+            number("angle", "angle", wheel.angle),
+            number("torque", "torque", wheel.torque),
+            number("excess", "torque", wheel.torque - cycle.mean),
+            number("energy", "energy", cycle.energy),
+        ],
+        ("angle_deg",),
+        "rows[]",
+    )
+    fast, slow = np.degrees([cycle.fastest, cycle.slowest]).tolist()
+    energy: list[str | Table] = [
+        "E(θ) = ∫ (T − T̄) dθ: what the flywheel takes up (Norton, Design of Machinery, §11.11)",
+        rows,
+        f"ΔE = E_max − E_min = {figures(cycle.fluctuation)} J, from {figures(slow)}° (slowest) to {figures(fast)}° (fastest)",
+    ]
+    inertia = [
+        f"I = ΔE/(C·ω²) = {figures(cycle.fluctuation)}/({figures(wheel.coefficient)}·{figures(wheel.speed)}²) = {figures(wheel.inertia)} kg·m²"
+    ]
+    return [
+        Topic("mean torque", mean, "Mean torque", {"work_J": cycle.work, "span_rad": span, "mean_torque_N_m": cycle.mean}),
+        Topic("energy", energy, "Energy above the mean", {"energy_fluctuation_J": cycle.fluctuation}),
+        Topic("inertia", inertia, "Moment of inertia", {"flywheel_inertia_kg_m2": wheel.inertia}),
+    ]  # fmt: skip

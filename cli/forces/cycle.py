@@ -71,7 +71,7 @@ class Forces(PoseStudy):
 
     @property
     def beside_each(self) -> bool:
-        """Whether something stands beside the poses of each variant."""
+        """Whether each variant has more than its poses."""
         return self.has_cycle or self.counterweights is not None
 
     def in_blocks(self, show: ShowOptions) -> bool:

@@ -177,10 +177,10 @@ def _part(analysis: Analysis, motion: Motion, name: str, order: int) -> Part:
 
 
 def _vector(
-    names: Sequence[str], z: NDArray[np.complex128], known: NDArray[np.bool_] | bool = True
+    names: Sequence[str], z: NDArray[np.complex128], finite: NDArray[np.bool_] | bool = True
 ) -> dict[str, Numbers]:
     """Components of vectors by their names."""
-    there = np.isfinite(z) & known
+    there = np.isfinite(z) & finite
     return dict(zip(names, (cells(z.real, there), cells(z.imag, there)), strict=True))
 
 

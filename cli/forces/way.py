@@ -42,7 +42,7 @@ def way(analysis: Analysis) -> list[Topic]:
 
 def _motors(analysis: Analysis) -> list[Topic]:
     """Links that carry a motor: their common centre G′ and inertia, and the motor's torque on both (Ibrahim §2.3)."""
-    m, found = analysis.mechanism, []
+    m, motors = analysis.mechanism, []
     for motor in m.motors:
         if motor.carrier == GROUND:
             continue
@@ -68,8 +68,8 @@ def _motors(analysis: Analysis) -> list[Topic]:
             "torque_N_m": torque[0] if len(torque) == 1 else torque,
         }
         title = f"Link {motor.carrier} with the motor of {motor.drives} (Ibrahim §2.3)"
-        found.append(Topic("motor", text, title, head))
-    return found
+        motors.append(Topic("motor", text, title, head))
+    return motors
 
 
 def _effort(analysis: Analysis, j: int | None) -> list[float]:
@@ -118,7 +118,7 @@ def _free_bodies(analysis: Analysis) -> list[Topic]:
     )
     text = "Every link cut loose: on each ΣF = 0 and ΣM_G = 0, inertia force −m·a_G and inertia torque −I_G·α among them."
     if motion.n > 1:
-        text += f" At {figures(analysis.inputs.shown[first][0])}:"
+        text += f" At {analysis.pose_text(first)}:"
     title = "Free-body diagrams (Ibrahim §2.2, Riul, figures 3 to 5)"
     head = over_poses(analysis, entries)
     return [Topic("free bodies", [text, table], title, head, partial(_diagrams, bodies, first))]
@@ -170,22 +170,22 @@ def _equations(analysis: Analysis, motion: Motion, entries: list[list[Entry]], m
         lines.append(f"Pose {analysis.inputs.shown[0][0]:g}; the others in the same way.")
     if not moves:
         lines.append("The mechanism is at rest: the velocities are virtual, of a unit speed of the input.")
-    for found in entries:
-        if not found:
+    for entry_list in entries:
+        if not entry_list:
             lines.append("The pose cannot be assembled.")
             continue
         idle: dict[str, list[str]] = {}
-        for e in found:
+        for e in entry_list:
             if e.workless:
                 name = f"{e.symbol} at {e.point}" if e.point else f"{e.symbol} ({e.kind})"
                 idle.setdefault(e.workless, []).append(name)
         lines += [f"No work, {why}: {', '.join(dict.fromkeys(which))}." for why, which in idle.items()]
-        here = [e for e in found if not e.workless]
-        known = [e for e in here if e.kind != "unknown"]
+        here = [e for e in entry_list if not e.workless]
+        loads = [e for e in here if e.kind != "unknown"]
         drives = [e for e in here if e.kind == "unknown"]
-        lines.append(f"ΣF·V + ΣT·ω = 0{f' for input {found[0].field}' if found[0].field else ''}:")
+        lines.append(f"ΣF·V + ΣT·ω = 0{f' for input {entry_list[0].field}' if entry_list[0].field else ''}:")
         lines.append("  " + (" + ".join(f"{e.symbol}·{e.rate}" for e in here) or "0") + " = 0")
-        lines += [f"  {e.equation()}" for e in known]
-        lines.append(f"  sum without the drive: {figures(sum(e.power for e in known))} W")
+        lines += [f"  {e.equation()}" for e in loads]
+        lines.append(f"  sum without the drive: {figures(sum(e.power for e in loads))} W")
         lines += [f"  {e.equation()}" for e in drives]
     return lines

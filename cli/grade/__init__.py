@@ -1,1 +1,55 @@
 """`dalembert grade`: the marks of answers to an exercise."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cli.show.commands import with_options
+from cli.show.output import show
+
+if TYPE_CHECKING:
+    from cli.show.result import Result
+
+
+EXAMPLE = "exercise-slider-crank"
+OPTIONS = """
+Arguments:
+  file FILE.toml  The exercise.
+  answers ANSWERS  The answers, as answers.csv with its column answer filled in; - is standard input.
+What:
+  key KEY.csv  The numbers of each student (default: key.csv in the folder of the answers).
+"""
+
+
+def _run(file: str, answers: str, key: str | None = None) -> Result:
+    """Mark the answers to an exercise: right, rounding, figures, carried, wrong or blank, with the likely mistake.
+
+    ANSWERS has the columns student, quantity, answer, the exercise's key columns and unit; further columns are kept. An
+    answer may have a decimal comma, a power of ten, its own unit: 1,23 or 1.23e0 or 18.1 kJ. An angle counts modulo a
+    turn. However wrong the answers, the status is 0.
+    """
+    from cli.exercise.description import read_exercise
+    from cli.exercise.solving import workshop
+    from cli.grade.answers import read_students
+    from cli.grade.marks import mark_all
+    from cli.grade.tables import METHOD, tables
+    from cli.show.result import Result
+
+    exercise = read_exercise(file)
+    warnings: list[str] = []
+    students = read_students(exercise, answers, key, warnings)
+    with workshop(exercise) as shop:
+        marks = mark_all(exercise, shop, students)
+    points = sum(mark.points for mark in marks)
+    of = float(exercise.points) * len(students)
+    return Result(
+        tables=tables(exercise, students, marks),
+        companions=["totals"],
+        notes=lambda: f"{exercise.title}: {len(students)} students, {points:g} of {of:g} points",
+        method=METHOD,
+        about={"title": f"Marks: {exercise.title}"},
+        warnings=warnings,
+    )
+
+
+run = with_options(_run, OPTIONS, ("json", "output", "text", "report", "about", "no_color"), show)

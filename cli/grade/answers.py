@@ -38,15 +38,15 @@ def read_students(exercise: Exercise, answers: str, key: str | None, warnings: l
     table = read(answers, texts=None)
     columns = _columns(table, ("student", "quantity", "answer"))
     students = _keyed(exercise, answers, key)
-    known = students is not None
+    listed = students is not None
     people: dict[str, Student] = students or {}
     keys = [key for key in exercise.keys if key in columns]
-    unknown = _of_key(exercise) if known else set()
+    unknown = _of_key(exercise) if listed else set()
     others = [name for name in columns if name not in (*OWN, *exercise.keys, *unknown)]
     for row, name in enumerate(columns["student"]):
         if not name:
             raise table.error(row, "student", name, "a student")
-        if known and name not in people:
+        if listed and name not in people:
             raise table.error(row, "student", name, f"a student of the key: {_some(people)}")
         student = people.setdefault(name, Student(name))
         for other in others:
@@ -127,17 +127,17 @@ def _question(
     quantity = columns["quantity"][row]
     there = [k for k, ask in enumerate(exercise.asks) if ask.quantity.lower() == quantity.lower()]
     if not there:
-        asked = ", ".join(dict.fromkeys(ask.quantity for ask in exercise.asks))
-        raise table.error(row, "quantity", quantity, f"a quantity that is asked for: {asked}")
+        expected = ", ".join(dict.fromkeys(ask.quantity for ask in exercise.asks))
+        raise table.error(row, "quantity", quantity, f"a quantity that is asked for: {expected}")
     fitting = [k for k in there if all(_same(exercise.asks[k], key, columns[key][row]) for key in keys)]
     if len(fitting) == 1:
         return fitting[0]
     missing = [key for key in exercise.keys if key not in keys]
     if not fitting:
         cells = ", ".join(f"{key} {quote(columns[key][row])}" for key in keys)
-        asked = "; ".join(_where(exercise.asks[k]) for k in there)
+        expected = "; ".join(_where(exercise.asks[k]) for k in there)
         raise table.error(
-            row, keys[0], columns[keys[0]][row], f"a row that is asked for ({asked}); found {cells}"
+            row, keys[0], columns[keys[0]][row], f"a row that is asked for ({expected}); found {cells}"
         )
     raise DataError(
         f"{table.file}: no column {', '.join(missing)}: expected {'it' if len(missing) == 1 else 'them'}, as "

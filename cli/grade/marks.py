@@ -9,14 +9,15 @@ from fractions import Fraction
 from functools import cached_property
 from math import pi
 
-from cli.exercise import rotor_slips
 from cli.exercise.answers import Answer
 from cli.exercise.description import Exercise
 from cli.exercise.mistakes import candidates
+from cli.exercise.recomputed import Recomputed
 from cli.exercise.slips import Candidates
 from cli.exercise.solving import Workshop
 from cli.exercise.variants import Variant
 from cli.grade.answers import Student
+from cli.grade.follows import Follows
 from dalembert.errors import DataError, quote
 from dalembert.figures import Right, Typed, typed
 from dalembert.units import composed
@@ -32,7 +33,7 @@ JOINED = {"Nm": "N*m", "kNm": "kN*m", "Nmm": "N*mm", "mNm": "mN*m", "kgm": "kg*m
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Mark:
-    """What is said of an answer."""
+    """The verdict on an answer."""
 
     student: Student
     answer: Answer
@@ -73,9 +74,18 @@ class Judge:
     variant: Variant
 
     @cached_property
+    def _runs(self) -> Recomputed:
+        """The command run again with slips in the data."""
+        return Recomputed(self.variant)
+
+    @cached_property
     def slips(self) -> list[Candidates]:
         """The slips of each question, found where an answer is wrong."""
-        return candidates(self.variant)
+        return candidates(self.variant, self._runs)
+
+    @cached_property
+    def _follows_from(self) -> Follows:
+        return Follows(self.variant, self._runs)
 
     def marks(self, student: Student) -> list[Mark]:
         """Return the marks of a student, in the order of the questions."""
@@ -125,23 +135,28 @@ class Judge:
         """Whether an answer follows from earlier ones, of which one at least is not right."""
         if all(each.verdict == "right" for each in earlier.values()):
             return False
-        if self.variant.problem.exercise.command[0] != "balance":
-            return False
-        follows = rotor_slips.carried(
-            self.variant, k, {j: (each.value, each.half) for j, each in earlier.items()}
-        )
-        if follows is None:
-            return False
-        low, high = follows
         answer = self.variant.answers[k]
-        middle, spread = (low + high) / 2, (high - low) / 2
-        if not middle:
+        if reading.number.digits < min(2, answer.ask.figures):
             return False
-        right = Right(middle, answer.ask.figures)
-        # what the earlier answers' own rounding leaves open, and that of this one
-        room = spread * (1 + 1e-9) + max(reading.half, float(right.unit) / 2)
-        off = self.slips[k].distance(reading.value, middle)
-        return abs(off) <= room and reading.number.digits >= min(2, answer.ask.figures)
+        typed = {j: (each.value, self._half(j, each)) for j, each in earlier.items()}
+        wrong = frozenset(j for j, each in earlier.items() if each.verdict != "right")
+        for low, high in self._follows_from.ranges(k, typed, wrong):
+            middle, spread = (low + high) / 2, (high - low) / 2
+            if not middle:
+                continue
+            right = Right(middle, answer.ask.figures)
+            # what the earlier answers' own rounding leaves open, and that of this one
+            room = spread * (1 + 1e-9) + max(reading.half, float(right.unit) / 2)
+            if abs(self.slips[k].distance(reading.value, middle)) <= room:
+                return True
+        return self._follows_from.same_slip(k, reading.value, reading.half, typed, wrong)
+
+    def _half(self, j: int, reading: _Reading) -> float:
+        """What an earlier answer leaves open; a right one no more than its figures do: 0.2 for 0.2000."""
+        if reading.verdict != "right":
+            return reading.half
+        answer = self.variant.answers[j]
+        return min(reading.half, float(Right(answer.value, answer.ask.figures).unit) / 2)
 
 
 def scale_of(unit: str, asked: str) -> Fraction | None:
@@ -160,16 +175,16 @@ def scale_of(unit: str, asked: str) -> Fraction | None:
 
 
 def _measure(unit: str) -> tuple[Fraction, object] | None:
-    found = composed(unit)
-    if found is None and unit[:1] in "kM" and unit[1:]:
+    scale = composed(unit)
+    if scale is None and unit[:1] in "kM" and unit[1:]:
         # kJ, MW: a thousand or a million of a unit that is known
         bare = composed(unit[1:])
         if bare is not None:
             (n, d), exponents = bare
             return Fraction(n) / Fraction(d) * (1000 if unit[0] == "k" else 10**6), exponents
-    if found is None:
+    if scale is None:
         return None
-    (n, d), exponents = found
+    (n, d), exponents = scale
     return Fraction(n) / Fraction(d), exponents
 
 

@@ -31,7 +31,7 @@ DEEPEST = 20
 
 @dataclass
 class Element:
-    """A tag with its attributes and what stands inside; `line` is where it begins."""
+    """A tag with its attributes and its contents; `line` is where it begins."""
 
     tag: str
     line: int
@@ -217,15 +217,15 @@ class _Reader:
         wanted = [(k, v) for k, v in e.attributes.items() if k in ("fastenlink", "fastenconnector")]
         wanted += [(c.tag.lower(), c.id) for c in e.all("fastenlink", "fastenconnector")]
         for kind, id_ in wanted:
-            found = (self.links if kind == "fastenlink" else self.connectors).get(id_)
-            if found is None:
+            fastened = (self.links if kind == "fastenlink" else self.connectors).get(id_)
+            if fastened is None:
                 self.d.leave(f"{kind} {id_} (line {e.line})", "there is none of that id")
                 continue
-            mine, its = self._body(e), self._body(found)
+            mine, its = self._body(e), self._body(fastened)
             if mine is None and its is not None:
                 self.d.body(its).points[f"C{e.id}"] = self.at[e.id]
             elif its is None and mine is not None:
-                self.d.body(mine).points[f"C{found.id}"] = self.at[found.id]
+                self.d.body(mine).points[f"C{fastened.id}"] = self.at[fastened.id]
             elif mine is not None and its is not None and mine != its:
                 self.d.welds.append((its, mine))
 
@@ -307,9 +307,9 @@ class _Reader:
                 d.welds.append((f"L{one}", f"L{other}"))
                 d.notes.append(f"{what}: L{one} carries the centre of L{other}: they are one body")
                 return
-        found = next(centers(d, first, second), None)
-        if found is None:
+        radii = next(centers(d, first, second), None)
+        if radii is None:
             d.leave(what, "no link holds the centres of both")
             return
         sense = 1.0 if ratio.attributes.get("type", "").lower() == "chain" else -1.0
-        d.meshes.append(Mesh(first, second, sense * sizes[0] / sizes[1], found[2]))
+        d.meshes.append(Mesh(first, second, sense * sizes[0] / sizes[1], radii[2]))

@@ -144,8 +144,8 @@ class _Reader:
         if numbers and e.get("type") == "rotary" and high - low >= 360:  # type: ignore[operator]
             del held["min"], held["max"]
         if held:
-            said = ", ".join(f"{key} {value}" for key, value in held.items())
-            self.d.leave(f"{said} of {where}", "an input has no limits of its own here")
+            values = ", ".join(f"{key} {value}" for key, value in held.items())
+            self.d.leave(f"{values} of {where}", "an input has no limits of its own here")
 
     def _actuator(self, k: int, e: dict[str, Any]) -> None:
         d, where = self.d, f"actuator {k}"

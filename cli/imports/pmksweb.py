@@ -29,10 +29,10 @@ class _List:
 
     def __init__(self, file: str, text: str) -> None:
         self.file, self.d = file, Drawing()
-        found = re.split(r"(?:^|[?&/])(j|l|f|pp|tp|s)=", text)
+        parts = re.split(r"(?:^|[?&/])(j|l|f|pp|tp|s)=", text)
         self.rows = {
             key: [row.strip().rstrip(",").split(",") for row in part.splitlines() if row.strip()]
-            for key, part in zip(found[1::2], found[2::2], strict=True)
+            for key, part in zip(parts[1::2], parts[2::2], strict=True)
         }
         if not self.rows.get("j") or not self.rows.get("l"):
             raise DataError(f"{file}: expected joints after j= and links after &l=; is the link cut off?")
@@ -171,8 +171,8 @@ def read(file: str, text: str) -> list[Drawing]:
     if LISTED.search(text):
         return [_List(file, unquote(text.strip())).drawing()]
     lines = [unquote(line).strip() for line in text.splitlines()]
-    found = [(i, line.rpartition("?")[2]) for i, line in enumerate(lines, 1) if line]
-    strings = [(i, s) for i, s in found if STRING.fullmatch(s)]
+    queries = [(i, line.rpartition("?")[2]) for i, line in enumerate(lines, 1) if line]
+    strings = [(i, s) for i, s in queries if STRING.fullmatch(s)]
     if not strings:
         raise damaged(
             file,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from cli.imports import linkage2, linkage_sim, motiongen, pmks, pmksweb, robots
+from cli.imports import freecad, linkage2, linkage_sim, motiongen, pmks, pmksweb, robots
 from cli.imports.drawn import Drawing
 from cli.imports.words import unknown
 from cli.read.robots import ROOTS, read_robot
@@ -92,6 +92,8 @@ def kind_of(file: str, text: str) -> str:
 
 def read(file: str, data: bytes, kind: str | None, folder: Path | None = None) -> tuple[str, list[Drawing]]:
     """Return the kind and the drawings of a file; files that it includes must lie in its folder."""
+    if kind == "freecad" or (kind is None and freecad.is_document(data)):
+        return "freecad", freecad.read(file, data)
     text = decoded(file, data)
     kind = kind or kind_of(file, text)
     if kind in ROOTS.values():

@@ -316,12 +316,12 @@ class _Layer:
     def _springs(self, moving: list[RobotJoint]) -> None:
         """Springs and dampers of joints and tendons; on a slide alone they have no like."""
         robot, d = self.robot, self.d
-        found = [
+        springs = [
             Spring(f"spring of joint {j.name}", [], [(j.name, 1.0)], j.stiffness, j.damping, j.rest)
             for j in moving
             if j.stiffness or j.damping
         ]
-        for s in found + robot.springs:
+        for s in springs + robot.springs:
             values: dict[str, object] = {
                 k: v for k, v in (("stiffness", s.stiffness), ("damping", s.damping)) if v
             }

@@ -10,6 +10,7 @@ KINDS = {
     "motiongen": "MotionGen JSON",
     "linkage": "Linkage (.linkage2)",
     "linkage_sim": "linkage_sim JSON",
+    "freecad": "FreeCAD sketch (.FCStd)",
     "urdf": "URDF robot",
     "sdf": "SDF model",
     "mjcf": "MuJoCo's MJCF",
@@ -18,10 +19,10 @@ KINDS = {
 
 def unknown(file: str) -> DataError:
     """Refuse a file of no known kind."""
-    known = "; ".join(f"{name} ({what})" for name, what in KINDS.items())
-    return DataError(f"{file}: of no known kind: expected {known}; --from names one")
+    programs = "; ".join(f"{name} ({what})" for name, what in KINDS.items())
+    return DataError(f"{file}: of no known kind: expected {programs}; --from names one")
 
 
-def damaged(file: str, where: str, found: object, expected: str) -> DataError:
+def damaged(file: str, where: str, value: object, expected: str) -> DataError:
     """Refuse a file at the place where it is no longer what it should be."""
-    return DataError(f"{file}: {where}: found {quote(str(found))}, expected {expected}")
+    return DataError(f"{file}: {where}: found {quote(str(value))}, expected {expected}")

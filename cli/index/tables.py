@@ -1,4 +1,4 @@
-"""What is computed of index balancing: the two parts, and how well the readings agree."""
+"""Results of index balancing: the two parts, how well the readings agree; the worked solution."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ import numpy as np
 from cli.read.rounding import angle_error, size_error
 from dalembert.angles import degrees
 from dalembert.results.columns import Column, Table, names, number
+from dalembert.results.way import Topic, figures, vector_text
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from cli.index.readings import Complex, Positions
+
 
 NEAR = 3.0  # from this growth of errors on the positions are named as near each other
 
@@ -113,4 +115,39 @@ def warnings(p: Positions) -> list[str]:
     return [
         f"the positions of the rotor are close to each other: errors of the readings grow by a factor of {growth:.3g}; "
         "add a reading with the rotor turned by half a turn"
+    ]
+
+
+def way(p: Positions) -> list[Topic]:
+    """The topics."""
+    read = p.shown(p.readings)
+    rotor, mandrel = complex(p.shown(p.parts.rotor)), complex(p.shown(p.parts.mounting))
+    e = np.exp(1j * np.radians(p.turned))
+    mean, turn = complex(read.mean()), complex(e.mean())
+    spread = float((np.abs(e - turn) ** 2).sum())
+    unit = p.unit
+    table = Table(
+        [
+            Column("turned", "deg", p.turned, place="turned_deg"),
+            Column(p.quantity, unit, np.abs(read), place=p.quantity),
+            Column("angle", "deg", degrees(read), place="angle_deg"),
+            Column("x", unit, read.real, place="x"),
+            Column("y", unit, read.imag, place="y"),
+        ],
+        ("turned_deg",),
+        "readings[]",
+    )
+    text: list[str | Table] = [
+        "v = mandrel + rotor·e^{i·turned} (ISO 21940-14); ē and v̄ are the means over all positions, D = Σ|e − ē|²:",
+        table,
+        f"  v̄ = {vector_text(mean.real, mean.imag)}, ē = {vector_text(turn.real, turn.imag)}, D = {figures(spread)}",
+    ]
+    numbers = [
+        f"rotor = Σ (e − ē)*·v/D = {vector_text(rotor.real, rotor.imag)} {p.spoken_unit}: {figures(abs(rotor))} at {figures(float(degrees(np.array([rotor]))[0]))}°",
+        f"mandrel = v̄ − ē·rotor = {vector_text(mandrel.real, mandrel.imag)} {p.spoken_unit}: {figures(abs(mandrel))} at {figures(float(degrees(np.array([mandrel]))[0]))}°",
+    ]
+    head = {"unit": unit, "rotor": [rotor.real, rotor.imag], "mandrel": [mandrel.real, mandrel.imag]}
+    return [
+        Topic("vectors", text, "Vectors of the readings", {"unit": unit}),
+        Topic("parts", numbers, "Rotor and mandrel", head),
     ]

@@ -1,1 +1,33 @@
-"""`dalembert inspect`."""
+"""`dalembert inspect`: what kind of mechanism it is, and in which order it is solved."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cli.cases.options import CASES, FILE, WORKERS, Options
+from cli.show.output import declared_command
+
+if TYPE_CHECKING:
+    from cli.show.commands import ShowOptions
+    from cli.show.result import Result
+
+EXAMPLE = "watt-six-bar"
+OPTIONS = f"{FILE}{CASES}{WORKERS}"
+
+
+@declared_command(OPTIONS, Options)
+def run(own: Options, show: ShowOptions) -> Result:
+    """Inspect a planar mechanism: mobility, groups, Grashof classes, limits, dead and change points, strokes.
+
+    Speaks of the whole range of the input: --over, --cases and --set change dimensions. On a terminal also the order
+    in which the mechanism is solved.
+    """
+    from cli.cases.analysis import Request
+    from cli.cases.call import Call
+    from cli.inspect.character import Inspection
+
+    call = Call.of(own, show, Request(own.file))
+    call.refuse_inputs(
+        "inspect speaks of the whole range of the input: expected a dimension, links.crank.B.x=..."
+    )
+    return call.result(call.study(Inspection))

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.cases.poses import records
 from cli.cases.study import Further, PoseStudy
-from dalembert.results.text import table_text
+from dalembert.results.columns import Column, Table, names, number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,7 +18,6 @@ if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
     from dalembert.results.way import Topic
 
-Document = dict[str, Any]
 # radians between the solution from the guess and that of the groups: beyond it they are two assemblies
 SAME = 1e-6
 
@@ -39,7 +36,7 @@ class Poses(PoseStudy):
 
     @property
     def beside_each(self) -> bool:
-        """Whether something stands beside the poses of each variant."""
+        """Whether each variant has more than its poses."""
         return self.newton
 
     def in_blocks(self, show: ShowOptions) -> bool:
@@ -50,8 +47,7 @@ class Poses(PoseStudy):
         """The iterates."""
         if not self.newton:
             return Further()
-        document = iterates(analysis)
-        return Further({"newton": records(document["iterates"])}, newton_text(document), document)
+        return Further(iterates(analysis))
 
     def way(self, analysis: Analysis) -> list[Topic]:
         """Loops, closed forms, Newton's iterates, parts of motion."""
@@ -66,48 +62,45 @@ class Poses(PoseStudy):
         return curves(analysis) if is_by_quantity(analysis) else drawn(analysis)
 
 
-def iterates(analysis: Analysis) -> Document:
+def iterates(analysis: Analysis) -> dict[str, Table]:
     """Newton-Raphson from the guess at every pose; the iterates of the first, the largest difference of all."""
     from virtualwork.study.newton_table import all_at_once
 
     assembly = analysis.assemblies[0]
-    done = [all_at_once(assembly, tuple(row)) for row in analysis.inputs.values.tolist()]
-    first = done[0]
-    names = [
-        *(f"{n}_deg" for n in first.unknowns[: first.angles]),
-        *(f"{n}_m" for n in first.unknowns[first.angles :]),
-    ]
-    rows = []
-    for it in first.iterates:
-        values = [*np.degrees(it.unknowns[: first.angles]).tolist(), *it.unknowns[first.angles :].tolist()]
-        rows.append({"k": it.k, **dict(zip(names, values, strict=True)), "residual_m": it.residual})
-    away = [i for i, d in enumerate(done) if not d.closed or not d.difference < SAME]
+    solutions = [all_at_once(assembly, tuple(row)) for row in analysis.inputs.values.tolist()]
+    first = solutions[0]
+    away = [i for i, each in enumerate(solutions) if not each.closed or not each.difference < SAME]
     for i in away[:3]:
-        why = "did not converge" if not done[i].closed else "found another assembly"
+        why = "did not converge" if not solutions[i].closed else "found another assembly"
         analysis.warnings.append(f"newton from the guess {why} at step {analysis.inputs.steps[i]}")
     if len(away) > 3:
         analysis.warnings.append(
-            f"newton from the guess missed the assembly at {len(away)} of {len(done)} poses"
+            f"newton from the guess missed the assembly at {len(away)} of {len(solutions)} poses"
         )
-    differences = [d.difference for d in done if math.isfinite(d.difference)]
+    columns = [names("k", [each.k for each in first.iterates])]
+    for i, unknown in enumerate(first.unknowns):
+        values = np.array([each.unknowns[i] for each in first.iterates])
+        turns = i < first.angles
+        columns.append(
+            number(unknown, "angle" if turns else "length", np.degrees(values) if turns else values)
+        )
+        columns[-1].place = (columns[-1].header,)
+    columns.append(number("residual", "length", [each.residual for each in first.iterates]))
+    rows = zip(first.unknowns, np.array(first.jacobian).T.tolist(), strict=True)
+    jacobian = [Column(unknown, "", row, place=str(j)) for j, (unknown, row) in enumerate(rows)]
+    about = [names("unknowns", [list(first.unknowns)]), names("at", ["the guess"])]
+    difference = max(
+        (each.difference for each in solutions if math.isfinite(each.difference)), default=math.nan
+    )
     return {
-        "iterates": rows,
-        "newton_difference_rad": max(differences) if differences else None,
-        "jacobian": {"unknowns": list(first.unknowns), "at": "the guess", "rows": first.jacobian.tolist()},
+        "newton": Table(
+            columns, ("k",), "iterates[]", above="Newton-Raphson, all loops at once, from the guess"
+        ),
+        "jacobian": Table(jacobian, (), "jacobian.rows[]", above="at the guess, x and y of each loop"),
+        "of the jacobian": Table([], place="jacobian", documented=about),
+        "difference": Table(
+            [Column("newton_difference", "rad", [difference], place="newton_difference_rad")],
+            place="",
+            above="largest, to the assembly solved group by group",
+        ),
     }
-
-
-def newton_text(document: Document) -> str:
-    """The table of iterates, the Jacobian at the guess, and the difference to the closed form."""
-    rows: Sequence[Document] = document["iterates"]
-    table = table_text({key: [row[key] for row in rows] for key in rows[0]})
-    jacobian = document["jacobian"]
-    shown = table_text(
-        {name: [row[j] for row in jacobian["rows"]] for j, name in enumerate(jacobian["unknowns"])}
-    )
-    difference = document["newton_difference_rad"]
-    return (
-        f"Newton-Raphson, all loops at once, from the guess:\n{table}\nJacobian at the guess (x and y of each loop):\n"
-        f"{shown}\nlargest difference to the assembly solved group by group: "
-        + ("nothing to compare" if difference is None else f"{difference:.3g} rad")
-    )

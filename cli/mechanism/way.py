@@ -109,7 +109,7 @@ def _groups(analysis: Analysis, motion: Motion) -> list[Topic]:
             its = at[first]
             assert its is not None
             if len(at) > 1:
-                parts.append(f"At {figures(analysis.inputs.shown[first][0])}:")
+                parts.append(f"At {analysis.pose_text(first)}:")
             parts += _root_text(group, its)
         parts.append(_root_table(analysis, m, group, name, at))
         groups.append(Topic("group", parts, title, head))
@@ -325,7 +325,7 @@ def _parts(analysis: Analysis, motion: Motion) -> Topic:
         "V = V_base + ω × R + V_rel; A = A_base + α × R − ω²·R + A_rel + 2·ω × V_rel (Ibrahim, eqs. 1.7.4 to 1.10.7)."
     ]
     if motion.n > 1:
-        text.append(f"At {figures(analysis.inputs.shown[first][0])}:")
+        text.append(f"At {analysis.pose_text(first)}:")
     if whole.any():
         text += [_parts_table(every, first, velocity=True), _parts_table(every, first, velocity=False)]
     figure = partial(_polygons, every, first) if whole.any() else None

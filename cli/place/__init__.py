@@ -1,1 +1,137 @@
 """`dalembert place`: a correction put where masses can go."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from cli.place.corrections import (
+    Request,
+    read_corrections,
+    read_drill,
+    read_planes,
+    read_ratio,
+    read_weights,
+)
+from cli.read import options
+from cli.show.commands import ShowOptions
+from cli.show.output import command
+
+if TYPE_CHECKING:
+    from cli.show.result import Result
+    from dalembert.results.way import Topic
+
+
+EXAMPLE = "blades"
+OPTIONS = """
+Arguments:
+  corrections MASS@ANGLE ...  Corrections to ADD, such as 83.5g@308.87deg; or a FILE that dalembert field wrote (CSV, JSON, workbook).
+What:
+  rotor NAME  The rotor, of a file.
+  plane NAME  The plane, of a file.
+  positions ANGLES  Where masses can go, such as 292.5deg,315deg.
+  blades N  So many places, evenly spaced, numbered from 1.
+  max_mass MASS  Limit of each place, such as 5g.
+How: weights as they are:
+  stock MASSES  Weights in stock, such as 1g,2g,5g; one a place; the fewest that come within 1 % of the correction, at most three.
+  weights MASSES  Weights of fixed mass that stand at any angle, such as 4g,4g: the angle of each.
+  max_pieces N  Largest number of weights from stock in all: least error, in place of the fewest within 1 %.
+How: elsewhere:
+  at_radius R  Radius the corrections were found for.
+  to_radius R  Radius the masses go to.
+  at_z Z  Where along the shaft the corrections were found for.
+  to_z Z1:Z2  Carry them over to these planes, with the same force and moment.
+How: drilling:
+  drill DIAMETER  Remove material instead, by drilling opposite.
+  density DENSITY  Density of the material drilled, such as 7850kg_m3.
+  remove  The vectors are material to REMOVE already: drill there, not opposite.
+Further options (docs/commands.md describes them):
+  first ANGLE  Angle of the first blade.
+  numbering  Whether the blades are numbered in the angles' sense or against it.
+  pieces N  How many weights from stock go on one place.
+  drill_point ANGLE  Point angle of the drill, such as 118deg; 180deg is flat.
+  max_depth DEPTH  Deepest hole; more are drilled at a place if needed.
+"""
+
+
+@command(OPTIONS)
+def run(
+    corrections: list[str],
+    rotor: str | None = None,
+    plane: str | None = None,
+    positions: str | None = None,
+    blades: Annotated[int | None, typer.Option(min=1, max=options.PLACES)] = None,
+    first: str = "0deg",
+    numbering: Literal["with", "against"] = "with",
+    max_mass: str | None = None,
+    stock: str | None = None,
+    weights: str | None = None,
+    pieces: Annotated[int, typer.Option(min=1)] = 1,
+    max_pieces: Annotated[int | None, typer.Option(min=1)] = None,
+    at_radius: str | None = None,
+    to_radius: str | None = None,
+    at_z: str | None = None,
+    to_z: str | None = None,
+    drill: str | None = None,
+    density: str | None = None,
+    drill_point: str = "180deg",
+    max_depth: str | None = None,
+    remove: bool = False,
+    *,
+    show: ShowOptions,
+) -> Result:
+    """Put a correction where masses can go: holes, blades, weights in stock, another radius, drilling.
+
+    Several corrections are combined first. Without --positions or --blades the result is the one mass. Of a file each
+    rotor's plane is placed by itself.
+    """
+    every = read_corrections(corrections, rotor, plane)
+    ratio = read_ratio(at_radius, to_radius)
+    drilled = read_drill(drill, density, drill_point, max_depth)
+    in_stock, fixed = read_weights("--stock", stock), read_weights("--weights", weights)
+    if in_stock is not None and drilled is not None:
+        raise options.bad("--stock", "weights from stock are not drilled: expected --stock or --drill")
+    if fixed is not None:
+        turned = "does not go with --weights, which have a mass of their own and stand at any angle"
+        options.refuse(turned, positions=positions, blades=blades, stock=stock, max_mass=max_mass)
+        options.refuse(turned, max_pieces=max_pieces, drill=drill, remove=remove)
+    moved = read_planes(at_z, to_z)
+    chosen = options.places(positions, blades, first, numbering)
+    if in_stock is not None and chosen is None:
+        raise options.bad("--stock", "expected --positions or --blades for the weights to go to")
+    limit = options.quantity("--max-mass", max_mass, "mass", positive=True)
+    from cli.place.placing import Placing
+    from cli.place.tables import METHOD, draw, tables
+    from cli.show.result import Result, Section, Sheet
+    from dalembert.results.text import heading
+
+    request = Request(chosen, limit, in_stock, fixed, pieces, max_pieces, ratio, drilled, moved, remove)
+    placings = [Placing(correction, request) for correction in every]
+    alone = len(placings) == 1
+    if not alone and show.plot is not None:
+        raise options.bad("--plot", "draws one correction: expected --rotor and --plane too")
+
+    def sheet(placing: Placing) -> Sheet:
+        parts = {name: table() for name, table in tables([placing]).items()}
+        sections = [Section(heading(name), [table.above, table]) for name, table in parts.items()]
+        return Sheet(placing.of.name, sections, lambda: draw(placing))
+
+    def way() -> list[Topic]:
+        from cli.place.tables import way
+
+        return [topic for each in placings for topic in way(each, "" if alone else each.of.name)]
+
+    return Result(
+        way=way,
+        tables=tables(placings),
+        figure=(lambda: draw(placings[0])) if alone else None,
+        method=METHOD,
+        sheets=None if alone else lambda: map(sheet, placings),
+        about={"title": "Placement of a correction"},
+        warnings=[
+            text if alone else f"{placing.of.name}: {text}"
+            for placing in placings
+            for text in placing.warnings
+        ],
+    )

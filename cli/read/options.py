@@ -116,13 +116,22 @@ def two_bearings(flag: str, text: str) -> tuple[float, float]:
     return z1, z2
 
 
-def places(positions: str | None, blades: int | None, first: str) -> list[float] | None:
-    """Return the angles of the places where masses can go, in degrees; None where none are given."""
+def places(
+    positions: str | None, blades: int | None, first: str, numbering: str = "with"
+) -> list[float] | None:
+    """Return the angles of the places where masses can go, in degrees; None where none are given.
+
+    `numbering`: `with` where the numbers of the blades go up in the angles' sense, `against` where they go the other way.
+    """
     if positions is not None and blades is not None:
         raise bad("--blades", "expected --positions or --blades, not both")
     if blades is not None:
-        start = in_degrees("--first", first)
-        return [(start + 360.0 * k / blades) % 360.0 for k in range(blades)]
+        start, way = in_degrees("--first", first), -1 if numbering == "against" else 1
+        return [(start + way * (360.0 * k / blades)) % 360.0 for k in range(blades)]
+    if numbering == "against":
+        raise bad(
+            "--numbering", "speaks of --blades: --positions are numbered in the order in which they stand"
+        )
     if positions is None:
         return None
     chosen = [in_degrees("--positions", part) for part in positions.split(",")]
@@ -152,11 +161,11 @@ def vector(flag: str, text: str | None, dimension: str) -> tuple[float, float, f
     if len(parts) != 3:
         raise bad(flag, f"'{text}': expected three numbers x,y,z")
     try:
-        given = [_number_and_unit(part, dimension) for part in parts]
+        numbers = [_number_and_unit(part, dimension) for part in parts]
     except ValueError as error:
         raise bad(flag, f"'{text}': expected three numbers x,y,z: {error}") from None
-    shared = given[2][1] or next(iter(UNITS[dimension]))
-    x, y, z = (float(to_si(value, dimension, unit or shared)) for value, unit in given)
+    shared = numbers[2][1] or next(iter(UNITS[dimension]))
+    x, y, z = (float(to_si(value, dimension, unit or shared)) for value, unit in numbers)
     return x, y, z
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -35,6 +35,7 @@ PRODUCTS = ("ixy", "ixz", "iyz")
 DENSITIES = {3: "density", 2: "area_density", 1: "linear_density"}
 TENSOR = "tensor"
 MESH = "mesh"
+POINT = "point"
 TURNS = ("rx", "ry", "rz")
 _NUMBERS = {
     "mass": "mass",
@@ -48,11 +49,21 @@ _NUMBERS = {
 }
 
 
+POLAR = ("radius", "angle")
+"""Where a point lies, in place of x and y."""
+SEVERAL = "body"
+"""The column that names each row's body where a table has several."""
+
+
 @dataclass(frozen=True)
 class Parts:
     """The parts as read, and the body they make."""
 
     file: str
+    body: str
+    """Its name in the column `body`."""
+    several: bool
+    """Whether the table has that column."""
     name: list[str]
     shape: list[str]
     each: Body
@@ -81,6 +92,8 @@ class _Unturned:
     mass: Array
     center: Array
     inertia: Array
+    reach: Array
+    """Radius times turn of points by radius and angle: their places have the errors of a cosine; else 0."""
 
     def error(self) -> BodyError:
         """Bound what is off in them: numbers as read, and their shapes' formulas."""
@@ -89,8 +102,9 @@ class _Unturned:
         from rigidbody3d.shapes import weighed
 
         masses, centers, tensors = (READ * np.abs(x) for x in (self.mass, self.center, self.inertia))
-        for i, found in self.meshes.items():
-            rough, reach = found.rough()
+        centers[:, :2] += READ * self.reach[:, None]
+        for i, solid in self.meshes.items():
+            rough, reach = solid.rough()
             masses[i] += rough * np.abs(self.mass[i])
             centers[i] += rough * reach
             tensors[i] += rough * np.abs(self.mass[i]) * reach**2
@@ -101,11 +115,11 @@ class _Unturned:
                 alike.setdefault((shape, amount), []).append(i)
         for (shape, amount), places in alike.items():
             names = SHAPES[shape].dimensions + SHAPES[shape].optional
-            given = {
+            entering = {
                 name: read([self.rows[i].get(key, 0.0) for i in places], 0, READ)
                 for name, key in (("amount", amount), *zip(names, names, strict=True))
             }
-            masses[places], tensors[places] = bounds(weighed, given, shape, amount != "mass")
+            masses[places], tensors[places] = bounds(weighed, entering, shape, amount != "mass")
         return BodyError(masses, centers, tensors)
 
     def solids(self) -> list[Solid]:
@@ -124,31 +138,57 @@ class _Unturned:
 
 
 def read_parts(path: str) -> Parts:
-    """Read a table of parts and put them together."""
-    table = read(path, numbers=_NUMBERS, texts=["part", "shape", "file", "file_unit"], blank=list(_NUMBERS))
+    """Read a table of the parts of one body, and put them together."""
+    bodies = read_bodies(path)
+    if len(bodies) > 1:
+        several = ", ".join(quote(parts.body) for parts in bodies)
+        raise DataError(f"{bodies[0].file}: column body: found {several}, expected one body")
+    return bodies[0]
+
+
+def read_bodies(path: str) -> list[Parts]:
+    """Read a table of parts and put them together: one body, or with a column `body` each of its own."""
+    return bodies_of(read_table(path), path)
+
+
+def read_table(path: str) -> Table:
+    """Read a table of parts as it stands."""
+    texts = ["part", "shape", "file", "file_unit", SEVERAL]
+    return read(path, numbers=_NUMBERS, texts=texts, blank=list(_NUMBERS))
+
+
+def bodies_of(table: Table, path: str) -> list[Parts]:
+    """Put the parts of a table together; meshes stand in files of the path's folder."""
     values = {name: column.si + 0.0 for name, column in table.numbers.items()}
     # row by row Python's numbers are faster; turns are no shape's
     columns = {key: column.tolist() for key, column in values.items() if key not in TURNS}
-    names = table.texts.get("part", [str(index + 1) for index in range(table.rows)])
+    labels = table.texts.get("part", [str(index + 1) for index in range(table.rows)])
     centers = np.stack([np.nan_to_num(values.get(axis, np.zeros(table.rows))) for axis in "xyz"], axis=-1)
+    reach = np.zeros(table.rows)
     folder = Path() if path == "-" else Path(path).parent
-    warnings, left_out = list(table.warnings), []
+    names, body_of = table.numbered(SEVERAL)
+    warnings: list[list[str]] = [[] for _ in names]
+    warnings[0] += table.warnings
+    left_out: list[list[str]] = [[] for _ in names]
     kept: list[int] = []
     shapes, rows, masses, tensors = [], [], [], []
     meshes: dict[int, _Mesh] = {}
     for index, shape in enumerate(map(str.lower, table.needed("shape"))):
         row = {key: value for key, column in columns.items() if (value := column[index]) == value}
+        if shape == POINT and row.keys() & set(POLAR):
+            centers[index, :2], reach[index] = _polar(table, index, row)
+            row = {key: value for key, value in row.items() if key not in POLAR}
         if shape == MESH:
-            found = _mesh(table, index, row, folder)
-            own, moments = found.mass, found.inertia
-            meshes[len(kept)] = found
+            solid = _mesh(table, index, row, folder)
+            own, moments = solid.mass, solid.inertia
+            meshes[len(kept)] = solid
             # it stays where the file has it
             if not row.keys() & {"x", "y", "z"}:
-                centers[index] = found.center
+                centers[index] = solid.center
         else:
-            own, moments = _part(table, index, shape, row, warnings, names[index])
+            own, moments = _part(table, index, shape, row, warnings[body_of[index]], labels[index])
         if own == 0:
-            left_out.append(f"{table.file}: part {quote(names[index])}: mass 0: left out")
+            left_out[body_of[index]].append(f"{table.file}: part {quote(labels[index])}: mass 0: left out")
             continue
         kept.append(index)
         shapes.append(shape)
@@ -156,32 +196,78 @@ def read_parts(path: str) -> Parts:
         masses.append(own)
         tensors.append(moments)
     mass, inertia = np.array(masses), np.array(tensors).reshape(-1, 3, 3)
-    missed = _check_tensors(table, kept, shapes, mass, inertia, names, warnings)
-    parts = _Unturned(shapes, rows, meshes, mass, centers[kept], inertia)
-    drawn = Body(mass, parts.center, inertia, parts.error, parts.solids)
+    missing = np.zeros(len(names))
+    for place, by in _check_tensors(table, kept, shapes, mass, inertia):
+        index = kept[place]
+        warnings[body_of[index]].append(_broken(table, index, labels[index], by))
+        missing[body_of[index]] += by
     rotation = (_turns(table) @ _along(table, values))[kept]
-    each = drawn.turned(rotation, error=_turning(rotation, values, kept))
-    total = mass.sum()
+    turning = _turning(rotation, values, kept)
+    result = []
+    for number, name in enumerate(names):
+        mine = np.flatnonzero(body_of[kept] == number)
+        own_rows = [kept[i] for i in mine]
+        parts = _Unturned(
+            [shapes[i] for i in mine],
+            [rows[i] for i in mine],
+            {k: meshes[i] for k, i in enumerate(mine.tolist()) if i in meshes},
+            mass[mine],
+            centers[own_rows],
+            inertia[mine],
+            reach[own_rows],
+        )
+        drawn = Body(parts.mass, parts.center, parts.inertia, parts.error, parts.solids)
+        each = drawn.turned(rotation[mine], error=turning[mine])
+        of = f"{table.file}: body {quote(name)}" if SEVERAL in table.texts else table.file
+        whole = _whole(of, each, float(missing[number]))
+        shown = [labels[i] for i in own_rows]
+        notes = [*warnings[number], *left_out[number]]
+        result.append(
+            Parts(table.file, name, SEVERAL in table.texts, shown, parts.shapes, each, whole, notes)
+        )
+    return result
+
+
+def _whole(of: str, each: Body, missing: float) -> Body:
+    """Put the parts of a body together; `missing` is by how much printed digits let the tensors miss a body's, kg·m²."""
+    total = each.mass.sum()
     if not total > 0:
         raise DataError(
-            f"{table.file}: the masses add up to {total:g} kg: expected a positive total (a hole is a negative mass)"
+            f"{of}: the masses add up to {total:g} kg: expected a positive total (a hole is a negative mass)"
         )
     whole = compose(each)
     verdict = check(whole.inertia)
-    if not verdict.valid and not verdict.margin >= -missed:
+    if not verdict.valid and not verdict.margin >= -missing:
         raise DataError(
-            f"{table.file}: no body is made of these parts: {verdict.reason}: is a hole outside its part?"
+            f"{of}: no body is made of these parts: {verdict.reason}: is a hole outside its part?"
         )
-    return Parts(table.file, [names[i] for i in kept], shapes, each, whole, [*warnings, *left_out])
+    return whole
+
+
+def _polar(table: Table, index: int, row: dict[str, float]) -> tuple[tuple[float, float], float]:
+    """Return x and y of a point by radius and angle, m, and its radius times its turn."""
+    for key, other in (POLAR, POLAR[::-1]):
+        if key not in row:
+            raise table.wrong(index, other, f"radius and angle together: a point has no {key}")
+    for key in "xy":
+        if key in row:
+            raise table.wrong(index, key, f"{key} or radius and angle of a point, not both")
+    radius = row["radius"]
+    if radius < 0:
+        raise table.wrong(index, "radius", "a radius that is not negative")
+    angle = table.numbers["angle"]
+    c, s = (float(x) for x in cosine_sine(angle.values[index], angle.unit))
+    plain = c in (0.0, 1.0, -1.0)
+    return (radius * c, radius * s), 0.0 if plain else radius * (1.0 + abs(row["angle"]))
 
 
 def _part(
     table: Table, index: int, shape: str, row: dict[str, float], warnings: list[str], name: str
 ) -> tuple[float, Array]:
     """Return the mass of a part and its tensor along its own axes."""
-    known = [*SHAPES, TENSOR, MESH]
-    if shape not in known:
-        expected = f"one of {', '.join(known)}{nearest(shape, known)}"
+    shapes = [*SHAPES, TENSOR, MESH]
+    if shape not in shapes:
+        expected = f"one of {', '.join(shapes)}{nearest(shape, shapes)}"
         raise table.error(index, "shape", table.texts["shape"][index], expected)
     needed = MOMENTS if shape == TENSOR else SHAPES[shape].dimensions
     optional = PRODUCTS if shape == TENSOR else SHAPES[shape].optional
@@ -206,44 +292,38 @@ def _part(
         formulas: Any = SHAPES[shape]  # they hold for plain numbers too, and those are faster one by one
         full = dict.fromkeys(formulas.optional, 0.0) | dimensions
         return mass, np.diag([mass * moment for moment in formulas.moments(**full)])
-    given = tensor(*(row.get(key, 0.0) for key in (*MOMENTS, *PRODUCTS)))
-    # a hole's tensor may be given as that of the material taken away, or already with its sign
-    if mass < 0 and np.trace(given) > 0:
-        given = -given
-    return mass, given
+    own = tensor(*(row.get(key, 0.0) for key in (*MOMENTS, *PRODUCTS)))
+    # a hole's tensor may be that of the material taken away, or have its sign already
+    if mass < 0 and np.trace(own) > 0:
+        own = -own
+    return mass, own
 
 
 def _check_tensors(
-    table: Table,
-    kept: list[int],
-    shapes: list[str],
-    mass: Array,
-    inertia: Array,
-    names: list[str],
-    warnings: list[str],
-) -> float:
-    """Refuse a given tensor that no body can have; all at once, for one by one takes long.
+    table: Table, kept: list[int], shapes: list[str], mass: Array, inertia: Array
+) -> Iterator[tuple[int, float]]:
+    """Refuse a tensor of the table that no body can have; all at once, for one by one takes long.
 
-    What its last printed digit explains is said and taken as it is; returned is by how much all of these miss, kg·m².
+    Yield the places of those that miss it by no more than their last printed digit, and by how much, kg·m².
     """
     places = [place for place, shape in enumerate(shapes) if shape == TENSOR]
-    missed = 0.0
     if not places:
-        return missed
-    given = inertia[places] * np.sign(mass[places])[:, None, None]
-    verdict = check(given)
+        return
+    tensors = inertia[places] * np.sign(mass[places])[:, None, None]
+    verdict = check(tensors)
     for at in np.flatnonzero(~verdict.valid):
         index, by = kept[places[at]], -float(verdict.margin[at])
-        digit = _last_digit(table, index)
         # the digit's own rounding is no reason to refuse
-        if not by <= digit * (1 + 1e-6):
-            raise table.wrong(index, "ixx", f"a tensor that a body can have: {check(given[at]).reason}")
-        warnings.append(
-            f"{table.file}: part {quote(names[index])}: the tensor breaks the triangle inequality by {by:.3g} kg·m², "
-            f"no more than its last printed digit ({digit:.3g} kg·m²): taken as it is"
-        )
-        missed += by
-    return missed
+        if not by <= _last_digit(table, index) * (1 + 1e-6):
+            raise table.wrong(index, "ixx", f"a tensor that a body can have: {check(tensors[at]).reason}")
+        yield places[at], by
+
+
+def _broken(table: Table, index: int, name: str, by: float) -> str:
+    return (
+        f"{table.file}: part {quote(name)}: the tensor breaks the triangle inequality by {by:.3g} kg·m², "
+        f"no more than its last printed digit ({_last_digit(table, index):.3g} kg·m²): taken as it is"
+    )
 
 
 def _last_digit(table: Table, index: int) -> float:
@@ -308,8 +388,8 @@ def _mass(table: Table, index: int, shape: str, row: dict[str, float], dimension
     if DENSITIES.get(kind) != key or len(densities) > 1:
         wanted = f"{DENSITIES[kind]} or mass" if kind else "mass"
         raise table.wrong(index, key, f"{wanted} for a {shape}")
-    known: Any = SHAPES[shape]
-    mass = row[key] * float(known.measure(**dict.fromkeys(known.optional, 0.0) | dimensions))
+    declared: Any = SHAPES[shape]
+    mass = row[key] * float(declared.measure(**dict.fromkeys(declared.optional, 0.0) | dimensions))
     if mass == 0:
         raise table.wrong(index, key, "a mass that is not zero: this shape has no volume")
     return mass

@@ -17,8 +17,8 @@ def vector_error(size: ArrayLike, angle: ArrayLike, unit: str) -> Real:
 
     A whole number of degrees is exact as it is written.
     """
-    given = np.asarray(angle, dtype=float)
-    last = np.where((given == np.rint(given)) & (unit == "deg"), 0.0, np.spacing(np.abs(given)) / 2)
+    angles = np.asarray(angle, dtype=float)
+    last = np.where((angles == np.rint(angles)) & (unit == "deg"), 0.0, np.spacing(np.abs(angles)) / 2)
     return np.asarray(np.abs(size) * (3 * EPS + to_si(last, "angle", unit)))
 
 
@@ -31,7 +31,7 @@ def angle_error(vector: ArrayLike, bound: ArrayLike, degrees: ArrayLike) -> Real
     """Bound the error of a vector's angle, degrees: half a turn where not even its direction is known."""
     size = np.asarray(np.abs(vector), dtype=float)
     error, shown = np.asarray(bound, dtype=float), np.asarray(degrees, dtype=float)
-    known = error < size
-    turn = np.arcsin(np.where(known, error / np.where(known, size, 1.0), 0.0))
-    turn = np.where(known, turn, np.where(error > 0, np.pi, 0.0))
+    directed = error < size
+    turn = np.arcsin(np.where(directed, error / np.where(directed, size, 1.0), 0.0))
+    turn = np.where(directed, turn, np.where(error > 0, np.pi, 0.0))
     return np.asarray(np.degrees(turn) + 2 * EPS * np.abs(shown))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 STANDARDS = ("API", "MIL")
-"""What --grade takes beside the grades of ISO 21940-11."""
+"""What --grade takes in addition to the grades of ISO 21940-11."""
 
 
 class Verdict(NamedTuple):

@@ -83,9 +83,9 @@ def stream(result: Result, suffix: str, output: Path | None, units: str | None, 
             for _ in made(Form(suffix, units, digits, parts), result.blocks):
                 pass
         return unknown
-    found = made(Form(suffix, units, digits), result.blocks)
+    parts_written = made(Form(suffix, units, digits), result.blocks)
     if suffix in (".csv", ".json"):
-        data = (data for data in found if isinstance(data, bytes))
+        data = (data for data in parts_written if isinstance(data, bytes))
         text = _document(result, data) if suffix == ".json" else data
         if output is not None:
             write(output, text)
@@ -93,7 +93,7 @@ def stream(result: Result, suffix: str, output: Path | None, units: str | None, 
             sys.stdout.writelines(part.decode() for part in text)
             sys.stdout.flush()
     elif output is not None:
-        tables = (data for data in found if isinstance(data, Table))
+        tables = (data for data in parts_written if isinstance(data, Table))
         write(output, parquet(tables) if suffix == ".parquet" else workbook({result.blocks_name: tables}))
     return unknown
 

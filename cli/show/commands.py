@@ -54,7 +54,10 @@ def suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
 
     def check(path: Path | None) -> Path | None:
         if path is not None and path.suffix.lower() not in suffixes:
-            raise typer.BadParameter(f"'{path}' has no known suffix: expected {', '.join(suffixes)}")
+            report = (
+                "; --report writes .html" if path.suffix.lower() == ".html" and ".json" in suffixes else ""
+            )
+            raise typer.BadParameter(f"'{path}' has no known suffix: expected {', '.join(suffixes)}{report}")
         return path
 
     return check
@@ -149,7 +152,7 @@ def help_lines(options: str) -> dict[str, HelpLine]:
     """Read the help of a command's parameters.
 
     Below each heading a line is a parameter's name as the function has it, its flags where they are others than that
-    name, what stands for its value, and after two blanks its help.
+    name, the placeholder of its value, and after two blanks its help.
     """
     result = {}
     heading = ""
@@ -189,29 +192,29 @@ def with_options(
         shared["about"] = shared["about"].replace(annotation=_annotated(list[str] | None, line))
 
     @wraps(find)
-    def run(**given: object) -> None:
+    def run(**values_of: object) -> None:
         from cli.read.options import column_names
         from dalembert.tables.headers import rename
 
-        options = ShowOptions(**{name: given.pop(name) for name in shared})  # type: ignore[arg-type]
+        options = ShowOptions(**{name: values_of.pop(name) for name in shared})  # type: ignore[arg-type]
         if two:
             values = options.about or []
             options.about = [text for text in values if "=" in text]
-            given["about"] = next((text for text in reversed(values) if "=" not in text), None)
+            values_of["about"] = next((text for text in reversed(values) if "=" not in text), None)
         if options.head and options.report is None:
             raise typer.BadParameter("expected --report FILE too", param_hint="--about")
         rename(column_names(options.column))
-        said = {
+        messages = {
             name.replace("_", " "): _said(value)
-            for name, value in given.items()
+            for name, value in values_of.items()
             if value != own[name].default and value is not None
         }
         if "show" in own:
-            given["show"] = options
-        result = find(**given) if asked is None else find(asked(**given), options)
+            values_of["show"] = options
+        result = find(**values_of) if asked is None else find(asked(**values_of), options)
         with result.within():
             if not take(result):
-                hand_on(result, options, said)
+                hand_on(result, options, messages)
 
     mine = [p for name, p in own.items() if name != "show" and not (two and name == "about")]
     parameters = [*mine, *shared.values()]
@@ -233,11 +236,11 @@ def _said(value: object) -> str:
 
 def _parameters(of: Callable[..., object], options: str) -> dict[str, Parameter]:
     """Return the parameters with their types and help; what is returned is not looked at, nor loaded for it."""
-    names, said = vars(sys.modules[of.__module__]), help_lines(options)
+    names, lines = vars(sys.modules[of.__module__]), help_lines(options)
     return {
         name: p.replace(
             kind=Parameter.KEYWORD_ONLY,
-            annotation=_annotated(eval(p.annotation, names), said[name]) if name != "show" else None,
+            annotation=_annotated(eval(p.annotation, names), lines[name]) if name != "show" else None,
         )
         for name, p in signature(of).parameters.items()
     }
@@ -246,8 +249,8 @@ def _parameters(of: Callable[..., object], options: str) -> dict[str, Parameter]
 def _annotated(kind: Any, line: HelpLine) -> object:
     """Add to a parameter's type its help."""
     argument = line.heading == "Arguments"
-    kind, given = get_args(kind) if hasattr(kind, "__metadata__") else (kind, None)
-    info = copy(given) or (typer.Argument() if argument else typer.Option())
+    kind, default = get_args(kind) if hasattr(kind, "__metadata__") else (kind, None)
+    info = copy(default) or (typer.Argument() if argument else typer.Option())
     info.param_decls = None if argument else line.flags
     info.metavar, info.help = line.metavar, line.help
     return Annotated[kind, info]

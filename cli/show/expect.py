@@ -1,4 +1,4 @@
-"""The exercise check: a result beside the values that were expected."""
+"""The exercise check: a result against expected values."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def compare(table: Table, file: str, rtol: float, others: Sequence[Callable[[], 
     relative error is at most `rtol`, an angle where it is off by at most `rtol` radians, modulo a turn; an
     expected zero is measured against the largest value in its column. Empty cells expect nothing. A key that is a
     number is matched to the digits that the file has. Values in another unit are converted; further columns of texts
-    (a student's name) are kept beside the verdicts, not compared. `others` are the result's further tables, for a file with columns of one of them.
+    (a student's name) are kept with the verdicts, not compared. `others` are the result's further tables, for a file with columns of one of them.
     """
     read_table = read(file, texts=None)
     headers = list(read_table.texts)

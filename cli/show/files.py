@@ -147,21 +147,21 @@ def _kind(column: Column) -> pyarrow.DataType:
 
     if column.unit:
         return pyarrow.float64()
-    known = {type(value) for value in map(plain, column.values) if value != ""}
-    if known == {float} or known == {int} or known == {int, float}:
-        return pyarrow.int64() if known == {int} else pyarrow.float64()
+    types = {type(value) for value in map(plain, column.values) if value != ""}
+    if types == {float} or types == {int} or types == {int, float}:
+        return pyarrow.int64() if types == {int} else pyarrow.float64()
     return pyarrow.string()
 
 
 def _array(column: Column, kind: pyarrow.DataType) -> pyarrow.Array:
     import pyarrow
 
-    given = column.values
+    cells = column.values
     if kind == pyarrow.float64() and (
-        not isinstance(given, Sequence) or {float, type(None)}.issuperset(map(type, given))
+        not isinstance(cells, Sequence) or {float, type(None)}.issuperset(map(type, cells))
     ):
         # what is not a number is null
-        return pyarrow.array(given, type=kind, from_pandas=True)
+        return pyarrow.array(cells, type=kind, from_pandas=True)
     if kind == pyarrow.string():
         values: list[str | float | None] = [None if v == "" else str(v) for v in map(plain, column.values)]
     else:
@@ -213,7 +213,7 @@ def _latex(grid: Grid) -> str:
     header, rows, numbers = grid
 
     def escaped(cell: str) -> str:
-        return re.sub(r"[&%$#_{}~^]", lambda found: _LATEX[found.group()], cell.replace("\\", "/"))
+        return re.sub(r"[&%$#_{}~^]", lambda match: _LATEX[match.group()], cell.replace("\\", "/"))
 
     def line(row: list[str]) -> str:
         return " & ".join(map(escaped, row)) + r" \\" + "\n"

@@ -33,22 +33,22 @@ def chosen_units(text: str) -> dict[str, str]:
     chosen: dict[str, str] = {}
     for part in text.split(","):
         word = unit_name(part)
-        found = {d: unit for d in _DIMENSIONS if (unit := find_unit(d, word))}
-        if not any(unit in LISTED[d] for d, unit in found.items()) and dimensions(word):
+        fitting = {d: unit for d in _DIMENSIONS if (unit := find_unit(d, word))}
+        if not any(unit in LISTED[d] for d, unit in fitting.items()) and dimensions(word):
             # a unit of vibration, such as mil
-            found = {}
-        if not word or not found:
-            known = sorted({unit for d in _DIMENSIONS for unit in UNITS[d]})
+            fitting = {}
+        if not word or not fitting:
+            units = sorted({unit for d in _DIMENSIONS for unit in UNITS[d]})
             hint = (
                 f"; '{word}' is a unit of amplitude, and amplitudes keep the file's"
                 if dimensions(word)
-                else nearest(word, known)
+                else nearest(word, units)
             )
             raise bad(
                 "--units",
                 f"'{part.strip()}' is no unit of a column: expected such as mm,g,deg,N_mm,rpm{hint}",
             )
-        for dimension, unit in found.items():
+        for dimension, unit in fitting.items():
             if chosen.setdefault(dimension, unit) != unit:
                 both = f"{chosen[dimension]} and {unit}"
                 raise bad("--units", f"{both} are both units of {dimension}: expected one of them")

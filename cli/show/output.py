@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 
 
 def command(
-    options: str, asked: Callable[..., object] | None = None
+    options: str, values: Callable[..., object] | None = None
 ) -> Callable[[Callable[..., Result]], Callable[..., None]]:
     """Make a command of a function that returns its result: it takes the shared options too, and shows the result.
 
     `options` is what the help says of its own (`told`). Where the function has a parameter `show`, it is given the
-    shared ones; `asked` as in `with_options`.
+    shared ones; `values` as in `with_options`.
     """
-    return lambda find: with_options(find, options, None, show, asked)
+    return lambda find: with_options(find, options, None, show, values)
 
 
 def declared_command(
@@ -53,7 +53,7 @@ def declared_command(
     return lambda find: with_options(find, options, None, show, values, own)
 
 
-def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:
+def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
     """Write the requested files, print the result; status 1 if an expectation is not met, or nothing was found."""
     from dalembert.tables.headers import check_renamed
 
@@ -82,7 +82,7 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
     if options.digits:
         result = _with_digits_that_hold(result)
     # a report cuts the digits of each of its tables
-    pages = _report(_with_first(result, whole), options, asked, checked)
+    pages = _report(_with_first(result, whole), options, call, checked)
     if checked is not None:
         result = _with_check(result, checked)
     _write(result, options, pages)
@@ -168,7 +168,7 @@ def _with_way(result: Result) -> Result:
     return replace(result, way=cache(result.way), shows_way=True)
 
 
-ROWS = 12  # rows of a further table that a terminal shows
+ROWS = 24  # rows of a further table that a terminal shows
 
 
 def _tables_text(result: Result, width: int | None) -> Iterator[str]:
@@ -180,7 +180,7 @@ def _tables_text(result: Result, width: int | None) -> Iterator[str]:
     yield _below_each_other(table.above, table_text(table.cells, table.keys, width), table.below)
     for name, of in others:
         table = of()
-        # without columns it is of the document alone; of a result whose document has another form it is told in words
+        # without columns it is of the document alone; where the document has another form, one without a place is not shown
         if not table.columns or (result.document is not None and table.place is None):
             continue
         if table.length == 1:
@@ -214,10 +214,10 @@ def reported(options: str) -> Callable[[Callable[..., Result]], Callable[..., No
     return lambda find: with_options(find, options, ("report", "about"), _hand_on)
 
 
-def _hand_on(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:
+def _hand_on(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
     from cli.show.files import write_all
 
-    files = [*result.beside.items(), *_report(result, options, asked).items()]
+    files = [*result.beside.items(), *_report(result, options, call).items()]
     refuse_inputs(path for path, _ in files)
     for note in result.warnings:
         print(f"note: {one_line(note)}", file=sys.stderr)
@@ -226,14 +226,14 @@ def _hand_on(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> 
 
 
 def _report(
-    result: Result, options: ShowOptions, asked: Mapping[str, str], checked: Comparison | None = None
+    result: Result, options: ShowOptions, call: Mapping[str, str], checked: Comparison | None = None
 ) -> dict[Path, Made]:
     """Return the files of --report."""
     if options.report is None:
         return {}
     from cli.show.report import pages
 
-    files = pages(result, options, asked, checked)
+    files = pages(result, options, call, checked)
     return {path: partial(bytes, page) for path, page in files.items()}
 
 

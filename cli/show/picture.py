@@ -11,12 +11,12 @@ import numpy as np
 from cli.read import options
 from cli.show.in_units import chosen_units, in_units
 from dalembert.errors import needs
-from dalembert.page import Shown, fits
 from dalembert.units import UNITS, to_si
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from dalembert.page import Shown
     from dalembert.results.columns import Table
 
 
@@ -47,6 +47,8 @@ DRAWN = ("length", "angle", "velocity", "acceleration", "speed", "force", "time"
 
 def refuse_long(count: int) -> None:
     """Refuse --page of more poses than a page can hold."""
+    from dalembert.page import fits
+
     try:
         fits(count)
     except ValueError as error:
@@ -55,6 +57,9 @@ def refuse_long(count: int) -> None:
 
 def shown(table: Table, units: str | None) -> dict[str, Shown]:
     """Return the columns of numbers under their SI headers, in the units of --units."""
+    # loaded where a page is written
+    from dalembert.page import Shown
+
     chosen = {} if units is None else chosen_units(units)
     pairs = zip(table.columns, in_units(table, chosen).columns, strict=True)
     return {

@@ -54,6 +54,7 @@ class Page:
     title: str
     sections: list[tuple[str, list[Part]]]
     figure: Callable[[], Figure] | None
+    dense: bool
 
 
 @dataclass(frozen=True)
@@ -69,11 +70,11 @@ class Report:
 
 
 def report(
-    result: Result, options: ShowOptions, asked: Mapping[str, str], checked: Comparison | None
+    result: Result, options: ShowOptions, call_options: Mapping[str, str], checked: Comparison | None
 ) -> Report:
     """Put a report together.
 
-    `asked` are the command's own options that were given, and their values; `checked` is how the result compares with
+    `call_options` are the command's own options that were given, and their values; `checked` is how the result compares with
     what was expected. What the options say for its head goes before what the file itself says.
     """
     from datetime import date
@@ -88,23 +89,24 @@ def report(
         from cli.show.way import way_sheets
 
         sheets += way_sheets(result)
-    given = list(_given(asked, () if result.shows_input else named()))
+    inputs = list(_given(call_options, () if result.shows_input else named()))
     if sheets:
         sections = list(sheets[0].sections)
-        if given and sections[0].title != VERDICT:
-            sections.insert(0, Section("Given", given))
+        if inputs and sections[0].title != VERDICT:
+            sections.insert(0, Section("Given", inputs))
         if checked is not None:
             sections.append(Section("Compared with what was expected", [checked.table, checked.summary]))
         sheets[0] = replace(sheets[0], sections=sections)
-        if given and sections[0].title == VERDICT:
+        if inputs and sections[0].title == VERDICT:
             # what is wanted comes first
             last = sheets[-1]
-            sheets[-1] = replace(last, sections=[*last.sections, Section("Given", given)])
+            sheets[-1] = replace(last, sections=[*last.sections, Section("Given", inputs)])
     pages = [
         Page(
             sheet.title,
             [(s.title, list(_printed(s.parts, finish)) or ["none"]) for s in sheet.sections],
             sheet.figure,
+            sheet.dense,
         )
         for sheet in sheets
     ]
@@ -142,11 +144,11 @@ def _with_sentences(table: Table) -> list[str | Table]:
     return [table.above, table, table.below]
 
 
-def _given(asked: Mapping[str, str], files: Sequence[str]) -> Iterator[str | Table]:
+def _given(call_options: Mapping[str, str], files: Sequence[str]) -> Iterator[str | Table]:
     """Yield the options that were given, and what the files hold."""
-    if asked:
+    if call_options:
         yield "; ".join(
-            name if value == "yes" else f"{name} {_spaced(value)}" for name, value in asked.items()
+            name if value == "yes" else f"{name} {_spaced(value)}" for name, value in call_options.items()
         )
     for path in files:
         shown = "standard input" if path == "-" else path
@@ -196,7 +198,7 @@ def _spaced(text: str) -> str:
                 return f"{number[0].strip()}{'' if unit == 'deg' else ' '}{written(unit)}"
         return part
 
-    return re.sub(r"[^,:@=\s]+(?: [^,:@=\s\d]+)?", lambda found: spoken(found[0]), text).replace(",", ", ")
+    return re.sub(r"[^,:@=\s]+(?: [^,:@=\s\d]+)?", lambda match: spoken(match[0]), text).replace(",", ", ")
 
 
 def _printed(parts: Iterable[str | Table | Bars], finish: Callable[[Table], Table]) -> Iterator[Part]:
@@ -301,10 +303,12 @@ table { border-collapse: collapse; margin: 1.5mm 0 2.5mm; font-size: 9pt; max-wi
 th, td { padding: .5mm 1.6mm; text-align: left; vertical-align: top; border-bottom: .2mm solid #ccc } tr { break-inside: avoid }
 th { background: #eee; font-weight: 600; vertical-align: bottom } .n { text-align: right; font-variant-numeric: tabular-nums }
 td.n { white-space: nowrap } th, td { overflow-wrap: break-word } .long { overflow-wrap: anywhere } .good { color: #06632f; font-weight: 600 } .bad { color: #b00020; font-weight: 700 }
-.warning { border-left: 1mm solid #b00020; padding-left: 2mm } footer { margin-top: 4mm; font-size: 8.5pt; color: #444 }
+.warning { border-left: 1mm solid #b00020; padding-left: 2mm } .warning { margin: 1mm 0; font-size: 9pt } footer { margin-top: 2mm; font-size: 8pt; color: #444 }
 figure { margin: 3mm 0; break-inside: avoid } svg { display: block; max-width: 100%; height: auto; max-height: 95mm; margin: 0 auto } .rows svg { max-height: 220mm }
-.verdict svg { max-height: 62mm } .wide { overflow-x: auto } section + section { break-before: page }
-@page { margin: 13mm 12mm } @media print { body { margin: 0; padding: 0; max-width: none } .wide { overflow: visible } }
+.dense { font-size: 8.5pt } .dense table { font-size: 7.5pt; line-height: 1.25; margin: 1mm 0 } .dense td, .dense th { padding-top: .2mm; padding-bottom: .2mm }
+.dense p { margin: .8mm 0 } .dense h3 { font-size: 10pt; margin: 2.5mm 0 .5mm } .dense svg { max-height: 52mm } .dense figure { margin: 1.5mm 0 }
+.verdict svg { max-height: 56mm } .wide { overflow-x: auto } section + section { break-before: page }
+@page { size: A4; margin: 12mm 12mm } @media print { body { margin: 0; padding: 0; max-width: none } .wide { overflow: visible } }
 """
 _MARKS = {**dict.fromkeys(GOOD, "good"), **dict.fromkeys(BAD, "bad")}
 LONG = 40
@@ -313,12 +317,12 @@ _NO_PICTURE = "(No picture: matplotlib is not installed.)"
 
 
 def pages(
-    result: Result, options: ShowOptions, asked: Mapping[str, str], checked: Comparison | None = None
+    result: Result, options: ShowOptions, call_options: Mapping[str, str], checked: Comparison | None = None
 ) -> dict[Path, bytes]:
     """Return the files of a result's report: the page itself, and beside Markdown its pictures."""
     path = options.report
     assert path is not None
-    made = report(result, options, asked, checked)
+    made = report(result, options, call_options, checked)
     if path.suffix.lower() == ".md":
         return _markdown(path, made)
     return {path: "".join(_html(made)).encode()}
@@ -345,7 +349,8 @@ def _html(report: Report) -> Iterator[str]:
         yield f"<dl>{''.join(rows)}</dl>\n"
     for page in report.pages:
         first = bool(page.sections) and page.sections[0][0] == VERDICT
-        yield '<section class="verdict">\n' if first else "<section>\n"
+        kind = "verdict" if first else "dense" if page.dense else ""
+        yield f'<section class="{kind}">\n' if kind else "<section>\n"
         if page.title:
             yield f"<h2>{html.escape(page.title)}</h2>\n"
         for name, parts in page.sections:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from dalembert.results.columns import Table, document
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from cli.read.seeking import Found
     from cli.show.bars import Bars
     from dalembert.results.columns import Document, Json
     from dalembert.results.way import Topic
@@ -47,6 +48,8 @@ class Sheet:
     title: str
     sections: Sequence[Section]
     figure: Callable[[], Figure] | None = None
+    dense: bool = False
+    """Whether it is for who wants to know how: set small, so that it stays one page."""
 
 
 @dataclass(eq=False, repr=False)
@@ -58,7 +61,7 @@ class Result:
     tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)
     """Name -> table; the first is the CSV."""
     head: Mapping[str, Json] = field(default_factory=dict)
-    """What stands at the top of the JSON document, in front of the tables."""
+    """The top of the JSON document, in front of the tables."""
     companions: Sequence[str] = ()
     """Which further tables go beside a file that holds one table, as FILE-name.csv."""
     screen: Callable[[], Table] | None = None
@@ -114,3 +117,14 @@ class Result:
         if self.shows_way and self.way is not None:
             whole = {**whole, "way": [topic.documented() for topic in self.way()]}
         return whole
+
+
+def with_found(result: Result, solution: Found) -> Result:
+    """Return the result with the number of --find: above the table, in JSON, in addition to a table alone."""
+    notes, document, aside = result.notes, result.documented, result.aside
+    return replace(
+        result,
+        notes=lambda: "\n".join(filter(None, (notes(), f"found: {solution.text}"))),
+        document=lambda: {**document(), "found": {solution.header: solution.value}},
+        aside=lambda: [*aside(), f"found: {solution.text}"],
+    )

@@ -40,7 +40,7 @@ def _runner(name: str) -> Callable[[Sequence[str]], Any]:
     import typer
 
     app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-    app.command(name)(import_module(f"cli.{name}.command").run)
+    app.command(name)(import_module(f"cli.{name}").run)
     built = typer.main.get_command(app)
     return lambda words: built.main(list(words), prog_name="dalembert", standalone_mode=False)
 
@@ -51,7 +51,7 @@ def options_of(name: str) -> frozenset[str]:
     import typer
 
     app = typer.Typer(add_completion=False)
-    app.command(name)(import_module(f"cli.{name}.command").run)
+    app.command(name)(import_module(f"cli.{name}").run)
     return frozenset(flag for parameter in typer.main.get_command(app).params for flag in parameter.opts)
 
 
@@ -71,10 +71,10 @@ def result_of(words: Sequence[str]) -> Result:
             raise
         except Exception as error:
             # of a usage error the sentence
-            said = getattr(error, "format_message", None)
-            if said is None:
+            message = getattr(error, "format_message", None)
+            if message is None:
                 raise
-            raise DataError(f"{name}: {said()}") from None
+            raise DataError(f"{name}: {message()}") from None
     if not taken:
         raise DataError(f"{name}: no result: expected options that compute")
     result = taken[0]

@@ -27,8 +27,8 @@ def coloured(text: str, stream: TextIO, wanted: bool = True) -> str:
     if not wanted or not stream.isatty() or os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
         return text
 
-    def painted(found: re.Match[str]) -> str:
-        return f"{_COLOURS.get(found[0], _YELLOW)}{found[0]}{_PLAIN}"
+    def painted(match: re.Match[str]) -> str:
+        return f"{_COLOURS.get(match[0], _YELLOW)}{match[0]}{_PLAIN}"
 
     return re.sub(_WORDS, painted, text, flags=re.MULTILINE)
 

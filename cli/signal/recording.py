@@ -1,4 +1,4 @@
-"""From a recorded vibration to its once-per-turn vectors."""
+"""From a recorded vibration to its vectors once per turn; the worked solution."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import numpy as np
 
 from balancing.synchronous import OncePerTurn, once_per_turn
 from cli.read.options import bad
+from dalembert.angles import degrees
 from dalembert.errors import DataError
+from dalembert.results.way import Topic, figures
 from dalembert.tables.sources import open_source
 from dalembert.tables.table import read
 from dalembert.units import find_unit
@@ -82,3 +84,22 @@ def read_signal(path: str, pulses: int) -> Recording:
             f"± {np.degrees(vectors.phase_resolution):.2g}°; more samples in a turn makes them more exact"
         )
     return Recording(sensors, next(iter(units.values())), vectors, table.warnings)
+
+
+def way(recording: Recording) -> list[Topic]:
+    """The one topic."""
+    of = recording.vectors
+    text = [
+        f"Turns between marks: {of.turns}; ω = 2π/T = {figures(float(of.speed))} rad/s.",
+        "In each turn a·cos(ωt + phase) is fitted: x = a·cos(phase) = (2/T)∫ s·cos ωt dt, y = a·sin(phase) = −(2/T)∫ s·sin ωt dt; "
+        "the vectors of all turns are averaged.",
+    ]
+    entries = []
+    for sensor, v in zip(recording.sensors, of.vector.tolist(), strict=True):
+        angle = float(degrees(np.array([v]))[0])
+        text.append(
+            f"  {sensor}: ({figures(v.real)}, {figures(v.imag)}) = {figures(abs(v))} ∠ {figures(angle)}° {recording.unit}"
+        )
+        entries.append({"sensor": sensor, "x": v.real, "y": v.imag, "amplitude": abs(v), "phase_deg": angle})
+    head = {"turns": int(of.turns), "speed_rad_s": float(of.speed), "sensors": entries}
+    return [Topic("vectors", text, "Vectors once per turn", head)]

@@ -1,1 +1,50 @@
-"""`dalembert simulate`."""
+"""`dalembert simulate`: the motion in time under the loads."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cli.cases.options import BRANCH, CASES, FILE, WORKERS, Options
+from cli.show.output import declared_command
+
+if TYPE_CHECKING:
+    from cli.show.commands import ShowOptions
+    from cli.show.result import Result
+
+EXAMPLE = "double-pendulum"
+OPTIONS = f"""
+{FILE}{CASES}{BRANCH}{WORKERS}
+What:
+  only NAME,...  These quantities in addition: H.x,coupler.omega; H is all of H.
+  forces  The joint forces, too.
+How:
+  time START:STOP:STEP  The times in seconds: 0:10:0.01 or 0:10/1000; needed.
+  accuracy NUMBER  Wanted error of the inputs (default 1e-9).
+  until INPUT=VALUE  End where an input has a value: crank=90deg.
+Output:
+  page FILE(.html)  Write a page that replays the motion.
+"""
+
+
+@declared_command(OPTIONS, Options)
+def run(own: Options, show: ShowOptions) -> Result:
+    """Simulate a mechanism whose inputs are released: its motion in time under the loads of FILE.toml.
+
+    The inputs start at the first time with the file's angle (or position) and speed; --at, --over and --cases set where
+    they start. The table has a row for each time: the inputs, the energy, and what --only names.
+    """
+    from cli.cases.analysis import Request, branch, names
+    from cli.cases.call import Call
+    from cli.read.options import bad
+    from cli.simulate.motion import Simulation, page, times_and_accuracy
+
+    if own.time is None:
+        raise bad("--time", "expected the times, such as --time 0:10:0.01")
+    if own.until is not None and own.page is not None and (own.over or own.cases):
+        raise bad("--until", "expected no --page: its variants have one clock; --set shows one of them")
+    times, accuracy = times_and_accuracy(own.time, own.accuracy)
+    request = Request(own.file, names(own.only), 2, branch(own.branch), forces=own.forces)
+    call = Call.of(own, show, request).started()
+    call.check_names()
+    study = call.study(Simulation, times=times, accuracy=accuracy, until=own.until)
+    return call.result(study, own.page, lambda cases: page(cases, show.units), len(times))

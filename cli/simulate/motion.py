@@ -1,4 +1,4 @@
-"""The motion of a mechanism in time under its loads: as a table, as JSON, drawn; of variants one by one or together."""
+"""The motion of a mechanism in time under its loads: its tables, JSON, picture and worked solution; of variants one by one or together."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ from cli.show.terminal import progress_in_time
 from dalembert.angles import read_degrees
 from dalembert.arithmetic.engines import anew
 from dalembert.errors import DataError
-from dalembert.results.columns import Table
+from dalembert.results.columns import Column, Table, document, names, number
+from dalembert.results.way import Topic, figures
 from virtualwork import MechanismError
 from virtualwork.describe.parts import GROUND
 
@@ -32,15 +33,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.cases.case import Rows
-    from dalembert.results.columns import Column, Document
+    from dalembert.results.columns import Document
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
     from virtualwork.animation import Series
     from virtualwork.intime.run import Run
-    from virtualwork.intime.travel import Travel
+    from virtualwork.intime.travel import Moved, Travel
 
     Reals = NDArray[np.float64]
     Values = dict[Quantity, Reals]
+    from collections.abc import Sequence
+
+    from virtualwork.describe.parts import Input
+
 
 # an input's angle and its rates
 INPUT = ("angle_deg", "speed_rad_s", "acceleration_rad_s2")
@@ -101,7 +106,7 @@ class Motion(TableCase):
 
     @cached_property
     def _wanted(self) -> list[Quantity]:
-        """What is requested beside the inputs and the energy."""
+        """What is requested in addition to the inputs and the energy."""
         return [*(self.analysis.places if self.analysis.request.only is not None else []), *self._forces]
 
     @property
@@ -116,16 +121,21 @@ class Motion(TableCase):
         joints = joints or [each for each in every if each.path[:1] == ("reactions",) and not each.reverse]
         return [*joints, *(each for each in every if each.path[:1] == ("shaking",))]
 
-    def values(self, way: Travel, wanted: Sequence[Quantity]) -> Values:
-        """The inputs, the energy and some quantities, of one of the two solutions."""
-        m, t = self.analysis.mechanism, self.run.t
+    def values(
+        self, way: Travel, wanted: Sequence[Quantity], times: Reals | None = None, moved: Moved | None = None
+    ) -> Values:
+        """The inputs, the energy and some quantities, of one of the two solutions; `moved`: with other states."""
+        m, t = self.analysis.mechanism, self.run.t if times is None else times
         q, v, acceleration, _ = way.at(t)
-        values = inputs_of(m, q, v, acceleration, self.run.error_estimate)
+        if moved is not None:
+            q, v = q + moved[0], v + moved[1]
+        error = self.run.error_estimate if times is None else np.zeros_like(q)
+        values = inputs_of(m, q, v, acceleration, error)
         turned = {each.path[1]: angles for each, angles in values.items() if each.path[2] == "angle_deg"}
         driven = {e.link: turned[e.name] for e in m.inputs if not e.is_slide and e.on == GROUND}
         values[ENERGY] = way.energy(t)
         keys = keys_of(wanted)
-        solved = dict(zip(keys, way.motion(t).values(keys), strict=True)) if keys else {}
+        solved = dict(zip(keys, way.motion(t, moved).values(keys), strict=True)) if keys else {}
         for each in wanted:
             if each.turns:
                 # whole turns and all
@@ -141,9 +151,13 @@ class Motion(TableCase):
         return self.values(self.run.fine, self._wanted)
 
     @cached_property
-    def coarse(self) -> Values:
-        """The coarser solution, for the errors."""
-        return self.values(self.run.coarse, self._wanted)
+    def errors(self) -> Values:
+        """The errors of the answer."""
+
+        def of(way: Travel, t: Reals, moved: Moved | None) -> list[Reals]:
+            return list(self.values(way, self._wanted, t, moved).values())
+
+        return dict(zip(self.fine, self.run.errors(of), strict=True))
 
     def table(self) -> Table:
         """A row for each time."""
@@ -161,7 +175,33 @@ class Motion(TableCase):
         return trusted(self.fine, self.run.unknown)
 
     def _error(self, each: Quantity) -> list[float]:
-        return bounds_of(self.run.spread(self.fine[each], self.coarse[each]))
+        error = self.errors[each]
+        if each.key:
+            own = self.run.rounding(each.key)
+            error = error + (np.degrees(own) if each.key[0] == "angle" and not each.key[2] else own)
+        return bounds_of(error)
+
+    def further(self) -> dict[str, Callable[[], Table]]:
+        """How it was integrated, and how exactly."""
+        return {"integration": self.integration}
+
+    def integration(self) -> Table:
+        """How it was integrated, and how exactly: method, steps, errors of the inputs, energy."""
+        run, inputs = self.run, self.analysis.mechanism.inputs
+        of_run = [
+            Column(
+                "methods", "", [" and ".join(run.fine.methods)], place="methods", stored=[run.fine.methods]
+            ),
+            names("steps", [run.fine.steps]),
+        ]
+        errors = [
+            Column(f"error of {entry.name}, estimated", "m" if entry.is_slide else "rad", [float(error)])
+            for entry, error in zip(inputs, run.error_estimate.max(axis=0), strict=True)
+        ]
+        if self.study.names:
+            # variants that are solved together have none
+            of_run = [replace(column, place=None) for column in of_run]
+        return Table([drift(run.energy_drift), *of_run, *errors], place="")
 
     def document(self) -> Document:
         """What the JSON document has of it."""
@@ -170,36 +210,14 @@ class Motion(TableCase):
             # in addition to the forces all points and links
             every = self.values(self.run.fine, [*self.analysis.places, *self._forces])
             shown = trusted(every, self.run.unknown)
-        return {
-            "time": rows_of_time(self.run.t, shown),
-            "energy_drift_J": largest(self.run.energy_drift),
-            **({} if self.study.names else {"methods": self.run.fine.methods, "steps": self.run.fine.steps}),
-        }
+        return documents(self.run.t, shown, self.integration())
 
     def warnings(self) -> list[str]:
         """Where it ends, and what is doubtful."""
         return [*self.analysis.warnings, *self.run.warnings]
 
-    def words(self) -> str:
-        """How it was integrated, and how exactly."""
-        run = self.run
-        drift = float(np.abs(run.energy_drift).max())
-        error = ", ".join(
-            f"{entry.name} {value:.1e} {'m' if entry.is_slide else 'rad'}"
-            for entry, value in zip(
-                self.analysis.mechanism.inputs, run.error_estimate.max(axis=0), strict=True
-            )
-        )
-        return (
-            f"{' and '.join(run.fine.methods)}: {run.fine.steps} steps\n"
-            f"error of the inputs, estimated: {error}\n"
-            f"energy that the work of the loads does not explain: {drift:.1e} J"
-        )
-
     def way(self) -> list[Topic]:
         """The start, and the energy."""
-        from cli.simulate.way import way
-
         return way(self.run, self.analysis.mechanism.inputs)
 
     def figure(self) -> Figure:
@@ -302,7 +320,7 @@ class Lane(Case):
 
     def document(self) -> Document:
         """What the JSON document has of it."""
-        return {"time": rows_of_time(self.t, self.values), "energy_drift_J": largest(self.drift)}
+        return documents(self.t, self.values, Table([drift(self.drift)], place=""))
 
 
 def _lanes(study: Simulation, shown: Rows) -> Iterator[tuple[Case | None, list[str]]]:
@@ -346,7 +364,7 @@ def page(cases: Sequence[tuple[str, Case]], units: str | None) -> bytes:
 # --- numbers over time ------------------------------------------------------------------------------------------------
 def inputs_of(m: Mechanism, q: Reals, v: Reals, a: Reals, error: Reals) -> Values:
     """The inputs, their rates and errors (n, k), as they are shown."""
-    found: Values = {}
+    result: Values = {}
     for j, entry in enumerate(m.inputs):
         lead = f"{entry.name}_input_" if len(m.inputs) > 1 else "input_"
         values = (q[:, j], v[:, j], a[:, j], error[:, j])
@@ -356,8 +374,8 @@ def inputs_of(m: Mechanism, q: Reals, v: Reals, a: Reals, error: Reals) -> Value
         names = *(SLIDE if entry.is_slide else INPUT)[:3], f"error_estimate_{unit}"
         for name, its in zip(names, values, strict=True):
             header = f"{lead}{unit if name in (SLIDE[0], INPUT[0]) else name}"
-            found[Quantity(("inputs", entry.name, name), header)] = its
-    return found
+            result[Quantity(("inputs", entry.name, name), header)] = its
+    return result
 
 
 def _degrees(q: Reals) -> Reals:
@@ -393,13 +411,40 @@ def columns_of(
     return columns
 
 
-def rows_of_time(t: Reals, values: Values) -> list[Any]:
-    """The numbers at each time as JSON."""
+def documents(t: Reals, values: Values, further: Table) -> Document:
+    """The numbers at each time, and how they were computed, as JSON has them."""
     numbers = {each: cells(of) for each, of in values.items()}
-    return list(in_rows({"t_s": t.tolist(), **nested(numbers, len(t))}, len(t)))
+    rows = list(in_rows({"t_s": t.tolist(), **nested(numbers, len(t))}, len(t)))
+    return {"time": rows, **document([further])}
 
 
-def largest(drift: Reals) -> float | None:
-    """The largest of numbers by size, with its sign; None where there is none."""
-    there = drift[np.isfinite(drift)]
-    return float(there[np.argmax(np.abs(there))]) if len(there) else None
+def drift(change: Reals) -> Column:
+    """The change of energy that the work of the loads does not explain: the largest, with its sign."""
+    there = change[np.isfinite(change)]
+    return number("energy_drift", "energy", [there[np.argmax(np.abs(there))] if len(there) else np.nan])
+
+
+def way(run: Run, inputs: Sequence[Input]) -> list[Topic]:
+    """The topics."""
+    q, v, a = (np.asarray(each, dtype=float) for each in (run.angle[0], run.speed[0], run.acceleration[0]))
+    law = [
+        "The inputs are free: by d'Alembert's principle M(q)·q̈ + h(q, q̇, t) = 0, the effort at every input being nothing "
+        "(Riul, unit II, eq. 5, solved for the accelerations).",
+    ]
+    for entry, place, speed, rate in zip(inputs, q.tolist(), v.tolist(), a.tolist(), strict=True):
+        unit = "m" if entry.is_slide else "rad"
+        law.append(
+            f"  at t = {figures(float(run.t[0]))} s: {entry.name} = {figures(place)} {unit}, speed {figures(speed)} {unit}/s, "
+            f"acceleration {figures(rate)} {unit}/s²"
+        )
+    energy = np.asarray(run.energy, dtype=float)
+    first, last = float(energy[0]), float(energy[-1])
+    drift = float(np.abs(run.energy_drift).max())
+    balance = [
+        f"E = T + V (gravity, springs): {figures(first)} J at t = {figures(float(run.t[0]))} s, "
+        f"{figures(last)} J at t = {figures(float(run.t[-1]))} s",
+        f"  E_end − E_start = {figures(last - first)} J is the work of applied loads, dampers and friction; unexplained {figures(drift)} J",
+    ]
+    start = {"angle": q.tolist(), "speed": v.tolist(), "acceleration": a.tolist()}
+    head = {"start_J": first, "end_J": last, "energy_drift_J": drift}
+    return [Topic("start", law, "Equation of motion", start), Topic("energy", balance, "Energy", head)]

@@ -1,1 +1,130 @@
 """`dalembert spin`: the rotation of a body in time."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.read import options
+from cli.show.commands import ShowOptions, suffix_among
+from cli.show.output import command
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cli.show.result import Result
+    from dalembert.results.way import Topic
+
+
+class Method(StrEnum):
+    """How the rotation is computed."""
+
+    exact = "exact"
+    integrate = "integrate"
+
+
+class Integrator(StrEnum):
+    """What integrates it."""
+
+    dop853 = "DOP853"
+    splitting = "splitting"
+
+
+EXAMPLE = "tennis-racket"
+OPTIONS = """
+Arguments:
+  body BODY.toml  The body and its state; - is standard input.
+What:
+  time START:STOP:STEP  Times in seconds, such as 0:10:0.01 or 0:10/1000.
+  at T  A time, s; may be repeated.
+  find NAME  Find this number of the file: omega.z, inertia.3, top.mgl, a top's tilt.
+  so_that QUANTITY=VALUE  What it is to give: slow=0.5rad_s, momentum.z=2.
+How:
+  method  Default: exact wherever a closed form exists, else integrate.
+  integrator  For integration; the splitting is for a symmetric top.
+Output: of the rotation:
+  page FILE.html  Write a page that moves to FILE: play, slider, curves, values.
+"""
+
+
+@command(OPTIONS)
+def run(
+    body: str,
+    time: str | None = None,
+    at: list[str] | None = None,
+    find: str | None = None,
+    so_that: str | None = None,
+    method: Annotated[Method | None, typer.Option(show_default=False)] = None,
+    integrator: Integrator = Integrator.dop853,
+    page: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None,
+    *,
+    show: ShowOptions,
+) -> Result:
+    """Turn a body through time: angular velocity, attitude, momentum and energy at any instant.
+
+    BODY.toml holds inertia = [I1, I2, I3] (or a 3 × 3 matrix, or parts = "parts.csv"), kg·m²; omega in body axes,
+    rad/s; attitude = [w, x, y, z], body to space (default [1, 0, 0, 0]); if wanted a table [top] with mgl in N·m
+    (then inertia is about the fixed point, the axis is body z and gravity acts along -z of space), or torque =
+    [x, y, z] in N·m with frame = "body" or "space".
+    """
+    import numpy as np
+
+    from cli.read.seeking import pair
+    from cli.show.result import Result, with_found
+    from cli.spin import tables
+    from cli.spin.rotation import Rotation, read_body
+
+    if time is not None and at:
+        raise options.bad("--at", "expected --time or --at, not both")
+    if time is not None:
+        times = options.time_range("--time", time)
+    else:
+        times = [options.number_or_quantity("--at", text, "time") for text in at or ["0"]]
+    if page is not None:
+        from cli.show.picture import refuse_long
+
+        refuse_long(len(times))
+    turning = read_body(body)
+    rotation = Rotation(turning, np.array(times), method.value if method else None, integrator.value)
+    sought, solution = pair(find, so_that), None
+    if sought is not None:
+        from cli.spin.seeking import find as search
+
+        rotation, solution = search(rotation, *sought)
+        turning = rotation.body
+    rotation.states  # noqa: B018  faults of the data are errors before anything is shown
+
+    def figure() -> Figure:
+        return tables.draw(rotation)
+
+    def moving() -> bytes:
+        from cli.show.picture import shown
+        from rigidbody3d.animation import turning_page
+
+        table = shown(tables.states(rotation), show.units)
+        made = turning_page(turning.name, turning.inertia, turning.omega, table, turning.mgl is not None)
+        return made.html.encode()
+
+    def way() -> list[Topic]:
+        from cli.spin.way import way
+
+        return way(rotation)
+
+    result = Result(
+        way=way,
+        tables=tables.tables(rotation),
+        head={"method": "exact" if rotation.exact else rotation.integrator},
+        figure=figure,
+        beside={} if page is None else {page: moving},
+        method=tables.METHOD,
+        about={"title": turning.name or "Rotation in time"} | turning.about,
+        warnings=[
+            *turning.warnings,
+            *tables.warnings(rotation),
+            *(tables.coarse(rotation) if page else ()),
+        ],
+    )
+    return result if solution is None else with_found(result, solution)

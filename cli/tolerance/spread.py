@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ from cli.cases.quantities import Quantity, cells, keys_of
 from cli.cases.study import METHOD
 from cli.read.options import processes
 from dalembert.errors import DataError
-from dalembert.results.columns import Column, Table
+from dalembert.results.columns import Column, Table, names
 from virtualwork.describe.dimensions import Dimension
 from virtualwork.family.tolerance import Drawn, Spread, drawn, drawn_numbers, limits, spread, summary
 from virtualwork.formulas.asked import Key
@@ -25,9 +26,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.cases.case import Rows
-    from cli.cases.quantities import Numbers
+    from cli.cases.quantities import Reals
     from cli.show.commands import ShowOptions
-    from dalembert.results.columns import Document
     from dalembert.results.way import Topic
 
 # how far a drawn standard deviation may be from the linear one, in its sampling errors and by its size
@@ -102,9 +102,9 @@ class Tolerances(TableCase):
         with processes(self.study.workers) as pool:
             for rows, values, assembled in drawn(m, numbers, motion.inputs, rates, self.keys, pool):
                 whole &= assembled.all(axis=1)
-                found = dict(zip(self.keys, values, strict=True))
+                solved = dict(zip(self.keys, values, strict=True))
                 for number in self.numbers:
-                    its, mean = number.of(found[number.key]), number.of(nominal[number.key][rows])
+                    its, mean = number.of(solved[number.key]), number.of(nominal[number.key][rows])
                     parts[number.header].append(summary(its, mean, 360.0 if number.turns else None))
         joined = {
             header: Drawn(*(np.concatenate([getattr(p, name) for p in some], axis=-1) for name in _FIELDS))
@@ -132,12 +132,12 @@ class Tolerances(TableCase):
             ]
         if not self.draws:
             return []
-        found, whole = self.drawn
+        samples, whole = self.drawn
         lines = []
         sampling = SURE / np.sqrt(2 * max(self.draws - 1, 1))
         # a uniform distribution between the limits is wider than a normal one of a third of them
         wider = np.sqrt(3.0) if self.study.distribution == "uniform" else 1.0
-        for header, its in found.items():
+        for header, its in samples.items():
             linear = self.linear[header].sd * wider
             with np.errstate(invalid="ignore", divide="ignore"):
                 apart = np.abs(its.sd - linear) / linear
@@ -155,55 +155,78 @@ class Tolerances(TableCase):
             )
         return lines
 
-    def document(self) -> Document:
-        """What the JSON document has of it."""
-        return {"tolerance": self.spreads()}
-
-    def spreads(self) -> dict[str, Any]:
-        """What `tolerance` holds."""
-        spreads: dict[str, Any] = {
-            "columns": {
-                header: {"worst": cells(its.worst), "sd": cells(its.sd)}
-                for header, its in self.linear.items()
-            },
-            "shares": [
-                {"path": d.path, "column": header, "share": cells(its.shares[i])}
-                for header, its in self.linear.items()
-                for i, d in enumerate(self.limits)
-            ],
-        }
-        if self.draws:
-            drawn, whole = self.drawn
-            spreads["drawn"] = {
-                "columns": {
-                    header: _sample(its)
-                    | {f"{name}_error": cells(e) for name, e in zip(NAMES, its.errors, strict=True)}
-                    for header, its in drawn.items()
-                },
-                "draws": self.draws,
-                "seed": self.study.seed,
-                "distribution": self.study.distribution,
-                "assembled": whole,
-            }
-        return spreads
-
     def table(self) -> Table:
         """The table of poses, each number with its worst case and its standard deviation."""
         base = poses.table(self.analysis)
-        result: list[Column] = []
+        columns: list[Column] = []
+        further: list[Column] = []
         for column in base.columns:
-            result.append(column)
-            if column.header not in self.linear:
+            header = column.header
+            columns.append(column)
+            if header not in self.linear:
                 continue
-            its = self.linear[column.header]
-            result.append(Column(f"{column.name}_worst", column.unit, cells(its.worst)))
-            result.append(Column(f"{column.name}_sd", column.unit, cells(its.sd)))
+
+            def of(name: str, values: Reals, *lead: str, shown: str, base: Column = column) -> Column:
+                place = (*lead, "columns", base.header, name)
+                return Column(f"{base.name}_{shown}", base.unit, cells(values), place=place)
+
+            its = self.linear[header]
+            columns += [
+                of(name, values, shown=name) for name, values in (("worst", its.worst), ("sd", its.sd))
+            ]
             if self.draws:
-                sample = _sample(self.drawn[0][column.header])
-                result += [
-                    Column(f"{column.name}_drawn_{name}", column.unit, sample[name]) for name in sample
+                sample = self.drawn[0][header]
+                columns += [
+                    of(name, values, "drawn", shown=f"drawn_{name}")
+                    for name, values in _sample(sample).items()
                 ]
-        return Table(result, base.keys)
+                further += [
+                    of(f"{name}_error", values, "drawn", shown=f"drawn_{name}_error")
+                    for name, values in zip(NAMES, sample.errors, strict=True)
+                ]
+        return Table(columns, base.keys, "tolerance", by_column=True, documented=further)
+
+    def further(self) -> dict[str, Callable[[], Table]]:
+        """Which share of the variance each dimension has; how the mechanisms were drawn."""
+        tables: dict[str, Callable[[], Table]] = {"largest shares": self.largest} if self.linear else {}
+        return tables | ({"drawn": self.drawing} if self.draws else {})
+
+    def documented(self) -> list[Table]:
+        """The numbers of every pose, of which there may be none, and the shares of them."""
+        tables = [Table([], place="tolerance.columns", by_column=True), self.table(), self.shares()]
+        return [*tables, *([self.drawing()] if self.draws else [])]
+
+    def shares(self) -> Table:
+        """The shares of the variance over the poses, a row for each number and dimension."""
+        rows = [
+            (d.path, header, cells(its.shares[i]))
+            for header, its in self.linear.items()
+            for i, d in enumerate(self.limits)
+        ]
+        columns = [
+            names(name, [row[i] for row in rows]) for i, name in enumerate(("path", "column", "share"))
+        ]
+        return Table(columns, ("column", "path"), "tolerance.shares[]")
+
+    def largest(self) -> Table:
+        """Which dimensions matter most to each number, in the mean of the poses."""
+        texts = []
+        for its in self.linear.values():
+            finite = np.isfinite(its.shares).any()
+            mean = np.nanmean(its.shares, axis=1) if finite else np.zeros(len(self.limits))
+            order = np.argsort(-mean, kind="stable")[:3]
+            paths = [d.path for d in self.limits]
+            texts.append(", ".join(f"{paths[i]} {mean[i] * 100:.3g} %" for i in order if mean[i] > 0))
+        above = "shares of the variance, means over the poses"
+        columns = [names("column", self.linear, None), names("dimensions", texts, None)]
+        return Table(columns, ("column",), "", above=above)
+
+    def drawing(self) -> Table:
+        """How the mechanisms were drawn."""
+        study = self.study
+        columns = [names("draws", [self.draws]), names("seed", [study.seed])]
+        columns += [names("distribution", [study.distribution]), names("assembled", [self.drawn[1]])]
+        return Table(columns, place="tolerance.drawn")
 
     def assembled(self, table: Table) -> list[bool] | bool:
         """Of each row of a table whether its pose is assembled, or whether any is."""
@@ -225,24 +248,6 @@ class Tolerances(TableCase):
     def figure(self) -> Figure:
         """The band of paths, and which dimension has which share."""
         return draw(self)
-
-    def words(self) -> str:
-        """Which dimensions matter most, for the terminal."""
-        lines = []
-        for header, its in self.linear.items():
-            mean = (
-                np.nanmean(its.shares, axis=1)
-                if np.isfinite(its.shares).any()
-                else np.zeros(len(self.limits))
-            )
-            order = np.argsort(-mean, kind="stable")[:3]
-            ranked = zip(order, [list(self.limits)[i].path for i in order], strict=True)
-            told = ", ".join(f"{path} {mean[i] * 100:.3g} %" for i, path in ranked if mean[i] > 0)
-            if told:
-                lines.append(f"{header}: {told}")
-        return (
-            "shares of the variance, the largest, means over the poses:\n" + "\n".join(lines) if lines else ""
-        )
 
 
 @dataclass(frozen=True)
@@ -289,10 +294,9 @@ class Spreads(TableStudy):
         whole.check_size(json=show.as_json, table=show.needs_table, times=times)
 
 
-def _sample(its: Drawn) -> dict[str, Numbers]:
+def _sample(its: Drawn) -> dict[str, Reals]:
     """Mean, standard deviation and quantiles of what was drawn, by the names that they are shown under."""
-    values = its.mean, its.sd, *its.quantiles
-    return {name: cells(each) for name, each in zip(("mean", "sd", *NAMES), values, strict=True)}
+    return dict(zip(("mean", "sd", *NAMES), (its.mean, its.sd, *its.quantiles), strict=True))
 
 
 _FIELDS = ("mean", "sd", "quantiles", "errors")
@@ -303,22 +307,22 @@ SEEN = 0.02
 BARS = 10
 
 
-def draw(found: Tolerances) -> Figure:
-    """The band of the path of each point beside the shares; without points, bands over the input."""
+def draw(tolerances: Tolerances) -> Figure:
+    """The band of the path of each point, and the shares; without points, bands over the input."""
     from matplotlib.figure import Figure
 
-    points = [number.key for number in found.numbers if number.key[0] == "point" and number.key[4] == 0]
-    points = list(dict.fromkeys(key for key in points if key[3] not in found.analysis.mechanism.ground))
+    points = [number.key for number in tolerances.numbers if number.key[0] == "point" and number.key[4] == 0]
+    points = list(dict.fromkeys(key for key in points if key[3] not in tolerances.analysis.mechanism.ground))
     figure = Figure(figsize=(11.0, 5.2), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=(1.3, 1))
     if points:
-        _paths(left, found, points)
-        _shares(right, found, points, "variance of the position")
+        _paths(left, tolerances, points)
+        _shares(right, tolerances, points, "variance of the position")
     else:
-        header = found.numbers[0].header
-        _over_input(left, found, header)
-        _shares(right, found, [found.numbers[0].key], f"variance of {header}")
-    figure.suptitle(found.analysis.mechanism.name, fontsize=10)
+        header = tolerances.numbers[0].header
+        _over_input(left, tolerances, header)
+        _shares(right, tolerances, [tolerances.numbers[0].key], f"variance of {header}")
+    figure.suptitle(tolerances.analysis.mechanism.name, fontsize=10)
     return figure
 
 

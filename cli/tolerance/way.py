@@ -66,7 +66,7 @@ def way(
         ("column",),
         "sums[]",
     )
-    at = f"At {analysis.inputs.shown[i][0]:g}: " if len(whole) > 1 else ""
+    at = f"At {analysis.pose_text(i)}: " if len(whole) > 1 else ""
     text = (
         f"{at}Δq = Σ (∂q/∂d)·δd to first order, slopes exact: worst case Σ |∂q/∂d|·limit, "
         "standard deviation √Σ (∂q/∂d·limit/3)²; limits in SI, slopes in the column's unit per SI unit:"

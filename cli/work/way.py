@@ -15,7 +15,7 @@ from virtualwork.textbook.link_states import KINDS
 def way(w: WorkBalance) -> list[Topic]:
     """The topics."""
     steps = [([names("step", [step.name])], list(entries(w, i))) for i, step in enumerate(w.states.steps)]
-    return [ledger("steps[]", steps, _equations(w, [found for _, found in steps]))]
+    return [ledger("steps[]", steps, _equations(w, [instants for _, instants in steps]))]
 
 
 def entries(w: WorkBalance, index: int) -> Iterator[Entry]:
@@ -77,25 +77,25 @@ def _at(values: object, shape: tuple[int, ...], here: tuple[int, ...]):  # type:
 
 def _equations(w: WorkBalance, steps: list[list[Entry]]) -> list[str]:
     """The equation in symbols, each product with its numbers, and the solution, of the first step."""
-    step, found = w.states.steps[0], steps[0]
+    step, terms = w.states.steps[0], steps[0]
     lines = []
     if len(steps) > 1:
         lines.append(f"Step {step.name}; the others in the same way.")
     idle: dict[str, list[str]] = {}
-    for entry in found:
+    for entry in terms:
         if entry.workless:
             idle.setdefault(entry.workless, []).append(f"{entry.symbol} ({entry.kind})")
     lines += [f"No work, {why}: {', '.join(dict.fromkeys(which))}." for why, which in idle.items()]
     for number, of in enumerate(step.fields):
-        here = [entry for entry in found if entry.field == of and not entry.workless]
+        here = [entry for entry in terms if entry.field == of and not entry.workless]
         if not here:
             continue
         name = f" in the velocity field {of}" if of else ""
         lines.append(f"ΣF·V + ΣT·ω = 0{name}:")
         lines.append("  " + " + ".join(f"{e.symbol}·{e.rate}" for e in here) + " = 0")
-        known = [entry for entry in here if entry.kind != "unknown"]
-        lines += [f"  {entry.equation()}" for entry in known]
-        power = sum(entry.power for entry in known)
+        loads = [entry for entry in here if entry.kind != "unknown"]
+        lines += [f"  {entry.equation()}" for entry in loads]
+        power = sum(entry.power for entry in loads)
         coefficients = w.group(0)[1].coefficient[w.where[0][1], number]
         left = [
             f"{figures(float(c))}·{_name(u.cells[0].link, u.cells[0].quantity, u.name)}"

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
+
+from dalembert.arithmetic import sines
+from dalembert.arithmetic.exact import upper
 
 # of a double's bits, those of its exponent
 EXPONENT = 0x7FF << 52
@@ -18,6 +22,10 @@ class Numpy:
     sin = staticmethod(np.sin)
     cos = staticmethod(np.cos)
     atan2 = staticmethod(np.arctan2)
+
+    upper = staticmethod(upper)
+    place = staticmethod(sines.place)
+    entry0, entry1, entry2, entry3 = (partial(sines.entry, row) for row in range(4))
 
     @staticmethod
     def binade(x: Any) -> Any:

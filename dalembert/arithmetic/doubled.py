@@ -14,12 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.arithmetic.exact import halves
+from dalembert.arithmetic.recorded import RECORDED, Real
 
 Array = NDArray[np.float64]
 
 
 class Doubled:
     """high + low, some 32 digits; arrays (...) that broadcast, or floats, with each other and with plain numbers.
+
+    The parts may be recorded numbers too: then the operations on them are written down.
 
     Examples
     --------
@@ -73,6 +76,8 @@ class Doubled:
         back -= total
         back += self.high
         rest += back
+        if _none(self.low) and _none(b.low):
+            return Doubled(total, rest)
         if not _none(self.low):
             rest += self.low
         if not _none(b.low):
@@ -91,10 +96,12 @@ class Doubled:
             rest += self.high * b.low
         if not _none(self.low):
             rest += self.low * b.high
-        return settled(product, rest)
+        return Doubled(product, rest)
 
     def left(self, b: Doubled, product: Any) -> Any:
         """The rounding error of a product of the upper parts (Dekker)."""
+        if isinstance(self.high, Real) or isinstance(b.high, Real):
+            return product.left if isinstance(product, Real) else 0.0
         (a1, a2), (b1, b2) = self.halves, b.halves
         rest = a1 * b1
         rest -= product
@@ -113,12 +120,17 @@ class Doubled:
             rest += self.low
         if not _none(b.low):
             rest -= b.low * first.high
-        return settled(first.high, _quotient(rest, b.high))
+        if isinstance(self.high, float) and self.high == 1.0:
+            # the first quotient is near enough to 1/b
+            return Doubled(first.high, rest * first.high)
+        return Doubled(first.high, _quotient(rest, b.high))
 
     def __rtruediv__(self, other: Any) -> Doubled:
         return doubled(other).__truediv__(self)
 
     def __abs__(self) -> Doubled:
+        if isinstance(self.high, Real):
+            return Doubled(abs(self.high), RECORDED.select(self.high, self.low, -self.low))
         if not np.ndim(self.high):
             return -self if self.high < 0 else self
         sign = np.where(self.high < 0, -1.0, 1.0)
@@ -153,12 +165,20 @@ def _quotient(a: Any, b: Any) -> Any:
     )
 
 
+def quick(a: Any, b: Any, *low: Any) -> Doubled:
+    """a + b + low, where b is no larger than a, or a is zero, and low is rounding (Dekker)."""
+    total = a + b
+    rest = total - a
+    rest = b - rest
+    for more in low:
+        if not _none(more):
+            rest = rest + more
+    return Doubled(total, rest)
+
+
 def settled(high: Any, low: Any) -> Doubled:
     """The same number with low below half a unit in the last place of high: a cancellation leaves it above."""
-    total = high + low
-    rest = high - total
-    rest += low
-    return Doubled(total, rest)
+    return quick(high, low)
 
 
 def doubled(x: Any) -> Doubled:

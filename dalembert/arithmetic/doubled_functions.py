@@ -1,55 +1,37 @@
 """Functions of doubled numbers: with them a tape gives some 31 digits, to hold its own sixteen against.
 
-Sine and cosine by a table of 256 angles to a turn and a few terms of their series from there, after a reduction with π/2
-in three parts; the arctangent by one correction of the float's, from the sine and cosine of it: its error is then that
-correction's cube.
+Sine and cosine begin at the nearest of 256 angles to a turn (`sines`) and add a few terms of their series from
+there, after a reduction with the step of that table in three parts; the arctangent turns back by the nearest of these
+angles and adds the series of what is left. The doubled numbers may be floats, arrays, or recorded: then the tape of a
+tape in 32 digits is written down.
 """
 
 from __future__ import annotations
 
 from fractions import Fraction
-from functools import cache
-from math import factorial, nan, pi, sqrt
 from typing import Any
 
 import numpy as np
 
-from dalembert.arithmetic.doubled import Doubled, settled
-
-# the remainders of π/2, each the nearest double of what is left
-HALF_PI = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591698e-33, 5.562271104316826e-50)
-TERMS = 15  # of either series for the table: (π/4)³⁰/30! is below 1e-35
-STEPS = 256  # of the table
-
-
-@cache
-def _inverse_factorial(n: int) -> Doubled:
-    return Doubled.of(Fraction((-1) ** (n // 2), factorial(n)))
+from dalembert.arithmetic.arrays import NUMPY
+from dalembert.arithmetic.doubled import Doubled, quick
+from dalembert.arithmetic.exact import two_sum
+from dalembert.arithmetic.recorded import RECORDED
+from dalembert.arithmetic.sines import STEP, nearest
 
 
-def _series(r: Doubled) -> tuple[Doubled, Doubled]:
-    """(sin r, cos r) for |r| up to π/4."""
-    square = r * r
-    sine = cosine = Doubled(np.zeros_like(r.high))
-    for n in range(TERMS, -1, -1):
-        sine = sine * square + _inverse_factorial(2 * n + 1)
-        cosine = cosine * square + _inverse_factorial(2 * n)
-    return sine * r, cosine
+def _series(*coefficients: str) -> tuple[Doubled, ...]:
+    return tuple(Doubled.of(Fraction(c)) for c in coefficients)
 
 
-@cache
-def _table() -> tuple[np.ndarray, ...]:
-    """Sines and cosines of the table's angles, high and low parts."""
-    k = np.arange(STEPS)
-    quarter = np.rint(k / (STEPS / 4))
-    within = Doubled(HALF_PI[0], HALF_PI[1]) * ((k - quarter * (STEPS / 4)) * (4 / STEPS))
-    sine, cosine = _series(within)
-    found = []
-    for turned in (quarter.astype(int), quarter.astype(int) + 1):
-        # of a sine; the cosine is the sine a quarter turn on
-        for s, c in ((sine.high, cosine.high), (sine.low, cosine.low)):
-            found.append(np.choose(turned % 4, [s, c, -s, -c]))
-    return tuple(found)
+SINE = _series("-1/6", "1/120", "-1/5040", "1/362880", "-1/39916800")
+COSINE = _series("-1/2", "1/24", "-1/720", "1/40320", "-1/3628800")
+ARCTANGENT = _series("-1/3", "1/5", "-1/7", "1/9", "-1/11", "1/13", "-1/15")
+
+
+def functions(x: Any) -> Any:
+    """The functions of the parts of a doubled number: numpy's of arrays, recorded ones, or Python's."""
+    return NUMPY if np.ndim(x) else RECORDED
 
 
 class DoubledKind:
@@ -61,7 +43,7 @@ class DoubledKind:
 
     >>> y = DOUBLED.sin(DOUBLED.const(0.5))
     >>> float(y.high), float(y.low)
-    (0.479425538604203, -5.1039698605560106e-18)
+    (0.479425538604203, -5.103969860556014e-18)
     """
 
     @staticmethod
@@ -70,41 +52,34 @@ class DoubledKind:
 
     @staticmethod
     def sqrt(x: Doubled) -> Doubled:
-        if not np.ndim(x.high):
-            first: Any = sqrt(x.high) if x.high >= 0 else nan
-            return (
-                settled(first, (x - Doubled(first) * first).high / (2 * first)) if first else Doubled(first)
-            )
+        of = functions(x.high)
         with np.errstate(divide="ignore", invalid="ignore"):
-            root = Doubled(np.sqrt(x.high))
-            square = root.high * root.high
+            first = Doubled(of.sqrt(x.high))
+            if isinstance(first.high, float) and not first.high:
+                return first
+            square = first.high * first.high
             rest = x.high - square
-            rest -= root.left(root, square)
-            rest += x.low
-            rest /= 2 * root.high
-            # the root of zero is zero, and has no correction
-            rest[root.high == 0] = 0.0
-        return settled(root.high, rest)
+            rest = rest - first.left(first, square)
+            rest = (rest + x.low) / (2 * first.high)
+        # the root of zero is zero, and has no correction
+        return Doubled(first.high, of.select(first.high, rest, 0.0))
 
-    @staticmethod
-    def sincos(x: Doubled) -> tuple[Doubled, Doubled]:
+    @classmethod
+    def sincos(cls, x: Doubled) -> tuple[Doubled, Doubled]:
         """(sin x, cos x), as good as 31 digits of x allow, for |x| up to some 10⁹."""
-        k = np.rint(x.high * (STEPS / (2 * pi)))
-        t = x
-        for part in HALF_PI[:3]:
-            t = t - Doubled(k) * (part * (4 / STEPS))
-        square = t * t
-        q = square.high
-        # what is left out is below 2⁻¹⁰⁷ of the first term
-        sine = _inverse_factorial(5) + q * (-1 / 5040 + q * (1 / 362880 - q / 39916800))
-        sine = t + t * ((sine * square + _inverse_factorial(3)) * square)
-        cosine = _inverse_factorial(6) + q * (1 / 40320 - q * (1 / 3628800 - q / 479001600))
-        cosine = ((cosine * square + _inverse_factorial(4)) * square - 0.5) * square
-        place = np.mod(np.nan_to_num(k, posinf=0.0, neginf=0.0), STEPS).astype(int)
-        s, s_low, c, c_low = (part[place] for part in _table())
-        of_sine, of_cosine = Doubled(s, s_low), Doubled(c, c_low)
-        return of_sine + (of_sine * cosine + of_cosine * sine), of_cosine + (
-            of_cosine * cosine - of_sine * sine
+        k, sine_there, cosine_there = nearest(x.high)
+        # x - k·STEP: the first difference is exact
+        product = k.high * STEP[0]
+        t, rest = two_sum(x.high - product, -k.left(Doubled(STEP[0]), product))
+        product = k.high * STEP[1]
+        t, more = two_sum(t, -product)
+        rest = rest + more - k.left(Doubled(STEP[1]), product) - k.high * STEP[2] + x.low
+        angle = quick(t, rest)
+        square = angle * angle
+        sine = quick(angle.high, *_pair(_polynomial(SINE, square, 2) * square * angle), angle.low)
+        cosine = _polynomial(COSINE, square, 3) * square
+        return _turned(sine_there, cosine_there * sine, sine_there * cosine), _turned(
+            cosine_there, -(sine_there * sine), cosine_there * cosine
         )
 
     @classmethod
@@ -117,28 +92,54 @@ class DoubledKind:
 
     @classmethod
     def atan2(cls, y: Doubled, x: Doubled) -> Doubled:
-        first = np.arctan2(y.high, x.high)
-        sine, cosine = cls.sincos(Doubled(first))
-        along = x * cosine + y * sine
+        of = functions(y.high + x.high)
+        k, sine, cosine = nearest(of.atan2(y.high, x.high))
         with np.errstate(divide="ignore", invalid="ignore"):
-            rest = (y * cosine - x * sine).high / along.high
-        return settled(first, np.where(along.high == 0, 0.0, rest))
+            along = x * cosine + y * sine
+            slope = (y * cosine - x * sine) / along
+        # no length has no angle but that of its signs
+        slope = Doubled(*(of.select(abs(along.high), part, 0.0) for part in (slope.high, slope.low)))
+        square = slope * slope
+        rest = quick(slope.high, *_pair(_polynomial(ARCTANGENT, square, 3) * square * slope), slope.low)
+        return _turned(k * Doubled(*STEP[:2]), rest)
 
-    @classmethod
-    def select(cls, test: Doubled, positive: Doubled, otherwise: Doubled) -> Doubled:
-        return cls._where(test.high > 0, positive, otherwise)
+    @staticmethod
+    def select(test: Doubled, positive: Doubled, otherwise: Doubled) -> Doubled:
+        of = functions(test.high)
+        return Doubled(
+            of.select(test.high, positive.high, otherwise.high),
+            of.select(test.high, positive.low, otherwise.low),
+        )
 
     @staticmethod
     def binade(x: Doubled) -> Doubled:
-        from dalembert.arithmetic.arrays import NUMPY
+        return Doubled(functions(x.high).binade(x.high))
 
-        return Doubled(NUMPY.binade(x.high))
 
-    @staticmethod
-    def _where(test: Any, a: Doubled, b: Doubled) -> Doubled:
-        if not np.ndim(test):
-            return a if test else b
-        return Doubled(np.where(test, a.high, b.high), np.where(test, a.low, b.low))
+def _pair(x: Doubled) -> tuple[Any, Any]:
+    return x.high, x.low
+
+
+def _polynomial(coefficients: tuple[Doubled, ...], square: Doubled, doubled: int) -> Doubled:
+    """c₀ + c₁·z + …, of a small z: the first coefficients in doubled numbers, what is left in floats."""
+    z = square.high
+    tail: Any = coefficients[-1].high
+    for c in coefficients[-2 : doubled - 1 : -1]:
+        tail = c.high + z * tail
+    first = coefficients[doubled - 1]
+    value = quick(first.high, z * tail, first.low)
+    for c in coefficients[: doubled - 1][::-1]:
+        value = quick(c.high, *_pair(value * square), c.low)
+    return value
+
+
+def _turned(there: Doubled, *more: Doubled) -> Doubled:
+    """A sum of parts of which each is smaller than those before it."""
+    high, low = there.high, there.low
+    total = quick(*(each.high for each in more)) if len(more) > 1 else Doubled(more[0].high)
+    for each in more:
+        total.low = total.low + each.low
+    return quick(high, total.high, low + total.low)
 
 
 DOUBLED = DoubledKind()

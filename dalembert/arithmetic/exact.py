@@ -36,6 +36,19 @@ def halves(a: Array) -> tuple[Array, Array]:
     return high, a - high
 
 
+UPPER = -1 << 27
+"""Of a double's bits, those of its sign, its exponent and the upper 26 of its digits."""
+
+
+def upper(x: Array) -> Array:
+    """Return the upper 26 bits of a number: these alone have exact products with 27 others.
+
+    >>> float(upper(np.array(1 + 2.0**-25 + 2.0**-26))) == 1 + 2.0**-25
+    True
+    """
+    return (np.asarray(x, dtype=float).view(np.int64) & UPPER).view(float)
+
+
 def exact_sum(x: Array, axis: int = -1) -> tuple[Array, Array]:
     """Return the sum along an axis as a pair (rounded, rest), good to some 30 digits of Σ|x|.
 

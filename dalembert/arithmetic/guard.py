@@ -68,7 +68,10 @@ class Once(cached_property[Any]):
     def __get__(self, instance: Any, owner: Any = None) -> Any:
         if instance is None:
             return self
-        name, cache = str(self.attrname), vars(instance)
+        name, cache = self.attrname, vars(instance)
+        # what is there is whole: it is put there when it is worked out
+        if name in cache:
+            return cache[name]
         with instance.lock:
             if name not in cache:
                 cache[name] = self.func(instance)

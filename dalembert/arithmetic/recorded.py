@@ -153,6 +153,14 @@ class Real:
             return abs(Real(self.recorder, of[0]))
         return Real(self.recorder, self.recorder.node("sqrt", self.settled))
 
+    @property
+    def left(self) -> Real:
+        """Of a product, what its rounding left out; it is exact."""
+        kind, *of = self.recorder.operations[self.number]
+        if kind != "mul":
+            raise TypeError(f"{kind}: only a product leaves a rest")
+        return Real(self.recorder, self.recorder.node("left", *of, self.number), self.negative)
+
     def sin(self) -> Real:
         return Real(self.recorder, self.recorder.node("sin", self.number), self.negative)
 

@@ -35,7 +35,18 @@ SIGNS = {
     "select": "({1} if {0} > 0 else {2})",
 }
 
-EMPTY: Mapping[int, str] = MappingProxyType({})
+DOUBLED = {
+    # of a product, what its rounding leaves out: a·b - p, exactly
+    "left": "left({}, {}, {})",
+    # the upper 26 bits of a number: products of these and of what they leave are exact
+    "upper": "upper({})",
+    # see `sines`
+    "place": "place({})",
+    **{f"entry{row}": f"entry{row}({{}})" for row in range(4)},
+}
+"""Further kinds, on the tape of a tape in doubled numbers (`engines.doubled`)."""
+
+EMPTY: Mapping[Any, Any] = MappingProxyType({})
 
 
 class Kind(Protocol):
@@ -132,7 +143,7 @@ class Tape:
                 lines.append(str(arguments[0]))
                 continue
             names.append(f"v{number}")
-            lines.append(f"v{number} = {SIGNS[kind].format(*(names[a] for a in arguments))}")
+            lines.append(f"v{number} = {(SIGNS | DOUBLED)[kind].format(*(names[a] for a in arguments))}")
         return "\n".join([*lines, *(f"{name}: {names[number]}" for name, number in self.outputs)])
 
     def hang(self, on: Mapping[str, int]) -> list[int]:

@@ -44,14 +44,14 @@ class Varied(Constant):
     # what complex itself answers, of the value or of what is recorded
     @property
     def real(self) -> Any:
-        return self if self.is_real else made(complex(self).real, self.recorded.real)
+        return self if self.is_real else made(complex(self).real, self.recorded.real, type(self))
 
     @property
     def imag(self) -> Any:
-        return 0.0 if self.is_real else made(complex(self).imag, self.recorded.imag)
+        return 0.0 if self.is_real else made(complex(self).imag, self.recorded.imag, type(self))
 
     def conjugate(self) -> Any:
-        return made(complex(self).conjugate(), self.recorded.conjugate())
+        return made(complex(self).conjugate(), self.recorded.conjugate(), type(self))
 
     def is_integer(self) -> bool:
         """False: it may change."""
@@ -95,25 +95,53 @@ class Varied(Constant):
         return self
 
     def __neg__(self) -> Any:
-        return made(-complex(self), -self.recorded)
+        return made(-complex(self), -self.recorded, type(self))
 
     def __abs__(self) -> Any:
-        return made(abs(complex(self)), abs(self.recorded))
+        return made(abs(complex(self)), abs(self.recorded), type(self))
 
     def __pow__(self, power: Any, modulo: Any = None) -> Any:
-        return made(complex(self) ** power, self.recorded**power)
+        return made(complex(self) ** power, self.recorded**power, type(self))
+
+
+class Precise(Varied):
+    """A constant that does not vary and has more digits than a float: whether it is a whole number its float says.
+
+    >>> from dalembert.arithmetic.recorded import Recorder
+    >>> ratio = Precise(-0.5, Recorder().input("ratio"))
+    >>> (1 / ratio).is_integer(), ratio.is_integer()
+    (True, False)
+    """
+
+    def is_integer(self) -> bool:
+        """Whether its float is a whole number."""
+        return complex(self).real.is_integer()
 
 
 def rotation(angle: Any) -> Any:
     """e^{i·angle} of a constant, plain or varied."""
     if isinstance(angle, Varied):
-        return made(cmath.rect(1.0, complex(angle).real), RECORDED.turn(angle.recorded))
+        return made(cmath.rect(1.0, complex(angle).real), RECORDED.turn(angle.recorded), type(angle))
     return complex(math.cos(angle), math.sin(angle))
 
 
-def made(value: complex, recorded: Number) -> Any:
-    """A varied constant, or what is recorded where that is plain."""
-    return Varied(value, recorded) if isinstance(recorded, (Real, Complex)) else recorded
+def direction(angle: Any) -> Any:
+    """e^{i·angle}, exact at the quarter turns, so that a guide at 90° is not tilted by a rounding.
+
+    >>> direction(math.pi / 2)
+    1j
+    """
+    if isinstance(angle, Varied):
+        return rotation(angle)
+    quarter = angle / (math.pi / 2)
+    if abs(quarter - round(quarter)) <= 1e-15 * max(1.0, abs(quarter)):
+        return (1 + 0j, 1j, -1 + 0j, -1j)[round(quarter) % 4]
+    return rotation(angle)
+
+
+def made(value: complex, recorded: Number, of: type[Varied] = Varied) -> Any:
+    """A varied constant of a kind, or what is recorded where that is plain."""
+    return of(value, recorded) if isinstance(recorded, (Real, Complex)) else recorded
 
 
 def _operator(name: str) -> Any:
@@ -126,7 +154,7 @@ def _operator(name: str) -> Any:
             return of(bare(a), bare(b))
         if not isinstance(other, (int, float, complex)):
             return NotImplemented
-        return made(of(complex(a), complex(b)), of(bare(a), bare(b)))
+        return made(of(complex(a), complex(b)), of(bare(a), bare(b)), type(self))
 
     return form
 
@@ -139,5 +167,12 @@ for _name in ("add", "sub", "mul", "truediv"):
 def heading(z: Any) -> Any:
     """The angle of a complex constant, plain or varied, in (−π, π]."""
     if isinstance(z, Varied):
-        return made(cmath.phase(complex(z)), RECORDED.angle(z.recorded))
+        return made(cmath.phase(complex(z)), RECORDED.angle(z.recorded), type(z))
     return cmath.phase(z)
+
+
+def root(x: Any) -> Any:
+    """The square root of a real constant, plain or varied."""
+    if isinstance(x, Varied):
+        return made(math.sqrt(complex(x).real), RECORDED.sqrt(x.recorded), type(x))
+    return math.sqrt(x)

@@ -59,11 +59,11 @@ def packed(values: ArrayLike, exact: bool = True) -> Json:
     >>> packed([2.5, 2.5]), packed([1.0, 2.0], exact=False)
     ({'all': 2.5}, {'f4': 'AACAPwAAAEA='})
     """
-    given = np.asarray(values, dtype=float)
-    if given.size and (given == given[0]).all():
-        return {"all": float(given[0])}
-    short = given.astype("<f4") if not exact and _in_range(given) else None
-    data, kind = (given.astype("<f8"), "f8") if short is None else (short, "f4")
+    numbers = np.asarray(values, dtype=float)
+    if numbers.size and (numbers == numbers[0]).all():
+        return {"all": float(numbers[0])}
+    short = numbers.astype("<f4") if not exact and _in_range(numbers) else None
+    data, kind = (numbers.astype("<f8"), "f8") if short is None else (short, "f4")
     return {kind: base64.b64encode(data.tobytes()).decode()}
 
 
@@ -127,7 +127,8 @@ def page(
     """
     own = ["common.js", "player.js", f"{scene}.js"]
     if script:
-        own = ["texts.js", "model.js", *own, "entry.js", "editor.js"]
+        own = ["way.js", "model.js", *own, "loose.js", "entry.js", "editor.js"]
+    own = ["texts.js", *own]
     return _filled(title, "page.html", script, own, {"series": series, **rest})
 
 
@@ -163,11 +164,11 @@ def _filled(title: str, html: str, script: str, names: Sequence[str], data: Mapp
         "{{data}}": text,
     }
     head, *rest = _part(html).split("{{")
-    found = [head]
+    parts = [head]
     for part in rest:
         name, after = part.split("}}", 1)
-        found += [places["{{" + name + "}}"], after]
-    return Page("".join(found))
+        parts += [places["{{" + name + "}}"], after]
+    return Page("".join(parts))
 
 
 @cache

@@ -1,32 +1,52 @@
 // Rotors whose masses are known: rows are typed, corrections, states, tolerances and polygons follow.
-const tapesOf = sheet.rotors.map((rotor) => ({ mass: new Tape(tapes[rotor.tapes].mass), result: new Tape(tapes[rotor.tapes].result) }));
+const tapesOf = sheet.rotors.map((rotor) => Object.fromEntries(Object.entries(tapes[rotor.tapes]).map(([name, tape]) => [name, new Tape(tape)])));
 const ROW = ["share", "sum"];
 const namesOf = sheet.rotors.map((rotor) => sheet.outputs[rotor.tapes]);
 const prefix = (rotor) => (sheet.rotors.length > 1 ? `${rotor.name}/` : "");
 const cellName = (rotor, row, column) => `${prefix(rotor)}${row}.${column}`;
 let polygons = [];
+// to a multiple of a step, ties to the even one; a step such as 0.1 divides by 10, as in the program
+function rounded(x, [unit, step]) {
+  const even = (y) => (Math.abs(y % 1) === 0.5 ? 2 * Math.round(y / 2) : Math.round(y));
+  const inverse = step < 1 ? Math.round(1 / step) : 0;
+  return (inverse && Math.abs(inverse * step - 1) < 4e-16 ? even((x / unit) * inverse) / inverse : even(x / unit / step) * step) * unit;
+}
 
 solveSheet = () => {
   polygons = [];
   for (const [r, rotor] of sheet.rotors.entries()) {
-    const { mass, result } = tapesOf[r];
+    const { mass, result, given } = tapesOf[r];
     const names = namesOf[r];
     const [sums, pairs] = [{}, {}];
     for (const name of names.mass) if (name.startsWith("sum ")) [sums[name], pairs[name]] = [0, [0, 0]];
     const drawn = rotor.planes.map(() => []);
     for (const row of sheet.rows[r]) {
-      const given = { ...sums, radius: 1, z: 0 };
-      for (const { name } of sheet.columns) given[name === sheet.amount ? "amount" : name] = values[cellName(rotor, row, name)];
-      const out = solved(mass, names.mass, given, { ...given, ...pairs });
+      const entry = { ...sums, radius: 1, z: 0 };
+      for (const { name } of sheet.columns) entry[name === sheet.amount ? "amount" : name] = values[cellName(rotor, row, name)];
+      const out = solved(mass, names.mass, entry, { ...entry, ...pairs });
       for (const name of Object.keys(sums)) [sums[name], pairs[name]] = [out.get(name)[0], out.get(name)[2]];
       rotor.planes.forEach((_, p) => drawn[p].push([row, out.get(`share ${p} x`)[0], out.get(`share ${p} y`)[0]]));
     }
     const out = solved(result, names.result, sums, pairs);
+    const before = new Map(out);
+    if (rotor.given) {
+      // the corrections as they are given out, and what these leave
+      const put = {};
+      rotor.planes.forEach((_, p) => {
+        for (const [name, from] of [["mass", `mass ${p}`], ["radius", `radius ${p}`], ["angle", `plane ${p} angle`]]) {
+          const x = out.get(from)[0];
+          put[`${name} ${p}`] = sheet.steps[name] ? rounded(name === "angle" ? whole(x) : x, sheet.steps[name]) % (name === "angle" ? 2 * Math.PI : Infinity) : x;
+          if (sheet.steps[name]) out.set(from, [put[`${name} ${p}`], 0]);
+        }
+      });
+      for (const [name, x] of solved(given, names.given, { ...sums, ...put }, { ...pairs, ...put })) out.set(name, x);
+    }
     const set = (name, from, turn = false) => out.has(from) && answers.set(`${prefix(rotor)}${name}`, turn ? [whole(out.get(from)[0]), out.get(from)[1]] : out.get(from));
     rotor.planes.forEach((plane, p) => {
       set(`${plane}.unbalance`, `plane ${p} size`);
       set(`${plane}.mass`, `mass ${p}`);
       set(`${plane}.angle`, `plane ${p} angle`, true);
+      set(`${plane}.radius`, `radius ${p}`);
       polygons.push([`${prefix(rotor)}${plane}`, drawn[p], [out.get(`made ${p} x`)[0], out.get(`made ${p} y`)[0]]]);
     });
     set("static.unbalance", "static size");
@@ -37,7 +57,7 @@ solveSheet = () => {
       set("couple.angle", "couple angle", true);
       set("residual.couple", "left couple");
     }
-    rotor.tolerance?.names.forEach((name, p) => set(`tolerance.${name}`, out.has(`before ${p}`) ? `before ${p}` : `plane ${p} size`));
+    rotor.tolerance?.names.forEach((name, p) => answers.set(`${prefix(rotor)}tolerance.${name}`, before.get(`before ${p}`) ?? before.get(`plane ${p} size`)));
   }
 };
 
@@ -49,7 +69,7 @@ function build() {
     const table = put(scroll, "table", { class: "cells" });
     put(table, "caption", {}, sheet.rotors.length > 1 ? TEXTS.massesOf(rotor.name) : TEXTS.masses);
     const head = put(put(table, "thead"), "tr");
-    for (const text of ["", ...sheet.columns.map((c) => `${c.name}, ${c.unit}`), ""]) put(head, "th", { scope: "col" }, text);
+    for (const text of ["", ...sheet.columns.map((c) => `${TEXTS[c.name]}, ${c.unit}`), ""]) put(head, "th", { scope: "col" }, text);
     const body = put(table, "tbody");
     for (const row of sheet.rows[r]) {
       const line = put(body, "tr");
@@ -88,13 +108,13 @@ drawSheet = () => {
   listed(
     host,
     sheet.remove ? TEXTS.toRemove : TEXTS.toAdd,
-    ["", `mass, ${mass.unit}`, "angle, deg", `unbalance, ${unbalance.unit}`],
-    sheet.rotors.flatMap((rotor) => rotor.planes.map((plane) => [`${prefix(rotor)}${plane}`, shownAnswer(`${prefix(rotor)}${plane}.mass`, mass.si), shownAnswer(`${prefix(rotor)}${plane}.angle`, turn), shownAnswer(`${prefix(rotor)}${plane}.unbalance`, unbalance.si)])),
+    ["", `${TEXTS.mass}, ${mass.unit}`, `${TEXTS.angle}, deg`, `${TEXTS.unbalance}, ${unbalance.unit}`, ...(sheet.sought ? [`${TEXTS.radius}, ${sheet.shown.radius.unit}`] : [])],
+    sheet.rotors.flatMap((rotor) => rotor.planes.map((plane) => [`${prefix(rotor)}${plane}`, shownAnswer(`${prefix(rotor)}${plane}.mass`, mass.si), shownAnswer(`${prefix(rotor)}${plane}.angle`, turn), shownAnswer(`${prefix(rotor)}${plane}.unbalance`, unbalance.si), ...(sheet.sought ? [shownAnswer(`${prefix(rotor)}${plane}.radius`, sheet.shown.radius.si)] : [])])),
   );
   listed(
     host,
     TEXTS.state,
-    ["", `static, ${unbalance.unit}`, "angle, deg", ...(sheet.couple ? [`couple, ${sheet.shown.couple.unit}`, "angle, deg"] : []), `residual, ${unbalance.unit}`],
+    ["", `${TEXTS.static}, ${unbalance.unit}`, `${TEXTS.angle}, deg`, ...(sheet.couple ? [`${TEXTS.couple}, ${sheet.shown.couple.unit}`, `${TEXTS.angle}, deg`] : []), `${TEXTS.residual}, ${unbalance.unit}`],
     sheet.rotors.map((rotor) => [
       rotor.name,
       shownAnswer(`${prefix(rotor)}static.unbalance`, unbalance.si),
@@ -107,7 +127,7 @@ drawSheet = () => {
     listed(
       host,
       TEXTS.tolerance,
-      ["", `permissible, ${unbalance.unit}`, `before, ${unbalance.unit}`, ""],
+      ["", `${TEXTS.permissible}, ${unbalance.unit}`, `${TEXTS.before}, ${unbalance.unit}`, ""],
       sheet.rotors.flatMap((rotor) => (rotor.tolerance?.names ?? []).map((name, p) => {
         const [limit, x] = [rotor.tolerance.permissible[p], answer(`${prefix(rotor)}tolerance.${name}`)];
         return [`${prefix(rotor)}${name}`, short(limit / unbalance.si), shownAnswer(`${prefix(rotor)}tolerance.${name}`, unbalance.si), Number.isFinite(x) ? (x <= limit ? TEXTS.within : TEXTS.beyond) : "–"];

@@ -80,6 +80,24 @@ function fill(cell, x) {
   if (rest) put(cell, "small", {}, rest);
   if (power) cell.append(power);
 }
+// which of n samples are drawn: of very many the first, the last, the least and the largest of each few
+function sampled(values, most) {
+  const n = values.length;
+  if (n <= most) return Array.from({ length: n }, (_, i) => i);
+  const some = new Set([0, n - 1]);
+  const step = Math.ceil((3 * n) / most);
+  for (let from = 0; from < n; from += step) {
+    let [low, high] = [from, from];
+    for (let i = from; i < Math.min(n, from + step); i++) {
+      // a gap stays one
+      if (!Number.isFinite(values[i])) some.add(i);
+      if (values[i] < values[low]) low = i;
+      if (values[i] > values[high]) high = i;
+    }
+    some.add(low).add(high).add(from);
+  }
+  return [...some].sort((a, b) => a - b);
+}
 function range(values) {
   let [low, high] = [Infinity, -Infinity];
   for (const x of values) {
@@ -105,7 +123,7 @@ function ticks(low, high, step) {
 const keys = new Map(); // key -> [what it does, its words]
 function onKey(key, words, act) {
   keys.set(key, act);
-  $("keys").append(`${key === " " ? "space" : key}: ${words}. `);
+  $("keys").append(`${key === " " ? TEXTS.space : key}: ${words}. `);
 }
 document.addEventListener("keydown", (event) => {
   const act = keys.get(event.key);
@@ -126,6 +144,9 @@ function theme() {
   };
   dark.addEventListener("change", set);
   $("theme").addEventListener("click", flip);
-  onKey("d", "dark or light", flip);
+  $("theme").setAttribute("aria-label", TEXTS.theme);
+  $("theme").title = `${TEXTS.theme} (d)`;
+  document.querySelector("footer summary").textContent = TEXTS.keys;
+  onKey("d", TEXTS.theme, flip);
   set();
 }

@@ -120,7 +120,7 @@ tool(TEXTS.fitDrawing, () => {
   fit();
   show(shown);
 });
-const given = make("textarea", { id: "given", readonly: "", rows: "3", "aria-label": "text to copy", hidden: "" });
+const given = make("textarea", { id: "given", readonly: "", rows: "3", "aria-label": TEXTS.toCopy, hidden: "" });
 function handOver(text) {
   given.hidden = false;
   given.value = text;
@@ -155,7 +155,8 @@ function options() {
 function toml() {
   if (!model.toml) return "";
   const lines = model.toml.filter(({ of, needed }) => needed || of.some((piece) => Array.isArray(piece) && numbers[piece[0]] !== machine.own[piece[0]]));
-  return `${lines.map(({ of }) => of.map((piece) => (Array.isArray(piece) ? tomlNumber(numbers[piece[0]]) : piece)).join("")).join("\n")}\n`;
+  const beside = model.files.length ? `# ${TEXTS.beside(model.files.join(", "))}\n` : "";
+  return `${beside}${lines.map(({ of }) => of.map((piece) => (Array.isArray(piece) ? tomlNumber(numbers[piece[0]]) : piece)).join("")).join("\n")}\n`;
 }
 const tomlNumber = (x) => (Number.isInteger(x) ? `${x + 0}.0` : String(x).replace(/^(-?\d+)e/, "$1.0e"));
 

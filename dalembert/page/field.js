@@ -7,6 +7,9 @@ const reading = (k, s, what) => `${sheet.runs[k]}/${sheet.sensors[s]}/${what}`;
 const onRotor = (k, p, what) => `${sheet.runs[k]}/${sheet.planes[p]}/${what}`;
 const has = (name) => Number.isFinite(values[name] ?? NaN);
 let doubts = [];
+let idle = []; // planes that need no trim, and why
+let beyond = []; // planes whose mass is beyond its limit
+const amount = (x) => `${short(Number((x / sheet.mass.si).toPrecision(4)))} ${sheet.mass.unit}`;
 const settable = sheet.runs.flatMap((_, k) => [
   ...sheet.sensors.flatMap((_s, s) => [reading(k, s, "amplitude"), reading(k, s, "phase")]),
   ...(k ? sheet.planes.flatMap((_p, p) => [onRotor(k, p, word), onRotor(k, p, "angle")]) : []),
@@ -33,8 +36,7 @@ let standing = [];
 const readIn = (k) => sheet.sensors.some((_, s) => has(reading(k, s, "amplitude")) || has(reading(k, s, "phase")));
 
 solveSheet = () => {
-  doubts = [];
-  standing = [];
+  [doubts, idle, beyond, standing] = [[], [], [], []];
   // a reading is an amplitude with its phase; each sensor is read in some run
   for (let k = 0; k < sheet.runs.length; k++) {
     for (let s = 0; s < sheet.sensors.length; s++) {
@@ -70,9 +72,17 @@ solveSheet = () => {
       answers.set(`fresh.${plane}.angle`, turned(`fresh ${last} ${p} angle`));
     }
     if (sheet.errors) {
-      answers.set(`${plane}.${word}_uncertainty`, out.get(`along ${p}`));
-      answers.set(`${plane}.angle_uncertainty`, [out.get(`across ${p}`)[0] / out.get(`plane ${p} size`)[0], 0]);
+      for (const [lead, from, size] of [["", p, `plane ${p} size`], ["trim.", last ? `${last} ${p}` : p, `${trim} size`]]) {
+        answers.set(`${lead}${plane}.${word}_uncertainty`, out.get(`along ${from}`));
+        answers.set(`${lead}${plane}.angle_uncertainty`, [out.get(`across ${from}`)[0] / out.get(size)[0], 0]);
+      }
     }
+    // the program's reasons for leaving a plane as it is
+    const size = answer(`trim.${plane}.${word}`);
+    const stands = sheet.sensors.map((_, s) => out.get(`${has(reading(last, s, "amplitude")) ? "read" : "expected"} ${last} ${s}`)[0]);
+    if (sheet.ceiling !== null && stands.every((x) => x <= sheet.ceiling * (1 + 1e-9))) idle.push(TEXTS.withinLimit(plane));
+    else if (sheet.errors && size < answer(`trim.${plane}.${word}_uncertainty`)) idle.push(TEXTS.belowUncertainty(plane));
+    if (sheet.limits[p] !== null && answer(`${plane}.${word}`) > sheet.limits[p] * (1 + 1e-12)) beyond.push(TEXTS.beyondLimit(plane, amount(answer(`${plane}.${word}`)), amount(sheet.limits[p])));
   });
   sheet.sensors.forEach((sensor, s) => {
     answers.set(`residual/${sensor}/amplitude`, out.get(`residual ${s} size`));
@@ -147,7 +157,7 @@ function dial(parent, plane) {
     const [x, y] = at(angle, 92);
     put(picture, "circle", { class: "place on", cx: x, cy: y, r: 7 });
     const [u, v] = at(angle, 115);
-    put(picture, "text", { x: u, y: v }, `${short(Number((size / sheet.mass.si).toPrecision(4)))} ${sheet.mass.unit}`);
+    put(picture, "text", { x: u, y: v }, amount(size));
     const [c, d] = at(angle, 70);
     put(picture, "text", { x: c, y: d }, `${Number(((angle * 180) / Math.PI).toFixed(1))}°`);
   }
@@ -158,18 +168,28 @@ drawSheet = () => {
   const host = $("answers");
   host.replaceChildren();
   const turn = Math.PI / 180;
+  for (const text of beyond) put(host, "p", { class: "doubt", role: "status" }, text);
+  for (const text of idle) put(host, "p", { role: "status" }, text);
   const sure = (name, by) => (sheet.errors && Number.isFinite(answer(name)) ? ` ± ${Number((answer(name) / by).toPrecision(2))}` : "");
-  const vectors = (lead, more) => sheet.planes.map((plane) => [plane, shownAnswer(`${lead}${plane}.${word}`, sheet.mass.si) + (more ? sure(`${plane}.${word}_uncertainty`, sheet.mass.si) : ""), shownAnswer(`${lead}${plane}.angle`, turn) + (more ? sure(`${plane}.angle_uncertainty`, turn) : "")]);
-  listed(host, TEXTS.corrections, ["", `${word}, ${sheet.mass.unit}`, "angle, deg"], vectors("", true));
-  listed(host, TEXTS.trim, ["", `${word}, ${sheet.mass.unit}`, "angle, deg"], vectors("trim.", false));
-  if (sheet.planes.some((plane) => answers.has(`fresh.${plane}.${word}`))) listed(host, TEXTS.fresh, ["", `${word}, ${sheet.mass.unit}`, "angle, deg"], vectors("fresh.", false));
+  const vectors = (lead, more) => sheet.planes.map((plane) => [plane, shownAnswer(`${lead}${plane}.${word}`, sheet.mass.si) + (more ? sure(`${lead}${plane}.${word}_uncertainty`, sheet.mass.si) : ""), shownAnswer(`${lead}${plane}.angle`, turn) + (more ? sure(`${lead}${plane}.angle_uncertainty`, turn) : "")]);
+  listed(host, TEXTS.corrections, ["", `${TEXTS[word]}, ${sheet.mass.unit}`, `${TEXTS.angle}, deg`], vectors("", true));
+  listed(host, TEXTS.trim, ["", `${TEXTS[word]}, ${sheet.mass.unit}`, `${TEXTS.angle}, deg`], vectors("trim.", true));
+  if (sheet.planes.some((plane) => answers.has(`fresh.${plane}.${word}`))) listed(host, TEXTS.fresh, ["", `${TEXTS[word]}, ${sheet.mass.unit}`, `${TEXTS.angle}, deg`], vectors("fresh.", false));
   if (doubts.length) put(host, "p", { class: "doubt", role: "status" }, doubts.join(" "));
   listed(host, TEXTS.expected, ["", `${TEXTS.amplitude}, ${amplitudeUnit}`, `${TEXTS.phase}, deg`], sheet.sensors.map((sensor) => [sensor, shownAnswer(`residual/${sensor}/amplitude`), shownAnswer(`residual/${sensor}/phase`, turn)]));
   const drawn = put(host, "div", { class: "polygons" });
   if (answers.size) for (const plane of sheet.planes) dial(drawn, plane);
   const box = put(host, "details");
   put(box, "summary", {}, TEXTS.coefficients);
-  listed(box, TEXTS.coefficients, [TEXTS.sensor, TEXTS.plane, `${amplitudeUnit} per ${sheet.mass.unit}`, `${TEXTS.phase}, deg`], sheet.coefficients.map(([sensor, plane, size, angle]) => [sensor, plane, short(size * sheet.mass.si), short(sheet.against ? (360 - angle) % 360 : angle)]));
+  listed(box, TEXTS.coefficients, [TEXTS.sensor, TEXTS.plane, TEXTS.per(amplitudeUnit, sheet.mass.unit), `${TEXTS.phase}, deg`], sheet.coefficients.map(([sensor, plane, size, angle, along, across]) => {
+    const error = (x) => (Number.isFinite(x) ? ` ± ${Number(x.toPrecision(2))}` : "");
+    return [sensor, plane, short(size * sheet.mass.si) + error(along * sheet.mass.si), short(sheet.against ? (360 - angle) % 360 : angle) + error(across / turn)];
+  }));
+  const limits = sheet.planes.flatMap((plane, p) => (sheet.limits[p] === null ? [] : [[`${TEXTS.largest} ${plane}`, amount(sheet.limits[p])]]));
+  const facts = [...sheet.facts, ...(sheet.ceiling === null ? [] : [[TEXTS.largestVibration, `${short(sheet.ceiling)} ${amplitudeUnit}`]]), ...limits];
+  if (!facts.length) return;
+  put(host, "h2", {}, TEXTS.machine);
+  for (const [name, text] of facts) put(host, "p", { class: "soft" }, `${name}: ${text}`);
 };
 
 function csv() {
@@ -187,18 +207,25 @@ function csv() {
   return `${lines.join("\n")}\n`;
 }
 
+// notes of the machine, kept with the readings
+const notes = make("textarea", { id: "notes", rows: "3", "aria-label": TEXTS.notes, placeholder: TEXTS.notes });
+notes.addEventListener("input", keep);
+notes.addEventListener("keydown", (event) => event.stopPropagation());
+$("entries").append(notes);
+
 // what was typed is kept on this machine, where the browser allows it
 const kept = `dalembert ${sheet.id}`;
 function keep() {
   try {
-    if (!wrong.size) localStorage.setItem(kept, JSON.stringify(Object.entries(values).filter(([, x]) => Number.isFinite(x))));
+    if (!wrong.size) localStorage.setItem(kept, JSON.stringify([...Object.entries(values).filter(([, x]) => Number.isFinite(x)), ["", notes.value]]));
   } catch {
     // a page in a frame keeps nothing
   }
 }
 try {
   const before = localStorage.getItem(kept);
-  if (before) for (const [name, x] of JSON.parse(before)) if (settable.includes(name) && typeof x === "number") values[name] = x;
+  if (before) for (const [name, x] of JSON.parse(before)) if (name === "" && typeof x === "string") notes.value = x;
+  else if (settable.includes(name) && typeof x === "number") values[name] = x;
 } catch {
   // nothing was kept
 }

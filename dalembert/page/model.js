@@ -1,75 +1,23 @@
-// A mechanism that is computed anew: its tapes with the numbers of the moment. No formula of mechanics stands here; what is done is
-// the choice of each loop's assembly, the look along the input for places where a radicand touches or crosses zero, and iteration.
-const TAU = 2 * Math.PI;
-const TOUCHES = 1e-13; // a radicand so small is zero but for rounding
-const DIP = 0.05; // a radicand below this may touch zero between two samples
-const PER_TURN = 720; // samples of a turn
+// A mechanism that is computed anew: its tapes with the numbers of the moment. No formula of mechanics stands here.
 const SERIES = [0.03, 0.16, 14]; // rad: beside a change point the quantities are interpolated, over so far, from so many poses
 
-class Machine {
-  constructor(model, tapes) {
-    this.model = model;
-    this.tapes = Object.fromEntries(Object.entries(tapes).map(([name, tape]) => [name, new Tape(tape)]));
-    this.kinds = new Map(model.dimensions.map(([path, kind]) => [path, kind]));
-    this.own = Object.fromEntries(model.dimensions.map(([path, , value]) => [path, value]));
-    this.n = model.n;
-    this.sweep = model.inputs.map((input) => unpack(input.sweep, model.n));
-    this.one = model.inputs.length === 1;
-    this.closed = model.groups.filter((g) => !g.start);
-    this.iterated = model.groups.filter((g) => g.start);
-    let place = 0;
-    for (const g of this.iterated) {
-      g.place = place;
-      place += 1 + g.start.length;
-    }
-    this.angleRows = new Set();
-    for (const q of Object.values(model.quantities)) if (q.turns) this.angleRows.add(q.row);
-  }
-
+class Machine extends Way {
   // what does not change along the input
   #given(numbers) {
     const given = { ...numbers };
     for (const [j, input] of this.model.inputs.entries()) {
       for (const [k, name] of ["v", "a", "j"].entries()) {
         const path = input.paths[k + 1];
-        given[`${name}${j}`] = path && numbers[path] !== this.own[path] ? numbers[path] : input.rates[k];
+        given[`${name}${j}`] = path && numbers[path] !== this.own[path] ? numbers[path] : this.rates[j][k];
       }
     }
+    if (this.time) given.time = this.time;
     return given;
   }
 
   // the inputs of the guess
   #start(numbers) {
     return this.model.inputs.map((input) => (input.follows && input.paths[0] ? numbers[input.paths[0]] : input.at));
-  }
-
-  // Newton's method on the steps of a tape: the unknowns of a group in `given`; says whether its loops close
-  #iterate(group, given, limit = 60) {
-    const { name, start, angles, place } = group;
-    const count = start.length;
-    const keys = start.map((_, i) => `x ${name} ${i}`);
-    const tape = this.tapes.steps;
-    let out = tape.one(given);
-    const size = this.model.size;
-    for (let round = 0; round < limit; round++) {
-      const x = keys.map((key) => given[key]);
-      const open = out[place];
-      if (!Number.isFinite(open)) return false;
-      const far = Math.max(size, ...x.slice(angles).map(Math.abs));
-      const step = x.map((value, i) => out[place + 1 + i] - value);
-      if (!step.every(Number.isFinite)) return open <= 1e-12 * far;
-      const big = Math.max(0, ...step.map((d, i) => Math.abs(d) / (i < angles ? 1 : far)));
-      if (open <= 1.5e-14 * far && big <= 1e-7) return true;
-      let factor = Math.min(1, 1 / (big || 1));
-      for (let half = 0; half < 12; half++) {
-        for (let i = 0; i < count; i++) given[keys[i]] = x[i] + factor * step[i];
-        out = tape.one(given);
-        if (out[place] <= open * (1 + 1e-12) || open <= 1.5e-14 * far) break;
-        factor /= 2;
-      }
-      if (!(out[place] <= open * (1 + 1e-12)) && open <= 1e-12 * far) return true;
-    }
-    return out[place] <= 1e-12 * size;
   }
 
   // how each loop closes at the guess: signs and unknowns in `given`, which has the dimensions; says whether it can be so at all
@@ -81,8 +29,7 @@ class Machine {
     let found = choice.one(given);
     for (const g of this.model.groups) {
       if (g.start) {
-        // the program goes on to search from many starts; the page says that it cannot
-        if (!this.#iterate(g, given)) return (given.open = g.name) && false;
+        if (!this.#assemble(g, given)) return (given.open = g.name) && false;
         found = choice.one(given);
         continue;
       }
@@ -94,41 +41,58 @@ class Machine {
     return !(found[found.length - 1] <= 0);
   }
 
-  // the sign of a closed form at inputs, with the change points between the guess and them
-  #signs(state, group, q) {
-    const flips = state.flips.get(group.name);
-    const base = state.given[`sign ${group.name}`];
-    if (!flips?.length) return base;
-    const count = (x) => flips.reduce((sum, f) => sum + (f <= x ? 1 : 0), 0);
-    const before = count(state.at[0]);
-    return Float64Array.from(q, (x) => ((count(x) - before) & 1 ? -base : base));
+  // the unknowns of an iterated group: iterated from the guess; where that does not close, the nearest of many assemblies
+  #assemble(g, given) {
+    const says = this.tapes.guessed.one(given).subarray(g.guess);
+    const put = (x) => g.keys.forEach((key, i) => (given[key] = x[i]));
+    if (g.sure) {
+      const x = Array.from(says.subarray(0, g.start.length));
+      const wide = 1 + g.free.length;
+      const rows = Array.from({ length: g.rows }, (_, row) => says.subarray(g.start.length + row * wide, g.start.length + (row + 1) * wide));
+      const slides = leastSquares(g.free.map((_, k) => rows.map((row) => row[1 + k])), rows.map((row) => row[0]));
+      g.free.forEach((i, k) => (x[i] = slides[k]));
+      put(x);
+      if (this.iterate(g, given)) return true;
+    }
+    let [least, best, others] = [Infinity, null, false];
+    for (const start of this.#starts(g)) {
+      put(start);
+      if (!this.iterate(g, given)) continue;
+      const far = this.tapes.guessed.one(given)[g.guess + g.start.length + g.rows * (1 + g.free.length)];
+      const x = g.keys.map((key) => given[key]);
+      others ||= best !== null && x.some((y, i) => (i < g.angles ? Math.hypot(Math.cos(y) - Math.cos(best[i]), Math.sin(y) - Math.sin(best[i])) : Math.abs(y - best[i]) / this.model.size) >= 1e-6);
+      if (far < least) [least, best] = [far, x];
+    }
+    // the guess says nothing of it, and there are several
+    if (!best || (others && !g.informed)) return false;
+    put(best);
+    return true;
   }
 
-  // an unknown of an iterated group between the samples of its way
-  #between(state, key, q) {
-    const { grid, unknowns } = state;
-    const values = unknowns.get(key);
-    const [first, step] = [grid[0], grid[1] - grid[0]];
-    return Float64Array.from(q, (x) => {
-      const place = Math.min(Math.max((x - first) / step, 0), grid.length - 1);
-      const low = Math.min(Math.floor(place), grid.length - 2);
-      const [a, b] = [values[low], values[low + 1]];
-      if (!Number.isFinite(a)) return b;
-      if (!Number.isFinite(b)) return a;
-      return a + (b - a) * (place - low);
-    });
+  // starts spread evenly over angles and slides: a Kronecker sequence of the generalised golden ratio
+  *#starts(g) {
+    const count = g.start.length;
+    let golden = 1;
+    for (let round = 0; round < 64; round++) golden = (1 + golden) ** (1 / (count + 1));
+    for (let k = 1; k <= Math.min(4096, 128 * count); k++) {
+      yield g.start.map((_, i) => {
+        const u = (0.5 + k * golden ** -(i + 1)) % 1;
+        return i < g.angles ? u * TAU : (2 * u - 1) * this.model.size;
+      });
+    }
   }
 
-  // all that enters the tapes at inputs, one array for each input of the mechanism
-  #entering(state, inputs) {
+  // all that enters the tapes at inputs, one array for each input of the mechanism; `pose`: with its rates
+  #entering(state, inputs, pose) {
     const given = { ...state.given };
+    if (pose !== undefined) Object.assign(given, lane(given, pose));
     inputs.forEach((q, j) => (given[`q${j}`] = q));
     const [q] = inputs;
-    for (const g of this.closed) given[`sign ${g.name}`] = this.one ? this.#signs(state, g, q) : state.given[`sign ${g.name}`];
+    for (const g of this.closed) given[`sign ${g.name}`] = this.one ? this.signs(state, g, q) : state.given[`sign ${g.name}`];
     if (this.iterated.length && this.one) {
       for (const g of this.iterated) {
         const keys = g.start.map((_, i) => `x ${g.name} ${i}`);
-        for (const key of keys) given[key] = this.#between(state, key, q);
+        for (const key of keys) given[key] = this.between(state, key, q);
         for (let round = 0; round < 3; round++) {
           const out = this.tapes.steps.run(given, q.length);
           const bad = q.map((_, l) => (out[g.place][l] < 0.1 * this.model.size ? 0 : NaN));
@@ -140,7 +104,39 @@ class Machine {
       }
     } else if (this.iterated.length) this.#alongLines(state, given, inputs);
     if (this.tapes.twists) this.#wind(state, given, inputs);
+    if (this.tapes.over && pose === undefined) this.#load(given, this.tapes.over.run(given, inputs[0].length));
+    if (this.tapes.statics && !(this.tapes.over && pose !== undefined)) this.#bear(given, inputs[0].length);
     return given;
+  }
+
+  // the equations of all links at one lane of the tape's outputs
+  #system(out, l) {
+    const { count, rows, places } = this.model.statics;
+    const a = Array.from({ length: rows }, () => new Array(count + 1).fill(0));
+    places.forEach(([row, column], k) => (a[row][column] = out[k][l]));
+    return [a, a.map((row) => row[count])];
+  }
+
+  // redundant statics: the forces that it determines enter the tape of the poses
+  #bear(given, n) {
+    const { count } = this.model.statics;
+    const out = this.tapes.statics.run(given, n);
+    const found = Array.from({ length: count }, () => new Float64Array(n));
+    for (let l = 0; l < n; l++) determined(...this.#system(out, l), count).forEach((x, i) => (found[i][l] = x));
+    found.forEach((x, i) => (given[`f ${i}`] = x));
+  }
+
+  // by how much the forces of a lane are off, as 32 digits show: what they leave of the equations, solved once more
+  #unbalanced(here) {
+    const { count, places } = this.model.statics;
+    const exact = this.tapes.statics.twice(here);
+    const rest = [];
+    places.forEach(([row, column], k) => {
+      const f = column < count ? here[`f ${column}`] || 0 : 1;
+      rest[row] = two.add(rest[row] ?? [0, 0], two.mul(exact[k], [f, 0]));
+    });
+    const [a] = this.#system(exact.map(([high]) => [high]), 0);
+    return determined(a, Array.from(rest, (x) => x?.[0] ?? 0), count);
   }
 
   // several inputs: every pose on its own straight line from the guess
@@ -157,7 +153,7 @@ class Machine {
         const to = Math.min(1, gone + step);
         const trial = { ...here };
         way.forEach((d, j) => (trial[`q${j}`] = state.at[j] + to * d));
-        const closes = this.iterated.every((g) => this.#iterate(g, trial, 8));
+        const closes = this.iterated.every((g) => this.iterate(g, trial, 8));
         if (closes && keys.every((key) => Math.abs(trial[key] - here[key]) < 0.3 * Math.max(1, Math.abs(here[key])))) {
           Object.assign(here, trial);
           gone = to;
@@ -185,178 +181,27 @@ class Machine {
     }
   }
 
-  // along the one input from low to high: change points, limits, the unknowns of iterated groups
-  #look(state, low, high) {
-    const input = this.model.inputs[0];
-    const turn = input.slides ? this.model.size : TAU;
-    if (!(high - low > 1e-9 * turn)) [low, high] = [low - 1e-3 * turn, high + 1e-3 * turn];
-    const steps = Math.min(40000, Math.max(8, Math.ceil((PER_TURN * (high - low)) / turn)));
-    const grid = Float64Array.from({ length: steps + 7 }, (_, i) => low + ((high - low) * (i - 2.5)) / steps);
-    Object.assign(state, { grid, flips: new Map(), limits: [], unknowns: new Map(), turn });
-    const given = { ...state.given, q0: grid };
-    for (const g of this.iterated) g.start.forEach((_, i) => (given[`x ${g.name} ${i}`] = NaN));
-    let margins;
-    for (const g of this.model.groups) {
-      if (g.start) {
-        this.#march(state, g, given);
-        margins = undefined;
-        continue;
-      }
-      margins ??= this.tapes.margins.run(given, grid.length);
-      const k = this.closed.indexOf(g);
-      const flips = this.#touches(state, g, k, grid, margins[k], [low, high]);
-      if (flips.length) {
-        state.flips.set(g.name, flips);
-        given[`sign ${g.name}`] = this.#signs(state, g, grid);
-        margins = undefined;
-      }
-    }
-    if (this.tapes.twists) {
-      const at = Math.round((state.at[0] - grid[0]) / (grid[1] - grid[0]));
-      const whole = this.tapes.twists.run(given, grid.length);
-      state.twists = whole.map((values) => {
-        const found = Float64Array.from(values);
-        for (let i = at + 1; i < found.length; i++) found[i] += TAU * Math.round((found[i - 1] - found[i]) / TAU) || 0;
-        for (let i = at - 1; i >= 0; i--) found[i] += TAU * Math.round((found[i + 1] - found[i]) / TAU) || 0;
-        return found;
+  // the forces that tables give, of what they are over: linear between their rows
+  #load(given, over) {
+    for (const [i, { at, x, y, periodic, turns }] of this.model.tables.entries()) {
+      const [first, end] = [at[0], at.at(-1)];
+      const within = (angle, period) => first + ((angle - first) % period < 0 ? ((angle - first) % period) + period : (angle - first) % period);
+      const force = (values) => over[i].map((place) => {
+        if (turns) place = within(place, TAU);
+        if (periodic) place = within(place, end - first);
+        if (!(place >= first && place <= end)) return NaN;
+        let [low, high] = [0, at.length - 1];
+        while (high - low > 1) {
+          const middle = (low + high) >> 1;
+          if (at[middle] <= place) low = middle;
+          else high = middle;
+        }
+        if (place === end) return values.at(-1);
+        return ((values[high] - values[low]) / (at[high] - at[low])) * (place - at[low]) + values[low];
       });
+      given[`table ${i} x`] = force(x);
+      given[`table ${i} y`] = force(y);
     }
-  }
-
-  // where the radicand of a group touches zero; where it crosses, a limit is noted
-  #touches(state, g, k, grid, m, [low, high]) {
-    if (!m.some((x) => x < DIP)) return [];
-    const margin = (q) => this.tapes.margins.run(this.#beside(state, q), q.length)[k];
-    const found = [];
-    const note = (q) => {
-      const same = 1e-6 * state.turn;
-      // a guess at one of them means the branch beyond it
-      const here = Math.abs(q - state.at[0]) < 1e-9 * state.turn ? Math.min(q, state.at[0]) : q;
-      if (q > low - same && q < high + same && !found.some((f) => Math.abs(f - q) < same)) found.push(here);
-    };
-    const zero = (x) => Math.abs(x) <= TOUCHES;
-    for (let i = 1; i + 1 < grid.length; i++) {
-      if (m[i] < DIP && m[i] <= m[i - 1] && m[i] <= m[i + 1] && m[i - 1] > 0 && m[i + 1] > 0 && m[i] > -TOUCHES) {
-        // followed down
-        let [centre, half, least] = [grid[i], grid[i + 1] - grid[i], m[i]];
-        for (let round = 0; round < 9 && half > 1e-9 * state.turn; round++) {
-          const near = Float64Array.from({ length: 33 }, (_, l) => centre + (half * (l - 16)) / 16);
-          const below = margin(near);
-          let lowest = 16;
-          for (let l = 0; l < 33; l++) if (below[l] < below[lowest]) lowest = l;
-          [centre, least] = [near[lowest], below[lowest]];
-          half /= 8;
-          if (least < -TOUCHES) break;
-        }
-        if (zero(least)) note(centre);
-        else if (least < 0) {
-          state.limits.push([this.#crossing(margin, grid[i - 1], centre), -1, g.name]);
-          state.limits.push([this.#crossing(margin, centre, grid[i + 1]), 1, g.name]);
-        }
-      }
-    }
-    for (let i = 0; i + 1 < grid.length; i++) {
-      if (m[i] >= 0 === m[i + 1] >= 0 || zero(m[i]) || zero(m[i + 1]) || !Number.isFinite(m[i] + m[i + 1])) continue;
-      const q = this.#crossing(margin, grid[i], grid[i + 1]);
-      if (q >= low - 1e-9 * state.turn && q <= high + 1e-9 * state.turn) state.limits.push([q, m[i] >= 0 ? -1 : 1, g.name]);
-    }
-    return found.sort((a, b) => a - b);
-  }
-
-  // a root between two inputs: regula falsi (Illinois), then the last bits by halves
-  #crossing(margin, a, b) {
-    const at = (q) => margin(Float64Array.of(q, q))[0];
-    let [fa, fb] = [at(a), at(b)];
-    for (let round = 0; round < 200; round++) {
-      if (fa === 0 || fb === 0 || Math.abs(b - a) <= 2 * Number.EPSILON * Math.max(Math.abs(a), Math.abs(b))) break;
-      let q = b - (fb * (b - a)) / (fb - fa);
-      if (!(Math.min(a, b) < q && q < Math.max(a, b))) {
-        q = (a + b) / 2;
-        if (q === a || q === b) break;
-      }
-      const f = at(q);
-      if (f >= 0 !== fb >= 0) [a, fa] = [b, fb];
-      else fa *= 0.5;
-      [b, fb] = [q, f];
-    }
-    return Math.abs(fa) < Math.abs(fb) ? a : b;
-  }
-
-  // what enters at further inputs, as far as groups are looked through
-  #beside(state, q) {
-    const given = { ...state.given, q0: q };
-    for (const g of this.closed) given[`sign ${g.name}`] = this.#signs(state, g, q);
-    for (const g of this.iterated) {
-      g.start.forEach((_, i) => {
-        const key = `x ${g.name} ${i}`;
-        given[key] = state.unknowns.has(key) ? this.#between(state, key, q) : NaN;
-      });
-    }
-    return given;
-  }
-
-  // an iterated group from the guess both ways, each pose from the last ones
-  #march(state, g, given) {
-    const { grid } = state;
-    const keys = g.start.map((_, i) => `x ${g.name} ${i}`);
-    const found = keys.map(() => new Float64Array(grid.length).fill(NaN));
-    const scalar = (q) => {
-      const here = { ...state.given, q0: q };
-      for (const other of this.closed) {
-        const sign = this.#signs(state, other, [q]);
-        here[`sign ${other.name}`] = typeof sign === "number" ? sign : sign[0];
-      }
-      for (const other of this.iterated) {
-        if (other === g) break;
-        other.start.forEach((_, i) => (here[`x ${other.name} ${i}`] = this.#between(state, `x ${other.name} ${i}`, [q])[0]));
-      }
-      return here;
-    };
-    const size = this.model.size;
-    const far = (i) => (i < g.angles ? 1 : size);
-    for (const way of [1, -1]) {
-      let q = state.at[0];
-      let x = keys.map((key) => state.given[key]);
-      let slope = x.map(() => 0);
-      let fresh = true;
-      const from = way > 0 ? grid.findIndex((p) => p > q) : grid.findLastIndex((p) => p <= q);
-      for (let i = from; i >= 0 && i < grid.length; i += way) {
-        let step = grid[i] - q;
-        const least = Math.abs(step) / 2 ** 26;
-        let ended = false;
-        while (q !== grid[i]) {
-          if (Math.abs(grid[i] - q) <= Math.abs(step)) step = grid[i] - q;
-          const to = step === grid[i] - q ? grid[i] : q + step;
-          const trial = scalar(to);
-          keys.forEach((key, k) => (trial[key] = x[k] + slope[k] * step));
-          const closes = this.#iterate(g, trial, 10);
-          const moved = keys.map((key, k) => (trial[key] - x[k]) / far(k));
-          const change = Math.max(...moved.map(Math.abs));
-          const off = Math.max(...keys.map((key, k) => Math.abs(trial[key] - x[k] - slope[k] * step) / far(k)));
-          if (closes && change < 0.3 && (fresh || off <= 0.2 * Math.max(change, 1e-4))) {
-            slope = keys.map((key, k) => (trial[key] - x[k]) / step);
-            x = keys.map((key) => trial[key]);
-            q = to;
-            fresh = false;
-          } else {
-            step /= 2;
-            if (Math.abs(step) < least) {
-              ended = true;
-              break;
-            }
-          }
-        }
-        if (ended) {
-          state.limits.push([q, -way, g.name]);
-          break;
-        }
-        keys.forEach((_, k) => (found[k][i] = x[k]));
-      }
-    }
-    keys.forEach((key, k) => {
-      state.unknowns.set(key, found[k]);
-      given[key] = found[k];
-    });
   }
 
   // all poses of the sweep and one more, the free one: numbers by their paths, the inputs of the free pose
@@ -368,7 +213,7 @@ class Machine {
     if (!state.chosen) return state;
     if (this.one) {
       const known = inputs[0].filter(Number.isFinite);
-      this.#look(state, Math.min(at[0], known.reduce((a, b) => Math.min(a, b), Infinity)), Math.max(at[0], known.reduce((a, b) => Math.max(a, b), -Infinity)));
+      this.look(state, Math.min(at[0], known.reduce((a, b) => Math.min(a, b), Infinity)), Math.max(at[0], known.reduce((a, b) => Math.max(a, b), -Infinity)));
     }
     state.entering = this.#entering(state, inputs);
     const out = this.tapes.pose.run(state.entering, this.n + 1);
@@ -394,23 +239,53 @@ class Machine {
       const angles = Array.from({ length: count }, (_, k) => (Math.PI * (k + 0.5)) / count);
       const nodes = Float64Array.from(angles, (t) => flip + half * Math.cos(t));
       const weights = angles.map((t, k) => (k % 2 ? -1 : 1) * Math.sin(t));
-      const values = this.tapes.pose.run(this.#entering(state, [nodes]), count);
-      if (!values.every((row) => row.every(Number.isFinite))) continue;
-      for (const [r, row] of values.entries()) {
-        if (this.angleRows.has(r)) for (let k = 1; k < count; k++) row[k] += TAU * Math.round((row[k - 1] - row[k]) / TAU);
-        for (const l of near) {
-          let [sum, total] = [0, 0];
-          let exact = -1;
-          for (let k = 0; k < count; k++) {
-            const d = q[l] - nodes[k];
-            if (d === 0) exact = k;
-            sum += (weights[k] / d) * row[k];
-            total += weights[k] / d;
+      // how little of a row is in the last of its Chebyshev terms, where the row is smooth
+      const rough = (row) => {
+        const tail = (order) => Math.abs(row.reduce((sum, y, k) => sum + y * Math.cos(order * angles[k]), 0));
+        return Math.max(tail(count - 1), tail(count - 2)) / Math.max(...row.map(Math.abs));
+      };
+      const between = (row, l, turns) => {
+        if (turns) for (let k = 1; k < count; k++) row[k] += TAU * Math.round((row[k - 1] - row[k]) / TAU);
+        // a joint force may grow without end there: then it is the force times the way to there that is smooth
+        let power = 0;
+        for (let [least, p, y] = [rough(row), 1, row]; p <= 2 && least > 1e-10; p++) {
+          y = y.map((x, k) => x * (nodes[k] - flip));
+          const next = rough(y);
+          if (next < 0.01 * least) [least, power, row] = [next, p, y];
+        }
+        let [sum, total] = [0, 0];
+        let exact = -1;
+        for (let k = 0; k < count; k++) {
+          const d = q[l] - nodes[k];
+          if (d === 0) exact = k;
+          sum += (weights[k] / d) * row[k];
+          total += weights[k] / d;
+        }
+        const x = (exact < 0 ? sum / total : row[exact]) / (q[l] - flip) ** power;
+        return turns ? x - TAU * Math.round(x / TAU) : Number.isFinite(x) ? x : NaN;
+      };
+      // the rates and the loads of a pose that has its own are kept at all nodes, so that what is interpolated is smooth
+      const lanes = this.tapes.over || Object.values(state.given).some((x) => typeof x !== "number") ? near.map((l) => [l]) : [near];
+      // beside the change point the closed forms lose digits: the nodes are worked out with 32
+      const precise = (tape, given) => {
+        const each = Array.from(nodes, (_, k) => tape.twice(lane(given, k)));
+        return tape.outputs.map((_, r) => Float64Array.from(each, (row) => row[r][0]));
+      };
+      for (const poses of lanes) {
+        const given = this.#entering(state, [nodes], poses[0]);
+        if (this.tapes.over) {
+          const over = precise(this.tapes.over, given);
+          this.#load(given, over.map((row, i) => [between(row, poses[0], this.model.tables[i].turns)]));
+          for (const [name, x] of Object.entries(given)) if (name.startsWith("table ")) given[name] = x[0];
+          if (this.tapes.statics) this.#bear(given, count);
+        }
+        const values = precise(this.tapes.pose, given);
+        if (!values.every((row) => row.every(Number.isFinite))) continue;
+        for (const [r, row] of values.entries()) {
+          for (const l of poses) {
+            out[r][l] = between(row, l, this.angleRows.has(r));
+            state.interpolated.add(l);
           }
-          let x = exact < 0 ? sum / total : row[exact];
-          if (this.angleRows.has(r)) x -= TAU * Math.round(x / TAU);
-          out[r][l] = x;
-          state.interpolated.add(l);
         }
       }
     }
@@ -422,28 +297,25 @@ class Machine {
     const state = { given, at, flips: new Map(), limits: [], unknowns: new Map(), numbers };
     if (!this.one || !this.#choose(given, at)) return [];
     const length = this.model.inputs[0].slides ? this.model.size : TAU;
-    this.#look(state, this.iterated.length ? at[0] - length : at[0], at[0] + length);
+    this.look(state, this.iterated.length ? at[0] - length : at[0], at[0] + length);
     return state.limits.sort((a, b) => a[0] - b[0]);
   }
 
   // the first loop of a pose that does not close, and by how much, m; null where that is not known
   short(state, l) {
     if (!state.chosen) return null;
-    const out = this.tapes.short.one(this.#at(state, l));
+    const out = this.tapes.short.one(lane(state.entering, l));
     const names = this.model.groups.filter((g) => !g.start).map((g) => g.name);
     for (const [k, by] of out.entries()) if (by > 0) return [names[k] ?? "", by];
     return null;
   }
 
-  // what enters at one pose
-  #at(state, l) {
-    return Object.fromEntries(Object.entries(state.entering).map(([name, x]) => [name, typeof x === "number" ? x : x[l]]));
-  }
-
   // how far the rows of a pose are from the same operations in 32 digits
   errors(state, l) {
     if (state.interpolated?.has(l)) return null;
-    const twice = this.tapes.pose.twice(this.#at(state, l));
+    const here = lane(state.entering, l);
+    if (this.tapes.statics) this.#unbalanced(here).forEach((x, i) => (here[`f ${i}`] = [here[`f ${i}`], x || 0]));
+    const twice = this.tapes.pose.twice(here);
     return twice.slice(0, -1).map(([high, low], r) => Math.abs(high - state.rows[r][l] + low));
   }
 
@@ -464,6 +336,14 @@ class Machine {
   // the numbers of the drawing that follow from the dimensions
   drawn(state) {
     return this.tapes.drawn.one(state.given);
+  }
+
+  // the points of a cam's profile, some on each piece of its law: their x, and their y
+  profile(state, k) {
+    const { counts } = this.model.cams[k];
+    const places = counts.flatMap((count, piece) => Array.from({ length: count }, (_, j) => [piece, j / count]));
+    const [piece, share] = [0, 1].map((i) => Float64Array.from(places, (place) => place[i]));
+    return this.tapes[`cam${k}`].run({ ...state.given, piece, share }, places.length);
   }
 }
 
@@ -492,11 +372,20 @@ function recompute(series) {
     } else for (let l = 0; l <= machine.n; l++) column.values[l] = inUnit(machine.value(state, column, l), si);
   }
   if (!state.rows) return;
+  redraw(machine, state, series);
+}
+// the numbers of the drawing, in its shapes, bodies and labels
+function redraw(machine, state, series) {
   const drawn = machine.drawn(state);
-  for (const [i, what, k, row] of machine.model.drawn) {
-    if (what === "label") series.labels[i].z[k] = drawn[row];
-    else if (what === "at") series.bodies[i].at[k] = drawn[row];
-    else if (what === "s") series.shapes[i].s = drawn[row];
-    else series.shapes[i][what][k] = drawn[row];
+  for (const [k, { shape }] of machine.model.cams.entries()) {
+    const [x, y] = machine.profile(state, k);
+    series.shapes[shape].p = Array.from(x).flatMap((u, l) => [u, y[l]]);
+  }
+  for (const [i, what, first, row, count] of machine.model.drawn) {
+    if (what === "s") series.shapes[i].s = drawn[row];
+    else {
+      const place = what === "label" ? series.labels[i].z : what === "at" ? series.bodies[i].at : series.shapes[i][what];
+      for (let k = 0; k < count; k++) place[first + k] = drawn[row + k];
+    }
   }
 }

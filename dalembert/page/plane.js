@@ -24,6 +24,11 @@ const real = (stands) => stands.every((where) => where.every(Number.isFinite));
 function outline(shape, stands) {
   const found = [];
   const [p, ends] = [shape.p ?? shape.z, shape.ends];
+  if (shape.n) {
+    // one line n times, at steps of d
+    for (let t = 0; t < shape.n; t++) for (let k = 0; k < p.length; k += 2) found.push(carried(stands[shape.b], p[k] + t * shape.d[0], p[k + 1] + t * shape.d[1]));
+    return found;
+  }
   for (let k = 0; k < p.length; k += 2) {
     if (!ends) found.push(carried(stands[shape.b], p[k], p[k + 1]));
     else {
@@ -72,7 +77,7 @@ const figures = data.series.map((series, s) => {
   return { series, group, parts };
 });
 const words = texts(layers.over);
-const missing = put(layers.over, "text", { class: "missing" }, "cannot be assembled at this input");
+const missing = put(layers.over, "text", { class: "missing" }, TEXTS.open);
 const bar = put(layers.over, "path", { class: "scale" });
 const drawn = { names: true, velocity: false, acceleration: false, forces: whole.forces.length > 0, centres: false, polygon: false };
 const traced = new Set(whole.points.filter((p) => p.trace).map((p) => p.name));
@@ -90,7 +95,9 @@ function drawFigure({ series, group, parts }, i) {
   if (!real(stands)) return null;
   for (const [k, shape] of series.shapes.entries()) {
     const points = outline(shape, stands);
-    if (shape.s === undefined) parts[k].setAttribute("d", `M${points.map(([x, y]) => fixed(px(x), py(y))).join("L")}${shape.c ? "Z" : ""}`);
+    // lines of a row that do not hang together begin anew
+    const each = shape.n && !shape.j ? points.length / shape.n : points.length;
+    if (shape.s === undefined) parts[k].setAttribute("d", `${points.map(([x, y], l) => (l % each ? "L" : "M") + fixed(px(x), py(y))).join("")}${shape.c ? "Z" : ""}`);
     else {
       parts[k].setAttribute("cx", px(points[0][0]).toFixed(2));
       parts[k].setAttribute("cy", py(points[0][1]).toFixed(2));
@@ -179,7 +186,7 @@ function centreTable(on) {
   if (!on) return;
   const scroll = put($("values"), "div", { class: "scroll", id: "centres" });
   const found = put(scroll, "table");
-  put(found, "caption", {}, "Instant centres");
+  put(found, "caption", {}, TEXTS.instantCentres);
   const head = put(put(found, "thead"), "tr");
   for (const text of ["", ...pointHeads]) put(head, "th", {}, text);
   const body = put(found, "tbody");
@@ -243,7 +250,7 @@ function drawTraces() {
       const [xs, ys] = p.path ?? [p.x, p.y].map((k) => series.columns[k].values.subarray(0, series.n).map((x) => x * (series.columns[k].si ?? 1)));
       let d = "";
       let pen = false;
-      for (let i = 0; i < xs.length; i++) {
+      for (const i of sampled(xs, 4000)) {
         const real = Number.isFinite(xs[i]);
         if (real) d += (pen ? "L" : "M") + fixed(px(xs[i]), py(ys[i]));
         pen = real;
@@ -321,12 +328,12 @@ function labels(stands, i) {
 function legend() {
   const said = [];
   const [first, ...others] = data.series.filter((series) => !series.hidden?.()).map((series) => series.name);
-  if (others.length) said.push(`in full: ${first || "as it is now"}; faint: ${others.slice(0, 4).join("; ")}${others.length > 4 ? ` and ${others.length - 4} more` : ""}`);
-  const of = (kind, unit) => longest[kind] && said.push(`longest arrow of ${kind}: ${short(longest[kind])} ${unit}`);
+  if (others.length) said.push(TEXTS.ghosts(first || TEXTS.asItIs, others.slice(0, 4).join("; "), Math.max(0, others.length - 4)));
+  const of = (kind, unit) => longest[kind] && said.push(TEXTS.longest(TEXTS.arrows[kind], `${short(longest[kind])} ${unit}`));
   if (drawn.velocity) of("velocity", data.units.v);
   if (drawn.acceleration) of("acceleration", data.units.a);
   if (drawn.forces) of("force", data.units.f);
-  if (drawn.polygon) said.push(`velocity polygon: each point's velocity from one pole, ${data.units.v}; dashed: the links' images`);
+  if (drawn.polygon) said.push(TEXTS.ofPolygon(data.units.v));
   $("legend").textContent = said.join("; ");
 }
 function drawAll(i) {
@@ -366,8 +373,8 @@ function resize() {
 }
 
 // --- values and controls ------------------------------------------------------------------------------------------------
-table("Points", [...pointHeads, "path"], whole.points.map((p) => [p.name, [p.x, p.y]]), () => true, (row, name) => {
-  const box = put(put(row, "td"), "input", { type: "checkbox", "aria-label": `path of ${name}` });
+table(TEXTS.points, [...pointHeads, TEXTS.path], whole.points.map((p) => [p.name, [p.x, p.y]]), () => true, (row, name) => {
+  const box = put(put(row, "td"), "input", { type: "checkbox", "aria-label": TEXTS.pathOf(name) });
   box.checked = traced.has(name);
   box.addEventListener("change", () => {
     traced[box.checked ? "add" : "delete"](name);
@@ -376,21 +383,21 @@ table("Points", [...pointHeads, "path"], whole.points.map((p) => [p.name, [p.x, 
 });
 const links = whole.bodies.slice(1);
 const turning = ["angle", "omega", "alpha"].filter((key) => links.some((b) => head(b[key])));
-table("Links", turning.map((key) => suffix(head(links[0][key]), links[0].name)), links.map((b) => [b.name, turning.map((key) => b[key])]), (k) => k === 0);
+table(TEXTS.links, turning.map((key) => suffix(head(links[0][key]), links[0].name)), links.map((b) => [b.name, turning.map((key) => b[key])]), (k) => k === 0);
 if (whole.forces.length) {
-  table("Joint forces", [`x, ${data.units.f}`, `y, ${data.units.f}`], whole.forces.map((f) => [f.name, [f.x, f.y]]), () => false);
+  table(TEXTS.jointForces, [`x, ${data.units.f}`, `y, ${data.units.f}`], whole.forces.map((f) => [f.name, [f.x, f.y]]), () => false);
 }
 const flips = (name, then) => (on) => {
   drawn[name] = on;
   then?.(on);
   legend();
 };
-toggle("n", "names", drawn.names, flips("names"));
-toggle("v", "velocities", false, flips("velocity"), longest.velocity > 0);
-toggle("a", "accelerations", false, flips("acceleration"), longest.acceleration > 0);
-if (whole.forces.length) toggle("f", "joint forces", drawn.forces, flips("forces"), longest.force > 0);
-toggle("i", "instant centres", false, flips("centres", centreTable), velocities && longest.velocity > 0);
-toggle("p", "velocity polygon", false, flips("polygon", polygonOn), velocities && longest.velocity > 0);
+toggle("n", TEXTS.names, drawn.names, flips("names"));
+toggle("v", TEXTS.velocities, false, flips("velocity"), longest.velocity > 0);
+toggle("a", TEXTS.accelerations, false, flips("acceleration"), longest.acceleration > 0);
+if (whole.forces.length) toggle("f", TEXTS.forces, drawn.forces, flips("forces"), longest.force > 0);
+toggle("i", TEXTS.centres, false, flips("centres", centreTable), velocities && longest.velocity > 0);
+toggle("p", TEXTS.velocityPolygon, false, flips("polygon", polygonOn), velocities && longest.velocity > 0);
 legend();
 watchers.push(drawAll);
 // a page that computes begins when its editor stands

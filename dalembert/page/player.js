@@ -15,7 +15,7 @@ function show(i) {
   shown = data.model && i === n ? n : Math.max(0, Math.min(n - 1, Math.round(i)));
   if (shown < n) $("slider").value = shown;
   $("slider").setAttribute("aria-valuetext", said(shown));
-  $("pose").textContent = `${said(shown)}${n > 1 && shown < n ? `  (pose ${shown + 1} of ${n})` : ""}`;
+  $("pose").textContent = `${said(shown)}${n > 1 && shown < n ? `  (${TEXTS.poseOf(shown + 1, n)})` : ""}`;
   for (const watch of watchers) watch(shown);
 }
 function said(i) {
@@ -36,7 +36,7 @@ const wraps = data.wraps ?? true;
 function play(on) {
   playing = on && lasts > 0;
   $("play").textContent = playing ? "❚❚" : "▶";
-  $("play").setAttribute("aria-label", playing ? "pause" : "play");
+  $("play").setAttribute("aria-label", playing ? TEXTS.pause : TEXTS.play);
   if (!playing) return;
   if (shown === n) show(Number($("slider").value));
   place = clock[shown] - begins;
@@ -73,6 +73,12 @@ function faster(by) {
 
 // --- controls ---------------------------------------------------------------------------------------------------------
 function controls() {
+  for (const [id, [label, title]] of Object.entries(TEXTS.controls)) {
+    $(id).setAttribute("aria-label", label);
+    if (title) $(id).title = title;
+  }
+  $("speed").before(TEXTS.speed);
+  $("more").textContent = TEXTS.anotherPlot;
   $("slider").max = n - 1;
   for (const id of ["slider", "play", "first", "back", "ahead", "speed"]) $(id).disabled = n < 2;
   for (const kind of ["input", "change"]) $("slider").addEventListener(kind, () => jump(Number($("slider").value)));
@@ -82,13 +88,13 @@ function controls() {
   while (lasts / speeds[speed] > 20 && speed < speeds.length - 1) speed++;
   faster(0);
   $("speed").addEventListener("change", () => (speed = $("speed").selectedIndex));
-  onKey(" ", "play, pause", () => play(!playing));
-  onKey("ArrowLeft", "one pose back, with shift ten", (e) => jump(shown - (e.shiftKey ? 10 : 1)));
-  onKey("ArrowRight", "one pose ahead, with shift ten", (e) => jump(shown + (e.shiftKey ? 10 : 1)));
-  onKey("Home", "first pose", () => jump(0));
-  onKey("End", "last pose", () => jump(n - 1));
-  onKey("-", "slower", () => faster(-1));
-  onKey("+", "faster", () => faster(1));
+  onKey(" ", TEXTS.playPause, () => play(!playing));
+  onKey("ArrowLeft", TEXTS.keyBack, (e) => jump(shown - (e.shiftKey ? 10 : 1)));
+  onKey("ArrowRight", TEXTS.keyAhead, (e) => jump(shown + (e.shiftKey ? 10 : 1)));
+  onKey("Home", TEXTS.firstPose, () => jump(0));
+  onKey("End", TEXTS.lastPose, () => jump(n - 1));
+  onKey("-", TEXTS.slower, () => faster(-1));
+  onKey("+", TEXTS.faster, () => faster(1));
   $("play").addEventListener("click", () => play(!playing));
   $("first").addEventListener("click", () => jump(0));
   $("back").addEventListener("click", () => jump(shown - 1));
@@ -138,17 +144,17 @@ const plots = [];
 function plot(column) {
   const host = put($("plots"), "div", { class: "plot" });
   const line = put(host, "div");
-  const choice = put(line, "select", { "aria-label": "column" });
+  const choice = put(line, "select", { "aria-label": TEXTS.column });
   const groups = new Map();
   for (const [k, c] of whole.columns.entries()) {
     if (!c.header) continue;
-    const group = groups.get(c.owner) ?? put(choice, "optgroup", { label: c.owner || "input" });
+    const group = groups.get(c.owner) ?? put(choice, "optgroup", { label: c.owner || TEXTS.input });
     groups.set(c.owner, group);
     put(group, "option", { value: k }, c.header);
   }
   choice.value = column;
   const value = put(line, "output");
-  const away = put(line, "button", { type: "button", "aria-label": "remove this plot", title: "remove this plot" }, "×");
+  const away = put(line, "button", { type: "button", "aria-label": TEXTS.removePlot, title: TEXTS.removePlot }, "×");
   const svg = svgIn(host);
   const x = data.x === undefined ? Float64Array.from({ length: n + 1 }, (_, i) => i + 1) : whole.columns[data.x].values;
   const margin = { left: 58, right: 18, top: 8, bottom: 30 };
@@ -171,7 +177,7 @@ function plot(column) {
       if (left === right) [left, right] = [left - 1, right + 1];
       px = (v) => margin.left + ((v - left) / (right - left)) * (width - margin.left - margin.right);
       py = (v) => height - margin.bottom - ((v - low) / (high - low)) * (height - margin.top - margin.bottom);
-      const under = data.x === undefined ? "pose" : whole.columns[data.x].header;
+      const under = data.x === undefined ? TEXTS.pose : whole.columns[data.x].header;
       for (const t of ticks(left, right, stepOf(left, right, Math.max(2, width / 70), under.endsWith("_deg")))) {
         put(svg, "line", { class: "grid", x1: px(t), x2: px(t), y1: margin.top, y2: height - margin.bottom });
         put(svg, "text", { class: "tick", x: px(t), y: height - margin.bottom + 13, "text-anchor": "middle" }, short(t));
@@ -186,11 +192,13 @@ function plot(column) {
         if (!values.length) continue;
         let d = "";
         let pen = false;
-        for (let i = 0; i < values.length; i++) {
+        let before = NaN;
+        for (const i of sampled(values, 4000)) {
           const y = values[i];
           if (!Number.isFinite(y)) pen = false;
           else {
-            if (i && Math.abs(y - values[i - 1]) > jumps) pen = false;
+            if (Math.abs(y - before) > jumps) pen = false;
+            before = y;
             d += (pen ? "L" : "M") + fixed(px(x[i] ?? i), py(y));
             pen = true;
           }

@@ -103,19 +103,19 @@ function resize() {
 function rows(caption, columns, every) {
   table(caption, [""], columns.map((k) => [whole.columns[k].header, [k]]), () => every);
 }
-rows("Angular velocity, body axes", data.omega, true);
-rows("Attitude [w, x, y, z], body to space", data.attitude, true);
-rows("Angular momentum, space axes, and energy", [...data.momentum, data.energy], false);
+rows(TEXTS.omega, data.omega, true);
+rows(TEXTS.attitude, data.attitude, true);
+rows(TEXTS.momentumAndEnergy, [...data.momentum, data.energy], false);
 const flip = (name) => (on) => {
   drawn[name] = on;
   drawTrace();
 };
-toggle("n", "names", true, flip("names"));
-toggle("b", "body axes", true, flip("axes"));
-toggle("w", "angular velocity", true, flip("velocity"), longest.velocity > 0);
-toggle("m", "angular momentum", true, flip("momentum"), longest.momentum > 0);
-toggle("t", "trace of an axis", true, flip("trace"));
-$("legend").textContent = `the trace is that of ${data.traced} on a sphere about the centre; drag to look from elsewhere`;
+toggle("n", TEXTS.names, true, flip("names"));
+toggle("b", TEXTS.bodyAxes, true, flip("axes"));
+toggle("w", TEXTS.angularVelocity, true, flip("velocity"), longest.velocity > 0);
+toggle("m", TEXTS.angularMomentum, true, flip("momentum"), longest.momentum > 0);
+toggle("t", TEXTS.traceOfAxis, true, flip("trace"));
+$("legend").textContent = TEXTS.traceOf(data.traced);
 svg.addEventListener("pointerdown", (event) => svg.setPointerCapture(event.pointerId));
 svg.addEventListener("pointermove", (event) => {
   if (!event.buttons) return;

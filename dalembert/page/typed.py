@@ -10,14 +10,14 @@ from dalembert.units import UNITS, to_si
 
 def units(kinds: Iterable[str]) -> dict[str, dict[str, list[float]]]:
     """What can be typed: every unit of these dimensions, and what it is in SI and radians, as a ratio."""
-    found = {}
+    spellings = {}
     for kind in dict.fromkeys(kinds):
         listed = UNITS.get(kind, {})
         si = min(listed, key=lambda unit: abs(float(to_si(1.0, kind, unit)) - 1.0), default="")
         # the SI unit first
         order = sorted(listed, key=lambda unit: unit != si)
-        found[kind] = {spelled(unit): [float(x) for x in listed[unit]] for unit in order}
-    return found
+        spellings[kind] = {spelled(unit): [float(x) for x in listed[unit]] for unit in order}
+    return spellings
 
 
 def spelled(unit: str) -> str:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     Bounds = Sequence[float] | NDArray[np.float64]
     Json = None | str | float | Sequence["Json"] | Mapping[str, "Json"]
     Document = dict[str, Json]
+    # the keys one after the other, joined by dots; a tuple where a key has dots itself
+    Place = str | tuple[str, ...] | None
 
 
 ABSENT: Any = object()
@@ -48,8 +50,8 @@ class Column:
     values: Values
     error: Callable[[], Bounds] | None = None
     """The rounding errors of computed numbers, in the same unit; inf where no digit holds."""
-    place: str | None = None
-    """Where it stands in a row of the JSON document, with its unit: `initial.static_unbalance_kg_m`; None: nowhere."""
+    place: Place = None
+    """Where it stands in a row of the JSON document, with its unit: `initial.static_unbalance_kg_m`; None: not in JSON."""
     stored: Any = None
     """The numbers as JSON has them, where these are not the values shown."""
 
@@ -59,6 +61,11 @@ class Column:
         return f"{self.name}_{self.unit}" if self.unit else self.name
 
     @property
+    def keys(self) -> Sequence[str]:
+        """The keys of its place, one after the other."""
+        return self.place.split(".") if isinstance(self.place, str) else self.place or ()
+
+    @property
     def documented(self) -> list[Any]:
         """The cells as JSON has them."""
         values: Any = self.values if self.stored is None else self.stored
@@ -66,9 +73,10 @@ class Column:
         return [None if isinstance(v, float) and not isfinite(v) else v for v in cells]
 
 
-def names(name: str, values: Iterable[Cell], place: str | None = "") -> Column:
+def names(name: str, values: Iterable[Json], place: Place = "") -> Column:
     """A column of names, verdicts or plain values; `place`: its key in JSON, if that is not the name."""
-    return Column(name, "", list(values), place=name if place == "" else place)
+    cells: list[Any] = list(values)
+    return Column(name, "", cells, place=name if place == "" else place)
 
 
 def number(
@@ -77,7 +85,7 @@ def number(
     si: ArrayLike,
     unit: str = "",
     error: Callable[[], ArrayLike] | None = None,
-    place: str | None = "",
+    place: Place = "",
 ) -> Column:
     """A quantity, shown in a unit.
 
@@ -94,7 +102,7 @@ def number(
     error
         Their rounding errors, in the same unit as `si`.
     place
-        Where it stands in a row of the JSON document, without its unit; by default under its name, None: nowhere.
+        Where it stands in a row of the JSON document, without its unit; by default under its name, None: not in JSON.
 
     Examples
     --------
@@ -106,7 +114,11 @@ def number(
 
     own = document_unit(dimension)
     unit = unit or own
-    key = None if place is None else f"{place or name}_{own}".rstrip("_")
+    key: Place = None
+    if isinstance(place, tuple):
+        key = (*place[:-1], f"{place[-1]}_{own}".rstrip("_"))
+    elif place is not None:
+        key = f"{place or name}_{own}".rstrip("_")
     array = np.asarray(si, dtype=float)
 
     def shown(values: ArrayLike) -> NDArray[np.float64]:
@@ -170,13 +182,15 @@ class Table:
     keys: Sequence[str] = ()
     """The headers of the columns that name a row."""
     place: str | None = None
-    """Where its rows stand in JSON: `rotors[].corrections[]`; empty: at the top, one row; None: nowhere."""
+    """Where its rows stand in JSON: `rotors[].corrections[]`; empty: at the top, one row; None: not in JSON."""
     above: str = ""
     """A sentence above it, on the terminal and in a report."""
     below: str = ""
     """A sentence below it."""
     documented: Sequence[Column] = ()
     """Further columns, of the JSON document alone."""
+    by_column: bool = False
+    """Whether JSON has a list of the numbers of each column, in place of a row for each."""
 
     @property
     def cells(self) -> dict[str, Values]:
@@ -187,6 +201,42 @@ class Table:
     def length(self) -> int:
         """How many rows."""
         return next((len(column.values) for column in (*self.columns, *self.documented)), 0)
+
+
+def stacked(tables: Sequence[Table], name: str, of: Sequence[str], place: str) -> Table:
+    """Put tables with the same columns below each other; a column in front names the one that a row is of.
+
+    Examples
+    --------
+    >>> rows = [Table([number("mass", "mass", [m])], place="") for m in (1.0, 2.0)]
+    >>> document([stacked(rows, "body", ["A", "B"], "bodies[]")])
+    {'bodies': [{'body': 'A', 'mass_kg': 1.0}, {'body': 'B', 'mass_kg': 2.0}]}
+    """
+    first = tables[0]
+
+    def joined(same: Sequence[Column]) -> Column:
+        errors = [column.error for column in same if column.error is not None]
+
+        def error() -> Bounds:
+            return [float(bound) for each in errors for bound in each()]
+
+        head = same[0]
+        values = [value for column in same for value in column.values]
+        stored = [value for column in same for value in column.documented]
+        return Column(
+            head.name, head.unit, values, error if len(errors) == len(same) else None, head.place, stored
+        )
+
+    def below(of: Callable[[Table], Sequence[Column]]) -> list[Column]:
+        return [*map(joined, zip(*map(of, tables), strict=True))]
+
+    front = names(name, [word for word, table in zip(of, tables, strict=True) for _ in range(table.length)])
+    columns, documented = below(lambda table: table.columns), below(lambda table: table.documented)
+    # what no table shows stays in the document alone
+    (columns or documented).insert(0, front)
+    at = first.place if first.place is None else f"{place}.{first.place}".rstrip(".")
+    sentence = "\n".join(dict.fromkeys(table.above for table in tables if table.above))
+    return Table(columns, (name, *first.keys), at, sentence, first.below, documented)
 
 
 @dataclass(eq=False, repr=False)
@@ -211,6 +261,11 @@ class _Lists:
         every = [*table.columns, *table.documented]
         columns = {column.name: column.documented for column in every}
         within = [c for c in every if c.place is not None and c.name not in shared]
+        if table.by_column:
+            whole = _walk(self.document, way)
+            for column in within:
+                _put(whole, column.keys, column.documented)
+            return
         homes = list(self.elements[parent].values()) if parent else [self.document]
         if way and way[-1].endswith("[]"):
             for home in homes:
@@ -221,12 +276,13 @@ class _Lists:
             self.keys[table.place] = tuple(name for name in names_of if name in columns)
             self.elements[table.place] = {}
         of_parent = list(zip(*(columns[name] for name in shared), strict=True)) if shared else []
-        cells = [(column.place.split("."), columns[column.name]) for column in within if column.place]
+        cells = [(column.keys, columns[column.name]) for column in within if column.place]
+        indexed = bool(cells) and all(len(path) == 1 and path[0].isdecimal() for path, _ in cells)
         for i in range(table.length):
             home = self.elements[parent][of_parent[i]] if parent else self.document
             here = _walk(home, way[:-1])
             if way and way[-1].endswith("[]"):
-                row: Document = {}
+                row: Any = [] if indexed else {}
                 here[way[-1][:-2]].append(row)
                 key = tuple(columns[name][i] for name in self.keys[table.place])
                 self.elements[table.place][key] = row

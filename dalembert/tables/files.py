@@ -40,8 +40,8 @@ def note(path: str | Path) -> Path:
     """Remember that a file is read."""
     with suppress(OSError, ValueError):
         # standard input may be a file too
-        found = os.fstat(sys.stdin.fileno()) if path == "-" else os.stat(path)
-        _read.add((found.st_dev, found.st_ino))
+        status = os.fstat(sys.stdin.fileno()) if path == "-" else os.stat(path)
+        _read.add((status.st_dev, status.st_ino))
     return Path(path)
 
 

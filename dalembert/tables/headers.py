@@ -40,12 +40,12 @@ class Heading:
             return ""
         return self.name[len(quantity) + 1 :] if name.startswith(f"{quantity}_") else None
 
-    def with_unit(self, cell: str, known: Mapping[str, str]) -> Heading:
+    def with_unit(self, cell: str, dimensions: Mapping[str, str]) -> Heading:
         """Return the heading with the unit of the row below; ValueError with the unit that the header itself has."""
         unit = "" if cell.strip() in NO_UNIT else unit_name(cell.strip().strip("[]()"))
         if not unit:
             return self
-        for quantity, dimension in known.items():
+        for quantity, dimension in dimensions.items():
             suffix = self.of(quantity)
             own = find_unit(dimension, suffix) if suffix else None
             if own:
@@ -61,10 +61,10 @@ def heading(written: str) -> Heading:
     """Read a header; a column that is renamed has its new name."""
     written = written.strip()
     base, unit = _parted(written)
-    for given, foreign in _renamed.items():
+    for header, foreign in _renamed.items():
         if foreign.lower() in (written.lower(), base.lower()):
-            _met.add(given)
-            return Heading(written, *_merged(given, unit, written))
+            _met.add(header)
+            return Heading(written, *_merged(header, unit, written))
     return Heading(written, base, unit)
 
 
@@ -114,20 +114,20 @@ def rename_from(path: str) -> None:
 
 def check_renamed() -> None:
     """Refuse a renaming whose header no table has had."""
-    for given, foreign in _renamed.items():
-        if given not in _met:
-            raise DataError(f"--column {given}={foreign}: no table has a column '{foreign}'")
+    for header, foreign in _renamed.items():
+        if header not in _met:
+            raise DataError(f"--column {header}={foreign}: no table has a column '{foreign}'")
 
 
-def _merged(given: str, unit: str, written: str) -> tuple[str, str]:
+def _merged(header: str, unit: str, written: str) -> tuple[str, str]:
     """Return name and unit of a renamed column: the unit stands in the name given, or in the file, or alike in both."""
-    base, own = _parted(given)
+    base, own = _parted(header)
     suffix = own or parted(base)[1]
     # the name may add how an amplitude is read: mm_s_rms of a column in mm/s
     tagged = any(suffix.lower() == f"{unit}{tag}".lower() for tag in TAGS)
     if suffix and unit and not tagged:
         raise DataError(
-            f"--column {given}={written}: found the unit '{unit}' in the file, expected '{suffix}'"
+            f"--column {header}={written}: found the unit '{unit}' in the file, expected '{suffix}'"
         )
     return base, own or ("" if suffix else unit)
 
@@ -145,7 +145,7 @@ def spellings(quantity: str, dimension: str) -> str:
 
 
 def find_columns(
-    file: str, headings: Sequence[Heading], known: Mapping[str, str], texts: Sequence[str]
+    file: str, headings: Sequence[Heading], dimensions: Mapping[str, str], texts: Sequence[str]
 ) -> dict[str, tuple[int, str]]:
     """Find each quantity's column: its place in the row and its unit."""
     result: dict[str, tuple[int, str]] = {}
@@ -156,7 +156,7 @@ def find_columns(
             raise DataError(f"{file}: the column {name} stands twice: expected it once")
         if places:
             result[name] = (places[0], "")
-    for name, dimension in known.items():
+    for name, dimension in dimensions.items():
         good: list[tuple[int, str]] = []
         bad: list[tuple[int, str]] = []
         for index, each in enumerate(headings):
@@ -173,7 +173,7 @@ def find_columns(
             result[name] = good[0]
         elif bad:
             # a column that another quantity claims (`z_rotation` beside `z`) is not an unknown unit
-            others = [other for other in (*known, *texts) if other.startswith(name + "_")]
+            others = [other for other in (*dimensions, *texts) if other.startswith(name + "_")]
             strays = [
                 (i, suffix)
                 for i, suffix in bad
@@ -190,28 +190,28 @@ def find_columns(
     return result
 
 
-def likeness(headings: Iterable[Heading], known: Mapping[str, str], texts: Sequence[str]) -> int:
+def likeness(headings: Iterable[Heading], dimensions: Mapping[str, str], texts: Sequence[str]) -> int:
     """Count the columns that a command knows, or may be meant to know: what tells a header from a title."""
     names = {name.lower() for name in texts}
     return sum(
         each.name.lower() in names
-        or any(each.of(quantity) is not None for quantity in known)
-        or bool(quantity_meant(each.base, (*known, *texts)))
+        or any(each.of(quantity) is not None for quantity in dimensions)
+        or bool(quantity_meant(each.base, (*dimensions, *texts)))
         for each in headings
         if each.written
     )
 
 
-def offers(headings: Iterable[Heading], known: Mapping[str, str], texts: Sequence[str]) -> list[str]:
+def offers(headings: Iterable[Heading], dimensions: Mapping[str, str], texts: Sequence[str]) -> list[str]:
     """Return for columns that are not known but may be meant the option that takes them: `--column mass_g=Masse`."""
     out = []
     for each in headings:
         base, unit = (each.base, each.unit) if each.unit else parted(each.base)
-        quantity = quantity_meant(base, (*known, *texts))
+        quantity = quantity_meant(base, (*dimensions, *texts))
         if quantity:
             from shlex import quote
 
-            dimension = known.get(quantity)
+            dimension = dimensions.get(quantity)
             fit = "" if dimension is None else find_unit(dimension, unit) or next(iter(UNITS[dimension]))
             out.append(f"--column {quantity}{'_' * bool(fit)}{fit}={quote(each.written)}")
     return out
@@ -264,7 +264,7 @@ def plain_word(word: str) -> str:
     return re.sub(r"[^a-z0-9]+", "_", word).strip("_")
 
 
-def quantity_meant(word: str, known: Iterable[str]) -> str:
+def quantity_meant(word: str, dimensions: Iterable[str]) -> str:
     """Return the known quantity that a foreign word may mean; nothing for one that is none.
 
     Examples
@@ -275,4 +275,4 @@ def quantity_meant(word: str, known: Iterable[str]) -> str:
     ''
     """
     plain = plain_word(word)
-    return next((quantity for quantity in known if plain in _WORDS.get(quantity, "").split()), "")
+    return next((quantity for quantity in dimensions if plain in _WORDS.get(quantity, "").split()), "")

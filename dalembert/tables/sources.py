@@ -94,11 +94,11 @@ class Source:
         """Yield (line, cells) of every row of data."""
         return islice(self.everything(), self.above + 1 + self.units_below, None)
 
-    def error(self, index: int, column: str, found: str, expected: str) -> DataError:
+    def error(self, index: int, column: str, value: str, expected: str) -> DataError:
         """Make the one line for a cell of a row of data; `column` as the header spells it."""
         line, _ = next(islice(self.rows(), index, None))
         if self.sheet is None:
-            return cell_error(self.file, index + 1, line, column, found, expected)
+            return cell_error(self.file, index + 1, line, column, value, expected)
         from dalembert.tables.workbooks import address
 
         at = f"row {line}"
@@ -106,7 +106,7 @@ class Source:
             at = f"cell {address((line - 1, self.header.index(column)))}"
         return DataError(
             f"{self.file}: sheet {quote(self.sheet.name)}, {at}, column {column}: "
-            f"found {quote(found)}, expected {expected}"
+            f"found {quote(value)}, expected {expected}"
         )
 
     def check_cells(self, columns: Iterable[int]) -> None:
@@ -116,9 +116,9 @@ class Source:
         used = set(columns)
         top = next(islice(self.everything(), self.above, None))[0] - 1
         self._tell_unseen(used, top)
-        for (row, column), (found, expected) in sorted(self.sheet.faults.items()):
+        for (row, column), (value, expected) in sorted(self.sheet.faults.items()):
             if row >= top and column in used:
-                raise self.sheet.error((row, column), found, expected)
+                raise self.sheet.error((row, column), value, expected)
 
     def _tell_unseen(self, used: set[int], top: int) -> None:
         """Remark hidden rows, hidden columns and percentages that take part."""
@@ -156,15 +156,15 @@ class Source:
         return f"({'; '.join(parts)})"
 
 
-def open_source(path: str, known: Mapping[str, str], texts: Sequence[str] | None) -> Source:
+def open_source(path: str, dimensions: Mapping[str, str], texts: Sequence[str] | None) -> Source:
     """Open a file, or standard input for `-`, and find its header; `texts` is None where every column is taken."""
     remember(path)
     path, wanted = split_sheet(path)
-    return source_of(*read_bytes(path), known, texts, wanted)
+    return source_of(*read_bytes(path), dimensions, texts, wanted)
 
 
 def source_of(
-    file: str, data: bytes, known: Mapping[str, str], texts: Sequence[str] | None, wanted: str = ""
+    file: str, data: bytes, dimensions: Mapping[str, str], texts: Sequence[str] | None, wanted: str = ""
 ) -> Source:
     """Find the header in the bytes of a file; `wanted` is the sheet of a workbook."""
     warnings: list[str] = []
@@ -182,7 +182,7 @@ def source_of(
     first = list(islice(source.everything(), LOOKED_AT))
     if not first:
         raise DataError(f"{file}: the file is empty{source.of_sheet}: expected a header and rows")
-    _find_header(source, first, known, texts)
+    _find_header(source, first, dimensions, texts)
     return source
 
 
@@ -213,13 +213,13 @@ def table_rows(file: str, data: bytes) -> list[dict[str, str]]:
 def _find_header(
     source: Source,
     records: list[tuple[int, list[str]]],
-    known: Mapping[str, str],
+    dimensions: Mapping[str, str],
     texts: Sequence[str] | None,
 ) -> None:
     """Find the header below a title, the units below the header, and what is off in its width."""
     candidates = [[heading(cell) for cell in cells] for _, cells in records]
     if texts is not None:
-        scores = [likeness(row, known, texts) for row in candidates]
+        scores = [likeness(row, dimensions, texts) for row in candidates]
         source.above = scores.index(max(scores)) if max(scores) > 1 else 0
     source.headings = candidates[source.above]
     line, _ = records[source.above]
@@ -228,9 +228,9 @@ def _find_header(
             f"{source.file}: the header is in line {line}; what stands above it is not read"
         )
     below = records[source.above + 1 :]
-    if below and _are_units(source.headings, below, known, texts):
+    if below and _are_units(source.headings, below, dimensions, texts):
         source.units_below = True
-        _take_units(source, *below[0], known)
+        _take_units(source, *below[0], dimensions)
         below = below[1:]
     width = len(source.headings)
     longer = [len(cells) == width + 1 and bool(cells[-1].strip()) for _, cells in below]
@@ -242,7 +242,7 @@ def _find_header(
 def _are_units(
     headings: Sequence[Heading],
     below: list[tuple[int, list[str]]],
-    known: Mapping[str, str],
+    dimensions: Mapping[str, str],
     texts: Sequence[str] | None,
 ) -> bool:
     """Whether the row below the header holds units: no number in it, a unit where numbers are expected."""
@@ -253,20 +253,20 @@ def _are_units(
     if texts is None:
         filled = [k for k, cell in enumerate(cells) if cell.strip(" -[]()")]
         return bool(rest and units) and units == filled and all(_is_number(rest[0][1][k]) for k in units)
-    return any(likeness([headings[k]], known, ()) for k in units)
+    return any(likeness([headings[k]], dimensions, ()) for k in units)
 
 
-def _take_units(source: Source, line: int, cells: list[str], known: Mapping[str, str]) -> None:
+def _take_units(source: Source, line: int, cells: list[str], dimensions: Mapping[str, str]) -> None:
     for k, (each, cell) in enumerate(zip(source.headings, cells, strict=False)):
         try:
-            source.headings[k] = each.with_unit(cell, known)
+            source.headings[k] = each.with_unit(cell, dimensions)
         except ValueError as error:
-            found, expected = quote(cell.strip()), f"'{error}', the unit in its header {quote(each.written)}"
+            value, expected = quote(cell.strip()), f"'{error}', the unit in its header {quote(each.written)}"
             if source.sheet is not None:
-                raise source.sheet.error((line - 1, k), found, expected) from None
+                raise source.sheet.error((line - 1, k), value, expected) from None
             raise DataError(
                 f"{source.file}: row of units (line {line}), column {each.written}: "
-                f"found {found}, expected {expected}"
+                f"found {value}, expected {expected}"
             ) from None
 
 

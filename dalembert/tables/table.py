@@ -21,9 +21,11 @@ from dalembert.errors import DataError, quote
 from dalembert.quantities import number_expected, parse_number
 from dalembert.tables.headers import Heading, find_columns, offers, spellings
 from dalembert.tables.sources import Source, open_source
-from dalembert.units import LARGEST, to_si
+from dalembert.units import LARGEST, UNITS, to_si
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     import pandas as pd
     from numpy.typing import NDArray
 
@@ -42,6 +44,15 @@ class Numbers:
     def si(self) -> NDArray[np.float64]:
         """The numbers in SI."""
         return to_si(self.values, self.dimension, self.unit)
+
+    @property
+    def exact(self) -> list[Fraction]:
+        """The decimals of the file in SI, not rounded: `unit` of an angle in degrees."""
+        from dalembert.quantities import exactly
+
+        factor = (1, 1) if self.unit == "deg" else UNITS[self.dimension][self.unit]
+        # the shortest decimal that is read as the number
+        return [exactly(repr(x), factor) for x in self.values.tolist()]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -127,10 +138,10 @@ class Table:
                 except ValueError:
                     raise self.error(i, name, cell, WITH_COMMA) from None
 
-    def error(self, index: int, column: str, found: object, expected: str) -> DataError:
+    def error(self, index: int, column: str, value: object, expected: str) -> DataError:
         """Make the one line for a cell: `column` as the header spells it."""
         assert self._source is not None
-        return self._source.error(index, column, str(found), expected)
+        return self._source.error(index, column, str(value), expected)
 
     def reject(self, bad: NDArray[np.bool_], quantity: str, expected: str) -> None:
         """Raise the error of the first cell of a number column for which `bad` holds."""
@@ -191,8 +202,8 @@ def read(
     DataError
         No such file, no text, no header, no rows, a doubled column, an unknown unit, a cell that is no number.
     """
-    known = {**(numbers or {}), **(cells or {})}
-    source = open_source(path, known, texts)
+    dimensions = {**(numbers or {}), **(cells or {})}
+    source = open_source(path, dimensions, texts)
     if layout is not None:
         source = layout(source)
     if headers is not None:
@@ -202,14 +213,14 @@ def read(
             for each, name in zip(source.headings, meant, strict=True)
         ]
     texts = [each.name for each in source.headings] if texts is None else texts
-    found = find_columns(source.file, source.headings, known, texts)
+    found = find_columns(source.file, source.headings, dimensions, texts)
     columns = [
         _Column(
             name,
             index,
             source.header[index],
             unit,
-            known.get(name, ""),
+            dimensions.get(name, ""),
             "text" if name in texts else "cell" if name in (cells or {}) else "number",
             name in blank,
         )
@@ -217,7 +228,7 @@ def read(
     ]
     used = {column.place for column in columns}
     extra = [each for index, each in enumerate(source.headings) if index not in used]
-    missed = {name: dimension for name, dimension in known.items() if name not in found}
+    missed = {name: dimension for name, dimension in dimensions.items() if name not in found}
     missed_texts = [name for name in texts if name not in found]
     if extra:
         names = ", ".join(quote(each.written) if each.written else "without a header" for each in extra)
@@ -227,10 +238,10 @@ def read(
             + (f"; to read: {' '.join(offered)}" if offered else "")
         )
     source.check_cells(used)
-    told = source.told(extra, missed, missed_texts)
+    note = source.told(extra, missed, missed_texts)
 
     def begun() -> Table:
-        return Table(source.file, source.header, 0, warnings=source.warnings, told=told, _source=source)
+        return Table(source.file, source.header, 0, warnings=source.warnings, told=note, _source=source)
 
     table = begun()
     if not (source.large and _read_large(source, table, columns, marker)):

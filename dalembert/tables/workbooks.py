@@ -77,10 +77,10 @@ class Sheet:
     """Cells that have no value of their own: what was found, and what was expected."""
     unseen: Unseen = field(default_factory=Unseen)
 
-    def error(self, place: Place, found: str, expected: str) -> DataError:
+    def error(self, place: Place, value: str, expected: str) -> DataError:
         """Make the one line for a cell."""
         return DataError(
-            f"{self.file}: sheet {quote(self.name)}, cell {address(place)}: found {found}, expected {expected}"
+            f"{self.file}: sheet {quote(self.name)}, cell {address(place)}: found {value}, expected {expected}"
         )
 
 

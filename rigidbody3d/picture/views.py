@@ -76,6 +76,7 @@ def shaft(
     forces: Mapping[str, Array],
     vectors: Mapping[str, Array] | None = None,
     figure: FigureBase | None = None,
+    letters: str = "xyz",
 ) -> NDArray[np.object_]:
     """Draw a shaft along z seen from two sides, and below each view the bearing forces in its plane.
 
@@ -87,6 +88,8 @@ def shaft(
         Their places along z, (2,), m.
     forces
         By name, (2, 2): of each bearing on the shaft, x and y, N.
+    letters
+        What the axes x, y, z are called.
 
     Returns
     -------
@@ -101,7 +104,9 @@ def shaft(
     drawn = []
     for component, (view, below) in enumerate(grid.T):
         drawn.append(
-            _view(view, ALONG_SHAFT[component], solids, pieces, names, whole, vectors or {}, bearings)
+            _view(
+                view, ALONG_SHAFT[component], solids, pieces, names, whole, vectors or {}, bearings, letters
+            )
         )
         at = bearings * _length(whole, pieces)[0]
         wide = 0.03 * abs(at[1] - at[0])
@@ -114,7 +119,7 @@ def shaft(
         below.margins(y=0.15)
         if not largest or not any(quiet(f[:, component], largest).any() for f in forces.values()):
             below.set_ylim(-1, 1)
-        below.set_ylabel(f"bearing force on the shaft\nalong {'xy'[component]}, {unit}")
+        below.set_ylabel(f"bearing force on the shaft\nalong {letters[component]}, {unit}")
         below.set_xlabel(view.get_xlabel())
         view.set_xlabel("")
     _legend(figure, solids, vectors or {}, grid[1, 0].get_legend_handles_labels()[0])
@@ -164,6 +169,7 @@ def _view(
     whole: Whole,
     vectors: Mapping[str, Array],
     bearings: Array | None = None,
+    letters: str = "xyz",
 ) -> tuple[Axes, list[Label]]:
     factor, unit = _length(whole, pieces)
     center = whole.center[list(view)] * factor
@@ -193,8 +199,8 @@ def _view(
         axes.plot(bearings * factor, [0, 0], "^", color="black", ms=9, zorder=65)
         axes.plot(bearings * factor, [0, 0], color="0.5", lw=1.0, zorder=0)
     _frame(axes, bearings is not None)
-    axes.set_xlabel(f"{'xyz'[view[0]]}, {unit}")
-    axes.set_ylabel(f"{'xyz'[view[1]]}, {unit}")
+    axes.set_xlabel(f"{letters[view[0]]}, {unit}")
+    axes.set_ylabel(f"{letters[view[1]]}, {unit}")
     plain(axes)
     return axes, labels
 

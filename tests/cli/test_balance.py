@@ -402,10 +402,11 @@ def test_digits_that_hold(dalembert: Dalembert) -> None:
     full = rows(dalembert("balance", "-", *near, stdin=table).stdout)[0]
     held = rows(dalembert("balance", "-", *near, "--digits", stdin=table).stdout)[0]
     assert 2 <= len(held["mass_g"].lstrip("0.").replace(".", "")) <= 9
-    # both vectors have the direction of 120°; the difference in length is 5·(1e-7 in radians)
-    true = 5 * math.radians(1e-7) * 90 / 0.001
+    # both vectors have the direction of 120°; the difference in length is 5·(1e-7 in radians), the arm that to plane B
+    true = 5 * math.radians(1e-7) * (90 - 0.001) / 0.001
     last = 10.0 ** -len(held["mass_g"].split(".")[1])
     assert abs(float(held["mass_g"]) - true) <= last
     assert len(full["mass_g"]) > len(held["mass_g"]) + 5
+    assert held["mass_g"] == "0.0007853894"
     plain = rows(dalembert("balance", "-", *TWO, "--digits", stdin=ROTOR).stdout)[0]
     assert 13 <= len(plain["mass_kg"].replace(".", "")) <= 16

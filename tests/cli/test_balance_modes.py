@@ -107,3 +107,31 @@ def test_its_options_need_the_table(dalembert: Dalembert) -> None:
         done = dalembert("balance", "-", *PLANES, *option, stdin=ROTOR)
         assert done.returncode == 2
         assert "needs --modes" in done.stderr
+
+
+def test_the_worked_solution_of_the_modes(dalembert: Dalembert, tmp_path: Path) -> None:
+    """Σ U·φ of each mode, the shapes at the planes, corrections with which both sums vanish; with force and couple too."""
+    (tmp_path / "modes.csv").write_text(wide())
+    planes = (*PLANES, "--plane", "D:900mm:50mm", "--plane", "E:100mm:50mm")
+    for further, conditions in (((), 3), (("--rigid",), 5), (("--mode-count", "1"), 1)):
+        words = ("balance", "-", *planes, "--modes", "modes.csv", *further)
+        done = dalembert(*words, "--steps", "--json", stdin=ROTOR)
+        made, _ = corrections(done)
+        way = json.loads(done.stdout)["way"]
+        assert [t["topic"] for t in way] == [
+            "modal sums",
+            "system",
+            *(f"plane {p}" for p in "ABCDE"),
+            "check",
+        ]
+        sums = np.array([complex(s["x_kg_m"], s["y_kg_m"]) for s in way[0]["sums"]]) * 1e6
+        at_planes = np.array([row["at_planes"] for row in way[1]["rows"]])
+        assert at_planes.shape == (conditions, 5)
+        assert np.abs(sums + at_planes @ made).max() < 1e-9 * np.abs(sums).max()
+        first = 2 if further == ("--rigid",) else 0
+        for k in range(1, conditions - first + 1):
+            expected = U @ shape(k, [400, 725])
+            assert abs(sums[first + k - 1] - expected) < 1e-6 * abs(expected)
+        assert all(left["x_kg_m"] == left["y_kg_m"] == 0 for left in way[-1]["residual"])
+        unbalances = [complex(t["x_kg_m"], t["y_kg_m"]) * 1e6 for t in way[2:-1]]
+        assert np.abs(np.array(unbalances) - made).max() < 1e-12 * np.abs(made).max()

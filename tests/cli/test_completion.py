@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.examples.command import EXAMPLES
+from cli.examples import EXAMPLES
 from tests.conftest import Dalembert
 
 COMMAND = Path(sys.executable).with_name("dalembert")

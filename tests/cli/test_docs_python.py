@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.examples.command import EXAMPLES
+from cli.examples import EXAMPLES
 
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.examples.command import describe, names
+from cli.examples import describe, names
 from tests.conftest import Dalembert
 
 

@@ -22,6 +22,7 @@ ROBOTS = (".xml", ".urdf", ".sdf")
 # inputs that no joint is: another joint is driven in their place, and it is said
 ELSEWHERE = {"desk-lamp", "double-pendulum"}
 RACKS = {"rack-lift", "doubling-rack"}
+CAMS = {"cam-valve"}
 
 
 def taken_back(data: bytes) -> Mechanism:
@@ -39,6 +40,8 @@ def test_every_example_comes_back_with_the_same_motion(file: Path, suffix: str) 
         pytest.skip("another joint is driven")
     if file.parent.name in RACKS and suffix == ".sdf":
         pytest.skip("the format has no rack: it is left out, and said")
+    if file.parent.name in CAMS:
+        pytest.skip("the formats have no cam: it is left out, and said")
     m = Mechanism.from_toml(file)
     back = taken_back(exported(m, suffix))
     order = [[e.name for e in back.inputs].index(e.name) for e in m.inputs]

@@ -69,6 +69,9 @@ def test_layout_2_masses_on_top_of_others(dalembert: Dalembert) -> None:
         "A: [80@40, 60@55]\nB: [[99.030381@43.960790], [84.932821@53.529955]]\nU: [10@-90]\n",
         "---\n# sensors\nA:\n  - 80@40\n  - 60@55\nB:\n  - - 99.030381@43.960790\n  - - 84.932821@53.529955\nU:\n  - 10@-90\n",
         "A: 80@40, 60@55\nB: [[99.030381@43.960790],\n    [84.932821@53.529955]]\nU: 10@-90\nkeep_trial: False\n",
+        '{"A": ["80@40", "60@55"], "B": [["99.030381@43.960790"], ["84.932821@53.529955"]], "U": ["10@-90"]}',
+        '\ufeff {\n "U": ["10@-90"], "keep_trial": false, "weight_const": {"0": 50},\n "A": ["80@40", "60@55"],\n'
+        ' "B": [["99.030381@43.960790"],\n ["84.932821@53.529955"]]}\n',
     ],
 )
 def test_layout_3_vectors(text: str, dalembert: Dalembert) -> None:
@@ -77,6 +80,21 @@ def test_layout_3_vectors(text: str, dalembert: Dalembert) -> None:
     assert [one["sensor"] for one in rotor["residual"]] == ["1", "2"]
     assert rotor["fit"]["degrees_of_freedom"] == 0
     assert rotor["fit"]["residual_sd"] is None
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('{"A": ["80@40"', "standard input: line 1: no JSON"),
+        ('{"A": ["80@40"], "B": 3, "U": ["1@0"]}', "B: found '3', expected amplitude@phase"),
+        ('{"A": ["80@40"], "A": ["60@40"]}', "A stands twice"),
+        ('{"A": null}', "no B: expected A (initial vectors), B (trial runs)"),
+    ],
+)
+def test_layout_3_as_json_that_is_wrong(text: str, said: str, dalembert: Dalembert) -> None:
+    done = dalembert("field", "-", stdin=text)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert said in done.stderr
 
 
 def test_layout_3_with_masses_left_on_slow_roll_and_limits(dalembert: Dalembert) -> None:

@@ -250,3 +250,16 @@ def test_the_json_has_what_the_contract_names(dalembert: Dalembert) -> None:
     assert set(standing) == {"plane", "mass_kg", "angle_deg"}
     assert {"plane", "mass_kg", "angle_deg", "mass_uncertainty_kg", "needed"} <= set(trim)
     assert abs(V0[0] + ALPHA[0] @ W) < 1e-12
+
+
+def test_a_split_on_blades_numbered_against_the_angles(dalembert: Dalembert) -> None:
+    """The same weights at the same angles, under the numbers that run the other way; in the trim too."""
+    text = runs("A,1,0,yes", "B,1,90,yes", on=BOTH)
+    there, back = (
+        rotor_of(dalembert, text, "--blades", "7", *more) for more in ((), ("--numbering", "against"))
+    )
+    for key in ("corrections", "trim"):
+        for one, other in zip(there[key], back[key], strict=True):
+            numbers = [{m["position"]: m["mass_kg"] for m in entry["split"]} for entry in (one, other)]
+            turned = {str((8 - int(name)) % 7 + 1): mass for name, mass in numbers[0].items()}
+            assert numbers[1] == pytest.approx(turned, rel=1e-13)

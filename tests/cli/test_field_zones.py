@@ -38,6 +38,20 @@ def test_readings_in_every_form(dalembert: Dalembert) -> None:
     assert zones(dalembert, "in_s", "1-flexible") == ["D", "A"]
 
 
+def test_the_last_run_with_corrections_has_its_zone(dalembert: Dalembert) -> None:
+    """As measured, beside before and predicted; in the report too. Without such a run there is no such key."""
+    log = [
+        "run,sensor,amplitude_mm_s,phase_deg,trial_plane,trial_mass_g,trial_angle_deg",
+        "a,1,8,0,,,", "b,1,13.342,12.995,A,10,0", "c,1,6.964,21.04,A,5,90", "d,1,1.011,-6.70,A,12,150",
+    ]  # fmt: skip
+    call = ("field", "-", "--json", "--zone-class", "1-rigid")
+    (rotor,) = document(dalembert(*call, "--fit", stdin="\n".join(log)))["rotors"]
+    (row,) = rotor["zones"]
+    assert (row["before_zone"], row["measured_zone"]) == ("D", "A")
+    (rotor,) = document(dalembert(*call, stdin="\n".join(log[:3])))["rotors"]
+    assert rotor["zones"][0].keys() == {"sensor", "speed_rad_s", "before_zone", "predicted_zone"}
+
+
 def test_what_is_no_velocity_is_refused(dalembert: Dalembert) -> None:
     for machine in ("2-rigid", "3-rigid"):
         done = dalembert("field", "-", "--zone-class", machine, stdin=FAN)

@@ -1,9 +1,12 @@
-"""`--find NAME --so-that QUANTITY=VALUE`: the ω, the length or the angle with which a quantity has a value."""
+"""`--find NAME --so-that QUANTITY=VALUE`: the ω, the length or the angle with which a quantity has a value.
+
+Of mechanisms, of bodies and their shafts, of tops.
+"""
 
 from __future__ import annotations
 
 import json
-from math import asin, degrees
+from math import asin, cos, degrees, radians, sin
 from pathlib import Path
 from typing import Any
 
@@ -72,3 +75,92 @@ def test_wrong_words(dalembert: Any, tmp_path: Path) -> None:
         done = dalembert("mechanism", "c.toml", *words)
         assert done.returncode == 2
         assert text in " ".join(done.stderr.split())
+
+
+ROD = "part,shape,mass_kg,length_m,ry_deg\nrod,rod,4,1,{tilt}\n"
+SHAFT = ("--shaft=-500mm:500mm", "--speed", "10rad_s")
+
+
+def sought(run: Any, *words: str) -> Any:
+    done = run(*words, "--json")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_the_speed_of_a_shaft_with_an_oblique_rod(dalembert: Any, tmp_path: Path) -> None:
+    """Riul's example 4: M = m·l²·ω²·sin 2β/24, R = M over the span; 20 N need ω² = 24·20/(m·l²·sin 2β)."""
+    (tmp_path / "rod.csv").write_text(ROD.format(tilt=60))
+    for sign in (1, -1):
+        words = ("--find", "speed", f"--so-that=bearing1_dynamic.x={sign * 20}N")
+        if sign < 0:
+            assert "no value in reach" in dalembert("body", "rod.csv", *SHAFT, *words).stderr
+            continue
+        document = sought(dalembert, "body", "rod.csv", *SHAFT, *words)
+        omega = (24 * 20 / (4 * sin(radians(120)))) ** 0.5
+        assert document["found"] == {"speed_rad_s": pytest.approx(omega, rel=1e-13)}
+        assert document["shaft"]["bearings"][0]["dynamic_N"][0] == pytest.approx(20, rel=1e-13)
+
+
+def test_the_angle_of_the_rod(dalembert: Any, tmp_path: Path) -> None:
+    """β with sin 2β = 24·12/(m·l²·ω²) = 0.72: of 23.0° and 67.0° the one nearest to 60°; in the file's unit."""
+    (tmp_path / "rod.csv").write_text(ROD.format(tilt=60))
+    words = ("--find", "rod.ry", "--so-that", "bearing1_dynamic.size=12")
+    document = sought(dalembert, "body", "rod.csv", *SHAFT, *words)
+    assert document["found"] == {"rod.ry_deg": pytest.approx(90 - degrees(asin(0.72)) / 2, rel=1e-12)}
+    text = dalembert("body", "rod.csv", *SHAFT, *words, "--text").stdout
+    assert text.startswith("found: rod.ry = 66.97")
+
+
+def test_omega_of_a_body_without_one(dalembert: Any, tmp_path: Path) -> None:
+    """H = I·ω: 2 kg·m²/s about y need 6 rad/s of a rod of 4 kg and 1 m; none where nothing is in the way."""
+    (tmp_path / "rod.csv").write_text(ROD.format(tilt=0))
+    document = sought(dalembert, "body", "rod.csv", "--find", "omega.y", "--so-that", "momentum.y=2")
+    assert document["found"] == {"omega.y_rad_s": pytest.approx(6, rel=1e-14)}
+    document = sought(dalembert, "body", "rod.csv", "--find", "rod.length", "--so-that", "principal.3=3")
+    assert document["found"] == {"rod.length_m": pytest.approx(3, rel=1e-14)}
+
+
+TOP = "inertia = [0.02, 0.02, 0.01]\nomega = [0, 0, 200]\nattitude = [{w}, {x}, 0, 0]\n[top]\nmgl = 2\n"
+
+
+@pytest.mark.parametrize("tilt", [30.0, 75.0, 120.0])
+def test_the_spin_of_a_top_that_precesses_at_a_rate(dalembert: Any, tmp_path: Path, tilt: float) -> None:
+    """(I_t·cos θ)·ψ̇² − I_a·ω_z·ψ̇ + mgl = 0, solved for ω_z, and for θ."""
+    w, x = cos(radians(tilt / 2)), sin(radians(tilt / 2))
+    (tmp_path / "top.toml").write_text(TOP.format(w=w, x=x))
+    rate = 0.5
+    document = sought(dalembert, "spin", "top.toml", "--find", "omega.z", "--so-that", f"slow={rate}rad_s")
+    omega = (2 + 0.02 * cos(radians(tilt)) * rate**2) / (0.01 * rate)
+    assert document["found"] == {"omega.z_rad_s": pytest.approx(omega, rel=1e-13)}
+    assert document["steady"]["slow_rad_s"] == pytest.approx(rate, rel=1e-13)
+    rate = 1.002
+    document = sought(dalembert, "spin", "top.toml", "--find", "tilt", "--so-that", f"slow={rate}")
+    lean = (0.01 * 200 * rate - 2) / (0.02 * rate**2)
+    assert cos(radians(document["found"]["tilt_deg"])) == pytest.approx(lean, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("body", "rod.csv", "--find", "rod.ry"), "--so-that QUANTITY=VALUE"),
+        (("body", "rod.csv", "--find", "rod.rx", "--so-that", "energy=3"), "rod.ry"),
+        (("body", "rod.csv", "--find", "rod.ry", "--so-that", "momentum=3"), "momentum"),
+        (("body", "rod.csv", "--find", "omega.x", "--so-that", "energy=3kg"), "in J"),
+        (("body", "two.csv", "--find", "p.mass", "--so-that", "mass=3"), "one body"),
+        (("spin", "top.toml", "--find", "top.mg", "--so-that", "slow=3"), "top.mgl"),
+        (
+            ("spin", "top.toml", "--find", "top.mgl", "--so-that", "slow=3", "--time", "0:1:0.1"),
+            "one instant",
+        ),
+    ],
+)
+def test_what_a_body_cannot_be_asked_for(
+    dalembert: Any, tmp_path: Path, words: tuple[str, ...], expected: str
+) -> None:
+    (tmp_path / "rod.csv").write_text(ROD.format(tilt=60))
+    (tmp_path / "two.csv").write_text("body,part,shape,mass_kg\nA,p,point,1\nB,q,point,1\n")
+    (tmp_path / "top.toml").write_text(TOP.format(w=1, x=0))
+    done = dalembert(*words)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert expected in " ".join(done.stderr.split())

@@ -152,7 +152,8 @@ def test_a_link_and_a_point_with_weights(dalembert, target, tmp_path):
     )
     again = dalembert(*FIT, "r.csv", "--want", "rocker.angle", *FREE, "--text")
     assert again.returncode == 0, again.stderr
-    assert "rocker comes within" in again.stdout
+    assert "Misses:" in again.stdout
+    assert "\nrocker " in again.stdout
 
 
 def test_the_options_of_the_search(dalembert, target, tmp_path):
@@ -207,3 +208,75 @@ def test_the_example_finds_scott_russells_mechanism(dalembert):
     numbers = [float(row[f"{path.split('=')[0]}_m"]) for path in free]
     assert numbers == pytest.approx([0.1, -0.1, 0], abs=1e-12)
     assert float(row["max_m"]) < 1e-12
+
+
+BAR = """gravity = [0, -9.81]
+[ground]
+O = [0, 0]
+T = [0, 0.5]
+[links.bar]
+points = { O = [0, 0], K = [0.3, 0] }
+mass = 2  # kg
+center = [0.5, 0]
+[input]
+link = "bar"
+angle = 0
+[guess]
+at = 0
+[[springs]]
+between = ["bar.K", "ground.T"]
+stiffness = "10 N/m"
+free_length = 0
+"""
+
+
+def test_a_spring_for_a_torque(dalembert, tmp_path):
+    """k a h = m g r; the file is written with it, its own units and comments as they were."""
+    (tmp_path / "bar.toml").write_text(BAR)
+    (tmp_path / "none.csv").write_text("input_deg,torque_N_mm\n-60,0\n0,0\n45,0\n")
+    call = (
+        "fit",
+        "bar.toml",
+        "none.csv",
+        "--want",
+        "bar.torque",
+        "--free",
+        "springs.1.stiffness=1N_per_m:1000N_per_m",
+    )
+    done = dalembert(*call, "--json", "-o", "new.toml")
+    assert done.returncode == 0, done.stderr
+    (stiffness,) = json.loads(done.stdout)["fit"]["parameters"].values()
+    assert stiffness == pytest.approx(65.4, rel=1e-12)
+    assert json.loads(done.stdout)["fit"]["max_N_m"] < 1e-12
+    written = (tmp_path / "new.toml").read_text()
+    assert "mass = 2  # kg" in written
+    assert 'N/m"' in written or "N_per_m" in written
+    after = dalembert("forces", "new.toml", "--over=-60deg:60deg:20deg", "--only", "bar.torque", "--json")
+    assert all(abs(pose["effort"]["input_torque_N_m"]) < 1e-12 for pose in json.loads(after.stdout)["poses"])
+
+
+@pytest.mark.usefixtures("target")
+def test_bounds_are_kept_and_named(dalembert):
+    """As the contract has it; wrong ones are one line that names what is expected."""
+    kept = ("--keep", "transmission>=33deg", "--keep", "H.y<=140mm", "--keep", "coupler.angle ≥ -30")
+    done = dalembert(*FIT, *FREE, *kept, "--starts", "16", "--json")
+    assert done.returncode == 0, done.stderr
+    fit = json.loads(done.stdout)["fit"]
+    assert [each["quantity"] for each in fit["kept"]] == ["transmission", "H.y", "coupler.angle"]
+    assert fit["kept"][0].keys() == {"quantity", "least", "met"}
+    assert fit["kept"][0]["least"] >= 33 - 1e-6
+    assert fit["kept"][1]["most"] <= 0.14 + 1e-9
+    assert all(each["met"] for each in fit["kept"])
+    for wrong, said in (
+        ("transmision>=40deg", "did you mean 'transmission'"),
+        ("transmission=40deg", "expected QUANTITY>=VALUE"),
+        ("transmission<=40deg", "expected transmission>=ANGLE"),
+        ("transmission>=95deg", "from 0deg to 90deg"),
+        ("H.y<=5kg", "5kg"),
+    ):
+        done = dalembert(*FIT, *FREE, "--keep", wrong)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert said in " ".join(done.stderr.split())
+    done = dalembert(*FIT, *FREE, "--keep", "transmission>=89deg", "--starts", "4")
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert "keeps transmission >= 89 deg (it comes to" in done.stderr

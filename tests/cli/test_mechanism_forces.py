@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -227,8 +228,9 @@ def test_counterweights(dalembert: Dalembert) -> None:
 def test_explain_names_what_is_left_out(dalembert: Dalembert) -> None:
     text = FOUR_BAR.replace('speed = "30 rad/s"', "").replace("center = [10, 3]", "center = [0, 0]")
     done = dalembert("inspect", "-", "--text", stdin=text)
-    assert "do no work: crank: weight" in done.stdout
-    assert "absent: no inertia loads" in done.stdout
+    cells = [re.split(r" {2,}", line.strip()) for line in done.stdout.splitlines()]
+    assert ["crank", "crank: weight", "does no work"] in cells
+    assert any(row[0].startswith("no inertia loads") and row[-1] == "absent" for row in cells)
     assert "joint forces, action and reaction, do no work together" in done.stdout
 
 

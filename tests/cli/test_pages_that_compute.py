@@ -312,6 +312,49 @@ def test_a_table_of_masses(dalembert: Dalembert, tmp_path: Path, browser: Any) -
     assert page.faults() == []
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "how",
+    [
+        ("--round-mass", "0.1g", "--round-angle", "1deg"),
+        ("--round-mass", "2g"),
+        ("--round-angle", "7deg", "--remove"),
+        ("--mass", "A:0.3kg"),
+        ("--mass", "B:0.3kg", "--round-angle", "5deg"),
+    ],
+    ids=" ".join,
+)
+def test_corrections_as_they_are_given_out(
+    how: tuple[str, ...], dalembert: Dalembert, tmp_path: Path, browser: Any
+) -> None:
+    """Rounded, or of a mass that is fixed: the page leaves what the program leaves, for the edited table too."""
+    options = (*RIUL[1:], *how)
+    if "--mass" in how:
+        options = (
+            tuple(part.replace("A:0mm:20mm", "A:0mm:?") for part in options) if how[1][0] == "A" else options
+        )
+    done = dalembert("balance", RIUL[0], *options, "--page", "b.html", "--json")
+    assert done.returncode == 0, done.stderr
+    page = Computing(browser, tmp_path / "b.html")
+    for change in ({}, {"W1__radius": 0.035, "W2__angle": 2.2}):
+        if change:
+            page.put(**change)
+            (tmp_path / "again.csv").write_text(page("return dalembert.csv()"))
+            done = dalembert("balance", "again.csv", *options, "--json")
+            assert done.returncode == 0, done.stderr
+        (rotor,) = json.loads(done.stdout)["rotors"]
+        largest = max(row["unbalance_kg_m"] for row in rotor["corrections"])
+        for row in rotor["corrections"]:
+            plane = row["plane"]
+            assert page.get(f"{plane}.unbalance") == pytest.approx(row["unbalance_kg_m"], rel=1e-12)
+            assert page.get(f"{plane}.mass") == pytest.approx(row["mass_kg"], rel=1e-12)
+            assert page.get(f"{plane}.radius") == pytest.approx(row["radius_m"], rel=1e-12)
+            assert page.get(f"{plane}.angle") == pytest.approx(math.radians(row["angle_deg"]), rel=1e-12)
+        for name, key in (("static", "static_unbalance_kg_m"), ("couple", "couple_unbalance_kg_m2")):
+            assert page.get(f"residual.{name}") == pytest.approx(rotor["residual"][key], abs=1e-12 * largest)
+    assert page.faults() == []
+
+
 def test_a_machines_sheet(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
     file = EXAMPLES / "fan-one-plane" / "fan.csv"
     assert dalembert("field", file, "--save-influence", "alpha.csv").returncode == 0
@@ -347,9 +390,44 @@ def test_a_machines_sheet(dalembert: Dalembert, tmp_path: Path, browser: Any) ->
     assert page.faults() == []
 
 
-def test_a_sheet_is_of_least_squares_alone(dalembert: Dalembert, tmp_path: Path) -> None:
+def test_a_sheet_names_what_is_beyond_a_limit(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """Least squares without limits: the program's own numbers, and a remark where a mass is beyond its limit."""
     file = EXAMPLES / "fan-one-plane" / "fan.csv"
-    done = dalembert("field", file, "--max-mass", "1g", "--page", "f.html")
+    errors = ("--reading-error", "2%,2deg")
+    plain = dalembert("field", file, *errors, "--json")
+    (row,) = json.loads(plain.stdout)["rotors"][0]["corrections"]
+    limits = ("--max-mass", "1g", "--max-residual", "2mm_s")
+    assert dalembert("field", file, *errors, *limits, "--page", "f.html").returncode == 0
+    page = Computing(browser, tmp_path / "f.html")
+    assert page.get("1.mass") == pytest.approx(row["mass_kg"], rel=1e-12)
+    # w = −v/α: the relative errors of a new reading and of the coefficient, which is as likely off in every direction
+    assert dalembert("field", file, *errors, "--save-influence", "alpha.csv").returncode == 0
+    with (tmp_path / "alpha.csv").open() as rows:
+        (alpha,) = csv.DictReader(rows)
+    size = float(alpha["magnitude_per_g"])
+    off = math.hypot(
+        float(alpha["magnitude_uncertainty_per_g"]) / size,
+        math.radians(float(alpha["phase_uncertainty_deg"])),
+    )
+    for name, error in (("mass", 0.02 * row["mass_kg"]), ("angle", math.radians(2))):
+        unit = row["mass_kg"] if name == "mass" else 1.0
+        assert page.get(f"1.{name}_uncertainty") == pytest.approx(
+            math.hypot(error, unit * off / math.sqrt(2)), rel=1e-6
+        )
+    assert "is more than its limit of 1 g" in page.text("answers")
+    # the trim of the first run is the correction itself; a small vibration needs none
+    assert page.get("trim.1.mass_uncertainty") == page.get("1.mass_uncertainty")
+    assert "no trim is needed" not in page.text("answers")
+    page.put(**{"initial/bearing/amplitude": 0.5})
+    assert "no trim is needed, the vibration is within the limit" in page.text("answers")
+    assert "is more than its limit" not in page.text("answers")
+    assert page.faults() == []
+
+
+def test_a_sheet_is_of_readings_with_phases(dalembert: Dalembert, tmp_path: Path) -> None:
+    done = dalembert(
+        "field", EXAMPLES / "fan-four-run" / "four_run.csv", "--method", "four-run", "--page", "f.html"
+    )
     assert done.returncode == 2
-    assert "least squares without limits" in " ".join(done.stderr.split())
+    assert "amplitudes with phases" in " ".join(done.stderr.split())
     assert not (tmp_path / "f.html").exists()

@@ -36,6 +36,24 @@ def test_blades(dalembert: Dalembert) -> None:
     assert shifted["masses"][0]["angle_deg"] == 10
 
 
+def test_blades_numbered_against_the_angles(dalembert: Dalembert) -> None:
+    """Same masses at the same angles; the blade at 360° − θ has θ's number, and the first stays where it is."""
+    vector = ["83.5g@308.87deg", "--blades", "16", "--json"]
+    there, back = (document(dalembert("place", *vector, *more)) for more in ([], ["--numbering", "against"]))
+    assert [(m["position"], m["angle_deg"]) for m in back["masses"]] == [("3", 315), ("4", 292.5)]
+    by_angle = [{m["angle_deg"]: m["mass_kg"] for m in found["masses"]} for found in (there, back)]
+    assert by_angle[0].keys() == by_angle[1].keys()
+    assert list(by_angle[1].values()) == pytest.approx(
+        [by_angle[0][angle] for angle in by_angle[1]], rel=1e-14
+    )
+    first = ["1g@50deg", "--blades", "4", "--first", "50deg", "--numbering", "against", "--json"]
+    assert document(dalembert("place", *first))["masses"][0]["position"] == "1"
+    refused = dalembert("place", "1g@50deg", "--positions", "0deg,90deg", "--numbering", "against")
+    assert refused.returncode == 2
+    assert "--numbering" in refused.stderr
+    assert "speaks of --blades" in refused.stderr
+
+
 def test_limits(dalembert: Dalembert) -> None:
     found = document(dalembert("place", "20g@30deg", "--blades", "12", "--max-mass", "8g", "--json"))
     assert max(m["mass_kg"] for m in found["masses"]) <= 0.008

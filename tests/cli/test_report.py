@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cli.examples.command import describe, names
+from cli.examples import describe, names
 from cli.show.report import WIDE
 from tests.conftest import Dalembert
 

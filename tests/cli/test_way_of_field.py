@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from cli.examples.command import EXAMPLES
+from cli.examples import EXAMPLES
 
 FIELD = sorted(f.parent.name for f in EXAMPLES.glob("*/example.toml") if '"dalembert field ' in f.read_text())
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from cli.examples.command import EXAMPLES
+from cli.examples import EXAMPLES
 
 REASONS = {None, "perpendicular to the displacement", "at rest", "pair"}
 

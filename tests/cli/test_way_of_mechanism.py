@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cli.examples.command import EXAMPLES
+from cli.examples import EXAMPLES
 
 MECHANISMS = sorted(
     file.parent.name

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import tomllib
 from math import cos, hypot, pi, radians, sin
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from cli.examples.command import EXAMPLES
+from cli.examples import EXAMPLES
 
 OTHERS = (
     "place",
@@ -27,9 +28,9 @@ OTHERS = (
     "tolerance",
 )
 CALLS = {
-    f.parent.name: tomllib.loads(f.read_text())["command"].split()
+    f.parent.name: shlex.split(tomllib.loads(f.read_text())["command"])
     for f in sorted(EXAMPLES.glob("*/example.toml"))
-    if tomllib.loads(f.read_text())["command"].split()[1] in OTHERS
+    if shlex.split(tomllib.loads(f.read_text())["command"])[1] in OTHERS
 }
 
 

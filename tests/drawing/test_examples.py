@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 import cli.show.picture
 from cli.app import main
-from cli.examples.command import ABOUT, EXAMPLES, describe, names
+from cli.examples import ABOUT, EXAMPLES, describe, names
 
 Draw = Callable[..., Figure]
 FURTHER = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.stress.assemblies import one_input, wrong_assemblies, wrong_dead_points, wrong_limits
-from virtualwork import Guess, Guide, Input, Link, Mechanism
+from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
 
 
 def _limits(seeds: range) -> int:
@@ -64,6 +64,7 @@ def test_every_assembly_is_listed_and_closes() -> None:
         pytest.param(100249, id="a slide's other range, behind a gap"),
         pytest.param(100300, id="the same"),
         pytest.param(500227, id="a group whose own range is longer than a turn"),
+        pytest.param(92604029, id="a group that ends with the one before it, its own Jacobian constant"),
     ],
 )
 def test_dead_points_of_every_range(seed: int) -> None:
@@ -108,3 +109,29 @@ def test_a_crank_driven_by_its_piston_has_four_dead_points() -> None:
     )
     assert m.check.dead_points == pytest.approx((-1.5, -0.5, 0.5, 1.5), abs=1e-12)
     assert m.check.input_limits == pytest.approx((0.5, 1.5), abs=1e-12)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_group_without_a_closed_form_ends_where_the_one_before_it_does(side: int) -> None:
+    """Two bars geared together ride on a four-bar, and one slides along the other: they stop with it, where it folds.
+
+    The Jacobian of the two is constant; its rounding was extrapolated to a limit up to 0.2 degrees off.
+    """
+    crank, coupler, rocker, base = 2.0, 1.0, 1.5, 2.6
+    end = float(np.arccos((crank**2 + base**2 - (coupler + rocker) ** 2) / (2 * crank * base)))
+    m = Mechanism(
+        {"A": (0, 0), "D": (base, 0)},
+        {
+            "crank": Link({"A": (0, 0), "B": (crank, 0)}),
+            "coupler": Link({"B": (0, 0), "C": (coupler, 0)}),
+            "rocker": Link({"D": (0, 0), "C": (rocker, 0)}),
+            "bar": Link({"C": (0, 0)}),
+            "arm": Link({"C": (0, 0), "E": (0.7, 0.4)}),
+        },
+        guides=[Guide("E", "arm", "bar", 0.3j, 0.0)],
+        gears=[Gear(("bar", "arm"), -1.9)],
+        inputs=Input("crank"),
+        guess=Guess(0.7 * side, {"coupler": -0.5 * side, "rocker": 1.9 * side, "bar": 0.4, "arm": 0.1}),
+    )
+    assert m.check.input_limits == pytest.approx((-end, end), abs=1e-14)
+    assert m.check.dead_points == pytest.approx((end, 2 * np.pi - end), abs=1e-14)

@@ -25,7 +25,7 @@ from dalembert.arithmetic.rounding import rounding_bounds
 from virtualwork import Mechanism
 from virtualwork.describe import MechanismError
 from virtualwork.formulas.asked import names
-from virtualwork.formulas.lanes import Lanes, taped
+from virtualwork.formulas.lanes import taped
 
 ANSWERS = json.loads(
     (Path(__file__).parents[1] / "data" / "answers_of_0_1_0.json").read_text(encoding="utf-8")
@@ -115,7 +115,7 @@ def test_the_watt_six_bar_beside_its_limits() -> None:
     stands = np.flatnonzero(motion.assembled)
     assert q[stands[[0, -1]]] == pytest.approx([-0.096, 0.09])
     keys = tuple(("angle", link, order) for link in m.links for order in range(3))
-    lanes = Lanes(motion.assembly, motion.poses)
+    lanes = motion.poses
     tape = taped(motion.assembly, lanes.recording, keys)
     given = lanes.entering(tape.inputs)
     found, bounds = run(tape, given, "numpy"), run(rounding_bounds(tape), given, "numpy")

@@ -18,13 +18,15 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.computing import ORDERS
 from virtualwork.describe import MechanismError
 from virtualwork.describe.dimensions import changed, dimensions, value
-from virtualwork.formulas.asked import FORCES, over_blocks
+from virtualwork.formulas.asked import FORCES
+from virtualwork.formulas.lanes import over_blocks
 from virtualwork.motion import Motion
 from virtualwork.quantities import Quantity, forces, places
 
 pytestmark = needs_node
 EXAMPLES = (
-    "andrews/andrews", "block-on-bar/bar", "boom/boom", "desk-lamp/lamp", "door-closer/door", "five-bar/five-bar",
+    "andrews/andrews", "belt-drive/belt-drive", "block-on-bar/bar", "cam-valve/cam-valve",
+    "rack-lift/rack-lift", "boom/boom", "crank-press/press", "desk-lamp/lamp", "door-closer/door", "engine-start/engine-start", "engine/engine", "five-bar/five-bar",
     "inclined-slider-crank/piston", "jansen/jansen", "klann/klann", "moving-ramp/ramp", "parallelogram/parallelogram",
     "peaucellier/peaucellier", "planetary-gear/planetary", "quick-return/quick-return", "robot-arm/arm",
     "scissors-lift/lift", "scotch-yoke/yoke", "stephenson-six-bar/stephenson", "toggle-clamp/clamp",

@@ -75,15 +75,38 @@ def test_many_more_of_them() -> None:
     _tally(range(120, LONG))
 
 
-# the judge takes gears' constants from the guess's angles as they stand, the program from the placed guess: of one link a
-# guide fixes the angle too, and both differ there by one unit in the last place, which no estimate of rounding has
-BETWEEN_GUESS_AND_GUIDE = pytest.mark.xfail(
-    reason="the guess and a guide disagree by 6e-17 rad on the same angle"
-)
-
-
-@pytest.mark.parametrize("seed", [pytest.param(4, marks=BETWEEN_GUESS_AND_GUIDE), 26, 43, 71])
+@pytest.mark.parametrize("seed", [4, 26, 43, 71])
 def test_the_estimate_holds_where_gears_and_relative_inputs_alone_move_a_link(seed: int) -> None:
     """Rates are products of the law of motion, and phases sums of several guides' angles: both are rounded."""
+    for error, bound in rates(np.random.default_rng(seed)):
+        assert error <= bound
+
+
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(77000122, id="a third of a speed: the share of a whole ratio is no float"),
+        pytest.param(77000135, id="a ratio of -0.5, whose other side is a whole number"),
+        pytest.param(77000123, id="a ratio of 3 on an arm that moves"),
+    ],
+)
+@pytest.mark.whole
+def test_gears_in_32_digits(seed: int) -> None:
+    """Shares of angles had the digits of floats in the second run; one ended in an internal error."""
+    for error, bound in rates(np.random.default_rng(seed)):
+        assert error <= bound
+
+
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(
+            88000211, id="slides along fixed lines: a column of ones, reflected by the root of three"
+        ),
+        pytest.param(89000060, id="a gear of ratio 1, whose arm fixes nothing of the guess's constants"),
+    ],
+)
+def test_constants_of_linear_systems_in_32_digits(seed: int) -> None:
+    """Four of 4287 estimates of speeds were up to 2.2 times too small: in the second run √3 had the digits of a float."""
     for error, bound in rates(np.random.default_rng(seed)):
         assert error <= bound

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.examples.command import EXAMPLES, describe, names
+from cli.examples import EXAMPLES, describe, names
 from tests.conftest import Dalembert
 from virtualwork.describe.keys import table_keys
 from virtualwork.describe.parts import TABLES

@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 
+from dalembert.arithmetic.varied import direction
 from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
-from virtualwork.plan.topology import direction
 
 QUARTER = math.pi / 2
 

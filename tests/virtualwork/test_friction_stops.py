@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -226,9 +227,9 @@ def test_friction_that_would_drive_ends_the_run() -> None:
     leg = run.fine.legs[0]
     equations = leg.equations
     assert isinstance(equations, Rubbing)
-    assert gains(equations, leg.nodes, 0.0) == (pytest.approx(3.0), None)
-    wrong = equations.in_mode((-1,), -1.0)
-    assert gains(wrong, leg.nodes, 0.0) == (pytest.approx(3.0), (0, "P"))
+    assert gains(leg, 0.0) == (pytest.approx(3.0), None)
+    wrong = replace(leg, coordinates=leg.coordinates.of(equations.in_mode((-1,), -1.0)))
+    assert gains(wrong, 0.0) == (pytest.approx(3.0), (0, "P"))
 
 
 # --- campaigns --------------------------------------------------------------------------------------------------------

@@ -14,8 +14,7 @@ from benchmarks.stress.topologies import generate
 from dalembert.arithmetic.engines import run
 from virtualwork import Mechanism
 from virtualwork.describe import DescriptionError, MechanismError
-from virtualwork.formulas.asked import over_blocks
-from virtualwork.formulas.lanes import Lanes
+from virtualwork.formulas.lanes import over_blocks
 
 EXAMPLES = {
     f"{path.parent.name}/{path.name}": path
@@ -40,9 +39,9 @@ def compare(m, monkeypatch, engine, share=1.0) -> None:
     motion = m.motion(q, speed, acceleration)
     keys = every_key(motion)
     monkeypatch.setenv("DALEMBERT_ENGINE", engine)
-    found = Lanes(m.assembly, m.motion(q, speed, acceleration).poses).values(keys)
+    found = m.motion(q, speed, acceleration).poses.values(keys)
     # asked for one by one, each begins at what those before it have left
-    alone = Lanes(m.assembly, m.motion(q, speed, acceleration).poses)
+    alone = m.motion(q, speed, acceleration).poses
     each = {key: alone.values([key])[0] for key in keys[::-1]}
     monkeypatch.delenv("DALEMBERT_ENGINE")
 
@@ -85,6 +84,40 @@ def test_every_quantity_of_mechanisms_of_any_topology(monkeypatch) -> None:
         compare(m, monkeypatch, "numpy", 0.02)
         compared += 1
     assert compared > 95
+
+
+@pytest.mark.parametrize("over", ["speed_rad_s", "angle_rad"])
+def test_a_torque_asked_for_beside_what_its_table_is_over(over, tmp_path, monkeypatch) -> None:
+    (tmp_path / "t.csv").write_text(f"{over},torque_N_m\n-9,3\n-1,-4\n0,0.5\n9,7\n")
+    (tmp_path / "m.toml").write_text("""
+[ground]
+A = [0, 0]
+D = [0.3, 0]
+[links.crank]
+points = { A = [0, 0], B = [0.1, 0] }
+[links.coupler]
+points = { B = [0, 0], C = [0.3, 0] }
+mass = 2
+[links.rocker]
+points = { D = [0, 0], C = [0.25, 0] }
+[[torques]]
+link = "coupler"
+torque = "t.csv"
+[input]
+link = "crank"
+[guess]
+at = 1
+coupler = 0.7
+rocker = 1
+""")
+    m = Mechanism.from_toml(tmp_path / "m.toml")
+    compare(m, monkeypatch, "numpy")
+    monkeypatch.setenv("DALEMBERT_ENGINE", "numpy")
+    q, key = np.linspace(0, 6, 20), ("angle", "coupler", int(over == "speed_rad_s"))
+    torque, turned = m.motion(q, 3.0).poses.values([("effort", 0), key])
+    assert np.isfinite(torque).all()
+    assert np.array_equal(torque, m.motion(q, 3.0).effort)
+    assert np.array_equal(turned, m.motion(q, 3.0).value(key))
 
 
 def test_an_evaluator_gives_what_the_motion_gives() -> None:

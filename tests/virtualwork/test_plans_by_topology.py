@@ -32,8 +32,17 @@ def scaled(m, factor):
     guides = [g if isinstance(g.through, str) else replace(g, through=g.through * factor) for g in m.guides]
     ground = {p: z * factor for p, z in m.ground.items()}
     racks = [replace(rack, radius=rack.radius * factor) for rack in m.racks]
+    cams = [
+        replace(
+            cam,
+            base_radius=cam.base_radius * factor,
+            roller_radius=cam.roller_radius and cam.roller_radius * factor,
+            law=tuple(replace(part, rise=part.rise and part.rise * factor) for part in cam.law),
+        )
+        for cam in m.cams
+    ]
     guess = Guess(m.at, m.guess.angles, {p: z * factor for p, z in m.guess.points.items()})
-    return Mechanism(ground, links, guides, m.gears, m.inputs, guess, belts=m.belts, racks=racks)
+    return Mechanism(ground, links, guides, m.gears, m.inputs, guess, belts=m.belts, racks=racks, cams=cams)
 
 
 def made_anew(m):

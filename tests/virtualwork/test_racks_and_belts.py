@@ -432,7 +432,7 @@ def test_random_racks_in_fifty_digits(seed: int) -> None:
 
 
 def test_the_examples_stand(tmp_path: Path) -> None:
-    from cli.examples.command import EXAMPLES
+    from cli.examples import EXAMPLES
 
     for name in ("rack-lift", "belt-drive", "doubling-rack"):
         m = Mechanism.from_toml(EXAMPLES / name / f"{name}.toml")

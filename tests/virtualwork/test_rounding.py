@@ -19,7 +19,22 @@ from benchmarks.truth.four_bar import circles, two_rates
 from benchmarks.truth.mechanism import Exact, along
 from tests.virtualwork.judged import judge
 from tests.virtualwork.mechanisms import slider_crank
-from virtualwork import Force, Friction, Guess, Input, Link, Mechanism, Motor, Spring, Torque, TorsionSpring
+from virtualwork import (
+    Force,
+    Friction,
+    Guess,
+    Guide,
+    Input,
+    Link,
+    Mechanism,
+    Motor,
+    Spring,
+    Torque,
+    TorsionSpring,
+)
+from virtualwork.digits.estimates import Estimates
+from virtualwork.forces import Forces
+from virtualwork.formulas.lanes import taped
 
 EXAMPLES = files("cli") / "examples"
 
@@ -175,6 +190,52 @@ def test_what_redundant_statics_determines() -> None:
     judge(pairs, 2)
 
 
+def test_friction_beside_redundant_statics(recwarn: pytest.WarningsRecorder) -> None:
+    """A block that a platform on three cranks pushes along a rough guide: both ways to the torque, each within its estimate."""
+    q = np.array([0.4, 1.0, 1.2, 2.5])
+
+    def dynamics(*friction: Friction) -> Forces:
+        bars = {f"bar{i}": Link({f"A{i}": 0j, f"B{i}": 0.5}) for i in range(3)}
+        top = Link({f"B{i}": complex(i) for i in range(3)}, mass=3, center=0.7 + 0.1j)
+        rod, block = Link({"B0": 0j, "S": 2.0}, 1.0, 1.0, 0.3), Link({"S": 0j}, 2.0, 0j, 0.1)
+        m = Mechanism(
+            ground={f"A{i}": complex(i) for i in range(3)},
+            links={**bars, "top": top, "rod": rod, "block": block},
+            guides=[Guide("S", "block", through=-0.3j, angle=0.0, turned=0.0)],
+            inputs=Input(link="bar0"),
+            guess=Guess(at=1.0, angles={"bar1": 1.0, "bar2": 1.0, "top": 0.0, "rod": -0.4, "block": 0.0}),
+            gravity=-9.81j,
+            friction=friction,
+        )
+        return m.motion(q, 2.0, 0.0).dynamics
+
+    d = dynamics(Friction("S", 0.2))
+    assert d.reactions.redundant
+    bounds = d.error_estimate()
+    apart = np.abs(d.effort - d.newton_euler)
+    assert (apart <= bounds.effort + bounds.newton_euler).all()
+    assert (bounds.newton_euler < 1e-12).all()
+    for joint in d.reactions.joints:
+        for body in joint.bodies:
+            known = np.isfinite(d.joint_force(joint, body))
+            assert (bounds.joint_force(joint, body)[known] < 1e-12).all()
+            assert (bounds.joint_moment(joint, body) < 1e-12).all()
+    # the force along the guide is the friction, to its own estimate
+    joint = next(joint for joint in d.reactions.joints if joint.guide is not None)
+    force = d.joint_force(joint, "block")
+    rough = np.abs(np.abs(force.real) - 0.2 * np.abs(force.imag))
+    assert (rough <= 2 * bounds.joint_force(joint, "block")).all()
+    # a pin whose force no statics determines rubs with a torque that nothing determines
+    d = dynamics(Friction("B1", 0.1, 0.02))
+    bounds = d.error_estimate()
+    for value, bound in ((d.effort, bounds.effort), (d.newton_euler, bounds.newton_euler)):
+        assert np.isnan(value).all()
+        assert np.isnan(bound).all()
+    joint = next(joint for joint in d.reactions.joints if joint.name == "B1")
+    assert np.isnan(bounds.joint_moment(joint, "top")).all()
+    assert not recwarn.list
+
+
 @pytest.mark.slow
 def test_a_chain_of_a_hundred_links() -> None:
     """Four-bars in a row, each rocker the next one's crank: dyad by dyad in 50 digits."""
@@ -319,6 +380,48 @@ def test_together_bounds_are_what_they_are_one_by_one(name: str, poses: int) -> 
         assert np.isfinite(alone).all()
         np.testing.assert_allclose(together[one], alone, rtol=1e-9)
     assert (together["effort"] == m.motion(q, 3.0, 1.0).dynamics.error_estimate().effort[:, 0]).all()
+
+
+@pytest.mark.parametrize("name", ["klann", "engine", "quick-return"])
+def test_every_engine_has_the_same_estimates(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the same answers: doubled numbers as they stand, and the tape of what they do by numpy and compiled."""
+    pytest.importorskip("llvmlite")
+    monkeypatch.setattr("dalembert.arithmetic.engines.doubled.PAYS", 0.0)
+    m = heavy(example(name))
+    q = m.at[0] + np.linspace(-0.02, 0.03, 40)
+    monkeypatch.setenv("DALEMBERT_ENGINE", "numpy")
+    motion = m.motion(q, 3.0, 1.0)
+    last = list(m.links)[-1]
+    keys = [motion.link(last).key(k) for k in (0, 1, 2)] + [("effort", 0), ("shaking",)]
+    values = dict(zip(keys, motion.values(keys), strict=True))
+    found = {}
+    for engine in ("python", "numpy", "llvm"):
+        monkeypatch.setenv("DALEMBERT_ENGINE", engine)
+        estimates = Estimates(
+            motion.poses, lambda keys: [values[key] for key in keys], lambda: motion.dynamics
+        )
+        estimates.together(keys)
+        found[engine] = [estimates.of(key) for key in keys]
+    for key, *each in zip(keys, *found.values(), strict=True):
+        for other in each[1:]:
+            np.testing.assert_allclose(other, each[0], rtol=1e-9, err_msg=str(key))
+
+
+def test_what_is_not_asked_for_is_not_computed_twice() -> None:
+    """The second run of one point costs less than that of all: counted in operations, margins of its own groups alone."""
+    m = example("klann")
+    motion = m.motion(np.linspace(0.0, 1.0, 5), 3.0, 1.0)
+    branch, exact = motion.rounding.branch, motion.rounding.second.exact
+    few, all_ = (
+        taped(branch, exact, tuple(motion.point(name).key(2) for name in names)).cost
+        for names in (("B",), m.points)
+    )
+    assert 5 * few < all_
+    point = motion.point("B")
+    point.error_estimate()
+    assert not motion.rounding.looked_at
+    motion.point("H").error_estimate()
+    assert len(motion.rounding.looked_at) == 2
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,6 @@ from virtualwork.describe.parts import Force, Torque
 from virtualwork.family.sensitivity import Sensitivities
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import names
-from virtualwork.formulas.lanes import Lanes
 
 # between them every kind: lengths, angles, masses, guides, gears, springs, motors, loads
 EXAMPLES = ["boom/boom", "engine/engine", "crank-press/press", "desk-lamp/lamp", "two-disc-four-bar/four-bar",
@@ -81,7 +80,7 @@ def compare(m, motion):
     written = Written(motion.assembly, dims, (True, True, False), own_signs=False, settled=False)
     tape = written.tape(keys)
     given = {d.path: float(value(m, d.path).real) for d in dims}
-    given |= Lanes(motion.assembly, motion.poses).entering([n for n in tape.inputs if n not in given])
+    given |= motion.poses.entering([n for n in tape.inputs if n not in given])
     worst = 0.0
     with mp.workdps(DIGITS):
         for lane in range(motion.n):

@@ -6,6 +6,7 @@ import json
 import math
 from typing import Any
 
+import mpmath as mp
 import numpy as np
 import pytest
 
@@ -38,13 +39,22 @@ def bar_in_slots(tilt: float, carried: bool, **more: Any) -> Mechanism:
     return Mechanism({"O": (0, 0)}, links, guides, inputs=Input("crank"), guess=guess, gravity=-10j)
 
 
-# at 90° the guides stand at a quarter turn in every digit: nothing that is rounded moves the bar, and where a crank
-# does not carry it the second run takes the bar the other way round, a whole turn off: an estimate that shows no digit
-UPRIGHT = pytest.mark.xfail(reason="the estimate is a rounding, or a whole turn")
+def turned_by_rounding(m: Mechanism, tilt: float) -> float:
+    """The angle by which the bar is off for the digits of its length and of the slots' distance alone; exactly.
+
+    At 90° the guides stand at a quarter turn in every digit, and their distance is the bar's length: by none.
+    """
+    with mp.workdps(40):
+        first, second = (guide.through for guide in m.guides)
+        assert isinstance(first, complex)
+        assert isinstance(second, complex)
+        along = mp.mpc(0, 1) ** int(tilt / 90) if tilt % 90 == 0 else mp.expj(mp.mpf(math.radians(tilt)))
+        distance = mp.im(mp.conj(along) * (mp.mpmathify(second) - mp.mpmathify(first)))
+        return float(mp.sqrt(2 * abs(distance / mp.mpf(LENGTH) - 1)))
 
 
 @pytest.mark.parametrize("carried", [True, False])
-@pytest.mark.parametrize("tilt", [0.0, 17.0, -33.3, pytest.param(90.0, marks=UPRIGHT)])
+@pytest.mark.parametrize("tilt", [0.0, 17.0, -33.3, 90.0, -90.0, 180.0])
 def test_places_hold_and_rates_are_left_out(tilt, carried):
     m = bar_in_slots(tilt, carried)
     motion = m.motion(TURN, speed=1.0, acceleration=0.0)
@@ -55,6 +65,8 @@ def test_places_hold_and_rates_are_left_out(tilt, carried):
     assert np.abs(motion.point("Q").complex(0) - both).max() < 1e-15
     for rate in (motion.link("bar").omega, motion.link("bar").alpha, motion.slide("Q").speed):
         assert np.isnan(rate).all()
+    # no number, no estimate
+    assert np.isnan(motion.link("bar").error_estimate(1)).all()
     # what does not hang on the bar is solved as ever
     assert np.isfinite(motion.point("A").acceleration).all()
     assert np.isfinite(motion.link("rod").omega).all() == carried
@@ -62,7 +74,18 @@ def test_places_hold_and_rates_are_left_out(tilt, carried):
     # the dimensions as they are rounded may move the bar by the root of a rounding
     estimate = motion.link("bar").error_estimate()
     assert (estimate < 1e-6).all()
-    assert (estimate > 1e-10).all()
+    assert (estimate >= turned_by_rounding(m, tilt)).all()
+
+
+@pytest.mark.slow
+def test_the_estimate_covers_the_digits_of_the_slots_at_any_tilt(first_seed):
+    rng = np.random.default_rng(first_seed)
+    for tilt in rng.uniform(-180.0, 180.0, 60).tolist():
+        for carried in (True, False):
+            m = bar_in_slots(tilt, carried)
+            estimate = m.motion(TURN[::6]).link("bar").error_estimate()
+            assert (estimate >= turned_by_rounding(m, tilt)).all(), tilt
+            assert (estimate < 1e-6).all(), tilt
 
 
 @pytest.mark.parametrize("carried", [True, False])

@@ -163,14 +163,7 @@ def test_one_motion(name: str) -> None:
 @pytest.mark.parametrize("n", [1, 2, 361, 20_000])
 @pytest.mark.parametrize("engine", ["", "numpy", "llvm"])
 @pytest.mark.parametrize("name", MECHANISMS)
-def test_one_motion_often(
-    name: str, engine: str, n: int, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
-) -> None:
-    if (name, engine) == ("parallelogram", "llvm") and n in (361, 20_000):
-        reason = (
-            "in some runs an acceleration beside a change point differs by 1e-10 by the order of requests"
-        )
-        request.applymarker(pytest.mark.xfail(reason=reason))
+def test_one_motion_often(name: str, engine: str, n: int, monkeypatch: pytest.MonkeyPatch) -> None:
     if engine:
         monkeypatch.setenv("DALEMBERT_ENGINE", engine)
     questions = of_motion(MECHANISMS[name]())
@@ -200,6 +193,21 @@ def beside_change_points(motion: Any) -> dict[str, Any]:
         if order == 3:
             # of 0.1 m
             found["C jerk"] = 0.1 * each[:, None]
+
+    def known(name: str, key: Any, value: Any) -> None:
+        """Two answers may lie apart by what the program says of either; close to the point it says that none is known."""
+        size, estimate = np.abs(value).max(), motion.rounding.of(key)
+        unit = found.get(name, 1e-12 * size) + np.where(estimate < 1e-6 * size, 2.0 * estimate, 0.0)
+        found[name] = unit if np.ndim(value) == 1 else unit[:, None]
+
+    for joint in motion.dynamics.reactions.joints:
+        for body in set(joint.bodies) - {"ground"}:
+            known(f"{joint.key} on {body}", ("force", joint.key, body), motion.reaction(joint.name, on=body))
+    known("effort", ("effort", 0), motion.effort)
+    known("rocker omega", motion.link("rocker").key(1), motion.link("rocker").omega)
+    for point in ("B", "C"):
+        part = motion.point(point)
+        known(f"{point} acceleration", part.key(2), part.acceleration)
     return found
 
 

@@ -91,7 +91,7 @@ def test_static_slider_crank_in_closed_form() -> None:
 
 def test_only_what_is_asked_for_is_formed() -> None:
     m = four_bar()
-    motion = m.motion(SWEEP, 10.0)
+    motion = m.motion(1.0, 10.0)
     _ = motion.effort
     assert motion.dynamics.__dict__.get("reactions") is None  # the effort forms no reaction
     motion.reaction("C", on="rocker")
@@ -99,6 +99,17 @@ def test_only_what_is_asked_for_is_formed() -> None:
     assert not any("A on" in name or "D on" in name for name in formed)
     motion.reaction("A", on="crank")
     assert "pin:A on crank" in formed
+    # of many poses the tape has no more than that either
+    poses = m.motion(SWEEP, 10.0).poses
+    effort, one, both = (
+        poses.operations(keys)
+        for keys in (
+            [("effort", 0)],
+            [("reaction", "C", "rocker")],
+            [("effort", 0), ("reaction", "C", "rocker")],
+        )
+    )
+    assert max(effort, one) < both < poses.operations([("effort", 0), ("newton-euler", 0)]) + one
 
 
 def test_loads_that_do_no_work_are_never_evaluated() -> None:

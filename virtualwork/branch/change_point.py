@@ -191,13 +191,13 @@ def _nearest(way: Along, group: Group, q0: float, span: float, share: float) -> 
         return d
 
     try:
-        found = branches(group, start, ORDER)
+        candidates = branches(group, start, ORDER)
     except ZeroDivisionError:
         # a group that this one depends on has no direction here
-        found = []
+        candidates = []
     best, nearest = None, np.inf
     probe = int(np.argmax(nodes))
-    for rates in found:
+    for rates in candidates:
         change = ChangePoint(group.name, q0, tuple(turn), tuple(slide), np.array(rates), 0.0)
         move = change.unknown(nodes[probe], 0)
         miss = (
@@ -223,7 +223,7 @@ def _nearest(way: Along, group: Group, q0: float, span: float, share: float) -> 
         else np.inf
     )
     reach = REACH * min(radius, share * (1.0 if way.length > 6 else way.length))
-    others = [rates[0] for rates in found if rates is not best]
+    others = [rates[0] for rates in candidates if rates is not best]
     change = ChangePoint(
         group.name, q0, tuple(turn), tuple(slide), np.array(best), reach, others[0] if others else None
     )

@@ -101,10 +101,10 @@ class Continuation:
         if not one or abs(u[:, -1] @ along) <= SINGULAR * self.size:
             return
         sides = [self._beside(q, x, way * vt[-1], unit) for way in (1.0, -1.0)]
-        found = sorted((side for side in sides if side is not None), key=lambda side: side[0])
-        if len(found) < 2 or not found[0][0] < q < found[1][0]:
+        starts = sorted((side for side in sides if side is not None), key=lambda side: side[0])
+        if len(starts) < 2 or not starts[0][0] < q < starts[1][0]:
             return
-        low, high = found
+        low, high = starts
         beside = [(to, at, *self._rate(self._state(to, at))) for to, at in (low, high)]
         # of coordinates that were rounded: a fold between the two is not stepped over
         if s[-1] > UPRIGHT * s[0] and len({np.sign(det) for *_, det in beside} | {np.sign(self.det[0])}) > 1:
@@ -214,16 +214,16 @@ class Continuation:
             guess = x + side * step * rate
             st = self._state(to)
             with np.errstate(all="ignore"):
-                found, closed = newton(self.group, st, guess[None], self.size, limit=8)
+                solution, closed = newton(self.group, st, guess[None], self.size, limit=8)
             if closed[0]:
                 new, det = self._rate(st)
                 # a slide that runs away is measured by itself
                 far = np.maximum(np.abs(x), self.size)
                 far[: len(self.group.angles)] = 1.0
-                if np.isfinite(new).all() and self._fine(side * step, found[0] - x, rate, new, far):
+                if np.isfinite(new).all() and self._fine(side * step, solution[0] - x, rate, new, far):
                     if np.sign(det) != np.sign(self.det[end]):
                         crossed.append((min(q, to), max(q, to)))
-                    self._put(side, to, found[0], new, det)
+                    self._put(side, to, solution[0], new, det)
                     self._crossed += crossed
                     # the last one before the end is short by the end alone
                     if step < h or not step < self.step[side] < np.inf:
@@ -231,7 +231,8 @@ class Continuation:
                     return
             step /= 2
         self.stopped[side] = True
-        self.ends.append((self._limit(side), -side))
+        limit = self._end_before(q, q + 2 * side * step, x)
+        self.ends.append((self._limit(side) if limit is None else limit, -side))
 
     def singular(self) -> bool:
         """Whether the Jacobian is singular at all nodes."""
@@ -302,13 +303,27 @@ class Continuation:
                 for j in range(len(x)):
                     put(x, j, here, rate[j])
 
+    def _end_before(self, inside: float, beyond: float, x: Reals) -> float | None:
+        """The limit between two inputs of what the group depends on, to the last bit; None where that goes on."""
+        if self._reaches(beyond, x):
+            return None
+        while True:
+            middle = (inside + beyond) / 2
+            if middle in (inside, beyond):
+                return inside
+            inside, beyond = (middle, beyond) if self._reaches(middle, x) else (inside, middle)
+
+    def _reaches(self, q: float, x: Reals) -> bool:
+        """Whether all that the group depends on is assembled at an input."""
+        return bool(np.isfinite(stack_rows(gaps(self.group, self._state(q, x)), 1)).all())
+
     def _limit(self, side: int) -> float:
         """The limit itself: det² is smooth in the input there and goes to zero; extrapolated from the last nodes."""
         order = slice(-6, None) if side > 0 else slice(0, 6)
         q, d2 = np.array(self.q[order]), np.array(self.det[order]) ** 2
+        near = q[-1] if side > 0 else q[0]
         keep = np.flatnonzero(np.diff(np.concatenate([[np.nan], d2])) != 0)
         q, d2 = q[keep], d2[keep]
-        near = q[-1] if side > 0 else q[0]
         if len(q) < 2:
             return float(near)
         d2 = d2 / np.abs(d2).max()
@@ -328,7 +343,7 @@ class Continuation:
         node = self.q[-1] if side > 0 else self.q[0]
         return next((q for q, inside in self.ends if inside == -side), node)
 
-    def _turned_back(self, q: Reals) -> Reals:
+    def in_period(self, q: Reals) -> Reals:
         """Beyond a limit the branch is remembered: a whole turn later or earlier the mechanism stands as before.
 
         A branch of more than a turn between its limits stands in two ways at some inputs: there it is not.
@@ -344,7 +359,7 @@ class Continuation:
 
     def close(self, st: State) -> None:
         """Close the group at a state's poses."""
-        q = self._turned_back(np.atleast_1d(np.asarray(st.inputs[0], dtype=float)))
+        q = self.in_period(np.atleast_1d(np.asarray(st.inputs[0], dtype=float)))
         nodes, x, rate = np.array(self.q), np.array(self.x), np.array(self.rate)
         if len(nodes) == 1:
             start = x[0] + np.outer(q - nodes[0], np.nan_to_num(rate[0]))
@@ -381,15 +396,15 @@ class Continuation:
         many = st if st.many else st.copy(many=True)
         start[~inside] = np.nan
         with np.errstate(all="ignore"):
-            found, closed = newton(self.group, many, start, self.size)
+            solution, closed = newton(self.group, many, start, self.size)
             if self.group.name in self.track.folded:
-                found = settle(self.group, many, found, self.size)
+                solution = settle(self.group, many, solution, self.size)
                 st.folded.add(self.group.name)
         if self.upright is not None:
             at = np.abs(q - middle) <= FINEST**2 * self.track.length
-            found[at], closed = x[k], closed | at
-        found[~(closed & inside)] = np.nan
-        write_unknowns(self.group, st, found)
+            solution[at], closed = x[k], closed | at
+        solution[~(closed & inside)] = np.nan
+        write_unknowns(self.group, st, solution)
         st.margin[self.group.name] = (
             np.where(closed & inside, 1.0, -1.0) if st.many else (1.0 if closed[0] else -1.0)
         )

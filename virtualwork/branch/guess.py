@@ -102,9 +102,9 @@ class _Chooser:
             turn = complex(np.exp(1j * self.angles.get(name, 0.0)))
             origin = next((self.points[p] - z * turn for p, z in link.points.items() if p in self.points), 0j)
             x += [self.angles.get(name, 0.0), origin.real / self.m.size, origin.imag / self.m.size]
-        found = hidden_freedom(self.m, np.array(x))
-        if found is not None:
-            links, joints = found
+        freedom = hidden_freedom(self.m, np.array(x))
+        if freedom is not None:
+            links, joints = freedom
             names = ", ".join(e.name for e in self.m.inputs)
             raise MobilityError(
                 f"a free degree of freedom: {', '.join(links)} can still move while every input ({names}) is held, "
@@ -186,8 +186,8 @@ class _Chooser:
         """Σ c·x of a gear, a belt or a rack: of what is known, and of the guess for the others."""
         total = 0.0
         for x, c in self.m.meshes[gear].shares.items():
-            known = st.slide.get(x) if isinstance(x, int) else st.angle.get(x)
-            total += c * float(self._guessed(x) if known is None else known)
+            placed = st.slide.get(x) if isinstance(x, int) else st.angle.get(x)
+            total += c * float(self._guessed(x) if placed is None else placed)
         return total
 
     def _guessed(self, x: Coordinate) -> float:
@@ -224,8 +224,8 @@ class _Chooser:
             return sign
         distances = [self._distance(group, trial) for _, trial in solutions]
         # a guess to full precision tells apart even assemblies that all but meet; distances are squares
-        told = min(distances) < 1e-3 * max(distances) and max(distances) > 1e-28
-        if len(solutions) == 2 and abs(solutions[0][1].margin[group.name]) < 1e-14 and not told:
+        clear = min(distances) < 1e-3 * max(distances) and max(distances) > 1e-28
+        if len(solutions) == 2 and abs(solutions[0][1].margin[group.name]) < 1e-14 and not clear:
             ahead = self._ahead(group, case, solutions[0][1])
             if ahead is not None:
                 distances = ahead

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, partial
-from math import lcm
+from math import isfinite, lcm
 
 import numpy as np
 
@@ -107,7 +107,7 @@ class Reach:
         if not track.active or track.slides:
             return None
         track.cover(track.start, track.start + track.length)
-        if any(t.slides for t in turns(track.plan.steps)):
+        if any(t.slides and t.angle.runs for t in turns(track.plan.steps)):
             # what a rack moves runs on and on
             return None
         if track.settled or track.comes_back or not track.plan.groups:
@@ -141,6 +141,15 @@ class Reach:
     def period(self) -> float | None:
         """The input's span after which the branch repeats, rad; None where it does not, or with a slide."""
         return None if self.turns is None else self.turns * self.track.length
+
+    def in_period(self, q: float) -> float:
+        """An input in [0, period of the branch)."""
+        period = self.period
+        if period is None or not isfinite(q):
+            return q
+        q %= period
+        # an input of −1e-15 is 0, not a whole period
+        return 0.0 if period - q < 1e-9 or q < 1e-9 else q
 
     def apart(self, q: Reals, from_: float) -> Reals:
         """How far inputs are from one, by the nearest way round the branch."""
@@ -196,19 +205,23 @@ class Reach:
         """The limits in what was covered."""
         track = self.track
         by_name = {g.name: g for g in track.plan.groups}
-        found = []
+        limits = []
         for x in track.brackets:
             here = x.group, x.low, x.high
             if here not in self._crossings:
                 self._crossings[here] = crossing(partial(track.margin, by_name[x.group]), x.low, x.high)
             q, side = self._crossings[here]
-            found.append(Limit(x.group, q + x.on, side))
+            limits.append(Limit(x.group, q + x.on, side))
         for name, way in track.continuations.items():
-            found += [Limit(name, q, side) for q, side in way.ends]
+            limits += [Limit(name, q, side) for q, side in way.ends]
         unique: list[Limit] = []
-        for limit in sorted(found, key=lambda x: x.input):
+        order = [*by_name]
+        for limit in sorted(limits, key=lambda x: x.input):
             if not unique or abs(limit.input - unique[-1].input) > 1e-10 * track.length:
                 unique.append(limit)
+            # groups that depend on the one that ends here end with it
+            elif order.index(limit.group) < order.index(unique[-1].group):
+                unique[-1] = limit
         return unique
 
     def shortfall(self, inputs: tuple[float, ...]) -> Shortfall | None:

@@ -39,15 +39,15 @@ def along_lines(track: Along, group: Group, st: State) -> None:
         with np.errstate(all="ignore"):
             track.run(before, trial)
             start = x[i] + moved * slope[i]
-            found, ok = newton(group, trial, start, m.size, limit=8)
+            solution, ok = newton(group, trial, start, m.size, limit=8)
             far = np.where(angles, 1.0, np.maximum(np.abs(x[i]), m.size))
-            change = np.abs((found - x[i]) / far).max(axis=1, initial=0.0)
-            new = _slope(track, group, before, at + to[:, None] * way[i], way[i], found)
+            change = np.abs((solution - x[i]) / far).max(axis=1, initial=0.0)
+            new = _slope(track, group, before, at + to[:, None] * way[i], way[i], solution)
             # the cubic's own defect, as along one input
-            defect = np.abs((found - x[i] - moved * 0.5 * (slope[i] + new)) / far).max(axis=1, initial=0.0)
+            defect = np.abs((solution - x[i] - moved * 0.5 * (slope[i] + new)) / far).max(axis=1, initial=0.0)
             ok &= (defect <= 0.05 * np.maximum(change, 1e-6)) & (change < 0.5)
         some = i[ok]
-        x[some], slope[some], gone[some] = found[ok], new[ok], to[ok]
+        x[some], slope[some], gone[some] = solution[ok], new[ok], to[ok]
         step[some] = np.minimum(2 * step[some], longest[some])
         step[i[~ok]] /= 2
         closed &= step > FINEST * longest

@@ -68,10 +68,10 @@ class Noted:
 
         changes = [replace(c, input=c.input + on) for c in seen.changes for on in copies(c.input).tolist()]
         self._add(group, changes)
-        known = set(self.brackets)
+        present = set(self.brackets)
         for x in seen.brackets:
             others = (x.carried(on) for on in copies((x.low + x.high) / 2 + x.on).tolist())
-            self.brackets += [other for other in others if other not in known]
+            self.brackets += [other for other in others if other not in present]
 
     def note(
         self, group: Group, flips: Reals, brackets: list[Bracket], share: float
@@ -82,14 +82,14 @@ class Noted:
         around = [x for x in [*self.brackets, *brackets] if x.group == group.name]
         out = {x for x in around for where in flips if x.on == 0 and x.low <= where <= x.high}
         self.brackets[:] = [x for x in [*self.brackets, *brackets] if x not in out]
-        known, same = self.flips.get(group.name, NOWHERE), SAME * self.pace.one_turn(group)
-        fresh = np.array([where for where in flips if np.abs(known - where).min(initial=np.inf) > same])
+        noted, same = self.flips.get(group.name, NOWHERE), SAME * self.pace.one_turn(group)
+        fresh = np.array([where for where in flips if np.abs(noted - where).min(initial=np.inf) > same])
         if not len(fresh):
             return ()
         from virtualwork.branch.change_point import through
 
         self.track.assembly.plain.pop(group.name, None)
-        self.flips[group.name] = self._as_passed(group, np.sort(np.append(known, fresh)))
+        self.flips[group.name] = self._as_passed(group, np.sort(np.append(noted, fresh)))
         # the branch through each one can be told only once all of them are known
         changes = [through(self.track, group, float(where), share) for where in fresh]
         self._add(group, changes)

@@ -75,7 +75,7 @@ class Pace:
         rates: list[float] = []
         for step in [*self.assembly.before(group), group]:
             rates += [k for t in turns([step]) for _, k in t.angle.inputs]
-            if any(t.slides for t in turns([step])):
+            if any(t.slides and t.angle.runs for t in turns([step])):
                 # it runs on and on
                 return None
             if any(not float(r).is_integer() for t in turns([step]) for _, r in t.angle.turning):

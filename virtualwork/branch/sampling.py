@@ -298,10 +298,10 @@ def touched(
         d = side * m
         low = (d[1:-1] <= d[:-2]) & (d[1:-1] < d[2:]) & (np.abs(m[1:-1]) < DIP * level)
         for i in 1 + np.flatnonzero(low if side > 0 else low & (d[1:-1] > 0)):
-            found = lowest(margin, float(q[i - 1]), float(q[i + 1]), noise)
-            if found is None:
+            least = lowest(margin, float(q[i - 1]), float(q[i + 1]), noise)
+            if least is None:
                 continue
-            where, depth_there, left = found
+            where, depth_there, left = least
             # the gap is narrower than the samples
             if side * depth_there < -left and d[i] > 0:
                 crossed += [(min(end, where), max(end, where)) for end in (float(q[i - 1]), float(q[i + 1]))]

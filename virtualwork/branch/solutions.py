@@ -12,7 +12,7 @@ from virtualwork.branch.choice import Choice
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.newton import gaps, newton, write_unknowns
-from virtualwork.formulas.numbers import dot, stack, stack_rows
+from virtualwork.formulas.numbers import Number, dot, stack, stack_rows
 from virtualwork.formulas.positions import State, columns
 from virtualwork.plan.steps import Group
 
@@ -38,13 +38,11 @@ def guessed_unknowns(
     write_unknowns(group, st, x)
     left = []
     for j, g in enumerate(group.slides, len(group.angles)):
-        guide = m.guides[g]
-        on = complex(np.ravel(st.turn[guide.on])[0])
-        origin = _origin(guide.on, m.through(guide), on, points, m)
-        if guide.point in points and origin is not None:
-            x[0, j] = dot(points[guide.point] - origin, directions[g] * on)
-        else:
+        slide = guessed_slide(g, complex(np.ravel(st.turn[m.guides[g].on])[0]), points, m, directions)
+        if slide is None:
             left.append(j)
+        else:
+            x[0, j] = slide
     write_unknowns(group, st, x)
     if left:
         # the loops are linear in the slides
@@ -55,9 +53,18 @@ def guessed_unknowns(
     return x
 
 
-def _origin(
-    body: str, z: complex, turn: complex, points: Mapping[str, complex], m: Description
-) -> complex | None:
+def guessed_slide(
+    guide: int, on: Number, points: Mapping[str, Number], m: Description, directions: Mapping[int, Number]
+) -> Number:
+    """A slide from the guessed points, where its guide's body stands at the rotation `on`; None where they do not say."""
+    g = m.guides[guide]
+    origin = _origin(g.on, m.through(g), on, points, m)
+    if g.point not in points or origin is None:
+        return None
+    return dot(points[g.point] - origin, directions[guide] * on)
+
+
+def _origin(body: str, z: Number, turn: Number, points: Mapping[str, Number], m: Description) -> Number:
     if body == GROUND:
         return z
     for name, local in m.links[body].points.items():

@@ -69,11 +69,13 @@ class Track:
         # one turn says it all where every turn of a body is a whole number of turns of the input
         angles = [t.angle for t in turns(self.plan.steps)]
         factors = [k for angle in angles for _, k in (*angle.inputs, *angle.turning)]
-        runs = any(t.slides for t in turns(self.plan.steps))
+        runs = any(t.slides and t.angle.runs for t in turns(self.plan.steps))
         self.whole = not (self.slides or runs) and all(float(k).is_integer() for k in factors)
         self.repeats = self.whole and all(g.kind != "Newton" for g in self.plan.groups)
         # no body turns with one of a loop, or with a slide's line, any faster than the input
-        follows = any(angle.bases for angle in angles) or any(g.kind == "RPR" for g in self.plan.groups)
+        follows = not all(angle.by_inputs for angle in angles) or any(
+            g.kind == "RPR" for g in self.plan.groups
+        )
         self.even = not follows and all(abs(k) <= 1 for k in factors)
         # no change point anywhere, however far the input turns: without a loop there is none
         self.settled = not self.plan.groups
@@ -108,8 +110,8 @@ class Track:
             wind_along_lines(self, group, st, bodies)
             return
         for body in bodies:
-            found = whole(self._samples.get(body, NONE), st.inputs[0], np.angle(st.turn[body]))
-            st.angle[body] = found if np.ndim(st.inputs[0]) else float(found)
+            turns = whole(self._samples.get(body, NONE), st.inputs[0], np.angle(st.turn[body]))
+            st.angle[body] = turns if np.ndim(st.inputs[0]) else float(turns)
 
     @alone
     def cover(self, low: float, high: float) -> None:
@@ -308,8 +310,8 @@ class Track:
             if s.name in self.flips or s.name in self.folded:
                 self.close(s, st)
             for body in self.assembly.geared.intersection(s.members):
-                known = self._samples.get(body, NONE)
-                samples = follow(partial(self._angle, body), grid, self.start, self.length, known)
+                held = self._samples.get(body, NONE)
+                samples = follow(partial(self._angle, body), grid, self.start, self.length, held)
                 self._samples[body] = samples
                 st.angle[body] = whole(samples, q, np.angle(st.turn[body]))
 

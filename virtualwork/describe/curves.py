@@ -22,6 +22,9 @@ N = TypeVar("N", float, complex)
 # columns of a table over the input, with what makes them SI
 TURNS = {"angle_rad": 1.0, "angle_deg": math.pi / 180}
 TRAVELS = {"position_m": 1.0, "position_mm": 1e-3}
+# the lift of a sliding follower, and of an arm
+LIFTS = {"lift_m": 1.0, "lift_mm": 1e-3}
+SWINGS = {"swing_rad": 1.0, "swing_deg": math.pi / 180}
 # the columns that a table of torque may be over
 AXES = {
     "t_s": ("time", 1.0),
@@ -33,19 +36,27 @@ AXES = {
 }
 
 
-@dataclass(frozen=True)
+class Rows(tuple[tuple[float, Any], ...]):
+    """The rows of a table with the `name` of its file; it compares as its rows."""
+
+    name: str = ""
+
+
+@dataclass(eq=False, repr=False)
 class Curve(Form):
-    """A table beside the file; it cannot be written into the file itself."""
+    """A table beside the file, which the file names; rows without a name cannot be written."""
 
     def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
+        if isinstance(value, Rows) and value.name:
+            return value.name
         raise DescriptionError("a table beside the file cannot be written into it")
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Law(Curve):
     """A law of motion: a CSV of time_s and angle_deg (angle_rad, position_m, position_mm)."""
 
-    def read(self, value: Any, where: str, entry: Entry) -> tuple[tuple[float, float], ...]:
+    def read(self, value: Any, where: str, entry: Entry) -> Rows:
         over = TRAVELS if entry.slides else TURNS
         rows, _ = curve(
             entry,
@@ -56,10 +67,36 @@ class Law(Curve):
             f"time_s and {' or '.join(over)}",
             lambda row, column: (float(row["time_s"]), float(row[column]) * over[column]),
         )
-        return tuple(rows)
+        return rows
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
+class LiftTable(Curve):
+    """The lift of a cam's follower over one turn: a CSV of angle_deg (angle_rad) and lift_mm, or swing_deg."""
+
+    def read(self, value: Any, where: str, entry: Entry) -> Rows:
+        lifts = LIFTS if entry.slides else SWINGS
+
+        def pair(row: dict[str, str], column: str) -> tuple[float, float]:
+            lift = next(name for name in lifts if name in row)
+            return float(row[column]) * TURNS[column], float(row[lift]) * lifts[lift]
+
+        columns = f"{' or '.join(TURNS)}, and {' or '.join(lifts)}"
+        rows, column = curve(entry, value, where, TURNS, lifts, columns, pair)
+        rises([at for at, _ in rows], value, where, column)
+        if len(rows) < 4 or abs(rows[-1][0] - rows[0][0] - 2 * math.pi) > 1e-9:
+            raise wrong(
+                where,
+                value,
+                f"at least four rows over one turn of {column}, the last 360 deg after the first",
+            )
+        largest = max(abs(lift) for _, lift in rows)
+        if abs(rows[-1][1] - rows[0][1]) > 1e-9 * largest:
+            raise wrong(where, value, "the same lift in the first and the last row")
+        return rows
+
+
+@dataclass(eq=False, repr=False)
 class ForceTable(Curve):
     """A force over the input: a CSV of angle_deg (angle_rad, position_m, position_mm), fx_N and fy_N."""
 
@@ -81,10 +118,10 @@ class ForceTable(Curve):
             ),
         )
         rises([at for at, _ in rows], value, where, column)
-        return {name: tuple(rows), "periodic": over is TURNS and is_cycle(rows[0][0], rows[-1][0])}
+        return {name: rows, "periodic": over is TURNS and is_cycle(rows[0][0], rows[-1][0])}
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class TorqueOrTable(Form):
     """A torque, or a table of it over the time, or over the angle or speed of its link: a CSV with torque_N_m."""
 
@@ -112,7 +149,7 @@ class TorqueOrTable(Form):
         rises([at for at, _ in rows], value, where, column)
         axis = AXES[column][0]
         periodic = axis == "angle" and is_cycle(rows[0][0], rows[-1][0])
-        return {name: 0.0, "history": tuple(rows), "over": axis, "periodic": periodic}
+        return {name: 0.0, "history": rows, "over": axis, "periodic": periodic}
 
     def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
         return self.torque.text(value, units, slides)
@@ -126,7 +163,7 @@ def curve(
     values: Collection[str],
     columns: str,
     pair: Callable[[dict[str, str], str], tuple[float, N]],
-) -> tuple[list[tuple[float, N]], str]:
+) -> tuple[Rows, str]:
     """The rows of a CSV file beside this one, each as `pair` reads it, and the column that they are over.
 
     Parameters
@@ -149,11 +186,12 @@ def curve(
     if column is None or rows[0].keys().isdisjoint(values):
         raise wrong(where, name, f"columns {columns}")
     try:
-        pairs = [pair(row, column) for row in rows]
+        pairs = Rows(pair(row, column) for row in rows)
     except (TypeError, ValueError):
         raise wrong(where, name, "numbers in every row") from None
     if not all(math.hypot(at, abs(value)) <= LARGEST for at, value in pairs):
         raise wrong(where, name, "finite numbers in every row")
+    pairs.name = str(name)
     return pairs, column
 
 

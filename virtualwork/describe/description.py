@@ -14,6 +14,7 @@ from typing import Any
 
 from dalembert.arithmetic.records import Record, record
 from virtualwork.describe import DescriptionError, require
+from virtualwork.describe.cams import CamDrive, drive_of
 from virtualwork.describe.forms import Form, Free, Pair
 from virtualwork.describe.keys import Key, Keys, Part, check, declared, place_of, table_keys
 from virtualwork.describe.meshes import Mesh
@@ -21,6 +22,7 @@ from virtualwork.describe.parts import (
     GROUND,
     PARTS,
     Belt,
+    Cam,
     Force,
     Friction,
     Gear,
@@ -66,6 +68,7 @@ class Description(Record):
     friction: tuple[Friction, ...] = ()
     belts: tuple[Belt, ...] = ()
     racks: tuple[Rack, ...] = ()
+    cams: tuple[Cam, ...] = ()
     tolerances: Mapping[str, float] = declared(
         Free("tolerances"),
         'limits of dimensions by their paths: "links.crank.B.x" = "0.05 mm" is ± that',
@@ -93,6 +96,7 @@ class Description(Record):
         tolerances: Mapping[str, float] | None = None,
         belts: Sequence[Belt] = (),
         racks: Sequence[Rack] = (),
+        cams: Sequence[Cam] = (),
         decimals: Decimals | None = None,
     ) -> None:
         values = {
@@ -112,6 +116,7 @@ class Description(Record):
             "friction": _several("friction", friction),
             "belts": _several("belts", belts),
             "racks": _several("racks", racks),
+            "cams": _several("cams", cams),
             "tolerances": MappingProxyType(dict(tolerances or {})),
             "decimals": decimals,
         }
@@ -121,7 +126,10 @@ class Description(Record):
         refuse(self)
 
     def __repr__(self) -> str:
-        counts = ((len(self.links), "link"), (len(self.pins) + len(self.guides) + len(self.meshes), "joint"))
+        counts = (
+            (len(self.links), "link"),
+            (len(self.pins) + len(self.guides) + len(self.meshes) + len(self.cams), "joint"),
+        )
         sizes = ", ".join(f"{n} {noun}{'' if n == 1 else 's'}" for n, noun in counts)
         driven = ", ".join(e.name for e in self.inputs) or "nothing"
         return f"{type(self).__name__}({self.name!r}: {sizes}, driven: {driven})"
@@ -139,7 +147,7 @@ class Description(Record):
         """Distances of two points of one link or of the ground, of guides from their bodies' axes, and radii, m."""
         spans = [abs(a - b) for body in self.bodies.values() for a in body.values() for b in body.values()]
         spans += [abs(g.through) for g in self.guides if not isinstance(g.through, str)]
-        wheels = [abs(rack.radius) for rack in self.racks]
+        wheels = [abs(rack.radius) for rack in self.racks] + [cam.prime_radius for cam in self.cams]
         return spans + wheels + [radius for belt in self.belts for radius in belt.radii]
 
     @cached_property
@@ -223,6 +231,11 @@ class Description(Record):
             *(belt.mesh for belt in self.belts),
             *(rack.mesh_on(i, self.guides[i].on) for rack, i in racks),
         )
+
+    @cached_property
+    def cam_drives(self) -> tuple[CamDrive, ...]:
+        """Every cam in its place: what carries it, where its follower stands at lift zero."""
+        return tuple(drive_of(self, number) for number in range(len(self.cams)))
 
     @property
     def ratios(self) -> tuple[float, ...]:
@@ -378,6 +391,11 @@ def refuse(m: Description) -> None:
             )
     for _, number, part in listed(m):
         check(part, place_of(part.table, number, len(m.inputs)) + part.label, m)
+    followers: dict[Any, int] = {}
+    for number, drive in enumerate(m.cam_drives, 1):
+        first = followers.setdefault(drive.guide if drive.body is None else drive.body, number)
+        if first != number:
+            raise DescriptionError(f"[[cams]] {number}: its follower is that of [[cams]] {first} already")
     if m.guess.at is not None and len(m.guess.at) != len(m.inputs):
         raise DescriptionError(
             f"[guess] at: found {len(m.guess.at)} values, expected one for each of {len(m.inputs)} inputs"

@@ -14,8 +14,9 @@ from dalembert.hints import nearest
 from dalembert.units import LISTED
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description, listed
+from virtualwork.describe.forms import Nested
 from virtualwork.describe.keys import keys_of, table_keys
-from virtualwork.describe.parts import Link
+from virtualwork.describe.parts import Input, Link
 from virtualwork.describe.points import joined
 
 D = TypeVar("D", bound=Description)
@@ -92,6 +93,12 @@ def _declared(prefix: str, where: Where, part: Any, slides: bool = False) -> Ite
     """The numbers of one part, by the keys that it declares."""
     for key in keys_of(type(part)):
         kind, held = key.form.dimension(slides), getattr(part, key.field)
+        if isinstance(key.form, Nested):
+            for i, row in enumerate(held or ()):
+                yield from _declared(f"{prefix}{key.name}.{i + 1}.", (*where, key.field, i), row, slides)
+            continue
+        if held is None and not isinstance(part, Input):
+            continue
         number = not isinstance(held, str) and not (held is None and key.form.parts)
         if kind and number and key.applies(part):
             yield from _numbers(prefix + key.name, kind, key.form.parts, (*where, key.field))

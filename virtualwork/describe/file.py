@@ -66,11 +66,13 @@ class Entry:
     where: str
     keys: Mapping[str, Any]
     fields: dict[str, Any] = field(default_factory=dict)
+    # the table of which it is a row
+    above: Entry | None = None
 
     @property
     def slides(self) -> bool:
-        """Whether it is an input that drives a slider."""
-        return "slider" in self.keys
+        """Whether it is a part that moves a slider."""
+        return "slider" in self.keys if self.above is None else self.above.slides
 
 
 def require_keys(entry: Mapping[str, Any], names: Collection[str], where: str, noun: str) -> None:

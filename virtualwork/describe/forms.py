@@ -38,7 +38,7 @@ class Names(Protocol):
         """The guides, each with its point."""
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Form:
     """A form of values; one that holds numbers names their dimension, a key of `dalembert.units.DIMENSIONS`."""
 
@@ -92,7 +92,7 @@ def whole(number: float) -> float:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Quantity(Form):
     """A number with a dimension; `sliding` is that of a part that slides, `negative` whether it may be below zero."""
 
@@ -121,7 +121,7 @@ class Quantity(Form):
         return whole(units.bare(value, self.dimension(slides)))
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Pair(Form):
     """Two numbers [x, y] of one dimension."""
 
@@ -144,7 +144,7 @@ class Pair(Form):
         return [whole(units.bare(x, self.of)) for x in (value.real, value.imag)]
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Lengths(Form):
     """A list of so many lengths."""
 
@@ -169,7 +169,7 @@ class Lengths(Form):
         return [whole(units.bare(x, "length")) for x in value]
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Flag(Form):
     """True or false."""
 
@@ -182,7 +182,7 @@ class Flag(Form):
         return value
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Choice(Form):
     """One of some words."""
 
@@ -196,7 +196,7 @@ class Choice(Form):
             raise wrong(where, value, " or ".join(map(repr, self.words)))
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Body(Form):
     """The name of a link, or of the ground."""
 
@@ -206,7 +206,7 @@ class Body(Form):
         require(value, names.bodies if self.ground else names.links, where, "link")
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class TwoBodies(Form):
     """The names of two links."""
 
@@ -233,7 +233,7 @@ def _has(names: Names, body: str, point: str, where: str) -> None:
         require(point, names.bodies[body], where, f"point of {owner}")
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class PointName(Form):
     """The name of a point of the body that another field names; of any body where it names no field."""
 
@@ -246,7 +246,7 @@ class PointName(Form):
             require(value, {p for points in names.bodies.values() for p in points}, where, "point")
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Place(Form):
     """A point of the body that another field names: its name, or [x, y] in the axes of that body."""
 
@@ -273,7 +273,7 @@ class Place(Form):
         return value if isinstance(value, str) else Pair("length").text(value, units)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Ends(TwoBodies):
     """Two points, each (body, its name or its place in the axes of the body); `crank.B` in the file."""
 
@@ -295,7 +295,7 @@ class Ends(TwoBodies):
         return [f"{body}.{point}" for body, point in value]
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class DrivenPoint(Form):
     """The point of the one slot or slider that an input drives."""
 
@@ -306,7 +306,7 @@ class DrivenPoint(Form):
             raise DescriptionError(f"{where}: '{value}' runs in more than one guide")
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class RackPoint(DrivenPoint):
     """The point of the one slot or slider that moves with a toothed wheel."""
 
@@ -323,7 +323,30 @@ class RackPoint(DrivenPoint):
             )
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
+class FollowerPoint(DrivenPoint):
+    """The point of the one slot or slider along which a cam moves its follower."""
+
+    def check(self, value: Any, where: str, part: Any, names: Names) -> None:
+        super().check(value, where, part, names)
+        guide = next(guide for guide in names.guides if guide.point == value)
+        if part.cam in (guide.link, guide.on):
+            raise DescriptionError(
+                f"{where}: '{value}' is a point of the cam '{part.cam}' or slides on it, expected a follower of its own"
+            )
+
+
+@dataclass(eq=False, repr=False)
+class Nested(Form):
+    """A list of tables, each with the keys that a dataclass declares."""
+
+    of: type
+
+    def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
+        raise NotImplementedError("`describe.text` writes the tables of a part")
+
+
+@dataclass(eq=False, repr=False)
 class Free(Form):
     """A value that the reader takes in a way of its own; `schema` names its schema."""
 

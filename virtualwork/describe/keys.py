@@ -11,7 +11,8 @@ from typing import Any, ClassVar
 
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.file import Entry, missing, require_keys
-from virtualwork.describe.forms import Form, Free, Names
+from virtualwork.describe.forms import Form, Free, Names, Nested
+from virtualwork.describe.units import wrong
 
 
 @dataclass(frozen=True)
@@ -211,10 +212,23 @@ def read_fields(entry: Entry, keys: Keys) -> dict[str, Any]:
         if isinstance(key.form, Free):
             # the reader itself takes it
             continue
-        if name in table:
+        if name in table and isinstance(key.form, Nested):
+            entry.fields[key.field] = _rows(entry, key.form, table[name], f"{where} {name}")
+        elif name in table:
             entry.fields.update(key.form.fields(key.field, table[name], f"{where} {name}", entry))
         elif callable(key.default):
             entry.fields[key.field] = key.default(entry)
         elif key.default is not None and key.field not in entry.fields:
             entry.fields[key.field] = key.default
     return entry.fields
+
+
+def _rows(entry: Entry, form: Nested, value: Any, where: str) -> tuple[Any, ...]:
+    """The tables of a list, each read by the keys of its class."""
+    if not isinstance(value, list) or not all(isinstance(row, dict) for row in value):
+        raise wrong(where, value, "a list of tables")
+    keys = table_keys(form.of)
+    return tuple(
+        form.of(**read_fields(Entry(entry.file, f"{where} {i}", row, above=entry), keys))
+        for i, row in enumerate(value, 1)
+    )

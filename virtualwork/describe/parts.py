@@ -15,6 +15,7 @@ from typing import ClassVar, Literal
 
 from dalembert.arithmetic.records import Record, record
 from virtualwork.describe import DescriptionError
+from virtualwork.describe.cams import Cam as Cam
 from virtualwork.describe.curves import ForceTable, Law, TorqueOrTable
 from virtualwork.describe.file import GROUND as GROUND
 from virtualwork.describe.file import Entry
@@ -31,6 +32,7 @@ from virtualwork.describe.forms import (
     TwoBodies,
 )
 from virtualwork.describe.keys import Key, Part, declared
+from virtualwork.describe.laws import Segment as Segment
 from virtualwork.describe.meshes import Belt as Belt
 from virtualwork.describe.meshes import Gear as Gear
 from virtualwork.describe.meshes import Rack as Rack
@@ -394,6 +396,7 @@ PARTS: tuple[type[Part], ...] = (
     Gear,
     Belt,
     Rack,
+    Cam,
     Force,
     Torque,
     Spring,

@@ -54,11 +54,11 @@ def as_number(value: float) -> float:
     return value if isinstance(value, complex) else float(value)
 
 
-def by_name(what: str, given: Mapping[str, Any]) -> Mapping[str, Any]:
+def by_name(what: str, entries: Mapping[str, Any]) -> Mapping[str, Any]:
     """Refuse what is no mapping of names."""
-    if not isinstance(given, Mapping):
-        raise DescriptionError(f"{what}: expected a mapping of names, found {type(given).__name__}")
-    return given
+    if not isinstance(entries, Mapping):
+        raise DescriptionError(f"{what}: expected a mapping of names, found {type(entries).__name__}")
+    return entries
 
 
 def as_points(points: Mapping[str, Point]) -> Mapping[str, complex]:

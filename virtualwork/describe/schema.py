@@ -6,7 +6,7 @@ from typing import Any
 
 from dalembert.quantities import expected
 from virtualwork.describe.description import FILE, UNITS
-from virtualwork.describe.forms import PAIR, QUANTITY, TEXT, Free, Pair, Quantity, Schema
+from virtualwork.describe.forms import PAIR, QUANTITY, TEXT, Free, Nested, Pair, Quantity, Schema
 from virtualwork.describe.keys import Key, Keys, table_keys
 from virtualwork.describe.parts import TABLES, Guess, Link, Polar
 
@@ -61,7 +61,8 @@ def _table(keys: Keys) -> Schema:
         if key.unless and keys[other].field == key.unless
     ]
     if either:
-        table["oneOf"] = [{"required": [name]} for pair in either for name in pair]
+        choices = [{"oneOf": [{"required": [name]} for name in pair]} for pair in either]
+        table |= choices[0] if len(choices) == 1 else {"allOf": choices}
     beside = {name: [key.beside] for name, key in keys.items() if key.beside}
     return table | ({"dependentRequired": beside} if beside else {})
 
@@ -73,6 +74,8 @@ def _description(key: Key) -> str:
 
 
 def _form(key: Key) -> Schema:
+    if isinstance(key.form, Nested):
+        return {"type": "array", "items": _table(table_keys(key.form.of)), "minItems": 1}
     return _free(key.form.name) if isinstance(key.form, Free) else key.form.schema()
 
 

@@ -10,9 +10,10 @@ from dataclasses import MISSING, fields
 from typing import Any
 
 from virtualwork.describe import DescriptionError
+from virtualwork.describe.curves import Rows, TorqueOrTable
 from virtualwork.describe.description import FILE, Description
 from virtualwork.describe.file import require_keys
-from virtualwork.describe.forms import Free, Pair, Quantity
+from virtualwork.describe.forms import Free, Nested, Pair, Quantity
 from virtualwork.describe.keys import keys_of, table_keys
 from virtualwork.describe.parts import PARTS, TABLES, Guess, Input, Link
 from virtualwork.describe.units import SI, Units
@@ -140,8 +141,18 @@ def table_of(part: Any, units: Units = SI, slides: bool = False) -> Table:
         if value is None or isinstance(key.form, Free) or not key.applies(part):
             continue
         if key.needed or key.unless or callable(key.default) or value != key.default:
-            table[key.name] = key.form.text(value, units, slides)
+            rows = isinstance(key.form, Nested)
+            table[key.name] = (
+                [table_of(row, units, slides) for row in value]
+                if rows
+                else key.form.text(value, units, slides)
+            )
     declared = {key.field for key in keys}
+    history = getattr(part, "history", None)
+    if isinstance(history, Rows) and history.name:
+        # what is read from a table beside the file, which the file names
+        declared |= {"history", "over", "periodic"}
+        table |= {key.name: history.name for key in keys if isinstance(key.form, TorqueOrTable)}
     for f in fields(part):
         default = f.default_factory() if f.default_factory is not MISSING else f.default
         if f.name not in declared and getattr(part, f.name) != default and not isinstance(part, Link):

@@ -17,24 +17,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.arithmetic.doubled import Doubled
+from dalembert.arithmetic.engines.doubled import OWN, estimated
 from dalembert.arithmetic.guard import guarded
-from virtualwork.digits.second_run import TURN, Found, SecondRun, length
-from virtualwork.formulas.asked import FORCES, Key, over_blocks
-from virtualwork.formulas.lanes import Turning
+from virtualwork.digits.second_run import Found, SecondRun, answer, apart, parts
+from virtualwork.formulas.asked import FORCES, Key
+from virtualwork.formulas.lanes import Lanes, over_blocks
 from virtualwork.formulas.numbers import Reals
-from virtualwork.formulas.poses import Poses
 
 if TYPE_CHECKING:
     from virtualwork.formulas.dynamics import Dynamics
 
-# of the difference, and of the quantity: what the second run itself may be off by, far from singular places
-OWN, LAST = 1.01, 2.0**-96
 # a radicand, relative, that rounding may reach, and the share of it that rounding takes
 NEAR, DOUBTED = 1e-12, 0.1
 # nodes on the way through a change point, and how many times farther off than the poses that a series carries through
@@ -51,7 +49,7 @@ class Estimates:
 
     Parameters
     ----------
-    poses : Poses
+    poses : Lanes
     values : function of keys, optional
         Gives the quantities as they were handed out, (n,) each; default those of the poses.
     dynamics : function, optional
@@ -59,16 +57,15 @@ class Estimates:
     """
 
     def __init__(
-        self, poses: Poses, values: Values | None = None, dynamics: Callable[[], Dynamics] | None = None
+        self, poses: Lanes, values: Values | None = None, dynamics: Callable[[], Dynamics] | None = None
     ) -> None:
         self.poses, self.n, self.lock = poses, poses.n, poses.lock
-        # poses that are asked for estimates are those of an assembly
-        self.branch = cast(Turning, poses.branch)
+        self.branch = poses.branch
         self._values = values or (lambda keys: [over_blocks(poses, key) for key in keys])
         self._dynamics = dynamics
         self._known: dict[Key, Reals] = {}
-        # of each group, the poses whose assembly rounding may have exchanged, once they were looked at
-        self._undecided: dict[str, NDArray[np.bool_]] | None = None
+        # of each group, once it was looked at, the poses whose assembly rounding may have exchanged
+        self._undecided: dict[str, NDArray[np.bool_]] = {}
 
     def of(self, key: Key) -> Reals:
         """The estimate of a quantity's error, (n,); the length of the error of a vector."""
@@ -78,34 +75,42 @@ class Estimates:
     def together(self, keys: Iterable[Key]) -> None:
         """Form the estimates of several quantities, which have most of the second run in common; `of` gives them out."""
         new = [key for key in dict.fromkeys(keys) if key not in self._known]
-        lost = [key for key in new if self._lost(key)]
-        self._known |= {key: np.full(self.n, np.inf) for key in lost}
-        new = [key for key in new if key not in lost]
+        values = dict(zip(new, self._values(new), strict=True)) if new else {}
+        for key in filter(self._lost, new):
+            value = values.pop(key)
+            self._known[key] = _without_nan(np.full(self.n, np.inf), value)
+        new = list(values)
         if not new:
             return
-        values = dict(zip(new, self._values(new), strict=True))
-        margins: list[Key] = [("margin", g.name) for g in self.second.exact.closed]
-        found = self.second.doubled([*new, *margins])
-        if self._undecided is None:
-            self._undecided = self._doubted({key[1]: found[key][0].value for key in margins})
-        errors = {key: _apart(key, values[key], found[key]) for key in new}
+        margins: list[Key] = [
+            ("margin", g.name) for g in self.second.exact.closed if g.name not in self._undecided
+        ]
+        if margins:
+            # of groups that none of these depend on nothing is formed
+            depended = {group for key in new for group in self.second.exact.hangs_on(key)}
+            margins = [key for key in margins if key[1] in depended]
+        estimates, found = self.second.compared(values, margins)
+        self._undecided |= self._doubted({key[1]: found[key][0].value for key in margins})
         rows = self._close_to_change
         if rows.any():
-            errors = self._passing(new, rows, values, errors)
+            self._pass(rows, values, estimates)
         for group, rows in self._undecided.items():
-            here = [key for key in new if group in self.second.exact.hangs_on(key)]
-            some = self.second.some(rows)
-            other = some.doubled(here, {f"sign {group}": -some.sign(group)}) if here else {}
-            for key in here:
-                errors[key][rows] = np.maximum(errors[key][rows], _apart(key, values[key][rows], other[key]))
+            here = [key for key in new if group in self.second.exact.hangs_on(key)] if rows.any() else []
+            if here:
+                some = self.second.some(rows)
+                other = {f"sign {group}": -some.sign(group)}
+                there, _ = some.compared({key: values[key][rows] for key in here}, changed=other)
+                for key in here:
+                    estimates[key][rows] = np.maximum(estimates[key][rows], there[key])
         for key in new:
-            for more in self.second.uncertain(key, found):
-                errors[key] = errors[key] + more
-            # what is no number is infinite
-            known = np.isfinite(values[key])
-            size = np.abs(values[key])
-            estimate = np.where(errors[key] < np.inf, OWN * errors[key] + LAST * size, np.inf)
-            self._known[key] = np.where(known, estimate, np.nan)
+            for more in self.second.uncertain(key):
+                estimates[key] += OWN * more
+            self._known[key] = _without_nan(estimates[key], values[key])
+
+    @property
+    def looked_at(self) -> frozenset[str]:
+        """The groups whose assembly was compared with that of the second run: those that a quantity depends on."""
+        return frozenset(self._undecided)
 
     @cached_property
     def second(self) -> SecondRun:
@@ -123,14 +128,15 @@ class Estimates:
         """The poses so near a limit of a group that rounding may have taken the one of its two assemblies for the other."""
         found = {}
         for group in self.second.exact.closed:
+            if group.name not in margins:
+                continue
             exact = margins[group.name]
+            found[group.name] = np.zeros(self.n, dtype=bool)
             if group.name in self.second.exact.folded or not np.any(np.abs(exact) < NEAR):
                 continue
             self.poses.solve(self.poses.plan.writes(group), 0)
             off = np.abs(self._margin(group.name) - exact) > DOUBTED * np.abs(exact)
-            rows = (np.abs(exact) < NEAR) & off & ~self._close_to_change
-            if rows.any():
-                found[group.name] = rows
+            found[group.name] = (np.abs(exact) < NEAR) & off & ~self._close_to_change
         return found
 
     def _margin(self, group: str) -> Reals:
@@ -143,39 +149,28 @@ class Estimates:
         """The poses close to a change point, where a series replaces the closed forms."""
         if self.poses.inputs.shape[1] > 1:
             return np.zeros(self.n, dtype=bool)
-        _ = self.second.lanes.recording
+        _ = self.second.poses.recording
         return self.branch.close_to_change(self.poses.inputs[:, 0])
 
-    def _passing(
-        self,
-        keys: Sequence[Key],
-        rows: NDArray[np.bool_],
-        values: Mapping[Key, Any],
-        errors: Mapping[Key, Reals],
-    ) -> dict[Key, Reals]:
-        """The errors close to change points, by interpolation where two branches meet there exactly.
+    def _pass(self, rows: NDArray[np.bool_], values: Mapping[Key, Any], estimates: dict[Key, Reals]) -> None:
+        """The estimates close to change points, by interpolation where two branches meet there exactly.
 
         Where the numbers keep them apart, if only in their last digits, the formulas themselves say what happens.
         """
         turns: list[Key] = [("turn", body) for g in self.second.exact.closed for body in g.angles]
         margins: list[Key] = [("margin", g.name) for g in self.second.exact.closed]
         some = self.second.some(rows)
-        beside = self._interpolated([*keys, *turns], rows)
+        beside = self._interpolated([*values, *turns], rows)
         here = some.doubled([*turns, *margins])
         root = np.sqrt(
             np.abs(np.min([np.broadcast_to(here[key][0].value, some.n) for key in margins], axis=0))
         )
-        apart = [
-            length([(a - b).value for a, b in zip(here[key], beside[0][key], strict=True)]) for key in turns
-        ]
-        meet = np.max(apart, axis=0) * root < MEETING
-        found = {}
-        for key in keys:
-            part = values[key][rows]
-            smooth = np.maximum(*(_apart(key, part, each[key]) for each in beside))
-            found[key] = errors[key].copy()
-            found[key][rows] = np.where(meet, smooth, errors[key][rows])
-        return found
+        gaps = [apart(key, here[key], beside[0][key]) for key in turns]
+        meet = np.max(gaps, axis=0) * root < MEETING
+        for key, value in values.items():
+            answered = parts(key, value[rows])
+            smooth = np.maximum(*(estimated(each[key], answered, answer(key).turning) for each in beside))
+            estimates[key][rows] = np.where(meet, smooth, estimates[key][rows])
 
     def _interpolated(self, keys: Sequence[Key], rows: NDArray[np.bool_]) -> list[Found]:
         """The quantities close to change points from poses farther off, two times: how far these are apart tells of both."""
@@ -197,14 +192,11 @@ class Estimates:
         return found
 
 
-def _apart(key: Key, value: Any, exact: Sequence[Doubled]) -> Reals:
-    """The size of the difference of a quantity and its second run, (n,)."""
-    parts = [value] if len(exact) == 1 else [value.real, value.imag]
-    with np.errstate(invalid="ignore"):
-        apart = [of - Doubled(part) for of, part in zip(exact, parts, strict=True)]
-        if key[0] == "angle" and key[2] == 0:
-            apart = [apart[0] - TURN * np.rint(apart[0].high / (2 * math.pi))]
-        return length([each.value for each in apart])
+def _without_nan(estimates: Reals, values: Any) -> Reals:
+    """Estimates where what is no number is infinite, and NaN where the quantity itself is none."""
+    if np.isfinite(np.add.reduce(estimates)):
+        return estimates
+    return np.where(np.isfinite(values), np.where(np.isnan(estimates), np.inf, estimates), np.nan)
 
 
 def _weights(nodes: Reals, q: Doubled) -> list[Doubled]:

@@ -25,8 +25,8 @@ from typing import Any
 
 from dalembert.arithmetic.doubled import PI, Doubled
 from dalembert.arithmetic.guard import guarded
-from dalembert.arithmetic.recorded import Number, Recorder, bare
-from dalembert.arithmetic.varied import Varied
+from dalembert.arithmetic.recorded import Number, Recorder, bare, lifted
+from dalembert.arithmetic.varied import Precise, Varied
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, dimensions, value
 from virtualwork.formulas.block import Block
@@ -38,6 +38,7 @@ from virtualwork.formulas.newton import gaps, unknowns
 from virtualwork.formulas.numbers import Written, dot, plus
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.reactions import JointForces
+from virtualwork.formulas.recorded_forces import negative
 from virtualwork.formulas.recording import Recording
 from virtualwork.formulas.statics import equations
 from virtualwork.plan.order import plan
@@ -56,6 +57,25 @@ class Meeting(Written):
 
 
 MEETING = Meeting()
+
+
+class Unrounded(Written):
+    """Recorded numbers whose linear systems round no constant to 16 digits.
+
+    Recorded numbers leave arithmetic of constants to Python: of a column of ones, as of slides along fixed lines, the
+    reflection's √3 would be a float, and the solution no better in 32 digits than in 16.
+    """
+
+    def __init__(self, recorder: Recorder) -> None:
+        self.recorder = recorder
+
+    def system(self, rows: list[list[Number]], right: list[Number], least: float = 0.0) -> list[Number]:
+        """Solve rows·x = right."""
+        return super().system([self._written(row) for row in rows], self._written(right), least)
+
+    def _written(self, row: list[Number]) -> list[Number]:
+        """The numbers of a row; a constant but zero, which costs nothing, is an operation too."""
+        return [x if isinstance(x, (int, float)) and x == 0 else lifted(self.recorder, bare(x)) for x in row]
 
 
 class Numbers:
@@ -79,6 +99,10 @@ class Numbers:
         self.mechanism = changed(m, numbers)
         if m.meshes:
             self.mechanism = replace(self.mechanism, guess=self._guess())
+        if m.cams:
+            pi: Any = self.enter("pi", math.pi, PI)
+            cams = tuple(replace(cam, pi=pi) for cam in self.mechanism.cams)
+            self.mechanism = replace(self.mechanism, cams=cams)
 
     def _number(self, dimension: Dimension) -> Any:
         x = float(complex(value(self._of, dimension.path)).real)
@@ -87,21 +111,15 @@ class Numbers:
             quarters = round(x / (math.pi / 2))
             if abs(x / (math.pi / 2) - quarters) <= 1e-15 * max(1.0, abs(quarters)):
                 exact = QUARTER * float(quarters)
-        whole = dimension.kind == "number" and x.is_integer()
-        if dimension.where[0] == "belts":
-            # a ratio in whole numbers turns without the angle itself
-            first, second = self._of.belts[int(dimension.where[1])].radii
-            whole = (first / second).is_integer()
-            exact = Doubled(x) if whole else exact
-        if not exact.low and (x == 0 or whole or (dimension.kind != "angle" and abs(x) == 1)):
-            # it is as exact as it stands, and costs nothing
+        if not exact.low and (x == 0 or (dimension.kind not in ("angle", "length") and abs(x) == 1)):
+            # it is as exact as it stands, and costs nothing; of lengths of 1 there are roots and angles
             return x
         return self.enter(dimension.path, x, exact)
 
-    def enter(self, name: str, x: float, exact: Doubled) -> Varied:
+    def enter(self, name: str, x: float, exact: Doubled) -> Precise:
         """A number as an input of the tape."""
         self.known[name] = exact
-        return Varied(x, self._recorder.input(name))
+        return Precise(x, self._recorder.input(name))
 
     def rest(self, kind: str, x: float) -> float:
         """What a number of the description is exactly, less the float."""
@@ -167,6 +185,7 @@ class Exact(Recording):
             branch.geared,
             settled=False,
             recorder=recorder,
+            kind=Unrounded(recorder),
         )
 
     @cached_property
@@ -227,7 +246,7 @@ class Exact(Recording):
     # --- further forces -------------------------------------------------------------------------------------------
     def _generalized(self, j: int) -> Number:
         paths, _, block = self.forces
-        return self._negative(generalized_force(paths, block, j))
+        return negative(generalized_force(paths, block, j))
 
     def _applied(self, link: str) -> Number:
         return self._reduced(link)[0]

@@ -5,25 +5,26 @@ redundant. Those solve the equilibrium of all links, A f + b = 0, by singular va
 32 digits, A⁺ times that, is what they are off by, one step of iterative refinement (N. J. Higham, Accuracy and
 Stability of Numerical Algorithms, 2nd ed., §12.1).
 
-With joint friction, loads and forces are exchanged in 32 digits until neither changes; where statics is redundant
-besides there is no estimate (infinite).
+With joint friction, loads and forces are exchanged in 32 digits until neither changes, and enter that balance so.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from dalembert.arithmetic.doubled import Doubled
+from dalembert.arithmetic.engines.doubled import OWN
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.guard import guarded
 from virtualwork.describe.parts import GROUND
-from virtualwork.digits.estimates import OWN, Estimates
-from virtualwork.formulas.asked import Key, over_blocks
+from virtualwork.digits.estimates import Estimates
+from virtualwork.formulas.asked import Key
 from virtualwork.formulas.dynamics import Dynamics, joints_at
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.statics import NULL, Column
 from virtualwork.plan.steps import Joint
@@ -36,11 +37,13 @@ class ForceErrors:
     def __init__(self, dynamics: Dynamics) -> None:
         self.dynamics, self.n, self.lock = dynamics, dynamics.poses.n, dynamics.lock
         self.mechanism = dynamics.poses.mechanism
-        self.estimates = Estimates(dynamics.poses, self._values, lambda: dynamics)
+        # forces that are asked for estimates are those of a motion
+        self._poses = cast(Lanes, dynamics.poses)
+        self.estimates = Estimates(self._poses, self._values, lambda: dynamics)
 
     def _values(self, keys: Sequence[Key]) -> list[Any]:
         """The forces as they were handed out."""
-        return [over_blocks(self.dynamics.poses, key, self.dynamics) for key in keys]
+        return self._poses.values(keys, lambda: self.dynamics)
 
     def together(self, reactions: Iterable[Key] | None = None) -> None:
         """Form the estimates of some joints' forces, or of all: they have most of the second run in common."""
@@ -100,7 +103,14 @@ class ForceErrors:
         assert self.dynamics.statics is not None
         normal: Column = ("normal", joint.key, "")
         turned = self.estimates.of(("turn", self.mechanism.guides[joint.guide].on))
-        return np.asarray(self._of(normal) + (turned + EPS) * np.abs(self.dynamics.statics.get(normal)))
+        along = self._rubbing(joint)
+        return np.asarray(
+            self._of(normal) + along + (turned + EPS) * np.abs(self.dynamics.statics.get(normal))
+        )
+
+    def contact(self, cam: int) -> Reals:
+        """Of `Dynamics.contact`, (n,); infinite where statics is redundant."""
+        return self.estimates.of(("contact", cam)) if self._redundant is None else np.full(self.n, np.inf)
 
     def joint_moment(self, joint: Joint, body: str) -> Reals:
         """Of `Dynamics.joint_moment`, (n,)."""
@@ -108,6 +118,8 @@ class ForceErrors:
             return np.zeros(self.n)
         if self._redundant is None:
             return self.estimates.of(("moment", joint.key, body))
+        if joint.guide is None:
+            return self._rubbing(joint)
         return self._of(("moment", joint.key, ""))
 
     def reaction(self, joint: str, on: str) -> Reals:
@@ -128,6 +140,12 @@ class ForceErrors:
         self.estimates.together([("applied", link), ("applied moment", link)])
         return self.estimates.of(("applied", link)), self.estimates.of(("applied moment", link))
 
+    def _rubbing(self, joint: Joint) -> Reals:
+        """Of a joint's friction, (n,): the torque of a pin, the force along a guide."""
+        contacts = self.dynamics.scene.case.contacts
+        numbers = [n for n, (rubbing, *_) in enumerate(contacts) if rubbing == joint]
+        return np.asarray(sum((self.estimates.second.friction_error(n) for n in numbers), np.zeros(self.n)))
+
     # --- redundant statics ------------------------------------------------------------------------------------------
     @cached_property
     def _redundant(self) -> tuple[list[Column], Reals] | None:
@@ -136,8 +154,8 @@ class ForceErrors:
         if statics is None:
             return None
         value, least = statics.solved[0], statics.least[0]
-        if self.dynamics.scene.friction:
-            return statics.unknowns, np.full(value.shape, np.inf)
+        if np.isnan(value).all():
+            return statics.unknowns, np.full(value.shape, np.nan)
         # what statics does not determine has a part in the balance too
         known = {f"f {i}": Doubled(column) for i, column in enumerate(np.nan_to_num(least).T)}
         keys: list[Key] = [("balance", row) for row in range(statics.rows)]

@@ -10,23 +10,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.arithmetic.doubled import Doubled
-from dalembert.arithmetic.engines.doubled import run
+from dalembert.arithmetic.engines.doubled import TURN, Answer, compared, run
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.guard import guarded
 from virtualwork.describe.dimensions import dimensions
-from virtualwork.digits.exact import QUARTER, Exact
+from virtualwork.digits.exact import Exact
 from virtualwork.formulas.asked import Key, names
-from virtualwork.formulas.lanes import Lanes, Turning, taped
+from virtualwork.formulas.lanes import Lanes, taped
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Reals, dot
-from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.recording import NAMES
+from virtualwork.plan.steps import Group
 
 if TYPE_CHECKING:
     from virtualwork.formulas.block import Block
@@ -35,9 +35,8 @@ if TYPE_CHECKING:
 
 # steps of Newton's method in 32 digits at most, and a step, of 1 rad or the size, that is the last
 STEPS, SMALL = 8, 2.0**-60
-# exchanges of friction and joint forces at most, and the last change of any friction, relative
-LONGEST, SETTLED = 200, 2.0**-72
-TURN = QUARTER * 4.0
+# the last change of any friction, relative; by what share it is moved to see what depends on it
+SETTLED, NUDGE = 2.0**-72, 2.0**-40
 
 Found = dict[Key, list[Doubled]]
 
@@ -53,12 +52,11 @@ class SecondRun:
     """
 
     def __init__(
-        self, poses: Poses, rest: Reals | None = None, dynamics: Callable[[], Dynamics] | None = None
+        self, poses: Lanes, rest: Reals | None = None, dynamics: Callable[[], Dynamics] | None = None
     ) -> None:
         self.poses, self.n, self.lock = poses, poses.n, poses.lock
         self._dynamics = dynamics
-        self.branch = cast(Turning, poses.branch)
-        self.lanes = Lanes(self.branch, poses)
+        self.branch = poses.branch
         self.rest = self._rest() if rest is None else rest
         self._solutions: dict[str, Doubled] = {}
 
@@ -84,7 +82,7 @@ class SecondRun:
     @cached_property
     def exact(self) -> Exact:
         """The formulas of the branch, with its numbers as inputs."""
-        branch, plain = self.branch, self.lanes.recording
+        branch, plain = self.branch, self.poses.recording
         key = "exact", plain.moves, plain.turning_over
         if key not in branch.recordings:
             branch.recordings[key] = Exact(branch, plain)
@@ -122,14 +120,37 @@ class SecondRun:
         zero = Doubled(0.0)
         return {key: [found.get(name, zero) for name in names(key)] for key in keys}
 
-    def uncertain(self, key: Key, found: Found) -> list[Reals]:
+    def compared(
+        self,
+        values: Mapping[Key, Any],
+        others: Sequence[Key] = (),
+        changed: Mapping[str, Doubled] | None = None,
+    ) -> tuple[dict[Key, Reals], Found]:
+        """Estimates (n,) of the errors of quantities as they were handed out, (n,) each; and other quantities as `doubled`."""
+        tape = taped(self.branch, self.exact, (*values, *others))
+        changed = dict(changed or {})
+        entering = self.entering(name for name in tape.inputs if name not in changed) | changed
+        answers = {answer(key): parts(key, value) for key, value in values.items()}
+        estimates, found = compared(tape, entering, answers)
+        zero = Doubled(0.0)
+        return (
+            {
+                key: of if np.shape(of) == (self.n,) else np.full(self.n, of)
+                for key, of in zip(values, estimates, strict=True)
+            },
+            {key: [found.get(name, zero) for name in names(key)] for key in others},
+        )
+
+    def uncertain(self, key: Key) -> list[Reals]:
         """By how much a quantity moves with each number that is not known exactly."""
-        moved = []
+        moved: list[Reals] = []
+        if not self._uncertain:
+            return moved
         of = taped(self.branch, self.exact, (key,)).inputs
-        for name, other in self._uncertain.items():
-            if name in of:
-                parts = self.doubled([key], {name: other})[key]
-                moved.append(length([(a - b).value for a, b in zip(parts, found[key], strict=True)]))
+        enter = [name for name in self._uncertain if name in of]
+        here = self.doubled([key])[key] if enter else []
+        for name in enter:
+            moved.append(apart(key, self.doubled([key], {name: self._uncertain[name]})[key], here))
         return moved
 
     @cached_property
@@ -144,10 +165,11 @@ class SecondRun:
             moved[name] = Doubled(phase) + 2 * EPS * max(1.0, abs(phase))
         for group in self.branch.plan.groups:
             if group.name in self.exact.folded and self.exact.enters(group):
-                # a double root moves by the root of what its loops leave open
+                # a double root moves by the root of what its loops leave open: an arm of length l that turns by a
+                # small angle φ is shorter along its line by l·φ²/2
                 keys: list[Key] = [("gap", group.name, i) for i in range(len(group.closures))]
                 gap = length([part.value for parts in self.doubled(keys).values() for part in parts])
-                turn = np.sqrt(gap / self.poses.mechanism.size)
+                turn = np.sqrt(2 * gap / _shortest(group, self.poses.mechanism.size))
                 for i in range(len(group.angles) + len(group.slides)):
                     off = turn if i < len(group.angles) else turn * self.poses.mechanism.size
                     moved[f"x {group.name} {i}"] = self._unknown(group.name, str(i)) + off
@@ -180,7 +202,7 @@ class SecondRun:
                 )
             else:
                 others.append(name)
-        return found | self.lanes.entering(others)
+        return found | self.poses.entering(others)
 
     def _input(self, j: int) -> Doubled:
         return Doubled(self.poses.inputs[:, j], self.rest[:, j])
@@ -204,7 +226,7 @@ class SecondRun:
         if any(g.name == group for g in self.branch.plan.groups if g.name in self.exact.folded):
             of = next(g for g in self.branch.plan.groups if g.name == group)
             inputs, keys = [f"x {group} {i}" for i in range(len(of.angles) + len(of.slides))], []
-        first = self.lanes.entering(inputs)
+        first = self.poses.entering(inputs)
         self._solutions |= {name: Doubled(x) for name, x in first.items()}
         for _ in range(STEPS if keys else 0):
             found = self.doubled(keys)
@@ -220,24 +242,57 @@ class SecondRun:
     def _rubbing(self, name: str) -> Doubled:
         """The friction of a contact and which way it slips, from the first run on until the friction fits its force."""
         if name not in self._solutions:
-            dynamics = self._dynamics() if self._dynamics is not None else self._own_dynamics()
-            contacts = dynamics.scene.case.contacts
-            forms = [partial(_friction_of, dynamics.reactions, n) for n in range(len(contacts))]
-            for n, size in enumerate(dynamics.reactions.over(*forms)):
+            for n, size in enumerate(self._first_friction):
                 self._solutions |= {f"friction {n}": Doubled(size), f"slip {n}": Doubled(-np.sign(size))}
-            keys: list[Key] = [("rub", n) for n in range(len(contacts))]
-            for _ in range(LONGEST):
-                found, last = self.doubled(keys), 0.0
-                for key in keys:
-                    new, old = found[key][0], self._solutions[f"friction {key[1]}"]
-                    step, size = np.abs((new - old).value), np.abs(new.high)
-                    there = np.broadcast_to(np.isfinite(step) & (size > 0), self.n)
-                    steps = np.divide(step, size, out=np.zeros(self.n), where=there)
-                    last = max(last, float(steps.max(initial=0.0)))
-                    self._solutions[f"friction {key[1]}"] = new + np.zeros(self.n)
-                if not last > SETTLED:
+            # where statics does not determine what a contact bears, nothing determines its friction
+            names = [f"friction {n}" for n, x in enumerate(self._first_friction) if not np.isnan(x).all()]
+            slopes = self._slopes(names) if names else np.empty(0)
+            for _ in range(STEPS if names else 0):
+                rest = self._unfit(names)
+                change = np.linalg.solve(slopes, np.array([x.value for x in rest]).T[:, :, None])[:, :, 0].T
+                old = [self._solutions[of] for of in names]
+                for of, step in zip(names, change, strict=True):
+                    self._solutions[of] = self._solutions[of] + step
+                size = np.abs([x.value for x in old]).max(axis=0, initial=0.0)
+                if not np.nanmax(np.abs(change) / np.where(size > 0, size, 1.0), initial=0.0) > SETTLED:
                     break
         return self._solutions[name]
+
+    def _unfit(self, names: Sequence[str], changed: Mapping[str, Doubled] | None = None) -> list[Doubled]:
+        """By how much the forces of the contacts ask for other friction than enters, (n,) each."""
+        keys: list[Key] = [("rub", int(of.removeprefix("friction "))) for of in names]
+        found = self.doubled(keys, changed)
+        enters = {of: self._solutions[of] for of in names} | dict(changed or {})
+        zero = np.zeros(self.n)
+        return [found[key][0] - enters[of] + zero for key, of in zip(keys, names, strict=True)]
+
+    def _slopes(self, names: Sequence[str]) -> Reals:
+        """How what does not fit falls with each friction, (n, contacts, contacts), for Newton's method."""
+        rest = self._unfit(names)
+        size = np.abs([self._solutions[of].value for of in names]).max(axis=0, initial=0.0)
+        by = NUDGE * np.where(size > 0, size, 1.0)
+        slopes = np.empty((self.n, len(names), len(names)))
+        for k, of in enumerate(names):
+            other = self._unfit(names, {of: self._solutions[of] + by})
+            slopes[:, :, k] = np.array([(x - y).value / by for x, y in zip(rest, other, strict=True)]).T
+        # what locks has no friction to look for
+        there = np.isfinite(slopes).all(axis=(1, 2))
+        slopes[~there] = np.eye(len(names))
+        return slopes
+
+    def friction_error(self, n: int) -> Reals:
+        """What the friction of the n-th contact was off by in the first run, (n,)."""
+        exact = self._rubbing(f"friction {n}")
+        first = self._first_friction[n]
+        return np.asarray(np.abs((first - exact.high) - exact.low))
+
+    @cached_property
+    def _first_friction(self) -> list[Any]:
+        """The friction of each contact in the first run, (n,)."""
+        dynamics = self._dynamics() if self._dynamics is not None else self._own_dynamics()
+        contacts = range(len(dynamics.scene.case.contacts))
+        forms = [partial(_friction_of, dynamics.reactions, n) for n in contacts]
+        return dynamics.reactions.over(*forms)
 
     def _own_dynamics(self) -> Dynamics:
         # a dozen files, loaded where there are forces
@@ -247,8 +302,7 @@ class SecondRun:
 
     def _table(self, number: int) -> tuple[Doubled, Doubled]:
         """What a table gives, linear between its rows."""
-        case = self.exact.forces[0].case
-        table = [load for load in case.loads if isinstance(load, Tabled)][number]
+        table = self.exact.tables[number]
         at, force = (np.array(column) for column in zip(*table.table, strict=True))
         place = self._place(table)
         if table.periodic:
@@ -273,9 +327,16 @@ class SecondRun:
         if table.axis == "speed":
             return place + np.zeros(self.n)
         # in the turn in which the first run reads it
-        turns = np.rint((self.lanes.place(table) - place.high) / (2 * math.pi))
+        turns = np.rint((self.poses.place(table) - place.high) / (2 * math.pi))
         whole: Doubled = place + TURN * turns
         return whole
+
+
+def _shortest(group: Group, size: float) -> float:
+    """The shortest arm that turns with a group's unknowns, of a size at most."""
+    terms = (t for closure in group.closures for t in closure.terms)
+    arms = (abs(complex(t.z)) for t in terms if t.body in group.members and t.slide is None)
+    return min((arm for arm in arms if arm), default=size)
 
 
 def _friction_of(reactions: Reactions, n: int, block: Block) -> Any:
@@ -287,7 +348,27 @@ def _friction_of(reactions: Reactions, n: int, block: Block) -> Any:
     return dot(value, reactions.rail(block, joint.guide))
 
 
+def answer(key: Key) -> Answer:
+    """What a quantity is called on a tape, and whether it is an angle without its whole turns."""
+    return Answer(tuple(names(key)), key[0] == "angle" and key[2] == 0)
+
+
+def parts(key: Key, value: Any) -> list[Any]:
+    """The parts of a quantity, (n,) each."""
+    return [value] if len(names(key)) == 1 else [value.real, value.imag]
+
+
+def apart(key: Key, parts: Sequence[Any], others: Sequence[Any]) -> Reals:
+    """How far two values of a quantity lie from each other, (n,); angles have no whole turns."""
+    with np.errstate(invalid="ignore"):
+        differences = [a - b for a, b in zip(parts, others, strict=True)]
+        if key[0] == "angle" and key[2] == 0:
+            differences = [x - TURN * np.rint(x.high / (2 * math.pi)) for x in differences]
+        return length([each.value for each in differences])
+
+
 def length(parts: list[Any]) -> Reals:
+    """The size of what has one part or two, infinite where it is no number."""
     with np.errstate(invalid="ignore"):
         size = np.abs(parts[0])
         for part in parts[1:]:

@@ -34,7 +34,7 @@ LANES = 1 << 18
 
 
 def chosen(
-    written: Written, m: Description, given: Mapping[str, Reals], n: int, low: Reals, high: Reals
+    written: Written, m: Description, numbers: Mapping[str, Reals], n: int, low: Reals, high: Reals
 ) -> tuple[dict[str, Reals], Mask]:
     """The sign of each closed form of each variant, (n,), and which variants go by them over their inputs, (n,).
 
@@ -43,7 +43,7 @@ def chosen(
     written : Written
         With the signs as inputs.
     m : Description
-    given : mapping of path to array (n,)
+    numbers : mapping of path to array (n,)
     low, high : array (n,), or (1,) where they are the same of all
         The least and the largest input that is asked for, and the guess's. Of several inputs no way is looked along.
     """
@@ -58,25 +58,25 @@ def chosen(
         # at the guess it is looked at anyhow
         way = way[[not (q == m.at[0]).all() for q in way]]
     tape = written.told(len(way))
-    enters = {**_across(given), **_inputs(m)} | {f"way {i}": q[:, None] for i, q in enumerate(way)}
+    enters = {**_across(numbers), **_inputs(m)} | {f"way {i}": q[:, None] for i, q in enumerate(way)}
     *table, level = (row[:, 0] for row in run_grid(tape, enters, (n, 1)))
     result = {group.name: sign for group, sign in zip(written.closed, table, strict=True)}
-    told, clear = level > 0, level > 1
-    if not told.all():
-        rest = np.flatnonzero(~told)
-        again, told[rest] = signs(written, m, _of(given, rest), len(rest))
+    decided, clear = level > 0, level > 1
+    if not decided.all():
+        rest = np.flatnonzero(~decided)
+        again, decided[rest] = signs(written, m, _of(numbers, rest), len(rest))
         for name, sign in again.items():
             result[name][rest] = sign
     if one and not (at_once and clear.all()):
-        rest = np.flatnonzero(told & ~clear if at_once else told)
-        known = _of(with_signs(given, result), rest)
+        rest = np.flatnonzero(decided & ~clear if at_once else decided)
+        known = _of(with_signs(numbers, result), rest)
         first, last = (end if len(end) == 1 else end[rest] for end in (low, high))
-        told[rest] = ~meet_on_the_way(written, m, known, len(rest), first, last)
-    return result, told
+        decided[rest] = ~meet_on_the_way(written, m, known, len(rest), first, last)
+    return result, decided
 
 
 def signs(
-    written: Written, m: Description, given: Mapping[str, Any], n: int
+    written: Written, m: Description, numbers: Mapping[str, Any], n: int
 ) -> tuple[dict[str, Reals], Mask]:
     """The sign of each closed form of each variant, (n,), and which variants tell theirs.
 
@@ -85,30 +85,30 @@ def signs(
     written : Written
         With the signs as inputs.
     m : Description
-    given : mapping of path to number or array (n,)
+    numbers : mapping of path to number or array (n,)
     """
     if not all(informed(m, group) for group in written.closed):
         return {}, np.zeros(n, dtype=bool)
     with np.errstate(all="ignore"):
-        found = run(written.choice, {**given, **_inputs(m)})
-        told, opens = np.broadcast_to(found["allowed"] > 0, n).copy(), {}
+        choice = run(written.choice, {**numbers, **_inputs(m)})
+        decided, opens = np.broadcast_to(choice["allowed"] > 0, n).copy(), {}
         for group in written.closed:
-            margin, a, b, seen, _ = (np.asarray(found[f"{what} {group.name}"]) for what in CHOICE)
+            margin, a, b, seen, _ = (np.asarray(choice[f"{what} {group.name}"]) for what in CHOICE)
             stands = margin > 0
             near, far = np.minimum(a, b), np.maximum(a, b)
-            told &= ~(np.abs(margin) <= CLOSE)
-            told &= np.where(stands, near < TOLD * far, (seen == 0) | ~(np.abs(seen) < CLOSE))
+            decided &= ~(np.abs(margin) <= CLOSE)
+            decided &= np.where(stands, near < TOLD * far, (seen == 0) | ~(np.abs(seen) < CLOSE))
             opens[group.name] = np.broadcast_to(~stands, n)
-    chosen = {g.name: np.broadcast_to(found[f"sign {g.name}"], n) + 0.0 for g in written.closed}
+    chosen = {g.name: np.broadcast_to(choice[f"sign {g.name}"], n) + 0.0 for g in written.closed}
     if len(m.inputs) == 1 and any(each.any() for each in opens.values()):
         # one that is assembled next to the guess is chosen by how it stands there
-        known = with_signs(given, chosen)
+        known = with_signs(numbers, chosen)
         step = BESIDE * (m.size if m.inputs[0].is_slide else 1.0)
         for side in (step, -step):
             for name, open_ in opens.items():
                 depth = _sampled(written, ("margin", name), known, np.array([[m.at[0] + side]]), n)
-                told &= ~(open_ & (depth[0] >= 0))
-    return chosen, told
+                decided &= ~(open_ & (depth[0] >= 0))
+    return chosen, decided
 
 
 def at_guess(written: Written, m: Description, given: Mapping[str, Any], n: int) -> dict[str, Reals]:
@@ -184,12 +184,12 @@ def samples(written: Written, m: Description, span: float) -> int:
 
 def _levers(written: Written) -> list[str]:
     """The bodies that a guide along them turns, however fast, where other loops follow from them."""
-    plan, found = written.plan, []
+    plan, levers = written.plan, []
     for group in plan.groups:
         for later in plan.groups:
             if later is not group and group.kind == "RPR" and group in plan.needed(plan.writes(later)):
-                found.append(group.angles[0])
-    return list(dict.fromkeys(found))
+                levers.append(group.angles[0])
+    return list(dict.fromkeys(levers))
 
 
 def _along(

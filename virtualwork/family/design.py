@@ -24,17 +24,16 @@ from virtualwork.describe.dimensions import Dimension, by_path, changed
 from virtualwork.family.branches import meet_on_the_way, samples, signs, with_signs
 from virtualwork.family.part import Part, Solver, assembled, parts
 from virtualwork.family.written import Written
-from virtualwork.formulas.asked import Key, names, over_blocks
-from virtualwork.formulas.lanes import Lanes
+from virtualwork.formulas.asked import Key, names
+from virtualwork.formulas.lanes import Lanes, over_blocks
 from virtualwork.formulas.numbers import Reals
-from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.recording import NAMES
 
-REST = (False, False, False)
-AT_REST: list[list[Any]] = [[0.0], [0.0], [0.0]]
+REST = (0.0, 0.0, 0.0)
 
 
 class Design:
-    """Positions over the input, of one set of dimensions after another; `Mechanism.design` makes one.
+    """Positions and the effort over the input, of one set of dimensions after another; `Mechanism.design` makes one.
 
     Attributes
     ----------
@@ -42,7 +41,9 @@ class Design:
         With one input.
     dimensions : tuple of Dimension
     keys : tuple
-        What is asked for: points, angles of links, slides.
+        What is asked for: points, angles of links, slides, the effort.
+    rates : tuple of float
+        Speed, acceleration and jerk of the input: those of the description where the effort is asked for, else none.
     evaluations : int
         Designs worked out so far.
     """
@@ -53,9 +54,18 @@ class Design:
         self.mechanism, self.dimensions, self.keys = mechanism, tuple(dimensions), tuple(keys)
         self.evaluations = 0
         own = np.zeros((1, len(self.dimensions)))
-        self._first = Solver(Part(self.mechanism, self.dimensions, own, np.zeros((1, 1, 1)), AT_REST))
+        driven, forces = mechanism.inputs[0], any(key[0] == "effort" for key in keys)
+        self.rates = (float(driven.speed or 0.0), float(driven.acceleration or 0.0), 0.0) if forces else REST
+        self._moving = {f"{name}0": rate for name, rate in zip(NAMES[1:], self.rates, strict=True)}
+        self._at_rates: list[list[Any]] = [[rate] for rate in self.rates]
+        self._first = Solver(Part(self.mechanism, self.dimensions, own, np.zeros((1, 1, 1)), self._at_rates))
         self._paths = [d.path for d in self.dimensions]
-        self._alone = Alone(self.mechanism, self.dimensions, self.keys)
+        self._alone = Alone(self.mechanism, self.dimensions, self.keys, self.rates)
+        if forces and not self._first.takes(self.keys):
+            raise DescriptionError(
+                "the effort has no derivatives here: friction, redundant joints and tables over an angle or a speed of a link "
+                "are of each pose"
+            )
         self._chosen: tuple[bytes, dict[str, Any] | None] = b"", None
         self._kept: dict[tuple[tuple[str, ...] | None, bool], tuple[bytes, Repeated]] = {}
         self._held: dict[str, float] | None = None
@@ -137,7 +147,7 @@ class Design:
         """The quantities, or their derivatives, from one run of a tape; and whether the branch is told so simply."""
         known = self._held if self._held is not None else {"at": self.mechanism.at[0]}
         again = self._ready(q, enters)
-        found, fine = again(known | by_path(self.dimensions, x.tolist()))
+        found, fine = again(self._moving | known | by_path(self.dimensions, x.tolist()))
         return found[:, : len(q)], fine
 
     def _ready(self, q: Reals, enters: tuple[str, ...] | None) -> Repeated:
@@ -215,7 +225,7 @@ class Design:
 
     def solved(self, numbers: Reals, inputs: Reals, keys: Sequence[Key]) -> list[NDArray[Any]]:
         """Any quantities of designs (v, d) at their inputs (v or 1, n), (v, n) each."""
-        part = Part(self.mechanism, self.dimensions, numbers, inputs[:, :, None], AT_REST)
+        part = Part(self.mechanism, self.dimensions, numbers, inputs[:, :, None], self._at_rates)
         return Solver(part, self._first).values(keys)
 
 
@@ -233,8 +243,19 @@ class Alone:
     keys : sequence of Key
     """
 
-    def __init__(self, mechanism: Description, dimensions: Sequence[Dimension], keys: Sequence[Key]) -> None:
-        self.mechanism, self.dimensions, self.keys = mechanism, tuple(dimensions), tuple(keys)
+    def __init__(
+        self,
+        mechanism: Description,
+        dimensions: Sequence[Dimension],
+        keys: Sequence[Key],
+        rates: tuple[float, float, float] = REST,
+    ) -> None:
+        self.mechanism, self.dimensions, self.keys, self.rates = (
+            mechanism,
+            tuple(dimensions),
+            tuple(keys),
+            rates,
+        )
         self._last: tuple[bytes, Assembly | None] | None = None
 
     @cached_property
@@ -249,7 +270,8 @@ class Alone:
             return None
         if own.folded:
             return None
-        result = Written(own, self.dimensions, REST, own_signs=True, settled=False)
+        moves = tuple(bool(rate) for rate in self.rates)
+        result = Written(own, self.dimensions, moves, own_signs=True, settled=False)
         return None if result.open_gears else result
 
     def values(self, x: Reals, q: Reals) -> Reals:
@@ -257,7 +279,22 @@ class Alone:
         poses = self._poses(x, q)
         if poses is None:
             return np.full((sum(len(names(key)) for key in self.keys), len(q)), np.nan)
+        if any(key[0] == "transmission" for key in self.keys):
+            # sines that are on the tape alone
+            return self._rows(self.written, x, poses)
         return table(over_blocks(poses, key) for key in self.keys)
+
+    def _rows(self, written: Written | None, x: Reals, poses: Lanes) -> Reals:
+        """What is asked for, from the tape."""
+        of = [name for key in self.keys for name in names(key)]
+        if written is None:
+            return np.full((len(of), poses.n), np.nan)
+        tape = written.tape(self.keys)
+        given = by_path(self.dimensions, x.tolist())
+        rest = [name for name in tape.inputs if name not in given]
+        with np.errstate(all="ignore"):
+            found = run(tape, given | poses.entering(rest))
+        return np.array([np.broadcast_to(found[name], poses.n) for name in of])
 
     def slopes(self, x: Reals, q: Reals, enters: tuple[str, ...]) -> Reals:
         """Its derivatives to dimensions by their paths, and to the input `q0`, (rows, n, len(enters))."""
@@ -273,7 +310,7 @@ class Alone:
         assert self._last is not None
         assert self._last[1] is not None
         with np.errstate(all="ignore"):
-            found = run(tape, given | Lanes(self._last[1], poses).entering(rest))
+            found = run(tape, given | poses.entering(rest))
         for row, name in enumerate(of):
             for column, to in enumerate(enters):
                 # what does not depend on it has no row
@@ -281,7 +318,7 @@ class Alone:
         out[:, ~poses.assembled] = np.nan
         return out
 
-    def _poses(self, x: Reals, q: Reals) -> Poses | None:
+    def _poses(self, x: Reals, q: Reals) -> Lanes | None:
         """A design at some inputs; None where it cannot be put together."""
         name = x.tobytes()
         if self._last is None or self._last[0] != name:
@@ -292,7 +329,7 @@ class Alone:
                 )
             except MechanismError:
                 self._last = name, None
-        return None if self._last[1] is None else Poses(self._last[1], q, 0.0, 0.0, 0.0)
+        return None if self._last[1] is None else Lanes(self._last[1], q, *self.rates)
 
 
 def table(quantities: Iterable[NDArray[Any]]) -> Reals:
@@ -301,7 +338,7 @@ def table(quantities: Iterable[NDArray[Any]]) -> Reals:
 
 
 def place_key(m: Description, name: str) -> Key:
-    """The key of a place: `points.H` (or `H`), `links.rocker`, `slides.B`.
+    """The key of a place: `points.H` (or `H`), `links.rocker`, `slides.B`; of the input's effort: `effort.crank`.
 
     Raises
     ------
@@ -309,6 +346,10 @@ def place_key(m: Description, name: str) -> Key:
         With what is known in place of what is not.
     """
     kind, _, of = name.rpartition(".")
+    if kind == "effort":
+        if of != m.inputs[0].name:
+            raise DescriptionError(f"the input is not named '{of}': expected effort.{m.inputs[0].name}")
+        return "effort", 0
     points = {point: body for body, named in m.bodies.items() for point in named}
     guides = {guide.point: i for i, guide in enumerate(m.guides)}
     for word, what, known in (
@@ -322,4 +363,6 @@ def place_key(m: Description, name: str) -> Key:
             if word == "points":
                 return "point", points[of], 0j, of, 0
             return ("angle", of, 0) if word == "links" else ("slide", guides[of], 0)
-    raise DescriptionError(f"'{name}': expected points.NAME, links.NAME or slides.NAME")
+    raise DescriptionError(
+        f"'{name}': expected points.NAME, links.NAME, slides.NAME or effort.{m.inputs[0].name}"
+    )

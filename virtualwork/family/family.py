@@ -58,14 +58,14 @@ class Family:
 
     def __init__(self, mechanism: Description, numbers: Mapping[str, ArrayLike]) -> None:
         self.mechanism = mechanism
-        known = dimensions(mechanism)
+        paths = dimensions(mechanism)
         if not isinstance(numbers, Mapping) or not numbers:
             raise ValueError(
-                f"vary: expected numbers by their paths, such as {{'{next(iter(known), 'path')}': [...]}}, found {numbers!r}"
+                f"vary: expected numbers by their paths, such as {{'{next(iter(paths), 'path')}': [...]}}, found {numbers!r}"
             )
         columns: dict[Dimension, Reals] = {}
         for path, given in numbers.items():
-            found = named(mechanism, path, known)
+            found = named(mechanism, path, paths)
             column = np.asarray(given)
             if np.iscomplexobj(column) and len(found) == 2:
                 column = np.stack([column.real, column.imag], axis=-1)

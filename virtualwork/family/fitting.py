@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple
 
 import numpy as np
 
@@ -18,19 +18,17 @@ from dalembert.arithmetic.parts import in_parts
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, by_path, changed, dimensions, named, value
-from virtualwork.family.design import Design, place_key
+from virtualwork.family.design import Design
+from virtualwork.family.fitted import FINE, D, Fit
+from virtualwork.family.keep import HELD, JUDGED, Bound, Bounds, Held, Kept
 from virtualwork.family.part import ASSEMBLED
 from virtualwork.family.search import AWAY, COARSE, Descent, along, in_turn, shares
 from virtualwork.family.target import Aim, Reached, Target
-from virtualwork.formulas.numbers import Complexes, Reals
+from virtualwork.formulas.numbers import Reals
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from matplotlib.axes import Axes
-    from matplotlib.figure import FigureBase
-
-D = TypeVar("D", bound=Description)
 
 # of the starts, the first by distance are put in order; the first of those are refined in rounds, so many by so many
 # steps, the best of each round further in the next; so many where the target is nearly met: a search may creep in a valley
@@ -38,111 +36,10 @@ D = TypeVar("D", bound=Description)
 ORDERED, ROUNDS = 64, ((48, 48, 15), (8, 24, 100), (1, 1, 300))
 # of the mechanism's size, or rad: a fit as near as this is not looked for again; and is nearly one
 MET, NEARLY = 1e-12, 1e-4
-# poses of the look over the whole range
-FINE = 721
+# descents with other multipliers, at first and later; so often further poses are held, in which a bound was not met
+FIRST_SETTLED, SETTLED, FURTHER = 4, 25, 8
 # of the bounds: solutions that differ less than this in every dimension are one
 SAME = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class Fit(Generic[D]):
-    """The dimensions that come nearest to a target.
-
-    Attributes
-    ----------
-    mechanism : Description
-        With the fitted numbers.
-    before : Description
-        Without them.
-    dimensions : tuple of Dimension
-    values : array (d,)
-        SI.
-    reached : tuple of Reached
-        What each point, link and slide of the target does.
-    starts, evaluations : int
-        Tried, and mechanisms worked out over a target in all.
-    remarks : tuple of str
-        What the designer should know: bounds reached, defects of assembly and of order.
-    others : tuple of Fit
-        Further solutions, where more than one was asked for: the next best first.
-    """
-
-    mechanism: D
-    before: D
-    dimensions: tuple[Dimension, ...]
-    values: Reals
-    reached: tuple[Reached, ...]
-    starts: int
-    evaluations: int
-    remarks: tuple[str, ...]
-    others: tuple[Fit[D], ...] = ()
-
-    @property
-    def parameters(self) -> dict[str, float]:
-        """The fitted numbers by path, SI."""
-        return by_path(self.dimensions, self.values.tolist())
-
-    @property
-    def inputs(self) -> Reals:
-        """(n,) rad or m, at each row of the (first) target."""
-        return self.reached[0].inputs
-
-    @property
-    def positions(self) -> Complexes:
-        """(n,) where the (first) point comes, x + iy in m."""
-        return self.reached[0].values
-
-    @property
-    def target(self) -> Complexes:
-        """(n,) where it should."""
-        return self.reached[0].target
-
-    @property
-    def distances(self) -> Reals:
-        """(n,) m; rad where it is a link's angle."""
-        return self.reached[0].distances
-
-    @property
-    def rms(self) -> float:
-        """Root of the mean square of all distances, m; rad of the angles, where there is nothing else."""
-        return float(np.sqrt(np.mean(self._all**2)))
-
-    @property
-    def max(self) -> float:
-        """The largest distance, m; rad where there are only angles."""
-        return float(self._all.max())
-
-    @property
-    def _all(self) -> Reals:
-        lengths = [each.distances for each in self.reached if each.kind != "angle"]
-        return np.concatenate(lengths or [each.distances for each in self.reached])
-
-    def plot(self, figure: FigureBase | None = None) -> list[Axes]:
-        """Draw the targets, and what the mechanism does over their range: a panel for each point, link and slide.
-
-        Parameters
-        ----------
-        figure : matplotlib figure
-            A new one of pyplot's where not given.
-        """
-        from virtualwork.picture.fitted import Fitted, fitted
-
-        own = np.array([float(value(self.before, d.path).real) for d in self.dimensions])
-        turning = not self.before.inputs[0].is_slide
-        panels = []
-        for each in self.reached:
-            design = Design(self.before, self.dimensions, [place_key(self.before, each.name)])
-            q = np.linspace(each.inputs.min(), each.inputs.max(), FINE)
-            lines = [design(numbers, q) for numbers in (self.values, own)]
-            after, before = (t[0] + 1j * t[1] if each.kind == "point" else t[0] for t in lines)
-            name = each.name.rpartition(".")[2]
-            panels.append(Fitted(name, each.kind, turning, q, after, before, each.inputs, each.target))
-        return fitted(panels, figure)
-
-    def __repr__(self) -> str:
-        result = ", ".join(f"{path}={number:.6g}" for path, number in self.parameters.items())
-        unit = "rad" if all(each.kind == "angle" for each in self.reached) else "m"
-        return f"Fit({result}; rms {self.rms:.3g} {unit})"
 
 
 def fit(
@@ -153,17 +50,18 @@ def fit(
     seed: int = 0,
     best: int = 1,
     executor: Executor | None = None,
+    keep: Sequence[Bound] = (),
 ) -> Fit[D]:
     """Find the dimensions that come nearest to targets; see `Mechanism.fit`."""
     if starts < 1 or best < 1:
         raise ValueError(f"starts and best: found {starts} and {best}, expected 1 or more")
-    return _Problem(m, targets, free).solved(starts, seed, best, executor)
+    return _Problem(m, targets, free, keep).solved(starts, seed, best, executor)
 
 
 class _Refined(NamedTuple):
     """A start refined: shares of the way from the lower to the upper bounds, the inputs of each target.
 
-    With half the sum of squares, the largest residual, and what it cost.
+    With half the sum of squares, the largest residual, what it cost, and what became of the bounds.
     """
 
     x: Reals
@@ -171,31 +69,63 @@ class _Refined(NamedTuple):
     cost: float
     largest: float
     evaluations: int
+    kept: tuple[Kept, ...] = ()
+
+    @property
+    def keeps(self) -> bool:
+        """Whether every bound is met."""
+        return all(each.met for each in self.kept)
 
 
 class _Problem(Generic[D]):
     """What is looked for: shares of the way from a lower to an upper bound, and the inputs that are free."""
 
-    def __init__(self, m: D, targets: Sequence[Target], free: Mapping[str, tuple[float, float]]) -> None:
-        self.m, self.targets, self.free = m, targets, free
+    def __init__(
+        self,
+        m: D,
+        targets: Sequence[Target],
+        free: Mapping[str, tuple[float, float]],
+        keep: Sequence[Bound] = (),
+    ) -> None:
+        self.m, self.targets, self.free, self.keep = m, targets, free, keep
         if len(m.inputs) != 1:
             raise DescriptionError(f"found {len(m.inputs)} inputs, expected one for a fit")
         self.aims = [Aim.read(m, target) for target in targets]
         if not self.aims:
             raise ValueError("target: expected one or more")
-        found = _free(m, free)
+        forces = any(key[0] == "effort" for aim in self.aims for key in aim.keys)
+        forces = forces or any(bound.name.startswith("effort.") for bound in keep)
+        found = _free(m, free, forces)
         self.dimensions = tuple(found)
         self.low, self.high = np.array(list(found.values()), dtype=float).T
         self.designs = [Design(m, self.dimensions, aim.keys) for aim in self.aims]
+        self.bounds = Bounds(m, self.dimensions, keep) if keep else None
 
     @property
     def evaluations(self) -> int:
         """Mechanisms worked out over a target so far."""
-        return sum(design.evaluations for design in self.designs)
+        kept = 0 if self.bounds is None else self.bounds.evaluations
+        return kept + sum(design.evaluations for design in self.designs)
+
+    @property
+    def sweep(self) -> tuple[float, float]:
+        """Over which bounds are kept: from the first to the last input of the targets; a whole turn where one is free."""
+        given = [aim.inputs for aim in self.aims if aim.inputs is not None]
+        if len(given) < len(self.aims):
+            at, m = self.m.at[0], self.m
+            return (at - 2 * m.size, at + 2 * m.size) if m.inputs[0].is_slide else (at, at + 2 * np.pi)
+        every = np.concatenate(given)
+        return float(every.min()), float(every.max())
+
+    def judged(self, x: Reals) -> tuple[Kept, ...]:
+        """What becomes of the bounds at some shares."""
+        if self.bounds is None:
+            return ()
+        return self.bounds.judged(self.values(x), np.linspace(*self.sweep, JUDGED))
 
     def own(self) -> _Problem[D]:
         """The same with designs of its own: what is worked out on one does not meet another on another thread."""
-        return _Problem(self.m, self.targets, self.free)
+        return _Problem(self.m, self.targets, self.free, self.keep)
 
     def values(self, x: Reals) -> Reals:
         """The dimensions (d,) of shares."""
@@ -213,6 +143,8 @@ class _Problem(Generic[D]):
         """Hold every loop on the branch that it has at some shares; None: let it go."""
         values = None if x is None else self.values(x)
         held = [design.hold(values) for design in self.designs]
+        if self.bounds is not None:
+            self.bounds.hold(values)
         return all(held)
 
     # --- starts -----------------------------------------------------------------------------------------------------
@@ -271,7 +203,7 @@ class _Problem(Generic[D]):
                 for each in refined:
                     evaluations += each.evaluations
                     found.append(each)
-                    if each.largest < MET:
+                    if each.largest < MET and each.keeps:
                         met = self._distinct([*met, each])
                     enough = len(found) >= max(count, wanted)
                     if len(met) >= best or (enough and min(f.largest for f in found) > NEARLY):
@@ -280,6 +212,9 @@ class _Problem(Generic[D]):
             if len(met) >= best:
                 break
             begun = [(each.x, each.inputs) for each in found]
+        if not any(each.keeps for each in found):
+            raise MechanismError(self._unmet(found, starts))
+        found = [each for each in found if each.keeps]
         fits = [self._fit(each, starts, evaluations) for each in found[:best]]
         there = [each for each in fits if each is not None]
         if not there:
@@ -288,10 +223,26 @@ class _Problem(Generic[D]):
             )
         return replace(there[0], others=tuple(there[1:]))
 
+    def _unmet(self, found: Sequence[_Refined], starts: int) -> str:
+        """Which bounds no start keeps, and how far the nearest comes."""
+        nearest = min(found, key=lambda each: sum(not kept.met for kept in each.kept))
+        lines = []
+        for each in nearest.kept:
+            if not each.met:
+                turns = each.bound.name == "transmission" or each.bound.name.startswith("links.")
+                number, reached = (
+                    f"{np.degrees(v) if turns else v:.6g}{' deg' if turns else ''}"
+                    for v in (each.bound.value, each.extreme)
+                )
+                lines.append(
+                    f"{each.bound.name} {'>=' if each.bound.most is None else '<='} {number} (it comes to {reached})"
+                )
+        return f"fit: no start of {starts} within the bounds keeps {' and '.join(lines)}"
+
     def _distinct(self, found: Sequence[_Refined]) -> list[_Refined]:
         """The best of each place in the space of dimensions, the best first."""
         kept: list[_Refined] = []
-        for each in sorted(found, key=lambda e: e.cost):
+        for each in sorted(found, key=lambda e: (not e.keeps, e.cost)):
             if all(np.abs(each.x - other.x).max() > SAME for other in kept):
                 kept.append(each)
         return kept
@@ -314,13 +265,35 @@ class _Problem(Generic[D]):
                 found, at = self._descended(x, inputs, steps)
         off = self.residuals(found, at)
         largest = float(np.abs(off).max())
-        return _Refined(found, tuple(at), float(off @ off) / 2, largest, self.evaluations - before)
+        cost, kept = float(off @ off) / 2, self.judged(found)
+        return _Refined(found, tuple(at), cost, largest, self.evaluations - before, kept)
 
     def _descended(self, x: Reals, inputs: Sequence[Reals], steps: int) -> tuple[Reals, Sequence[Reals]]:
+        width = self.high - self.low
+        if self.bounds is None:
+            way = Descent(self.aims, self.designs, self.values, width, inputs)
+            x = self._down(way, x, steps)
+            return x, way.at(x).inputs
+        held = Held(self.bounds, np.linspace(*self.sweep, HELD), width)
+        way = Descent(self.aims, self.designs, self.values, width, inputs, held)
+        for _ in range(FURTHER if steps > ROUNDS[0][2] else 1):
+            for _ in range(SETTLED if steps > ROUNDS[0][2] else FIRST_SETTLED):
+                way.forget()
+                x = self._down(way, x, steps)
+                if held.settle(self.values(x)):
+                    break
+            way.forget()
+            kept = self.judged(x)
+            if all(each.met for each in kept):
+                break
+            held.hold_too(kept)
+        return x, way.at(x).inputs
+
+    @staticmethod
+    def _down(way: Descent, x: Reals, steps: int) -> Reals:
+        """One descent."""
         from scipy.optimize import least_squares
 
-        width = self.high - self.low
-        way = Descent(self.aims, self.designs, self.values, width, inputs)
         bounds = (0.0, 1.0)
         # dogbox steps along the bounds; trf, which keeps off them, creeps in the long valleys of this problem
         result = least_squares(
@@ -334,7 +307,7 @@ class _Problem(Generic[D]):
             gtol=1e-15,
             max_nfev=steps,
         )
-        return np.asarray(result.x), way.at(result.x).inputs
+        return np.asarray(result.x)
 
     def _fit(self, found: _Refined, starts: int, evaluations: int) -> Fit[D] | None:
         """A solution as it is handed out; None where it cannot be assembled at every row."""
@@ -355,7 +328,8 @@ class _Problem(Generic[D]):
             inputs.append(q)
         mechanism = changed(self.m, by_path(self.dimensions, values.tolist()))
         remarks = tuple(self._remarks(values, inputs))
-        return Fit(mechanism, self.m, self.dimensions, values, tuple(reached), starts, evaluations, remarks)
+        fit = Fit(mechanism, self.m, self.dimensions, values, tuple(reached), starts, evaluations, remarks)
+        return replace(fit, kept=found.kept)
 
     def _remarks(self, values: Reals, inputs: Sequence[Reals]) -> list[str]:
         """What is to be said of a solution."""
@@ -398,7 +372,9 @@ def _cost(squared: Reals) -> Reals:
     return np.where(np.isfinite(squared), squared, AWAY**2)
 
 
-def _free(m: Description, free: Mapping[str, tuple[float, float]]) -> dict[Dimension, tuple[float, float]]:
+def _free(
+    m: Description, free: Mapping[str, tuple[float, float]], forces: bool
+) -> dict[Dimension, tuple[float, float]]:
     known = dimensions(m)
     result: dict[Dimension, tuple[float, float]] = {}
     for path, (low, high) in free.items():
@@ -407,7 +383,11 @@ def _free(m: Description, free: Mapping[str, tuple[float, float]]) -> dict[Dimen
             raise DescriptionError(f"'{path}' names two numbers: expected {dimension.path} or {both[0].path}")
         of, last = dimension.where[0], dimension.where[-1]
         weight = of == "links" and (last in ("mass", "inertia") or dimension.where[2] == "center")
-        if of not in ("ground", "links", "guides", "gears", "belts", "racks") or weight:
+        if of == "inputs":
+            raise DescriptionError(f"{dimension.path}: the input is not free: expected a dimension or a load")
+        if not forces and (
+            of not in ("ground", "links", "guides", "gears", "belts", "racks", "cams") or weight
+        ):
             raise DescriptionError(f"{dimension.path} moves no point: expected a dimension of the geometry")
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
             raise DescriptionError(f"{dimension.path}: found bounds {low:g} to {high:g}, expected low < high")

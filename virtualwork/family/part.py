@@ -22,11 +22,10 @@ from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, by_path, changed
 from virtualwork.family.branches import at_guess, chosen, stays_within, with_signs
 from virtualwork.family.written import Written
-from virtualwork.formulas.asked import COMPLEX, FORCES, Key, over_blocks, quantity
+from virtualwork.formulas.asked import COMPLEX, FORCES, Key, quantity
 from virtualwork.formulas.dynamics import Dynamics
-from virtualwork.formulas.loads import Tabled
+from virtualwork.formulas.lanes import Lanes, over_blocks
 from virtualwork.formulas.numbers import Number, Reals, leave_out
-from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.recording import NAMES, NEAR
 
 Mask = NDArray[np.bool_]
@@ -80,7 +79,7 @@ class Part:
         """The i-th variant."""
         return changed(self.mechanism, by_path(self.dimensions, self.values[i].tolist()))
 
-    def poses(self, i: int, seeds: Seeds) -> Poses:
+    def poses(self, i: int, seeds: Seeds) -> Lanes:
         """The i-th variant, put together alone; `seeds`: see `seeds_of`.
 
         Raises
@@ -92,7 +91,7 @@ class Part:
         n = len(q)
         assembly = Assembly.from_guess(self.described(i))
         assembly.seeds.update(seeds)
-        result = Poses(assembly, q if q.shape[1] > 1 else q[:, 0], 0.0, 0.0, 0.0)
+        result = Lanes(assembly, q if q.shape[1] > 1 else q[:, 0], 0.0, 0.0, 0.0)
         result.rates = [
             [float(np.ravel(r)[0]) if np.size(r) == 1 else np.broadcast_to(r, (1, n))[0] for r in order]
             for order in one.rates
@@ -116,7 +115,7 @@ class Solver:
             if all(theirs or not mine for mine, theirs in zip(self.moves, like.moves, strict=True)):
                 self.written, self.moves = like.written, like.moves
         self.reasons: dict[int, str] = {}
-        self._poses: dict[int, Poses | None] = {}
+        self._poses: dict[int, Lanes | None] = {}
 
     @cached_property
     def assembly(self) -> Assembly | None:
@@ -228,11 +227,11 @@ class Solver:
         m, written = self.part.mechanism, self.written
         if written is None:
             return False
-        if any(key[0] in FORCES for key in keys) and not m.friction:
+        if all(key[0] not in FORCES for key in keys):
+            return True
+        if m.friction or any(table.axis != "input" for table in written.recording.tables):
             # what a table gives is known beforehand where it is over the input
-            loads = written.recording.forces[0].case.loads
-            if any(isinstance(load, Tabled) and load.axis != "input" for load in loads):
-                return False
+            return False
         return written.recording.takes(keys)
 
     def _taken(self, keys: Sequence[Key]) -> Mask:
@@ -250,7 +249,7 @@ class Solver:
             return result
         if len(m.inputs) > 1:
             # each counts along lines of its own
-            fixed = (not self.written.plan.angles[body].bases for s in m.torsion_springs for body in s.links)
+            fixed = (self.written.plan.angles[body].by_inputs for s in m.torsion_springs for body in s.links)
             return np.full(v, all(fixed))
         low, high = self._span
         for number in range(len(m.torsion_springs)):
@@ -327,8 +326,8 @@ class Solver:
             return 0.0
         if kind == "table":
             number, part = group.split()
-            loads = self.written.recording.forces[0].case.loads if self.written is not None else ()
-            table = [load for load in loads if isinstance(load, Tabled)][int(number)]
+            assert self.written is not None
+            table = self.written.recording.tables[int(number)]
             q = self.part.inputs[:, :, 0]
             force = np.asarray(table.over(q.ravel(), True)).reshape(q.shape)
             value = force.real if part == "x" else force.imag
@@ -350,7 +349,7 @@ class Solver:
         """Describe one variant alone."""
         if i not in self._poses or self._poses[i] is None:
             try:
-                poses: Poses | None = None if i in self.reasons else self.part.poses(i, self._seeds)
+                poses: Lanes | None = None if i in self.reasons else self.part.poses(i, self._seeds)
             except MechanismError as error:
                 poses = None
                 self.reasons[i] = str(error)

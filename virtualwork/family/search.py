@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from virtualwork.family.design import Design
+from virtualwork.family.keep import Held
 from virtualwork.family.target import Aim
 from virtualwork.formulas.numbers import Reals
 
@@ -131,6 +132,8 @@ class Descent:
         Of the bounds: the derivative of that.
     inputs : sequence of array
         Of each target; those that are free begin there.
+    held : Held, optional
+        What is kept: its rows stand below the residuals.
     """
 
     def __init__(
@@ -140,9 +143,10 @@ class Descent:
         values: Callable[[Reals], Reals],
         width: Reals,
         inputs: Sequence[Reals],
+        held: Held | None = None,
     ) -> None:
         self.aims, self.designs, self.values, self.width = aims, designs, values, width
-        self.inputs = list(inputs)
+        self.inputs, self.held = list(inputs), held
         self._last: tuple[bytes, _Here] | None = None
 
     def residuals(self, x: Reals) -> Reals:
@@ -179,7 +183,15 @@ class Descent:
             off.append(np.where(np.isfinite(apart), apart, AWAY).ravel())
             slopes.append(np.where(np.isfinite(there), there, 0.0).reshape(-1, d))
             inputs.append(q)
+        if self.held is not None:
+            rows, slope = self.held.rows(values)
+            off.append(rows)
+            slopes.append(slope)
         return _Here(np.concatenate(off), np.concatenate(slopes), inputs)
+
+    def forget(self) -> None:
+        """The rows weigh otherwise from here on."""
+        self._last = None
 
     @staticmethod
     def _followed(aim: Aim, design: Design, values: Reals, q: Reals) -> Reals:

@@ -24,7 +24,6 @@ from virtualwork.family.written import Written
 from virtualwork.formulas.asked import FORCES, JOINTS, Key, names, quantity
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import leave_out
-from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.recording import NAMES
 
 # so many poses are looked at for whether a quantity varies
@@ -40,9 +39,8 @@ ENTERS = dict(zip(("value", "speed", "acceleration", "jerk"), NAMES, strict=True
 class Sensitivities:
     """Derivatives of the quantities of some poses of an assembly."""
 
-    def __init__(self, assembly: Assembly, poses: Poses) -> None:
+    def __init__(self, assembly: Assembly, poses: Lanes) -> None:
         self.assembly, self.poses, self.lock = assembly, poses, assembly.lock
-        self._lanes = Lanes(assembly, poses)
         self._written: dict[tuple[Dimension, ...], Written] = {}
 
     def dimension(self, path: str) -> Dimension:
@@ -97,7 +95,7 @@ class Sensitivities:
             for d in dimensions
             if d.where[0] != "inputs"
         }
-        return own | self._lanes.entering([name for name in tape.inputs if name not in own])
+        return own | self.poses.entering([name for name in tape.inputs if name not in own])
 
     def vary(self, keys: Sequence[Key], limits: Mapping[Dimension, float]) -> list[tuple[bool, ...]]:
         """Which quantities vary at all with these dimensions: of each its parts, x and y of what is complex.
@@ -129,7 +127,7 @@ class Sensitivities:
 
     def values(self, keys: Sequence[Key]) -> list[Any]:
         """The quantities themselves, (n,)."""
-        return self._lanes.values(list(keys))
+        return self.poses.values(list(keys))
 
     def _formulas(self, dimensions: tuple[Dimension, ...]) -> Written:
         if dimensions not in self._written:

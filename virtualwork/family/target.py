@@ -1,4 +1,4 @@
-"""What a fit aims at, and what it reached: points at places, links at angles, slides at travels."""
+"""What a fit aims at, and what it reached: points at places, links at angles, slides at travels, an effort."""
 
 from __future__ import annotations
 
@@ -9,9 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
 from virtualwork.family.design import place_key
 from virtualwork.formulas.asked import Key
+from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Reals
 
 
@@ -23,12 +26,13 @@ class Target:
     ----------
     places : mapping of name to array
         `points.H` or `H`: (n, 2) or complex (n,), m. `links.rocker`: angles (n,), rad, compared modulo 2π.
-        `slides.B`: travels (n,), m.
+        `slides.B`: travels (n,), m. `effort.crank`: the input's torque (n,), N·m, or force, N, at the description's own
+        speed and acceleration.
     inputs : array (n,), optional
         Rad or m; without it the input at each row is found too, in the order of the rows.
     weights : mapping of name to number, or array (n,)
         A row of weight w counts as if it stood w times; 1 where not given. Lengths are counted in sizes of the
-        mechanism, angles in radians.
+        mechanism, angles in radians, efforts in shares of the largest that is wanted or that there is.
 
     Examples
     --------
@@ -48,11 +52,11 @@ class Reached:
     Attributes
     ----------
     name : str
-    kind : "point", "angle" or "slide"
+    kind : "point", "angle", "slide" or "effort"
     inputs : array (n,)
         Rad or m.
     values, target : array (n,)
-        x + iy in m of a point, rad of a link's angle, m of a slide.
+        x + iy in m of a point, rad of a link's angle, m of a slide, N·m or N of an effort.
     """
 
     name: str
@@ -63,7 +67,7 @@ class Reached:
 
     @property
     def distances(self) -> Reals:
-        """(n,) m, or rad."""
+        """(n,) m, rad, N·m or N."""
         apart = self.values - self.target
         return np.abs(_round_turn(apart) if self.kind == "angle" else apart)
 
@@ -125,6 +129,8 @@ class Aim:
                 raise ValueError(f"weights of {name}: expected one number, or {n}, 0 or more")
             wanted.append(rows)
             unit = 1.0 if key[0] == "angle" else 1.0 / m.size
+            if key[0] == "effort":
+                unit = 1.0 / _largest(m, rows, target.inputs)
             scale.append(np.broadcast_to(np.sqrt(weight) * unit, rows.shape))
             angle += [key[0] == "angle"] * len(rows)
         strange = [name for name in target.weights if name not in keys]
@@ -148,11 +154,11 @@ class Aim:
         off = self._off(found[..., None], self.wanted[:, None, :], self.scale[:, None, :])
         return np.asarray((off**2).sum(axis=0))
 
-    def _off(self, found: Reals, wanted: Reals, scale: Reals) -> Reals:
+    def _off(self, values: Reals, wanted: Reals, scale: Reals) -> Reals:
         def beside(each: NDArray[Any]) -> NDArray[Any]:
-            return each.reshape(len(each), *(1,) * (found.ndim - each.ndim), *each.shape[1:])
+            return each.reshape(len(each), *(1,) * (values.ndim - each.ndim), *each.shape[1:])
 
-        apart = found - beside(wanted)
+        apart = values - beside(wanted)
         if self.angle.any():
             apart = np.where(beside(self.angle), _round_turn(apart), apart)
         return np.asarray(apart * beside(scale))
@@ -168,6 +174,22 @@ class Aim:
             out.append(Reached(name, key[0], inputs, values, target))
             row += 2 if key[0] == "point" else 1
         return tuple(out)
+
+
+def _largest(m: Description, wanted: Reals, inputs: ArrayLike | None) -> float:
+    """The largest effort that is wanted; where none is, the largest that the description has, over a turn or at the inputs."""
+    largest = float(np.abs(wanted).max())
+    if largest:
+        return largest
+    span = 2 * np.pi if m.inputs[0].link is not None else m.size
+    q = m.at[0] + span * np.arange(24) / 24 if inputs is None else np.asarray(inputs, dtype=float)
+    own = Dynamics(Lanes(Assembly.from_guess(m), q, None, None)).effort
+    there = np.abs(own[np.isfinite(own)])
+    if not there.size or not there.max():
+        raise ValueError(
+            "target: no effort is wanted, and there is none: expected a load, or an effort other than 0"
+        )
+    return float(there.max())
 
 
 def _rows(name: str, is_point: bool, given: ArrayLike, n: int | None) -> Reals:

@@ -95,7 +95,7 @@ class Drawn:
 
 
 def drawn_numbers(
-    m: Description, given: Mapping[Dimension, float], draws: int, seed: int, distribution: str
+    m: Description, limits: Mapping[Dimension, float], draws: int, seed: int, distribution: str
 ) -> dict[str, Reals]:
     """The numbers of drawn mechanisms by path, (draws,) each.
 
@@ -109,12 +109,12 @@ def drawn_numbers(
     streams = np.random.SeedSequence(seed).spawn(-(-draws // STREAM))
     parts = []
     for stream in streams:
-        rng, shape = np.random.default_rng(stream), (STREAM, len(given))
+        rng, shape = np.random.default_rng(stream), (STREAM, len(limits))
         parts.append(rng.normal(size=shape) / 3 if distribution == "normal" else rng.uniform(-1, 1, shape))
     unit = np.concatenate(parts)[:draws]
     return {
         d.path: float(value(m, d.path).real) + limit * unit[:, i]
-        for i, (d, limit) in enumerate(given.items())
+        for i, (d, limit) in enumerate(limits.items())
     }
 
 

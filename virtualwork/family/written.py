@@ -15,15 +15,16 @@ from dalembert.arithmetic.tape import Tape
 from dalembert.arithmetic.varied import Varied, made
 from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.guess import distance, sign_of_angles
+from virtualwork.branch.solutions import guessed_slide
 from virtualwork.describe.description import Description, joints_apart, known_by_guess, slide_by_guess
 from virtualwork.describe.dimensions import Dimension, changed, value
 from virtualwork.describe.keys import keys_of
 from virtualwork.describe.parts import Link
 from virtualwork.formulas.asked import FORCES, Key, names
 from virtualwork.formulas.closed_forms import Case, missing
-from virtualwork.formulas.newton import put_unknowns, unknowns
-from virtualwork.formulas.numbers import WRITTEN, Number
-from virtualwork.formulas.positions import State, run
+from virtualwork.formulas.newton import gaps, put_unknowns, unknowns
+from virtualwork.formulas.numbers import PARTS, WRITTEN, Number
+from virtualwork.formulas.positions import State, columns, run
 from virtualwork.formulas.recording import NEAR, Recording
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Step, Turn
@@ -56,6 +57,8 @@ class Written:
         Whether the sign of every closed form enters too (`sign GROUP`), as each variant has its own.
     settled : bool
         See `Recording`.
+    recording : type
+        That, or one that writes down more.
     """
 
     def __init__(
@@ -65,6 +68,7 @@ class Written:
         moves: tuple[bool, ...],
         own_signs: bool,
         settled: bool = True,
+        recording: type[Recording] = Recording,
     ) -> None:
         recorder = Recorder()
         # that of the recording
@@ -83,10 +87,12 @@ class Written:
         # two slides have one solution: their sign is that of any
         signs = {g.name: assembly.signs.get(g.name, 1) for g in self.plan.groups if g.kind != "Newton"}
         turning = [g.name for g in self.closed] if own_signs else assembly.turning_over
-        self.recording = Recording(
+        self.recording = recording(
             self.mechanism, self.plan, signs, moves, turning, assembly.geared, settled, recorder
         )
         self._tapes: dict[tuple[Any, ...], Tape] = {}
+        # of each group without a closed form the unknowns that the guess leaves to the loops, once `guessed` is written
+        self.free: dict[str, list[int]] = {}
 
     @cached_property
     def closed(self) -> list[Group]:
@@ -98,11 +104,11 @@ class Written:
         """The keys of their radicands."""
         return [("margin", group.name) for group in self.closed]
 
-    def _once(self, write: Callable[..., Tape], *asked: Any) -> Tape:
+    def _once(self, write: Callable[..., Tape], *arguments: Any) -> Tape:
         """A tape, written on the first request."""
-        key = write.__name__, *asked
+        key = write.__name__, *arguments
         if key not in self._tapes:
-            self._tapes[key] = write(*asked)
+            self._tapes[key] = write(*arguments)
         return self._tapes[key]
 
     def tape(self, keys: Iterable[Key]) -> Tape:
@@ -175,24 +181,24 @@ class Written:
 
     def _told(self, samples: int) -> Tape:
         recorder = Recorder()
-        found, margins = _again(self.choice, recorder, {}), self.tape(self.margins)
+        choice, margins = _again(self.choice, recorder, {}), self.tape(self.margins)
         signs, clear = {}, []
         for name in (group.name for group in self.closed):
-            nearer = found[f"plus {name}"] - found[f"minus {name}"]
+            nearer = choice[f"plus {name}"] - choice[f"minus {name}"]
             signs[f"sign {name}"] = RECORDED.select(nearer, -1.0, 1.0)
-            clear.append(found[f"margin {name}"] - CLEAR)
+            clear.append(choice[f"margin {name}"] - CLEAR)
         for i in range(samples):
             depths = _again(margins, recorder, signs | {"q0": recorder.input(f"way {i}")})
             clear += [depth - CLEAR for depth in depths.values()]
-        told = every(self._plain(found), every(clear, 2.0, 1.0))
+        told = every(self._plain(choice), every(clear, 2.0, 1.0))
         return recorder.tape(signs | {"told": told})
 
-    def _plain(self, found: Mapping[str, Number]) -> list[Number]:
+    def _plain(self, values: Mapping[str, Number]) -> list[Number]:
         """What is positive where a choice is told plainly, and the description is no other than that of all."""
-        plain = [found["allowed"]]
+        plain = [values["allowed"]]
         for name in (group.name for group in self.closed):
-            plus, minus = found[f"plus {name}"], found[f"minus {name}"]
-            plain.append(found[f"margin {name}"] - CLOSE)
+            plus, minus = values[f"plus {name}"], values[f"minus {name}"]
+            plain.append(values[f"margin {name}"] - CLOSE)
             plain.append(RECORDED.select(TOLD * plus - minus, 1.0, TOLD * minus - plus))
         return plain
 
@@ -209,18 +215,18 @@ class Written:
         signs: dict[str, Number] = {}
         fine: list[Number] = []
         if own_signs:
-            found = _again(self.choice, recorder, {"q0": recorder.input("at")})
-            signs = {name: found[name] for name in found if name.startswith("sign ")}
-            fine = self._plain(found)
+            numbers = _again(self.choice, recorder, {"q0": recorder.input("at")})
+            signs = {name: numbers[name] for name in numbers if name.startswith("sign ")}
+            fine = self._plain(numbers)
         if enters is None:
             margins = self.margins if own_signs else []
             outputs = _again(self.tape((*keys, *margins)), recorder, signs)
             fine += [outputs.pop(name) - DIP for key in margins for name in names(key)]
         else:
-            found = _again(self.slopes(keys, enters), recorder, signs)
+            numbers = _again(self.slopes(keys, enters), recorder, signs)
             parts = [part for key in keys for part in names(key)]
             every_one = [f"d({part})/d({name})" for part in parts for name in enters]
-            outputs = {name: found.get(name, 0.0) for name in every_one}
+            outputs = {name: numbers.get(name, 0.0) for name in every_one}
         if own_signs:
             outputs["fine"] = every(fine)
         return recorder.tape(outputs)
@@ -292,6 +298,46 @@ class Written:
         outputs["allowed"] = every(allowed)
         return recorder.tape(outputs)
 
+    @cached_property
+    def guessed(self) -> Tape:
+        """The tape of what the guess says of each group without a closed form, at its inputs.
+
+        The unknowns that it says, in `guess GROUP i`, zero where it says nothing of a slide; the gaps of the loops there
+        (`gap GROUP row`) and their columns (`column GROUP row i`) by such slides; how far the unknowns that enter are from
+        the guess (`far GROUP`).
+        """
+        recorder, m = self.recording.recorder, self.mechanism
+        st = State([recorder.input(f"q{j}") for j in range(len(m.inputs))], kind=WRITTEN)
+        angles, points = known_by_guess(m)
+        outputs: dict[str, Number] = {}
+
+        def close(group: Group, st: State) -> None:
+            name = group.name
+            if group.kind != "Newton":
+                sign = recorder.input(f"sign {name}") if group in self.closed else 1
+                Case(group, bare).solve(st, sign, bare(m.size))
+                return
+            trial = st.copy()
+            x: list[Number] = [bare(angles.get(body, 0.0)) for body in group.angles]
+            put_unknowns(group, trial, [*x, *(0.0 for _ in group.slides)])
+            for g in group.slides:
+                x.append(guessed_slide(g, trial.turn[m.guides[g].on], points, m, self.plan.directions))
+            free = self.free[name] = [i for i, slide in enumerate(x) if slide is None]
+            x = [0.0 if slide is None else bare(slide) for slide in x]
+            put_unknowns(group, trial, x)
+            outputs.update({f"guess {name} {i}": number for i, number in enumerate(x)})
+            along = columns(group, trial)
+            for loop, gap in enumerate(gaps(group, trial)):
+                for part, of in enumerate(PARTS):
+                    row = 2 * loop + part
+                    outputs[f"gap {name} {row}"] = of(bare(gap))
+                    outputs.update({f"column {name} {row} {i}": of(bare(along[loop][i])) for i in free})
+            put_unknowns(group, st, self.recording.unknowns(group))
+            outputs[f"far {name}"] = distance(group, st, self.plan, m, angles, points)
+
+        run(self.plan.steps, st, close)
+        return recorder.tape(outputs)
+
 
 def _placed(m: Description, order: Plan, assembly: Assembly) -> Plan | None:
     """The order of solution with the constants of gears, belts and racks as the guess's own pose has them.
@@ -331,16 +377,16 @@ def _placed(m: Description, order: Plan, assembly: Assembly) -> Plan | None:
     return replace(order, steps=(*steps, *order.steps[len(steps) :]))
 
 
-def every(conditions: Iterable[Number], found: Number = 1.0, otherwise: float = -1.0) -> Number:
+def every(conditions: Iterable[Number], value: Number = 1.0, otherwise: float = -1.0) -> Number:
     """A number where all of these are positive, and another one where they are not."""
     for condition in reversed(list(conditions)):
-        found = RECORDED.select(condition, found, otherwise)
-    return found
+        value = RECORDED.select(condition, value, otherwise)
+    return value
 
 
-def _again(tape: Tape, recorder: Recorder, known: Mapping[str, Number]) -> dict[str, Number]:
+def _again(tape: Tape, recorder: Recorder, values: Mapping[str, Number]) -> dict[str, Number]:
     """The outputs of a tape on another one, where some of what enters is known."""
-    enters = {name: known[name] if name in known else recorder.input(name) for name in tape.inputs}
+    enters = {name: values[name] if name in values else recorder.input(name) for name in tape.inputs}
     return tape.on(enters, RECORDED)
 
 

@@ -58,9 +58,9 @@ class Shared:
         are added.
         """
         a, b = spring.links
-        known = [self.plan.angles[body] for body in (a, b)]
-        if all(not angle.bases for angle in known):
-            twist = (st.affine(known[1]) - spring.free_angle) - st.affine(known[0])
+        angles = [self.plan.angles[body] for body in (a, b)]
+        if all(angle.by_inputs for angle in angles):
+            twist = (st.affine(angles[1]) - spring.free_angle) - st.affine(angles[0])
             return twist + 2 * np.pi * spring.turns if spring.turns else twist
         return self.wound(spring, st, self.within(st, spring))
 

@@ -297,14 +297,14 @@ class Case:
             w = np.complex128(w)
         v, u = self.vectors(st)
         if group.kind == "RRR":
-            *found, margin = two_angles(w, v, u, sign, kind)
+            *roots, margin = two_angles(w, v, u, sign, kind)
         elif group.kind == "RRP":
-            *found, margin = angle_and_slide(w, v, u, sign, kind)
+            *roots, margin = angle_and_slide(w, v, u, sign, kind)
         elif group.kind == "RPR":
-            *found, margin = turning_slide(w, v, u, sign, size, kind)
+            *roots, margin = turning_slide(w, v, u, sign, size, kind)
         else:
-            *found, margin = two_slides(w, v, u)
-        for i, value in enumerate(found, -len(group.angles)):
+            *roots, margin = two_slides(w, v, u)
+        for i, value in enumerate(roots, -len(group.angles)):
             if i < 0:
                 st.turn[group.angles[i]] = value
             else:

@@ -1,7 +1,7 @@
 """All joints of a mechanism at once in the coordinates (θ, x, y) of every link, and what their rank says of its freedom.
 
 No loops, no groups, no order of solution: Φ(x) = 0 with two rows for a pin, one for a slot, two for a slider, one for a
-gear, a belt or a rack. A motion that every row of Φ_x and every input leaves free, at poses all around, is a freedom that no input holds,
+gear, a belt, a rack or a cam. A motion that every row of Φ_x and every input leaves free, at poses all around, is a freedom that no input holds,
 whatever Grübler's count says (J. García de Jalón, E. Bayo, Kinematic and Dynamic Simulation of Multibody Systems,
 1994, §2.2 and §3.5).
 """
@@ -9,6 +9,7 @@ whatever Grübler's count says (J. García de Jalón, E. Bayo, Kinematic and Dyn
 from __future__ import annotations
 
 import cmath
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -16,6 +17,7 @@ import numpy as np
 
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.lifts import lift_at
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.positions import State
 from virtualwork.plan.steps import Plan, joints, relations
@@ -89,6 +91,19 @@ class Constraints:
                 rows.tie({body: c / m.size for body, c in mesh.torques.items()}, phases.get(i, 0.0) / m.size)
             else:
                 rows.turn(mesh.label, mesh.torques, phases.get(i, 0.0))
+        for drive in m.cam_drives:
+            cam, on = (
+                0.0 if body == GROUND else float(x[rows.column[body]]) for body in (drive.cam.cam, drive.on)
+            )
+            lifted, slope = (drive.cam.sign * float(lift_at(drive.lift, cam - on, k)) for k in (0, 1))
+            unit = 1.0 if drive.guide is None else m.size
+            if drive.guide is not None:
+                along(drive.label, drive.guide, 1 + 0j)
+            else:
+                rows.turn(drive.label, {str(drive.body): 1.0, drive.on: -1.0}, 0.0)
+                here = (rows.values[-1] - drive.rest - lifted + math.pi) % (2 * math.pi) - math.pi
+                rows.values[-1] = here + drive.rest + lifted
+            rows.follow({drive.cam.cam: -slope / unit, drive.on: slope / unit}, (drive.rest + lifted) / unit)
         count = len(rows.labels)
         for j, e in enumerate(m.inputs):
             if e.is_slide:
@@ -144,6 +159,13 @@ class _Rows:
             if body != GROUND:
                 row[self.column[body]] += c
         self._add(label, float(row @ self.x) - const, row)
+
+    def follow(self, slopes: Mapping[str, float], const: float) -> None:
+        """Take a number that goes with angles, and its derivatives by them, from the last row."""
+        for body, slope in slopes.items():
+            if body != GROUND:
+                self.rows[-1][self.column[body]] += slope
+        self.values[-1] -= const
 
     def tie(self, shares: Mapping[str, float], const: float) -> None:
         """Add Σ c·θ − const to the last row: a distance that goes with angles."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import cached_property, partial
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from dalembert.arithmetic.guard import guarded
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.asked import Key
 from virtualwork.formulas.block import Block
-from virtualwork.formulas.effort import effort, finished, generalized, write_effort
+from virtualwork.formulas.effort import effort, generalized
 from virtualwork.formulas.loads import EXTERNAL, OWN, Load
 from virtualwork.formulas.numbers import TOGETHER, Complexes, Number, Reals, cross, leave_out, plus, xy
 from virtualwork.formulas.poses import Poses
@@ -33,14 +34,29 @@ class Dynamics:
         The loads.
     friction_iterations : int
         How often friction and reactions were exchanged; 0 without friction.
+
+    Parameters
+    ----------
+    poses : Poses
+    taped : bool
+        Whether the forces come from the tape of the poses, where it has them; else they are formed over blocks.
     """
 
-    def __init__(self, poses: Poses) -> None:
-        self.poses, self.lock = poses, poses.lock
+    def __init__(self, poses: Poses, *, taped: bool = True) -> None:
+        self.poses, self.lock, self.taped = poses, poses.lock, taped
         self.scene = Scene(poses)
         self._effort: Reals | None = None
         self._euler: Reals | None = None
         self._forces: dict[tuple[str, str], Complexes] = {}
+
+    def _from_tape(self, *keys: Key) -> list[Any] | None:
+        """Forces by their keys, (n,) each; None where they are formed over blocks."""
+        return self.poses.taped(keys) if self.taped else None
+
+    @cached_property
+    def over_blocks(self) -> Dynamics:
+        """The same forces formed over blocks throughout, as sums over the loads are."""
+        return Dynamics(self.poses, taped=False) if self.taped else self
 
     @cached_property
     def _settled(self) -> tuple[int, NDArray[np.bool_]]:
@@ -74,6 +90,9 @@ class Dynamics:
     def effort(self) -> Reals:
         """The effort at each input by virtual work, (n, k)."""
         if self._effort is None:
+            found = self._from_tape(*(("effort", j) for j in range(len(self.poses.mechanism.inputs))))
+            self._effort = None if found is None else np.stack(found, axis=1)
+        if self._effort is None:
             # friction settles first: the loads depend on it
             _, settled = self._settled
             self._effort = effort(self.scene)
@@ -103,6 +122,9 @@ class Dynamics:
     def newton_euler(self) -> Reals:
         """The effort at each input by Newton and Euler, (n, k): ΣM = 0 of the driven link with its joint forces."""
         if self._euler is None:
+            found = self._from_tape(*(("newton-euler", j) for j in range(len(self.poses.mechanism.inputs))))
+            self._euler = None if found is None else np.stack(found, axis=1)
+        if self._euler is None:
             r, inputs = self.reactions, self.poses.mechanism.inputs
             if self.statics is not None:
                 found = [
@@ -114,47 +136,14 @@ class Dynamics:
             self._euler = np.stack(found, axis=1)
         return self._euler
 
-    def solve(self, sides: Iterable[tuple[Joint, str]] | None = None) -> None:
-        """Form effort, both ways, and joint forces in one pass over the poses, instead of each when asked for.
-
-        Parameters
-        ----------
-        sides : iterable of (joint, body), optional
-            The joint forces; default one side of every joint.
-        """
-        r, inputs = self.reactions, self.poses.mechanism.inputs
-        if self.statics is not None or self.scene.friction or self.scene.case.carried:
-            return
-        if sides is None:
-            sides = [(joint, joint.bodies[-1]) for joint in r.joints]
-        wanted = [side for side in sides if (side[0].key, side[1]) not in self._forces]
-        n, k = self.poses.n, len(inputs)
-        work, euler = np.zeros((n, k)), np.zeros((n, k))
-
-        def efforts(block: Block) -> None:
-            if self._effort is None:
-                write_effort(self.scene, block, work)
-            for j in range(k):
-                value = r.effort(block, j)
-                if value is not None:
-                    euler[block.rows, j] = value
-
-        forms = [partial(r.joint_force, joint=joint, body=body) for joint, body in wanted]
-        found = r.over(*forms, kind=complex, also=efforts)
-        for (joint, body), force in zip(wanted, found, strict=True):
-            self._forces[joint.key, body] = force
-        if self.scene.lost is not None:
-            euler[self.scene.lost] = np.nan
-        if self._euler is None:
-            self._euler = euler
-        if self._effort is None:
-            self._effort = finished(self.scene, work)
-
     def joint_force(self, joint: Joint, body: str) -> Complexes:
         """The force of a joint on one of its bodies, (n,) complex; NaN where statics does not determine it."""
         key = joint.key, body
         if key not in self._forces:
-            if self.statics is not None:
+            found = self._from_tape(("force", *key))
+            if found is not None:
+                self._forces[key] = found[0]
+            elif self.statics is not None:
                 self._forces[key] = self.statics.joint_force(joint, body)
             else:
                 form = partial(self.reactions.joint_force, joint=joint, body=body)
@@ -165,6 +154,9 @@ class Dynamics:
 
     def joint_moment(self, joint: Joint, body: str) -> Reals:
         """The moment of a joint on one of its bodies about the joint's point, (n,): a guide's, or a pin's friction."""
+        found = self._from_tape(("moment", joint.key, body))
+        if found is not None:
+            return np.asarray(found[0])
         r = self.reactions
         result = np.zeros(self.poses.n)
         if joint.guide is not None:
@@ -179,6 +171,21 @@ class Dynamics:
                 result = result + r.over(load.form)[0]
         return result
 
+    def contact(self, cam: int) -> Reals:
+        """How hard a cam (from 0) presses on its follower along the normal, (n,); below zero it would have to pull."""
+        statics, r = self.statics, self.reactions
+        if statics is None:
+            return np.asarray(r.over(lambda block: r.contact(block, cam))[0])
+        drive = self.poses.mechanism.cam_drives[cam]
+        unit = 1.0 if drive.guide is not None else self.poses.mechanism.size
+        push = statics.get(("contact", str(cam), "")) * unit
+
+        def form(block: Block) -> Number:
+            here = push[block.rows]
+            return r.contact(block, cam, here if block.st.many else float(here[0]))
+
+        return np.asarray(r.over(form)[0])
+
     def reaction(self, joint: str, on: str) -> Reals:
         """The force of all others on a link at a joint, (n, 2)."""
         return xy(self.at_joint(joint, on))
@@ -192,6 +199,27 @@ class Dynamics:
             total = total + force
         return total
 
+    def value(self, key: Key) -> Any:
+        """A force by its key, (n,)."""
+        kind, *of = key
+        if kind == "effort":
+            return self.effort[:, of[0]]
+        if kind == "generalized":
+            return self.generalized[:, of[0]]
+        if kind.startswith("applied"):
+            return self.applied(of[0])[kind != "applied"]
+        if kind == "newton-euler":
+            return self.newton_euler[:, of[0]]
+        if kind.startswith("shaking"):
+            force, moment = self.shaking
+            return moment if kind == "shaking moment" else force[:, 0] + 1j * force[:, 1]
+        if kind == "contact":
+            return self.contact(of[0])
+        if kind == "reaction":
+            return self.at_joint(*of)
+        joint = self.reactions.by_key[of[0]]
+        return self.joint_force(joint, of[1]) if kind == "force" else self.joint_moment(joint, of[1])
+
     @cached_property
     def shaking(self) -> tuple[Reals, Reals]:
         """Shaking force (n, 2) and shaking moment (n,) on the ground, about its origin.
@@ -199,6 +227,9 @@ class Dynamics:
         All that the moving links do to the ground through joints, springs and the drive's own reaction: by
         d'Alembert the sum of their weights, applied loads and inertia loads. No reaction is formed for it.
         """
+        found = self._from_tape(("shaking",), ("shaking moment",))
+        if found is not None:
+            return xy(found[0]), found[1]
         n = self.poses.n
         force, moment = np.zeros(n, complex), np.zeros(n)
         loads = shaking_loads(self.scene.loads)

@@ -34,23 +34,22 @@ def generalized(scene: Scene) -> Reals:
     out = np.zeros((scene.poses.n, len(scene.mechanism.inputs)))
 
     def work(block: Block) -> None:
-        write_effort(scene, block, out)
+        for j in range(out.shape[1]):
+            total = generalized_force(scene.paths, block, j)
+            if total is not None:
+                np.negative(total, out=out[block.rows, j])
+                bad = _singular(scene, block, j)
+                if bad is not False:
+                    out[block.rows, j][bad] = np.nan
         if scene.poses.n > BLOCK:
             block.forget(lasting=True)
 
     scene.each((), work)
-    return finished(scene, out)
-
-
-def write_effort(scene: Scene, block: Block, out: Reals) -> None:
-    """The generalized forces over one block."""
-    for j in range(out.shape[1]):
-        total = generalized_force(scene.paths, block, j)
-        if total is not None:
-            np.negative(total, out=out[block.rows, j])
-            bad = _singular(scene, block, j)
-            if bad is not False:
-                out[block.rows, j][bad] = np.nan
+    if scene.lost is not None:
+        out[scene.lost] = np.nan
+    # no −0
+    out += 0.0
+    return out
 
 
 def generalized_force(paths: LoadPaths, block: Block, j: int) -> Number:
@@ -63,14 +62,6 @@ def generalized_force(paths: LoadPaths, block: Block, j: int) -> Number:
             value = paths.value(block, load)
             total = plus(total, value if isinstance(moved, float) and moved == 1 else times(value, moved))
     return total
-
-
-def finished(scene: Scene, out: Reals) -> Reals:
-    """What `write_effort` wrote: NaN where not assembled, no −0."""
-    if scene.lost is not None:
-        out[scene.lost] = np.nan
-    out += 0.0
-    return out
 
 
 def _singular(scene: Scene, block: Block, j: int) -> Any:

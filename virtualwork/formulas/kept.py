@@ -37,13 +37,13 @@ class Later:
     leaves: dict[str, int]
 
 
-def later(recording: Recording, keys: Sequence[Key], known: Container[int]) -> Later:
+def later(recording: Recording, keys: Sequence[Key], formed: Container[int]) -> Later:
     """The tape of quantities from the values of operations that are known, and what it leaves besides."""
     with recording.lock:
         outputs = recording.recorder.numbers(recording.outputs(keys))
         operations = recording.recorder.operations
-    below = reached(operations, (number for _, number in outputs), known)
-    takes = {number: f"kept {k}" for k, number in enumerate(number for number in below if number in known)}
+    below = reached(operations, (number for _, number in outputs), formed)
+    takes = {number: f"kept {k}" for k, number in enumerate(number for number in below if number in formed)}
     worth = _worth_keeping(recording, operations) if len(operations) <= LONGEST else set()
     leaves = {
         f"left {k}": number for k, number in enumerate(sorted(worth.intersection(below) - takes.keys()))

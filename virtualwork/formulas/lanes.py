@@ -8,25 +8,32 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.engines import floats, run
+from dalembert.arithmetic.choice import wanted
+from dalembert.arithmetic.engines import as_part, floats, run
 from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.tape import Tape
-from virtualwork.formulas.asked import COMPLEX, FORCES, Key, names, over_blocks, quantity
-from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.asked import COMPLEX, FORCES, Key, names, quantity
 from virtualwork.formulas.kept import Later, later
-from virtualwork.formulas.load_case import LoadCase
-from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.newton import unknowns
 from virtualwork.formulas.numbers import SINGULAR, Number, Reals, leave_out
 from virtualwork.formulas.poses import Branch, Poses
 from virtualwork.formulas.recording import NAMES, NEAR, Recording
-from virtualwork.formulas.scene import Scene
+from virtualwork.plan.steps import Step, joints
 
+if TYPE_CHECKING:
+    from virtualwork.formulas.dynamics import Dynamics
+    from virtualwork.formulas.loads import Tabled
+
+# poses from which on a second request brings all of its kind, and how many times the operations of those requested
+MANY_POSES, WASTE = 10_000, 4
+# times that one pose is asked for from which on the tape pays
+OFTEN = 50
 # tapes of later requests that an assembly keeps
 MANY = 256
 
@@ -81,24 +88,50 @@ class Turning(Branch, Protocol):
 
 
 @guarded
-class Lanes:
-    """Quantities of the poses of one assembly over given inputs and rates, by their keys (`Recording.value`)."""
+class Lanes(Poses):
+    """Poses of an assembly whose quantities come from the tape, by their keys (`Recording.value`).
 
-    def __init__(self, branch: Turning, poses: Poses) -> None:
-        self.branch, self.poses, self.lock = branch, poses, branch.lock
+    Parameters are those of `Poses`.
+    """
+
+    branch: Turning
+
+    def __init__(
+        self,
+        branch: Turning,
+        angle: ArrayLike | None = None,
+        speed: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+        jerk: ArrayLike | None = None,
+        block_of: int | None = None,
+    ) -> None:
+        super().__init__(branch, angle, speed, acceleration, jerk, block_of)
         self.known: dict[Key, Any] = {}
+        # which quantities of one pose come from the tape
+        self._taped: dict[Key, bool] = {}
         # values of operations for later requests, by their numbers; and where doubts are right
         self._kept: dict[int, Any] = {}
         self._bad: dict[Key, NDArray[np.bool_] | None] = {}
+        # kinds and orders that were requested
+        self._requested: set[tuple[str, int]] = set()
+        self._repeated = False
 
     @cached_property
     def recording(self) -> Recording:
         """The formulas of the branch, for rates that are zero where these are."""
-        inputs = self.poses.inputs
+        inputs = self.inputs
         if inputs.shape[1] == 1 and len(inputs) and not self.branch.settled:
             self.branch.cover(float(np.nanmin(inputs)), float(np.nanmax(inputs)))
-        moves = tuple(any(np.any(rate) for rate in rates) for rates in self.poses.rates)
+        moves = tuple(any(np.any(rate) for rate in rates) for rates in self.rates)
         return recorded(self.branch, moves)
+
+    @property
+    def solved(self) -> list[tuple[Step, int]]:
+        """What has been worked out so far, (step, order); order 0 is position."""
+        result = {(id(step), k): (step, k) for step, k in self._solved}
+        for steps, order in map(self.recording.steps, self.known):
+            result |= {(id(step), k): (step, k) for k in range(order + 1) for step in steps}
+        return list(result.values())
 
     def takes(self, keys: Iterable[Key]) -> bool:
         """Whether the tape has these quantities; a group that is singular in every pose it has not."""
@@ -109,24 +142,89 @@ class Lanes:
         """What quantities of a pose cost, in operations on real numbers, with all that they depend on."""
         return taped(self.branch, self.recording, tuple(keys)).cost
 
-    def values(self, keys: Sequence[Key]) -> list[Any]:
-        """The quantities, each (n,), real or complex.
+    def values(self, keys: Sequence[Key], forces: Callable[[], Dynamics] | None = None) -> list[Any]:
+        """The quantities, each (n,), real or complex: of many poses from the tape, of one by the formulas on floats.
 
-        What `takes` does not take, and poses close to a change point, are worked out over blocks.
+        One pose that is asked for often comes from the tape too, as a function of floats. What `takes` does not take, and
+        poses close to a change point, are worked out over blocks, forces by what `forces` gives.
         """
-        new = [key for key in keys if key not in self.known]
-        if new and self.poses.n == 1 and self.one(tuple(new)):
-            return [self.known[key] for key in keys]
-        if new and not self.takes(new):
-            for key in new:
-                self.known[key] = over_blocks(self.poses, key, self._dynamics)
+        new = tuple(key for key in keys if key not in self._taped)
+        if new and not self.many and not wanted():
+            self._taped |= dict.fromkeys(new, self._often(new) and self.one(new))
         elif new:
-            self._run(new)
-        return [self.known[key] for key in keys]
+            new = self._foreseen(new)
+            if self.many or not self.one(new):
+                self._fill(new, forces)
+            # not before: what a table is over is asked for on the way, and may be among these
+            self._taped |= dict.fromkeys(new, True)
+        # what was handed out once stays as it is, to its last digit
+        by_blocks = self._by_blocks([key for key in keys if not self._taped[key]], forces)
+        return [self.known[key].copy() if self._taped[key] else by_blocks[key] for key in keys]
+
+    def _foreseen(self, keys: tuple[Key, ...]) -> tuple[Key, ...]:
+        """What a request is answered with: the second of a kind and order over very many poses brings all of them.
+
+        One tape for all is cheaper than one for each; what nobody asks for twice is not computed.
+        """
+        kinds = {_kind(key) for key in keys}
+        self._repeated = self._repeated or not kinds.isdisjoint(self._requested)
+        self._requested |= kinds
+        if len(kinds) > 1 or not self._repeated or self.n < MANY_POSES:
+            return keys
+        more = [key for key in self._every(*next(iter(kinds))) if key not in self.known]
+        spent = self.operations([*keys, *(key for key in self.known if _kind(key) in kinds)])
+        if not self.takes(more) or self.operations([*keys, *more]) > WASTE * spent:
+            return keys
+        return tuple(dict.fromkeys((*keys, *more)))
+
+    def _every(self, kind: str, order: int) -> Iterator[Key]:
+        """All quantities of a kind: of points, links, slides that are not driven; of forces efforts and one side of each joint."""
+        m = self.mechanism
+        driven = {entry.link for entry in m.inputs}
+        if kind == "point":
+            moving = ((body, name) for name, (body, _) in m.points.items() if body != GROUND)
+            yield from (("point", body, 0j, name, order) for body, name in moving)
+        elif kind == "angle":
+            yield from (("angle", link, order) for link in m.links if link not in driven)
+        elif kind == "slide":
+            yield from (("slide", guide, order) for guide in range(len(m.guides)))
+        elif kind == "forces":
+            yield from (("effort", j) for j in range(len(m.inputs)))
+            yield from (("reaction", joint.name, joint.bodies[-1]) for joint in joints(m))
+
+    def taped(self, keys: Sequence[Key]) -> list[Any] | None:
+        """Quantities of many poses from the tape; None of one pose, and where the tape does not have them."""
+        return self.values(keys) if self.many and self.takes(keys) else None
+
+    def _often(self, keys: tuple[Key, ...]) -> bool:
+        """Whether one pose has been asked for so often that to write the tape pays: some milliseconds."""
+        counts = self.branch.recordings.setdefault("asked", {})
+        counts[keys] = counts.get(keys, 0) + 1
+        return bool(counts[keys] > OFTEN)
+
+    def _fill(self, keys: tuple[Key, ...], forces: Callable[[], Dynamics] | None) -> None:
+        if self.takes(keys):
+            # a part of a sweep has the digits of the whole
+            if self.block_of:
+                as_part(self.block_of, self._run, list(keys))
+            else:
+                self._run(list(keys))
+        else:
+            self.known |= self._by_blocks(keys, forces)
+
+    def _by_blocks(self, keys: Sequence[Key], forces: Callable[[], Dynamics] | None = None) -> dict[Key, Any]:
+        """Quantities worked out over blocks."""
+        loaded = [key for key in keys if key[0] in FORCES]
+        moving = [key for key in keys if key[0] not in FORCES]
+        result = dict(zip(moving, self.by_blocks(moving), strict=True))
+        if loaded:
+            of = _dynamics_of(self) if forces is None else forces()
+            result |= {key: of.value(key) for key in loaded}
+        return result
 
     def one(self, keys: tuple[Key, ...]) -> bool:
         """Work out one pose that depends on nothing but its input, by a function of floats; False where it depends on more."""
-        given = [self.poses.inputs, *(rates[0] for rates in self.poses.rates)]
+        given = [self.inputs, *(rates[0] for rates in self.rates)]
         values = [x if isinstance(x, float) else float(np.ravel(x)[0]) for x in given]
         made = ready(self.branch, tuple(x != 0.0 for x in values[1:]), keys)
         if made is None:
@@ -143,7 +241,7 @@ class Lanes:
     def _run(self, keys: list[Key]) -> None:
         doubts = [key for key in dict.fromkeys(self._doubts(keys)) if key not in self._bad]
         # what is asked for first may be all: from the second time on, something is kept for those to come
-        kept = dict(self._kept) if self.known and self.poses.n > 1 else None
+        kept = dict(self._kept) if self.known and self.n > 1 else None
         asked, known = (*keys, *doubts), frozenset(kept or ())
         cut = _cut(self.branch, self.recording, asked, None if kept is None else known)
         given = self.entering(name for name in cut.tape.inputs if name not in cut.takes)
@@ -153,8 +251,10 @@ class Lanes:
         self._kept.update((number, out[name]) for name, number in cut.leaves.items())
         for key in doubts:
             self._bad[key] = self._where_bad(key, out[names(key)[0]])
+        # what a table is over has been handed out
+        keys = [key for key in keys if key not in self.known]
         for key in keys:
-            value = quantity(out, key, self.poses.n)
+            value = quantity(out, key, self.n)
             for nowhere in (self._nowhere, *map(self._bad.get, self._closed(key))):
                 if nowhere is not None:
                     leave_out(value, nowhere)
@@ -165,10 +265,9 @@ class Lanes:
             if key[0] != "closed" and bad is not None:
                 careful = careful | bad
         if careful.any():
-            some = self.poses.some(careful)
-            again = Dynamics(some)
+            again = self.some(careful)._by_blocks(keys)
             for key in keys:
-                self.known[key][careful] = over_blocks(some, key, again)
+                self.known[key][careful] = again[key]
 
     def _doubts(self, keys: Iterable[Key]) -> Iterator[Key]:
         """What tells where quantities cannot be had, or not from the tape."""
@@ -193,35 +292,30 @@ class Lanes:
             bad = ~np.isfinite(found)
         else:
             bad = np.abs(found) < (NEAR if key[0] == "margin" else SINGULAR)
-        return np.broadcast_to(bad, self.poses.n) if np.any(bad) else None
-
-    @cached_property
-    def _dynamics(self) -> Dynamics:
-        """The forces over blocks, where the tape has them not."""
-        return Dynamics(self.poses)
+        return np.broadcast_to(bad, self.n) if np.any(bad) else None
 
     @cached_property
     def _nowhere(self) -> NDArray[np.bool_] | None:
         """The poses whose input is no number; None where there are none."""
-        finite = np.isfinite(self.poses.inputs)
+        finite = np.isfinite(self.inputs)
         return None if finite.all() else np.asarray(~finite.all(axis=1))
 
     @cached_property
     def _careful(self) -> NDArray[np.bool_]:
         """The poses close to a change point."""
-        return self.branch.close_to_change(self.poses.inputs[:, 0])
+        return self.branch.close_to_change(self.inputs[:, 0])
 
     def entering(self, inputs: Iterable[str]) -> dict[str, Any]:
         """The inputs of a tape, by their names."""
-        poses, result = self.poses, {}
+        result: dict[str, Any] = {}
         for name in inputs:
             kind, _, of = name.partition(" ")
             if not of:
                 j = int(name[1:])
-                value = poses.inputs[:, j] if name[0] == "q" else poses.rates[NAMES.index(name[0]) - 1][j]
+                value = self.inputs[:, j] if name[0] == "q" else self.rates[NAMES.index(name[0]) - 1][j]
                 result[name] = value
             elif kind == "sign":
-                result[name] = np.asarray(self.branch.sign(of, poses.inputs[:, 0]), dtype=float)
+                result[name] = np.asarray(self.branch.sign(of, self.inputs[:, 0]), dtype=float)
             elif kind == "x":
                 result[name] = self._unknown(*of.rsplit(" ", 1))
             elif kind == "table":
@@ -232,47 +326,68 @@ class Lanes:
                 result[name] = self.twist(int(of.removeprefix("spring ")))
             else:
                 result[name] = self._angle(of)
-        if poses.n == 1:
+        if self.n == 1:
             result = {name: float(np.ravel(value)[0]) for name, value in result.items()}
         return result
 
     def _unknown(self, group: str, i: str) -> Reals:
         """An unknown of a group without a closed form, from its own iteration."""
         of = next(g for g in self.branch.plan.groups if g.name == group)
-        self.poses.solve(self.branch.plan.writes(of), 0)
-        return self.poses.over(lambda _, st: unknowns(of, st)[int(i)])  # type: ignore[no-any-return]
+        self.solve(self.branch.plan.writes(of), 0)
+        return self.over(lambda _, st: unknowns(of, st)[int(i)])  # type: ignore[no-any-return]
 
     def _angle(self, body: str) -> Reals:
         """A body's angle with its whole turns."""
-        self.poses.solve((f"angle:{body}",), 0)
-        return self.poses.over(lambda _, st: st.angle[body])  # type: ignore[no-any-return]
+        self.solve((f"angle:{body}",), 0)
+        return self.over(lambda _, st: st.angle[body])  # type: ignore[no-any-return]
 
     def twist(self, number: int) -> Reals:
         """A torsion spring's twist with its whole turns, (n,)."""
+        from virtualwork.formulas.scene import Scene
+
         spring = self.branch.mechanism.torsion_springs[number]
-        setting = Scene(self.poses).setting
-        self.poses.solve(tuple(f"angle:{body}" for body in spring.links if body != "ground"), 0)
-        return self.poses.over(lambda _, st: setting.twist(st, spring))  # type: ignore[no-any-return]
+        setting = Scene(self).setting
+        self.solve(tuple(f"angle:{body}" for body in spring.links if body != "ground"), 0)
+        return self.over(lambda _, st: setting.twist(st, spring))  # type: ignore[no-any-return]
 
     def _table(self, number: int) -> Any:
         """What a table gives."""
-        case: LoadCase = self.recording.forces[0].case
-        table = [load for load in case.loads if isinstance(load, Tabled)][number]
+        table = self.recording.tables[number]
         return table.over(self.place(table), True)
 
     def place(self, table: Tabled) -> Reals:
         """What a table is over."""
-        poses = self.poses
         if table.axis == "input":
-            return poses.inputs[:, 0]
+            return self.inputs[:, 0]
         if table.axis == "time":
-            return np.asarray(table.timed(poses.time))
+            return np.asarray(table.timed(self.time))
         if table.axis == "speed":
-            return poses.angle(table.body, 1)
+            return self.angle(table.body, 1)
         known = self.branch.plan.angles[table.body]
-        if known.bases:
-            return np.asarray(table.in_turn(poses.angle(table.body)))
-        return np.asarray(known.const + sum(c * poses.inputs[:, j] for j, c in known.inputs))
+        if not known.by_inputs:
+            return np.asarray(table.in_turn(self.angle(table.body)))
+        return np.asarray(known.const + sum(c * self.inputs[:, j] for j, c in known.inputs))
+
+
+def over_blocks(poses: Poses, key: Key, forces: Dynamics | None = None) -> Any:
+    """A quantity worked out over blocks of poses, (n,)."""
+    if key[0] in FORCES:
+        return (forces or _dynamics_of(poses)).value(key)
+    return poses.by_blocks((key,))[0]
+
+
+def _dynamics_of(poses: Poses) -> Dynamics:
+    # a dozen files: positions and rates do not load them
+    from virtualwork.formulas.dynamics import Dynamics
+
+    return Dynamics(poses, taped=False)
+
+
+def _kind(key: Key) -> tuple[str, int]:
+    """The kind and order of a quantity."""
+    if key[0] in FORCES:
+        return "forces", 0
+    return key[0], key[-1] if key[0] in ("point", "angle", "slide") else 0
 
 
 def recorded(branch: Turning, moves: tuple[bool, ...]) -> Recording:
@@ -327,12 +442,8 @@ def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Re
 
 
 def _made(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Ready | None:
-    poses = Poses(branch)
-    if (
-        poses.inputs.shape[1] > 1
-        or not (branch.settled and Lanes(branch, poses).takes(keys))
-        or branch.may_open
-    ):
+    poses = Lanes(branch)
+    if poses.inputs.shape[1] > 1 or not (branch.settled and poses.takes(keys)) or branch.may_open:
         return None
     tape = taped(branch, recorded(branch, moves), keys)
     arguments = [f"{name}0" for name in NAMES]

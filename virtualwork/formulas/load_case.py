@@ -70,6 +70,11 @@ class LoadCase:
                 loads += self._torsion(torsion)
         return loads
 
+    @cached_property
+    def tables(self) -> list[Tabled]:
+        """The loads that tables give, in the order in which their forces enter a tape."""
+        return [load for load in self.loads if isinstance(load, Tabled)]
+
     def _force(self, force: Force) -> Load:
         place = self.mechanism.place(force.link, force.point)
         at = "applied force", force.link, self.path(force.link, place), place
@@ -153,9 +158,14 @@ class LoadCase:
         """Loads and friction."""
         return [*self.loads, *self.friction]
 
+    @cached_property
+    def _reads(self) -> set[str]:
+        """What the loads depend on."""
+        return set().union(*(load.reads() for load in self.everything))
+
     def targets(self, keys: Iterable[str] = ()) -> tuple[tuple[str, ...], int]:
         """What `keys` and the loads depend on, `angle:BODY`, `slide:GUIDE`, `point:NODE`, and to which derivative."""
-        reads = set(keys).union(*(load.reads() for load in self.everything)) - {f"angle:{GROUND}"}
+        reads = set(keys).union(self._reads) - {f"angle:{GROUND}"}
         if not reads:
             # nothing acts: any one thing that moves will do
             reads = set(self.plan.writes(next(s for s in self.plan.steps if not isinstance(s, Place))))

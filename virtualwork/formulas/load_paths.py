@@ -29,9 +29,11 @@ import numpy as np
 from virtualwork.describe.meshes import Coordinate
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
+from virtualwork.formulas.contacts import ContactForce, ContactMoment, Lifted
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.numbers import Number, dot
-from virtualwork.formulas.quantities import Combination, Quantity, Transmitted, in_order
+from virtualwork.formulas.quantities import Carried, Combination, Quantity, Transmitted, in_order
+from virtualwork.formulas.touches import Touch, Touches
 from virtualwork.plan.joint_forces import Order, Side
 from virtualwork.plan.steps import Group, Place, Term, Turn, key_of
 
@@ -58,6 +60,7 @@ class LoadPaths:
         self._sides: dict[Side, Combination] = {}
         self._hung: dict[str, list[Hung]] = {}
         self._tied: dict[str, list[tuple[Coordinate, float]]] = {}
+        self.touches = Touches(self.mechanism, self.plan)
         self._hang()
         # from the last link inward, or long chains would nest the calls
         for step in reversed(self.plan.steps):
@@ -138,8 +141,8 @@ class LoadPaths:
 
         What bears on angles tied to this one is not in it.
         """
-        known = key, without and without.name, free
-        if known not in self._known:
+        name = key, without and without.name, free
+        if name not in self._known:
             levers: dict[tuple[str, int | None], Combination] = {}
             along = key.startswith("slide:")
             for t, _, source in self._hung.get(key, ()):
@@ -150,15 +153,31 @@ class LoadPaths:
             total = Combination() if along else self.torque(key.removeprefix("angle:"), free=free)
             for (body, slide), force in levers.items():
                 total.add(self.quantities.lever(body, slide, force, along))
-            self._known[known] = self.quantities.total(total)
-        return self._known[known]
+            self._known[name] = self.quantities.total(total)
+        return self._known[name]
 
-    def with_ties(self, key: str, without: Group) -> Combination:
+    def with_ties(self, key: str, without: Group | None) -> Combination:
         """Q of an angle or a slide, of all that is tied to it too, `without` the loops of one group."""
         total = Combination(self.own(key, without))
         for body, r in self._tied.get(key, ()):
             total.add(self.with_ties(key_of(body), without), r)
+        for touch, sign in self.touches.turned_by(key):
+            lifted = self.with_ties(touch.coordinate, without)
+            if lifted:
+                total.add(Combination({self.quantities(Lifted, touch, lifted): sign}))
         return total
+
+    def push(self, touch: Touch) -> Combination:
+        """What a cam does along the coordinate of its follower: it balances all that bears on that."""
+        return self.with_ties(touch.coordinate, None).times(-1.0)
+
+    def contact(self, touch: Touch) -> Quantity:
+        """The contact force of a cam on its follower."""
+        key = "contact", touch.drive.number
+        if key not in self._known:
+            of = self.quantities(ContactForce, touch, self.push(touch))
+            self._known[key] = Combination({of: 1.0})
+        return next(iter(self._known[key]))  # type: ignore[return-value]
 
     def on_group(self, group: Group) -> list[Combination]:
         """Q of each unknown of a group, angles and then slides, without its own loops."""
@@ -175,9 +194,11 @@ class LoadPaths:
         return [entry for entry in (*bodies, *slides) if entry[2]]
 
     # --- one body -----------------------------------------------------------------------------------------------
-    def force(self, body: str) -> Combination:
-        """The sum of the forces on a body."""
+    def force(self, body: str, *, touched: bool = True) -> Combination:
+        """The sum of the forces on a body, those of cams (`touched`) among them."""
         total = Combination()
+        for touch, sign in self.touches.on(body) if touched else ():
+            total.add(Combination({self.contact(touch): sign}))
         for load in self.case.everything:
             if load.body == body and load.path is not None:
                 total.add(load.combination(self.quantities))
@@ -199,6 +220,8 @@ class LoadPaths:
         body: str,
         about: complex,
         sides: Iterable[tuple[complex, int | None, complex, Combination]] = (),
+        *,
+        touched: bool = True,
     ) -> Combination:
         """The moment on a body about a point of its own, of its loads and of further forces at its points.
 
@@ -218,6 +241,9 @@ class LoadPaths:
         for entry in sides:
             at(*entry)
         total = self.torque(body)
+        for touch, sign in self.touches.on(body) if touched else ():
+            acts = self.quantities(ContactMoment, touch, self.contact(touch), self.case.path(body, about))
+            total.add(Combination({acts: sign}))
         for slide, force in levers.items():
             total.add(self.quantities.lever(body, slide, force))
         return total
@@ -414,13 +440,3 @@ class ToothForce(Quantity):
     def reads(self) -> Iterable[Quantity | None]:
         g = self.paths.mechanism.guides[self.guide]
         return self.paths.side((f"guide:{self.guide}", g.link if g.link != GROUND else g.on))
-
-
-@dataclass(frozen=True, eq=False)
-class Carried(Quantity):
-    """The torque of input j's motor, where it sits on another body than `on`."""
-
-    input: int
-
-    def form(self, block: Block) -> tuple[float, Number]:
-        return 1.0, block.drive(self.input)

@@ -146,9 +146,9 @@ class Constant(Load):
     def potential(self, block: Block) -> Number:
         if self.path is not None:
             return -dot(self.amount, block.position(self.path))
-        known = block.setting.plan.angles[self.body]
+        angle = block.setting.plan.angles[self.body]
         # of a torque on a link whose whole turns are not known there is none
-        return np.nan if known.bases else -self.amount * block.st.affine(known)
+        return np.nan if not angle.by_inputs else -self.amount * block.st.affine(angle)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,9 +202,9 @@ class Tabled(Load):
             return self.timed(block.time)
         if self.axis == "speed":
             return 0.0 if block.omega(self.body) is None else block.omega(self.body)
-        known = block.setting.plan.angles[self.body]
-        if not known.bases:
-            return block.st.affine(known)
+        angle = block.setting.plan.angles[self.body]
+        if angle.by_inputs:
+            return block.st.affine(angle)
         return self.in_turn(block.st.kind.angle(block.st.turn[self.body]))
 
     def timed(self, time: Number) -> Number:

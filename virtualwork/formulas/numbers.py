@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import cmath
 import math
+from bisect import bisect
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -84,9 +86,9 @@ def real_array(name: str, value: ArrayLike) -> Reals:
     try:
         return np.asarray(value, dtype=float)
     except (TypeError, ValueError):
-        found = repr(value)
-        found = found if len(found) <= 60 else f"{found[:60]} …"
-        raise ValueError(f"{name}: expected real numbers, found {found}") from None
+        text = repr(value)
+        text = text if len(text) <= 60 else f"{text[:60]} …"
+        raise ValueError(f"{name}: expected real numbers, found {text}") from None
 
 
 def xy(z: Complexes) -> Reals:
@@ -229,12 +231,12 @@ def solve_determined(cols: list[list[Number]], right: list[Number]) -> list[Numb
 
 def solve_transposed(cols: list[list[Number]], loads: list[Number]) -> list[Number]:
     """Solve Σ_c λ_c·∂C_c/∂x + Q_x = 0 for the complex λ of the loops; None is no load."""
-    given = [0.0 if load is None else load for load in loads]
-    shape = np.broadcast_shapes(*(np.shape(c) for row in cols for c in row), *(np.shape(q) for q in given))
+    filled = [0.0 if load is None else load for load in loads]
+    shape = np.broadcast_shapes(*(np.shape(c) for row in cols for c in row), *(np.shape(q) for q in filled))
     n = int(np.prod(shape))
     jacobian = np.swapaxes(stack(cols, n), -1, -2)
     right = np.zeros((n, len(loads)))
-    for i, load in enumerate(given):
+    for i, load in enumerate(filled):
         right[:, i] = -load
     good = np.asarray(np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(right).all(axis=1))
     out = np.full((n, jacobian.shape[-1]), np.nan)
@@ -269,6 +271,12 @@ class Kind(Protocol):
     def inverse(self, length: Number, least: float) -> Number:
         """1/length; NaN of one that is not above the least, which has no direction."""
 
+    def select(self, test: Number, positive: Number, otherwise: Number) -> Number:
+        """The second where the first is positive, else the third."""
+
+    def among(self, x: Number, knots: Sequence[Number], values: Sequence[Number]) -> Number:
+        """Of values between rising knots the one in whose interval x lies; the last where x is beyond."""
+
     def solve(self, cols: list[list[Number]], right: list[Number]) -> list[Number]:
         """Solve Σ column·x + right = 0, complex, for the real unknowns x of a group."""
 
@@ -294,6 +302,14 @@ class One:
     def inverse(self, length: float, least: float) -> float:
         """1/length, or NaN."""
         return 1 / length if length > least else math.nan
+
+    def select(self, test: float, positive: Number, otherwise: Number) -> Number:
+        """One of two."""
+        return positive if test > 0 else otherwise
+
+    def among(self, x: float, knots: Sequence[float], values: Sequence[Number]) -> Number:
+        """The value in whose interval x lies."""
+        return values[min(max(bisect(knots, x) - 1, 0), len(values) - 1)]
 
     join, angle = complex, staticmethod(cmath.phase)
     solve, transposed = staticmethod(solve_columns), staticmethod(solve_transposed)
@@ -333,6 +349,16 @@ class Many:
         """1/length, or NaN."""
         return 1 / np.where(length > least, length, np.nan)
 
+    def select(self, test: Number, positive: Number, otherwise: Number) -> Number:
+        """One of two."""
+        return np.where(test > 0, positive, otherwise)
+
+    def among(self, x: Number, knots: Sequence[float], values: Sequence[Number]) -> Number:
+        """The value in whose interval x lies."""
+        if all(value == values[0] for value in values):
+            return values[0]
+        return np.array(values)[np.clip(np.searchsorted(knots, x, "right") - 1, 0, len(values) - 1)]
+
 
 class Folded:
     """A kind for two assemblies that meet in every pose: the root is zero, and its noise is left out."""
@@ -340,6 +366,7 @@ class Folded:
     def __init__(self, kind: Kind) -> None:
         self.exp, self.join, self.regular = kind.exp, kind.join, kind.regular
         self.angle, self.inverse = kind.angle, kind.inverse
+        self.select, self.among = kind.select, kind.among
         self.solve, self.transposed = kind.solve, kind.transposed
 
     def sqrt(self, x: Number) -> Number:
@@ -389,16 +416,35 @@ class Written:
         length = bare(length)
         return 1 / RECORDED.select(length - bare(least), length, math.nan)
 
+    def select(self, test: Number, positive: Number, otherwise: Number) -> Number:
+        """One of two."""
+        return RECORDED.select(bare(test), bare(positive), bare(otherwise))
+
+    def among(self, x: Number, knots: Sequence[Number], values: Sequence[Number]) -> Number:
+        """The value in whose interval x lies: halves of halves, so that a decision is a few deep."""
+        if all(value == values[0] for value in values):
+            return bare(values[0])
+        middle = len(values) // 2
+        return self.select(
+            bare(x) - bare(knots[middle]),
+            self.among(x, knots[middle:], values[middle:]),
+            self.among(x, knots[:middle], values[:middle]),
+        )
+
     def solve(self, cols: list[list[Number]], right: list[Number]) -> list[Number]:
         """Solve Σ column·x + right = 0."""
         rows = [[part(c) for c in row] for row in cols for part in PARTS]
-        return solved(rows, [-part(w) for w in right for part in PARTS])
+        return self.system(rows, [-part(w) for w in right for part in PARTS])
 
     def transposed(self, cols: list[list[Number]], loads: list[Number]) -> list[Number]:
         """Solve Σ_c λ_c·column_c + load = 0."""
         rows = [[part(row[j]) for row in cols for part in PARTS] for j in range(len(loads))]
-        x = solved(rows, [0.0 if load is None else -bare(load) for load in loads], least=PARALLEL)
+        x = self.system(rows, [0.0 if load is None else -bare(load) for load in loads], PARALLEL)
         return [self.join(x[2 * c], x[2 * c + 1]) for c in range(len(cols))]
+
+    def system(self, rows: list[list[Number]], right: list[Number], least: float = 0.0) -> list[Number]:
+        """Solve rows·x = right."""
+        return solved(rows, right, least=least)
 
 
 ONE, MANY, WRITTEN = One(), Many(), Written()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property, partial
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Complexes, Number, Reals, condition, real_array
-from virtualwork.formulas.positions import BLOCK, SWEEP, EvenSweep, State, columns, run
-from virtualwork.formulas.rates import Passage, Rates
+from virtualwork.formulas.positions import BLOCK, State, columns, run
+from virtualwork.formulas.rates import Passage, Rates, chain_rule
+from virtualwork.formulas.touches import Touch
 from virtualwork.plan.steps import Group, Plan, Step, Term, path_reads
 
 
@@ -55,6 +57,10 @@ class Branch(Protocol):
         """How derivatives go through change points; None with several inputs."""
 
     @property
+    def recordings(self) -> dict[Any, Any]:
+        """What has been written down of it."""
+
+    @property
     def known_steps(self) -> dict[tuple[str, ...], tuple[Step, ...]]:
         """The steps that targets depend on, as far as requested."""
 
@@ -76,7 +82,7 @@ class _Asked(NamedTuple):
     targets: tuple[str, ...]
     order: int
     which: int
-    # for one input alone, not along the motion
+    # over one input alone
     alone: bool
     number: type
     place: Callable[[State], Number]
@@ -104,14 +110,12 @@ class Poses:
     Attributes
     ----------
     inputs : array (n, k)
-    block_of : EvenSweep, optional
-        The sweep that these inputs are `BLOCK` poses of: they have the digits of the sweep solved whole.
+    block_of : int, optional
+        The number of poses of which these are a part: they have the digits that all have together.
     input_error : float or array (n, k)
         Bound of the inputs' own errors, for the estimates of rounding errors: 0 where they are exact as given.
     input_rest : float or array (n, k), or a function that gives them, optional
         What the inputs are exactly, less the floats: where they stand in degrees or in decimals.
-    solved : list of (step, order)
-        What has been worked out so far; order 0 is position.
     """
 
     def __init__(
@@ -121,7 +125,7 @@ class Poses:
         speed: ArrayLike | None = None,
         acceleration: ArrayLike | None = None,
         jerk: ArrayLike | None = None,
-        block_of: EvenSweep | None = None,
+        block_of: int | None = None,
     ) -> None:
         self.block_of = block_of
         self._known_steps, self._plain, self._close = branch.known_steps, branch.plain, branch.close
@@ -149,7 +153,7 @@ class Poses:
         self.input_rest: ArrayLike | Callable[[], Reals] | None = None
         # (n,) s, where the poses are those of a motion in time
         self.time: Reals | None = None
-        self.solved: list[tuple[Step, int]] = []
+        self._solved: list[tuple[Step, int]] = []
         self._done: set[tuple[int, int, int]] = set()
         self._blocks: list[State] | None = None
         self._along: dict[int, list[Rates]] = {}
@@ -169,14 +173,14 @@ class Poses:
         v = np.broadcast_to(v, (self.n, k)) if v.ndim == 1 else v
         return [v[:, j] for j in range(k)]
 
-    def again(self, inputs: Reals, rates: list[list[Number]] | None = None) -> Poses:
+    def again(self, inputs: Reals, rates: list[list[Number]] | None = None) -> Self:
         """The same assembly at other inputs (n, k), at rest or with other rates of them."""
-        other = Poses(self.branch, inputs if inputs.shape[1] > 1 else inputs[:, 0], 0.0, 0.0, 0.0)
+        other = type(self)(self.branch, inputs if inputs.shape[1] > 1 else inputs[:, 0], 0.0, 0.0, 0.0)
         if rates is not None:
             other.rates = rates
         return other
 
-    def some(self, which: NDArray[np.bool_]) -> Poses:
+    def some(self, which: NDArray[np.bool_]) -> Self:
         """Some of these poses, `which` of them (n,), with their rates."""
 
         def of(rate: Number) -> Number:
@@ -216,6 +220,11 @@ class Poses:
         return whole
 
     # --- solving ----------------------------------------------------------------------------------------------
+    @property
+    def solved(self) -> list[tuple[Step, int]]:
+        """What has been worked out so far, (step, order); order 0 is position."""
+        return self._solved
+
     def states(self) -> list[State]:
         """The blocks of poses."""
         if self._blocks is None:
@@ -223,22 +232,19 @@ class Poses:
             if k == 1 and self.n:
                 q = self.inputs[:, 0]
                 self.branch.cover(float(q.min()), float(q.max()))
-            if self.n == 1 and self.block_of is None:
+            if not self.many:
                 self._blocks = [State([float(v) for v in self.inputs[0]])]
             else:
                 self._blocks = [
                     State([self.inputs[i : i + BLOCK, j] for j in range(k)], many=True)
                     for i in range(0, self.n, BLOCK)
                 ]
-                if k == 1 and self.swept:
-                    sweep = self.block_of or EvenSweep(self.inputs[0, 0], self.inputs[-1, 0], self.n)
-                    sweep.give(self._blocks)
         return self._blocks
 
     @property
-    def swept(self) -> bool:
-        """Whether this is a sweep of so many poses, or a block of one, that e^{iq} is formed by angle addition."""
-        return self.n > SWEEP or self.block_of is not None
+    def many(self) -> bool:
+        """Whether these are many poses, or a part of many."""
+        return self.n != 1 or self.block_of is not None
 
     def rows(self) -> Iterator[tuple[slice, State]]:
         """The blocks, each with the poses that are in it."""
@@ -267,7 +273,7 @@ class Poses:
             if new:
                 missing.append((k, new))
                 self._done.update((id(s), k, key) for s in new)
-                self.solved += [(s, k) for s in new]
+                self._solved += [(s, k) for s in new]
         if not missing and then is None:
             return self._along.get(which, [])
         states = self.states()
@@ -283,7 +289,7 @@ class Poses:
                     states[i] = State([np.array([q]) for q in st.inputs], many=True)
                     for w in self._along:
                         self._along[w] = [self._rates_of(s, b, w) for b, s in enumerate(states)]
-                    for step, k in self.solved:
+                    for step, k in self._solved:
                         for w in list(self._along) if k else [-2]:
                             if (id(step), k, w) in self._done:
                                 self._advance(i, w, [(k, [step])])
@@ -347,8 +353,16 @@ class Poses:
         """The order-th derivative of input j in time, (n,)."""
         return np.broadcast_to(np.asarray(self.rates[order - 1][j], dtype=float), (self.n,))
 
-    def values(self, keys: Sequence[tuple[Any, ...]]) -> list[Any]:
-        """Quantities of motion by their keys (`asked.Key`), (n,) each; what they depend on is solved in one pass."""
+    def values(self, keys: Sequence[Key]) -> list[Any]:
+        """Quantities by their keys, (n,) each."""
+        return self.by_blocks(keys)
+
+    def taped(self, keys: Sequence[Key]) -> list[Any] | None:
+        """Quantities from the tape; None where there is none."""
+        return None
+
+    def by_blocks(self, keys: Sequence[Key]) -> list[Any]:
+        """Quantities of motion by the formulas over blocks, (n,) each; what they depend on is solved in one pass."""
         asked = [self._asked(key) for key in keys]
         wanted: dict[tuple[int, int], dict[str, None]] = {}
         for quantity in asked:
@@ -356,7 +370,7 @@ class Poses:
         rates = {of: self.solve(targets, *of) for of, targets in wanted.items()}
         return [self._formed(quantity, rates[quantity.order, quantity.which]) for quantity in asked]
 
-    def _asked(self, key: tuple[Any, ...]) -> _Asked:
+    def _asked(self, key: Key) -> _Asked:
         """What a quantity depends on, and what the states and their rates have of it."""
         kind, of, *more = key
         alone = kind in ("dpoint", "dangle")
@@ -378,6 +392,12 @@ class Poses:
         if kind == "slide":
             return _Asked(
                 (f"slide:{of}",), *how, float, lambda st: st.slide[of], lambda r, k: r.slide[of][k - 1]
+            )
+        if kind in ("pressure angle", "curvature radius"):
+            touch = Touch(self.mechanism, self.plan, self.mechanism.cam_drives[of])
+            name, reads = kind.replace(" ", "_"), tuple(sorted(touch.targets))
+            return _Asked(
+                reads, 0, -1, False, float, lambda st: getattr(touch.at(st), name)(), lambda r, k: None
             )
         target = (f"angle:{of}",)
         if kind == "turn":
@@ -411,28 +431,6 @@ class Poses:
             [self.join([b[i][j] for b in blocks], complex) for j in range(len(blocks[0][i]))]
             for i in range(len(group.closures))
         ]
-
-
-def chain_rule(order: int, get: Callable[[int], Number], rates: Sequence[Number]) -> Number:
-    """A derivative in time of what has the derivatives K, L, M over the input, from q̇, q̈, q⃛; None is zero."""
-    v, a, j = rates
-    # what each derivative over the input is weighed with
-    if order == 1:
-        weights: tuple[Number, ...] = (v,)
-    elif order == 2:
-        weights = a, None if v is None else v * v
-    else:
-        second = None if v is None or a is None else 3.0 * v * a
-        weights = j, second, None if v is None else v * v * v
-    total: Number = None
-    for k in range(order, 0, -1):
-        weight = weights[k - 1]
-        value = None if weight is None else get(k)
-        if value is not None:
-            # a factor of exactly 1 costs nothing
-            value = value if isinstance(weight, float) and weight == 1.0 else value * weight
-            total = value if total is None else total + value
-    return total
 
 
 def part(rate: Number, rows: slice, many: bool) -> Number:

@@ -7,22 +7,21 @@ Assur group. The steps do not know what kind of numbers they run on.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from virtualwork.describe.laws import Lift
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.numbers import EPS, MANY, ONE, Complexes, Kind, Number, Reals
+from virtualwork.formulas.lifts import Located, lift, located
+from virtualwork.formulas.numbers import MANY, ONE, Kind, Number, Reals
 from virtualwork.plan.steps import Angle, Closure, Group, Path, Place, Step, Term, Turn
 
 # poses worked out together: their temporaries stay in the cache
 BLOCK = 8192
 EMPTY: Mapping[str, Any] = MappingProxyType({})
-# from so many poses on, e^{iθ} of a uniform sweep is formed by angle addition
-SWEEP = 256
 # rad: what turns farther than this between two samples is looked at in between
 FAR = 1.0
 # of the whole way, or of a turn of the input: samples this near are not divided again
@@ -57,7 +56,9 @@ class State:
         self.margin: dict[str, Number] = {}
         # groups that are singular in every pose
         self.folded: set[str] = set()
-        # e^{i·input}, where a sweep knows it already
+        # where the cams stand in their laws
+        self.lifts: dict[Lift, Located] = {}
+        # e^{i·input}
         self.spins: dict[int, Number] = {}
 
     def copy(self, many: bool | None = None) -> State:
@@ -68,6 +69,8 @@ class State:
         for name in ("turn", "angle", "point", "slide", "margin"):
             setattr(other, name, dict(getattr(self, name)))
         other.folded = set(self.folded)
+        if many == self.many:
+            other.lifts = dict(self.lifts)
         return other
 
     def spin(self, j: int) -> Number:
@@ -109,7 +112,20 @@ class State:
             if base not in known:
                 return None
             value = value + r * known[base]  # type: ignore[index]
+        return self.lifted(angle, value)
+
+    def lifted(self, angle: Angle, value: Number = 0.0) -> Number:
+        """A number and the lifts of cams in an angle or a slide."""
+        for of, r in angle.cams:
+            value = value + r * lift(self.lifts[of], 0)
         return value
+
+    def locate(self, angle: Angle) -> None:
+        """Find where the cams of an angle or a slide stand in their laws."""
+        for of, _ in angle.cams:
+            e = self.turn[of.cam]
+            on = None if of.on == GROUND else self.turn[of.on].conjugate()
+            self.lifts[of] = located(self.kind, of, e if on is None else e * on)
 
     def affine(self, angle: Angle) -> Number:
         """const + Σ k·input, the part of an angle that needs no other angle."""
@@ -143,74 +159,10 @@ class State:
             else:
                 factor = self.kind.exp(r * self.angle[base])
             value = factor if value is None else value * factor
+        if angle.cams:
+            factor = self.kind.exp(self.lifted(angle))
+            value = factor if value is None else value * factor
         return 1.0 + 0j if value is None else value
-
-
-class EvenSweep:
-    """An even sweep of an input, whose e^{iq} follow by angle addition: e^{i(q0 + jh)} = e^{iq0}·e^{ijh}.
-
-    Each factor is rounded once and the product twice, whatever the length of the sweep; the sweep's own rounding,
-    the difference between q and q0 + jh, is put back to first order, which is exact here. A block of `BLOCK` poses
-    needs no other block of the sweep.
-
-    Parameters
-    ----------
-    first, last : float
-        rad.
-    n : int
-        Number of poses.
-    even : bool
-        False where some block is known not to be even: then none is taken as such.
-
-    Examples
-    --------
-    >>> sweep = EvenSweep(0.0, 6.0, 7)
-    >>> bool(np.allclose(sweep.turns(np.arange(7.0)), np.exp(1j * np.arange(7.0)), rtol=1e-15))
-    True
-    >>> sweep.turns(np.arange(7.0) ** 2) is None
-    True
-    """
-
-    def __init__(self, first: float, last: float, n: int, even: bool = True) -> None:
-        self.even = even
-        h = (last - first) / (n - 1)
-        self.ramp = h * np.arange(min(n, BLOCK))
-        self.bound = 64 * EPS * max(abs(first), abs(last), 1e-3)
-
-    @cached_property
-    def _table(self) -> Complexes:
-        table = np.empty(len(self.ramp), complex)
-        np.cos(self.ramp, out=table.real)
-        np.sin(self.ramp, out=table.imag)
-        return table
-
-    def off(self, q: Reals) -> Reals | None:
-        """By how much a block's inputs are off from even steps; None where they are not even to rounding."""
-        with np.errstate(invalid="ignore"):
-            off = (q - q[0]) - self.ramp[: len(q)]
-            return off if off.max() <= self.bound and off.min() >= -self.bound else None
-
-    def give(self, blocks: Sequence[State]) -> None:
-        """Give blocks of poses their e^{iq}; where one block is not even, none gets them."""
-        turns = []
-        for st in blocks:
-            turns.append(self.turns(st.inputs[0]))
-            if turns[-1] is None:
-                return
-        for st, spin in zip(blocks, turns, strict=True):
-            st.spins[0] = spin
-
-    def turns(self, q: Reals) -> Complexes | None:
-        """e^{iq} of a block, (≤ BLOCK,); None where the sweep is not even."""
-        off = self.off(q) if self.even else None
-        if off is None:
-            return None
-        e = self._table[: len(q)] * complex(np.cos(q[0]), np.sin(q[0]))
-        turn = np.empty(len(q), complex)
-        turn.real = 1.0
-        turn.imag = off
-        e *= turn
-        return e
 
 
 def run(
@@ -240,6 +192,7 @@ def run(
 
 def turn(step: Turn, st: State) -> None:
     """A body's rotation, and its angle where a gear's ratio will need it; or a slide."""
+    st.locate(step.angle)
     if isinstance(step.body, int):
         st.slide[step.body] = st.whole(step.angle)
         return
@@ -251,6 +204,7 @@ def turn(step: Turn, st: State) -> None:
 
 def tied(tie: Turn, st: State) -> None:
     """A rotation or a slide that follows from others; its angle stays as it was."""
+    st.locate(tie.angle)
     if isinstance(tie.body, int):
         st.slide[tie.body] = st.whole(tie.angle)
     else:

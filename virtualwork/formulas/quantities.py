@@ -168,6 +168,16 @@ class Lever(Quantity):
         return self.force
 
 
+@dataclass(frozen=True, eq=False)
+class Carried(Quantity):
+    """The torque of input j's motor, where it sits on another body than `on`."""
+
+    input: int
+
+    def form(self, block: Block) -> tuple[float, Number]:
+        return 1.0, block.drive(self.input)
+
+
 class Quantities:
     """Makes each quantity once: what is made of the same is the same quantity."""
 
@@ -197,19 +207,19 @@ class Quantities:
         Of the force's part in the body's own (e^{iθ})″ = (iα − ω²)e^{iθ} only α is left, e × (e)″ = α: this turns
         I_G·α into (I_G + m|z|²)·α, the inertia about the point the body hangs on (Steiner).
         """
-        rest, found = Combination(force), Combination()
+        rest, lever = Combination(force), Combination()
         if slide is None and not along and body != GROUND:
             second, bare = self.second("turn", body), self(Turned, body, None)
             c = 0j + rest.get(second, 0.0)
             if c and not c.imag:
                 del rest[second]
-                found.add(Combination({self.second("angle", body): c.real}))
+                lever.add(Combination({self.second("angle", body): c.real}))
             c = 0j + rest.pop(bare, 0.0)
             if c.imag:
-                found.add(Combination({None: c.imag}))
+                lever.add(Combination({None: c.imag}))
         if rest:
-            found.add(Combination({self(Lever, body, slide, rest, along): 1.0}))
-        return found
+            lever.add(Combination({self(Lever, body, slide, rest, along): 1.0}))
+        return lever
 
 
 def in_order(quantity: Quantity) -> list[Quantity]:

@@ -8,15 +8,17 @@ formula.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import comb
 from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
 
+from virtualwork.describe.laws import Lift
 from virtualwork.describe.meshes import Coordinate
 from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.lifts import composed
 from virtualwork.formulas.numbers import Number, cross, singular_poses, solve_determined
 from virtualwork.formulas.positions import State, columns
 from virtualwork.plan.steps import Angle, Group, Path, Place, Plan, Step, Term, Turn
@@ -126,7 +128,16 @@ class Rates:
             if base not in without:
                 known = self.slide[base] if isinstance(base, int) else self.angle[base]
                 value = _plus(value, _times(r, known[k - 1]))
+        for of, r in angle.cams:
+            value = _plus(value, _times(r, composed(k, self.st.lifts[of], self.against(of, k))))
         return value
+
+    def against(self, of: Lift, k: int) -> list[Number]:
+        """The derivatives up to the k-th of a cam's angle against the body that carries it."""
+        on = self.angle[of.on]
+        if not on:
+            return self.angle[of.cam][:k]
+        return [_plus(a, _times(-1, b)) for a, b in zip(self.angle[of.cam][:k], on[:k], strict=True)]
 
     def _write_tied(self, tie: Turn, k: int) -> None:
         """Store the k-th derivative of an angle or a slide that is tied to others."""
@@ -242,3 +253,25 @@ def _times(f: Number, a: Number) -> Number:
     if a is None:
         return None
     return a if isinstance(f, (int, float)) and f == 1 else f * a
+
+
+def chain_rule(order: int, get: Callable[[int], Number], rates: Sequence[Number]) -> Number:
+    """A derivative in time of what has the derivatives K, L, M over the input, from q̇, q̈, q⃛; None is zero."""
+    v, a, j = rates
+    # what each derivative over the input is weighed with
+    if order == 1:
+        weights: tuple[Number, ...] = (v,)
+    elif order == 2:
+        weights = a, None if v is None else v * v
+    else:
+        second = None if v is None or a is None else 3.0 * v * a
+        weights = j, second, None if v is None else v * v * v
+    total: Number = None
+    for k in range(order, 0, -1):
+        weight = weights[k - 1]
+        value = None if weight is None else get(k)
+        if value is not None:
+            # a factor of exactly 1 costs nothing
+            value = value if isinstance(weight, float) and weight == 1.0 else value * weight
+            total = value if total is None else total + value
+    return total

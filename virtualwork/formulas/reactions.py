@@ -10,7 +10,7 @@ there is no friction: its value at rest is not determined, only bounded.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import effort
 from virtualwork.formulas.load_paths import LoadPaths
+from virtualwork.formulas.locking import balanced
 from virtualwork.formulas.numbers import Number, dot, leave_out, minus, plus, times
 from virtualwork.formulas.positions import BLOCK
 from virtualwork.formulas.scene import Scene
@@ -49,13 +50,13 @@ class JointForces:
         """Whether statics cannot give every joint force: more unknowns than equations."""
         return self.order.redundant
 
-    def force(self, block: Block, body: str) -> Number:
-        """The sum of the loads on a body."""
-        return self.paths.force(body).value(block)
+    def force(self, block: Block, body: str, *, touched: bool = True) -> Number:
+        """The sum of the loads on a body, those of cams (`touched`) among them."""
+        return self.paths.force(body, touched=touched).value(block)
 
-    def moment(self, block: Block, body: str) -> Number:
+    def moment(self, block: Block, body: str, *, touched: bool = True) -> Number:
         """The moment of the loads on a body about its centre of mass."""
-        return self.paths.moment(body, self.mechanism.rigid[body].center).value(block)
+        return self.paths.moment(body, self.mechanism.rigid[body].center, touched=touched).value(block)
 
     def on_side(self, block: Block, side: Side) -> Number:
         """The force of a joint on a body, complex; None where it is zero throughout."""
@@ -82,9 +83,12 @@ class JointForces:
         return plus(value, self.rubbed(block, joint, body))
 
     def is_pushed(self, guide: int) -> bool:
-        """Whether another part than the rail pushes along a guide: an input, or the teeth of a wheel that has a bearing."""
+        """Whether another part than the rail pushes along a guide: an input, a cam, or the teeth of a wheel that has a bearing."""
         driven = self.mechanism.driver_of(guide) is not None
-        return driven or any(self.meshing(mesh) is not None for mesh in self.order.racks.get(guide, ()))
+        cam = any(drive.guide == guide for drive in self.mechanism.cam_drives)
+        return (
+            driven or cam or any(self.meshing(mesh) is not None for mesh in self.order.racks.get(guide, ()))
+        )
 
     def meshing(self, mesh: int) -> str | None:
         """Where the teeth of a rack's wheel act.
@@ -103,6 +107,16 @@ class JointForces:
     def tooth(self, block: Block, mesh: int) -> Number:
         """The tooth force of a rack along its slide, positive on the link of the guide."""
         return self.paths.value(block, self.paths.tooth(mesh))
+
+    def contact(self, block: Block, cam: int, push: Number = None) -> Number:
+        """How hard a cam presses on its follower along the normal; below zero it would have to pull.
+
+        `push`: what it does along the follower's coordinate, where statics has told it.
+        """
+        touch = self.paths.touches.every[cam]
+        if push is None:
+            push = self.paths.value(block, self.paths.push(touch))
+        return times(times(touch.drive.cam.sign, abs(touch.at(block.st).unit())), push)
 
     def borne(
         self, block: Block, joint: Joint, body: str, tooth: Callable[[Block, int], Number] | None = None
@@ -196,16 +210,8 @@ class Reactions(JointForces):
         if self.scene.case.carried and self.scene.setting.drive is None:
             self.scene.setting.drive = effort(self.scene)
 
-    def over(
-        self,
-        *forms: Callable[[Block], Number],
-        kind: type = float,
-        also: Callable[[Block], None] | None = None,
-    ) -> list[Any]:
-        """Quantities over all blocks, formed block by block together; NaN where a pose is not assembled.
-
-        `also` is called with each block while what they are made of is there.
-        """
+    def over(self, *forms: Callable[[Block], Number], kind: type = float) -> list[Any]:
+        """Quantities over all blocks, formed block by block together; NaN where a pose is not assembled."""
         self._drive()
         n = self.scene.poses.n
         result: list[Any] = [np.empty(n, dtype=kind) for _ in forms]
@@ -214,8 +220,6 @@ class Reactions(JointForces):
             for out, form in zip(result, forms, strict=True):
                 value = form(block)
                 out[block.rows] = 0.0 if value is None else value
-            if also is not None:
-                also(block)
             if n > BLOCK:
                 # over a long sweep what the quantities were made of is not kept
                 block.forget(lasting=True)
@@ -228,7 +232,7 @@ class Reactions(JointForces):
 
 
 def settle(scene: Scene) -> tuple[int, NDArray[np.bool_]]:
-    """Iterate friction and reactions until neither changes.
+    """Iterate friction and reactions until neither changes; where they do not settle so, follow them from no friction on.
 
     Returns
     -------
@@ -248,21 +252,8 @@ def settle(scene: Scene) -> tuple[int, NDArray[np.bool_]]:
             change: Number = 0.0
             scale: Number = 0.0
             fresh: dict[int, Number] = {}
-            for number, (joint, body, other, coefficient, radius) in enumerate(scene.case.contacts):
-                force = reactions.on_side(block, (joint.key, body))
-                force = plus(force, reactions.borne(block, joint, body))
-                if force is None:
-                    continue
-                if joint.guide is None:
-                    rate = minus(block.omega(body), block.omega(other))
-                    value = times(-coefficient * radius * abs(force), None if rate is None else np.sign(rate))
-                else:
-                    rail = reactions.rail(block, joint.guide)
-                    rate = block.slide_rate(joint.guide)
-                    normal = abs(dot(force, 1j * rail))
-                    value = times(-coefficient * normal * rail, None if rate is None else np.sign(rate))
-                if value is None:
-                    continue
+            for number, force, along, arm in _rubbing(reactions, block):
+                value = times(-arm * abs(force), along)
                 fresh[number] = value
                 before = block.friction.get(number, 0.0)
                 change = np.maximum(change, abs(value - before) / np.where(value == 0, 1.0, abs(value)))
@@ -272,9 +263,62 @@ def settle(scene: Scene) -> tuple[int, NDArray[np.bool_]]:
             converged[block.rows] = ~(change > CLOSE * 8) & np.isfinite(scale)
         if (converged | ~scene.poses.assembled).all():
             break
+    for block in reactions.blocks():
+        rows = np.flatnonzero(~converged[block.rows] & scene.poses.assembled[block.rows])
+        if len(rows):
+            converged[block.rows] |= _follow(reactions, block, rows, len(converged[block.rows]))
     _anew(reactions)
     scene.formed.clear()
     return count, converged
+
+
+def _rubbing(reactions: Reactions, block: Block) -> Iterator[tuple[int, Number, Number, Number]]:
+    """Of each contact that slides over a block: its number, the force that it bears, along what it rubs, and its friction over the force with the sign of its rate.
+
+    A pin's force is complex and it rubs as a torque, 1; a guide's is the normal one, and it rubs along its rail.
+    """
+    for number, (joint, body, other, coefficient, radius) in enumerate(reactions.scene.case.contacts):
+        force = reactions.on_side(block, (joint.key, body))
+        force = plus(force, reactions.borne(block, joint, body))
+        if force is None:
+            continue
+        if joint.guide is None:
+            along, arm = 1.0, coefficient * radius
+            rate = minus(block.omega(body), block.omega(other))
+        else:
+            along, arm = reactions.rail(block, joint.guide), coefficient
+            force, rate = dot(force, 1j * along), block.slide_rate(joint.guide)
+        if rate is not None:
+            yield number, force, along, arm * np.sign(rate)
+
+
+def _follow(reactions: Reactions, block: Block, rows: NDArray[np.intp], n: int) -> NDArray[np.bool_]:
+    """Put the friction of some of a block's n poses that did not settle; which of all could be found, (n,)."""
+    contacts = [number for number, *_ in _rubbing(reactions, block)]
+    alongs = {number: along for number, _, along, _ in _rubbing(reactions, block)}
+    arms = np.array([np.broadcast_to(arm, n) for *_, arm in _rubbing(reactions, block)])
+    before = dict(block.friction)
+
+    def forces(friction: dict[int, Number]) -> Any:
+        block.friction.clear()
+        block.friction.update(friction)
+        _anew(reactions)
+        every = {number: force for number, force, *_ in _rubbing(reactions, block)}
+        return np.array([np.broadcast_to(every[number], n) for number in contacts], dtype=complex)
+
+    p = forces({})
+    q = np.array([forces({number: alongs[number] * np.ones(n)}) - p for number in contacts])
+    solved = np.zeros(n, dtype=bool)
+    friction = np.zeros((len(contacts), n))
+    for i in rows.tolist():
+        phi = balanced(arms[:, i], p[:, i], q[:, :, i].T)
+        if phi is not None:
+            friction[:, i], solved[i] = phi, True
+    for k, number in enumerate(contacts):
+        before[number] = np.where(solved, friction[k] * alongs[number], before.get(number, 0.0))
+    block.friction.clear()
+    block.friction.update(before)
+    return solved
 
 
 def _anew(reactions: Reactions) -> None:

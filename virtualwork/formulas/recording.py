@@ -12,35 +12,36 @@ Inputs of a tape
 `near BODY`              the angle, with its whole turns, of a body of which the angle itself is needed
 `near spring 0`          the same of a torsion spring's twist
 `table 0 x`, `table 0 y` the force of the first load that is given by a table
+`time`                   where a table is over it
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from dalembert.arithmetic.guard import Lock, guarded, own_lock
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare, squared
-from dalembert.arithmetic.systems import regularity, solved
+from dalembert.arithmetic.systems import regularity
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.description import Description
-from virtualwork.describe.parts import GROUND, TorsionSpring
-from virtualwork.formulas.asked import FORCES, JOINTS, Key, names
-from virtualwork.formulas.block import Block, Shared, Table
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.asked import FORCES, JOINTS, LOADS, Key, names
 from virtualwork.formulas.closed_forms import Case
-from virtualwork.formulas.dynamics import joints_at, resultant, shaking_loads
-from virtualwork.formulas.effort import generalized_force
-from virtualwork.formulas.load_case import LoadCase
-from virtualwork.formulas.load_paths import LoadPaths
-from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.newton import gaps, put_unknowns, unknowns
-from virtualwork.formulas.numbers import PARTS, WRITTEN
-from virtualwork.formulas.poses import chain_rule
+from virtualwork.formulas.numbers import PARTS, WRITTEN, Written
 from virtualwork.formulas.positions import State, columns, run
-from virtualwork.formulas.rates import Rates
-from virtualwork.formulas.reactions import JointForces
+from virtualwork.formulas.rates import Rates, chain_rule
+from virtualwork.formulas.touches import Touch
 from virtualwork.plan.order import plan
-from virtualwork.plan.steps import Group, Path, Plan, Term, path_reads
+from virtualwork.plan.steps import Group, Path, Plan, Step, Term, path_reads
+
+if TYPE_CHECKING:
+    from virtualwork.formulas.block import Block
+    from virtualwork.formulas.load_paths import LoadPaths
+    from virtualwork.formulas.loads import Tabled
+    from virtualwork.formulas.reactions import JointForces
 
 # sin² of a transmission angle below which a force may have no digit left
 NEAR = 1e-18
@@ -68,6 +69,8 @@ class Recording:
     settled : bool
         Whether the unknowns of groups without a closed form are exact as they enter. Else one Newton step is on the
         tape, without which a derivative to a dimension would not see what the group makes of it.
+    kind : Written
+        The operations of its numbers.
     """
 
     def __init__(
@@ -80,21 +83,24 @@ class Recording:
         geared: Iterable[str] = (),
         settled: bool = True,
         recorder: Recorder | None = None,
+        kind: Written = WRITTEN,
     ) -> None:
         self.mechanism, self.plan, self.signs, self.moves = mechanism, plan, signs, moves
         self.recorder = recorder or Recorder()
         self.turning_over, self.geared = frozenset(turning_over), frozenset(geared)
         self.settled = settled
         k = len(mechanism.inputs)
-        self.st = State([self.recorder.input(f"q{j}") for j in range(k)], kind=WRITTEN)
+        self.kind = kind
+        self.st = State([self.recorder.input(f"q{j}") for j in range(k)], kind=kind)
         self.rates = [
             [self.recorder.input(f"{name}{j}") if there else None for j in range(k)]
             for name, there in zip(NAMES[1:], moves, strict=True)
         ]
         self.cases = {g.name: Case(g, bare) for g in plan.groups if g.kind != "Newton"}
-        self._by = [Rates(plan, self.st, [[1.0] if i == j else [] for i in range(k)]) for j in range(k)]
+        self.by = [Rates(plan, self.st, [[1.0] if i == j else [] for i in range(k)]) for j in range(k)]
         given = [[rate[j] for rate in self.rates] for j in range(k)]
-        self._along = Rates(plan, self.st, given) if k > 1 else None
+        # in time, with several inputs
+        self.together = Rates(plan, self.st, given) if k > 1 else None
         self._done: set[tuple[int, int, int]] = set()
         self._values: dict[Key, Number] = {}
         self._forces: tuple[LoadPaths, JointForces, Block] | None = None
@@ -119,7 +125,7 @@ class Recording:
 
     def step(self, group: Group, st: State) -> list[Number] | None:
         """By how much a group's unknowns that enter are off, to first order; None where they are exact."""
-        return None if self.settled else WRITTEN.solve(columns(group, st), gaps(group, st))
+        return None if self.settled else self.kind.solve(columns(group, st), gaps(group, st))
 
     def _close(self, group: Group, st: State) -> None:
         if self.enters(group):
@@ -146,9 +152,9 @@ class Recording:
         """Write down what targets depend on, up to an order of derivatives."""
         steps = self.plan.needed(targets)
         for k in range(order + 1):
-            ways: list[tuple[int, Rates | None]] = [(-1, None)] if k == 0 else [*enumerate(self._by)]
-            if k and self._along is not None:
-                ways.append((len(self._by), self._along))
+            ways: list[tuple[int, Rates | None]] = [(-1, None)] if k == 0 else [*enumerate(self.by)]
+            if k and self.together is not None:
+                ways.append((len(self.by), self.together))
             for number, rates in ways:
                 for step in steps:
                     key = id(step), k, number
@@ -163,11 +169,11 @@ class Recording:
     @property
     def along(self) -> Rates:
         """The derivatives over the one input, or in time with several."""
-        return self._by[0] if self._along is None else self._along
+        return self.by[0] if self.together is None else self.together
 
     def _in_time(self, order: int, get: Callable[[int], Number]) -> Number:
         """A derivative in time, of derivatives over the one input or along all."""
-        if self._along is not None:
+        if self.together is not None:
             return get(order)
         return chain_rule(order, get, [rate[0] for rate in self.rates])
 
@@ -176,10 +182,10 @@ class Recording:
     def forces(self) -> tuple[LoadPaths, JointForces, Block]:
         """The loads over the recorded pose, with everything solved that they depend on."""
         if self._forces is None:
-            case = LoadCase(self.mechanism, self.plan, any(self.moves[:2]))
-            paths = LoadPaths(case)
-            self.solve(*case.targets())
-            self._forces = paths, JointForces(paths, set()), _Block(self)
+            # a dozen files: a motion without forces does not load them
+            from virtualwork.formulas.recorded_forces import forces_of
+
+            self._forces = forces_of(self)
         return self._forces
 
     def _places(self) -> tuple[LoadPaths, JointForces, Block]:
@@ -187,27 +193,6 @@ class Recording:
         case = self.forces[0].case
         self.solve(*case.targets(case.places))
         return self.forces
-
-    def efforts(self) -> list[Number]:
-        """The effort at each input by virtual work, through the carriers of motors."""
-        paths, _, block = self.forces
-        k = len(self.mechanism.inputs)
-        force = [self._negative(generalized_force(paths, block, j)) for j in range(k)]
-        if not self.mechanism.carried:
-            return force
-        matrix: list[list[Number]] = [[float(i == j) for j in range(k)] for i in range(k)]
-        for j in self.mechanism.carried:
-            link, carrier = str(self.mechanism.inputs[j].link), self.mechanism.carrier(j)
-            self.solve([f"angle:{link}", f"angle:{carrier}"], 1)
-            for i in range(k):
-                turned = [block.turning(body, i) for body in (link, carrier)]
-                driven, carried = (0.0 if t is None else t for t in turned)
-                matrix[i][j] = driven - carried
-        return solved(matrix, force) if k > 1 else [force[0] / matrix[0][0]]
-
-    @staticmethod
-    def _negative(value: Number) -> Number:
-        return 0.0 if value is None else -bare(value)
 
     # --- what can be asked ------------------------------------------------------------------------------------------
     def value(self, key: Key) -> Number:
@@ -217,24 +202,32 @@ class Recording:
         ----
         ("point", body, z, node or None, order)      position or a time derivative, complex
         ("angle", body, order)                       θ in (−π, π], ω, α, the angular jerk
-        ("slide", guide, order)
         ("turn", body)                               e^{iθ}, complex
         ("dpoint", body, z, node or None, j, order)  ∂P/∂q_j, complex; order 2 with one input: ∂²P/∂q²
         ("dangle", body, j, order)
-        ("dslide", guide, j, order)
-        ("effort", j), ("newton-euler", j)
-        ("force", joint's key, body), ("moment", joint's key, body)
+        ("slide", guide, order), ("dslide", guide, j, order)
+        ("effort", j), ("newton-euler", j), ("force", joint's key, body), ("moment", joint's key, body)
         ("reaction", joint's name, body)             of all joints of that name: a pin, and the guide its point runs in
         ("shaking",), ("shaking moment",)            complex; real
+        ("load", n), ("load at", n), ("load torque", n), ("rail", guide)   see `single_loads.OF_ONE`
+        ("contact", cam)                             how hard a cam, from 0, presses on its follower
+        ("pressure angle", cam), ("curvature radius", cam)
         ("closed", groups' names …)                  a finite number where these groups are assembled
         ("margin", group's name)                     the radicand of a closed form, relative
+        ("transmission", group's name)               sin² of the transmission angle of a two-link group
         ("twist", number)                            of a torsion spring, within half a turn of free
         ("column", loop, unknown)                    of the Jacobian of all loops (`loops`), complex; as their columns
         ("size",)                                    the mechanism's characteristic length
         ("regularity", group's name)                 of a larger group: how far its Jacobian is from singular, of 1
         """
         if key not in self._values:
-            found = getattr(self, f"_{key[0].replace('-', '_').replace(' ', '_')}")(*key[1:])
+            kind, *of = key
+            if kind in LOADS:
+                from virtualwork.formulas.single_loads import OF_ONE
+
+                found = OF_ONE[kind](*self._places(), *of)
+            else:
+                found = getattr(self, f"_{kind.replace('-', '_').replace(' ', '_')}")(*of)
             self._values[key] = 0.0 if found is None else bare(found)
         return self._values[key]
 
@@ -278,7 +271,7 @@ class Recording:
     def _dpoint(self, body: str, z: complex, node: str | None, j: int, order: int = 1) -> Number:
         path = self._path(body, z, node)
         self.solve(path_reads(path), order)
-        return self._by[j].vector(path, order)
+        return self.by[j].vector(path, order)
 
     def _path(self, body: str, z: complex, node: str | None) -> Path:
         if node is not None:
@@ -292,11 +285,18 @@ class Recording:
 
     def _twist(self, number: int) -> Number:
         spring = self.mechanism.torsion_springs[number]
-        if all(not self.plan.angles[body].bases for body in spring.links):
+        if all(self.plan.angles[body].by_inputs for body in spring.links):
             # the inputs alone fix it, whole turns included
             return 0.0
+        from virtualwork.formulas.block import Shared
+
         self.solve([f"angle:{body}" for body in spring.links], 0)
         return Shared.within(self.st, spring)
+
+    @cached_property
+    def tables(self) -> list[Tabled]:
+        """The loads that tables give, in the order in which their forces enter."""
+        return self.forces[0].case.tables
 
     def _angle(self, body: str, order: int) -> Number:
         if body == GROUND:
@@ -310,7 +310,7 @@ class Recording:
         if body == GROUND:
             return 0.0
         self.solve((f"angle:{body}",), order)
-        return self._by[j].angle[body][order - 1]
+        return self.by[j].angle[body][order - 1]
 
     def _slide(self, guide: int, order: int) -> Number:
         self.solve((f"slide:{guide}",), order)
@@ -320,10 +320,12 @@ class Recording:
 
     def _dslide(self, guide: int, j: int, order: int = 1) -> Number:
         self.solve((f"slide:{guide}",), order)
-        return self._by[j].slide[guide][order - 1]
+        return self.by[j].slide[guide][order - 1]
 
     def _effort(self, j: int) -> Number:
-        return self.efforts()[j]
+        from virtualwork.formulas.recorded_forces import efforts
+
+        return efforts(self)[j]
 
     def _newton_euler(self, j: int) -> Number:
         _, of, block = self._places()
@@ -334,6 +336,8 @@ class Recording:
         return of.joint_force(block, of.by_key[joint], body)
 
     def _reaction(self, joint: str, body: str) -> Number:
+        from virtualwork.formulas.dynamics import joints_at
+
         of = joints_at(self.forces[1].joints, joint, body)
         return sum((self.value(("force", j.key, body)) for j in of), 0.0)
 
@@ -342,7 +346,25 @@ class Recording:
         guide = of.by_key[joint].guide
         return None if guide is None else of.guide_moment(block, guide, body)
 
+    def _contact(self, cam: int) -> Number:
+        _, of, block = self._places()
+        self.solve(of.paths.touches.every[cam].targets, 0)
+        return of.contact(block, cam)
+
+    def _pressure_angle(self, cam: int) -> Number:
+        return self._touch(cam).at(self.st).pressure_angle()
+
+    def _curvature_radius(self, cam: int) -> Number:
+        return self._touch(cam).at(self.st).curvature_radius()
+
+    def _touch(self, cam: int) -> Touch:
+        touch = Touch(self.mechanism, self.plan, self.mechanism.cam_drives[cam])
+        self.solve(touch.targets, 0)
+        return touch
+
     def _shaking(self, part: int = 0) -> Number:
+        from virtualwork.formulas.dynamics import resultant, shaking_loads
+
         paths, _, block = self.forces
         return resultant(shaking_loads(paths.case.loads), block)[part]
 
@@ -354,18 +376,25 @@ class Recording:
 
         What cancels is not on the tape: a platform that stays level has the angle 0 there, whatever carries it.
         """
+        steps = () if key[0] in ("margin", "transmission", "size") else self.steps(key)[0]
+        return tuple(step.name for step in steps if isinstance(step, Group))
+
+    def steps(self, key: Key) -> tuple[tuple[Step, ...], int]:
+        """The steps that a quantity depends on, and how often they are differentiated."""
         kind, *of = key
-        if kind in ("margin", "size"):
-            return ()
+        order = of[-1] if kind in ("point", "angle", "slide", "dpoint", "dangle", "dslide") else 0
         if kind in ("point", "dpoint"):
             targets = path_reads(self._path(*of[:3]))
         elif kind in ("angle", "dangle", "turn"):
             targets = {f"angle:{of[0]}"}
         elif kind in ("slide", "dslide"):
             targets = {f"slide:{of[0]}"}
+        elif kind in ("pressure angle", "curvature radius"):
+            targets = Touch(self.mechanism, self.plan, self.mechanism.cam_drives[of[0]]).targets
         else:
             targets = {key for g in self.plan.groups for key in self.plan.writes(g)}
-        return tuple(step.name for step in self.plan.needed(targets) if isinstance(step, Group))
+            order = self.forces[0].case.targets()[1] if kind in FORCES else 0
+        return self.plan.needed(targets), order
 
     def _closed(self, *groups: str) -> Number:
         total: Number = 0.0
@@ -401,45 +430,17 @@ class Recording:
     def _margin(self, group: str) -> Number:
         return self.st.margin[self.solved(group).name]
 
+    def _transmission(self, group: str) -> Number:
+        """Between the two links, between a rod and the normal of its guide, of a slot as it passes its pivot, between guides."""
+        of = self.solved(group)
+        margin: Number = self.st.margin[of.name]
+        if of.kind != "RPR":
+            return margin
+        size, w = bare(self.mechanism.size), self.cases[of.name].offset(self.st)
+        return margin * (size * size / (w.conjugate() * w).real)
+
     def solved(self, group: str) -> Group:
         """A group, with its position written down."""
         of = next(g for g in self.plan.groups if g.name == group)
         self.solve(self.plan.writes(of), 0)
         return of
-
-
-class _Setting(Shared):
-    """What the one recorded block is told of its poses."""
-
-    def __init__(self, recording: Recording) -> None:
-        super().__init__(recording.mechanism, recording.plan)
-        self.recording = recording
-
-    def rates(self, rows: slice, many: bool) -> tuple[Number, Number]:
-        """q̇ and q̈ of the one input."""
-        speed, acceleration, _ = self.recording.rates
-        return speed[0], acceleration[0]
-
-    def wound(self, spring: TorsionSpring, st: State, within: Number) -> Number:
-        """The twist next to the one that enters."""
-        number = self.mechanism.torsion_springs.index(spring)
-        return self.recording.unwrapped(f"near spring {number}", WRITTEN.exp(within))
-
-
-class _Block(Block):
-    """The recorded pose as the loads see it."""
-
-    def __init__(self, recording: Recording) -> None:
-        super().__init__(_Setting(recording), slice(None), recording.st, recording._along, recording._by)
-        self.recording = recording
-
-    def drive(self, j: int) -> Number:
-        """The torque of input j's motor."""
-        return self.recording.value(("effort", j))
-
-    def table(self, load: Table) -> Number:
-        """The force of a table, as it enters."""
-        tables = [of for of in self.recording.forces[0].case.loads if isinstance(of, Tabled)]
-        number = next(i for i, of in enumerate(tables) if of is load)
-        enter = self.recording.recorder.input
-        return WRITTEN.join(enter(f"table {number} x"), enter(f"table {number} y"))

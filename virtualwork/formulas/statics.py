@@ -43,6 +43,7 @@ def unknowns(of: JointForces) -> list[Column]:
             if of.mechanism.guides[joint.guide].is_slider:
                 unknowns.append(("moment", joint.key, ""))
     unknowns += [mesh_column(of.mechanism, i) for i in range(len(of.mechanism.meshes))]
+    unknowns += [("contact", str(cam), "") for cam in range(len(of.mechanism.cams))]
     for j, entry in enumerate(of.mechanism.inputs):
         unknowns.append(("force" if entry.is_slide else "torque", str(j), ""))
     return unknowns
@@ -75,7 +76,7 @@ def equations(of: JointForces, block: Block) -> Iterator[tuple[int, int | None, 
             yield 3 * links.index(body) + 2, column[unknown], factor
 
     for i, body in enumerate(links):
-        force, moment = of.force(block, body), of.moment(block, body)
+        force, moment = of.force(block, body, touched=False), of.moment(block, body, touched=False)
         if force is not None:
             yield 3 * i, None, real_part(force)
             yield 3 * i + 1, None, imaginary_part(force)
@@ -249,6 +250,8 @@ class Statics:
                 return f"{kind} at {names[key]} on {body}"
             if kind in ("normal", "moment"):
                 return f"the {kind} {'force ' if kind == 'normal' else ''}of guide {names[key]}"
+            if kind == "contact":
+                return f"the contact force of {self.mechanism.cam_drives[int(key)].label}"
             if kind == "tooth":
                 return f"the tooth force of {self.mechanism.meshes[int(key)].label}"
             return f"the {kind} of {'input' if kind in ('force', 'torque') else 'gear'} {int(key) + 1}"
@@ -270,12 +273,12 @@ class Statics:
             sums += [(f"{axis} on {body}", at(axis, body, False)) for body in links]
             sums.append((f"{axis} from the ground", at(axis, GROUND, True)))
         sums += [(f"normal force on {link}", at("normal", link, True)) for link in links]
-        known = [
+        determined = [
             f"{what} at {' and '.join(names[self.unknowns[i][1]] for i in here)}"
             for what, here in sums
             if len(here) > 1 and np.abs(null[:, :, here].sum(axis=2)).max() <= 1e-7
         ]
         result = ["statics does not determine " + ", ".join(label(self.unknowns[i]) for i in free)]
-        if known:
-            result.append("determined are the sums of " + "; ".join(known))
+        if determined:
+            result.append("determined are the sums of " + "; ".join(determined))
         return result

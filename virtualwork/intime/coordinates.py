@@ -194,7 +194,7 @@ class Coordinates:
 
 def twists(motion: Motion) -> list[float]:
     """The twists of all torsion springs in one pose, with their whole turns."""
-    return [float(motion.lanes.twist(i)[0]) for i in range(len(motion.mechanism.torsion_springs))]
+    return [float(motion.poses.twist(i)[0]) for i in range(len(motion.mechanism.torsion_springs))]
 
 
 def wound(assembly: Assembly, at: Floats, twisted: Sequence[float]) -> Assembly:

@@ -95,11 +95,11 @@ class Crossing:
         from poses too near they have lost their digits.
         """
         known, ends = self.values(f), (self.at - self.inner, self.at + self.inner)
-        found = [(f(q), self.interpolated(known, q)) for q in ends]
+        pairs = [(f(q), self.interpolated(known, q)) for q in ends]
         sizes = [
-            max(map(abs, of)) for of in zip(least, *known, *(values for values, _ in found), strict=True)
+            max(map(abs, of)) for of in zip(least, *known, *(values for values, _ in pairs), strict=True)
         ]
-        apart = [[abs(x - y) for x, y in zip(*pair, strict=True)] for pair in found]
+        apart = [[abs(x - y) for x, y in zip(*pair, strict=True)] for pair in pairs]
         # NaN is the worst
         self.missed = [max(x if x == x else math.inf for x in of) for of in zip(*apart, strict=True)]
         return [x / size if size else 0.0 for x, size in zip(self.missed, sizes, strict=True)]
@@ -110,16 +110,16 @@ def narrowed(f: Callable[[float], Floats], at: float, widest: float, least: Floa
 
     Gaps are relative to at least `least` of each quantity; where that is 0, what vanishes cannot be told from rounding.
     """
-    best, lowest, told = Crossing(at, widest), math.inf, False
+    best, lowest, smooth = Crossing(at, widest), math.inf, False
     for j in range(NARROWINGS):
         result = Crossing(at, widest * NARROWER**j)
         gaps = result.gaps(f, least)
-        told = told or all(gap < SMOOTH for gap, size in zip(gaps, least, strict=True) if size)
+        smooth = smooth or all(gap < SMOOTH for gap, size in zip(gaps, least, strict=True) if size)
         if max(gaps) < BETTER * lowest:
             best, lowest = result, max(gaps)
         if lowest <= ENOUGH:
             break
-    if told:
+    if smooth:
         best.compare(f, Crossing(at, OTHER * best.inner / INNER))
         return best
     # what is not smooth there is left as it is, but for the nearest poses
@@ -147,9 +147,9 @@ def crossings(
     return crossings
 
 
-def nearest(found: list[Crossing], q: float) -> Crossing | None:
+def nearest(crossings: list[Crossing], q: float) -> Crossing | None:
     """The crossing next to an input; None where there is none."""
-    if not found:
+    if not crossings:
         return None
-    i = bisect_left([c.at for c in found], q)
-    return min(found[max(0, i - 1) : i + 1], key=lambda c: abs(c.at - q))
+    i = bisect_left([c.at for c in crossings], q)
+    return min(crossings[max(0, i - 1) : i + 1], key=lambda c: abs(c.at - q))

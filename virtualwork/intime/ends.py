@@ -104,7 +104,7 @@ def events(
     sides : mapping of an input's number to array (lanes,)
         See `sides`.
     """
-    found, doubt = np.full(nodes.t.shape[1], np.nan), np.zeros(nodes.t.shape[1], dtype=bool)
+    times, doubt = np.full(nodes.t.shape[1], np.nan), np.zeros(nodes.t.shape[1], dtype=bool)
     for j, level in levels.items():
         g = _gaps(nodes, j, level, sides[j])
         rounds, lanes, doubtful, low, high = _pieces(g)
@@ -130,5 +130,5 @@ def events(
             if not going.any():
                 break
         doubt[lane] |= going | ~(np.abs(h - guess) <= NEAR * whole)
-        found[lane] = np.fmin(found[lane], here.t + h)
-    return found, doubt
+        times[lane] = np.fmin(times[lane], here.t + h)
+    return times, doubt

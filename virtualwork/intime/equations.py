@@ -202,8 +202,7 @@ class Equations:
     @cached_property
     def _tables(self) -> list[Tabled]:
         """The loads that tables give, in the order of the tape."""
-        case = LoadCase(self.mechanism, self.assembly.plan, moves=True)
-        return [load for load in case.loads if isinstance(load, Tabled)]
+        return LoadCase(self.mechanism, self.assembly.plan, moves=True).tables
 
     def recording(self, *moves: bool, settled: bool = True) -> Recording:
         """The formulas of the assembly, with what the equations can fill in: speeds and accelerations as `moves`."""

@@ -37,9 +37,21 @@ def share(tolerance: float) -> float:
     return min(1.0, SAFETY * (1 / GAIN + 4 * EPS / tolerance))
 
 
-def spread(fine: Reals, coarse: Reals, of: Any) -> Reals:
-    """The error of a quantity over times, the last axis but the inputs': the largest so far, and its rounding."""
-    return np.asarray(np.maximum.accumulate(np.abs(fine - coarse) * of, axis=-2) + 4 * EPS * np.abs(fine))
+def apart(t: Reals, q: Reals, v: Reals) -> Reals:
+    """How far two solutions lie apart at times (…, n), from the differences of their inputs and speeds, (…, n, k).
+
+    They may meet by chance and be at different speeds: what these come to within a step counts as well.
+
+    >>> apart(np.array([0.0, 0.5]), np.array([[0.0], [0.0]]), np.array([[0.0], [2e-9]])).tolist()
+    [[0.0], [1e-09]]
+    """
+    step = np.diff(t, axis=-1, prepend=t[..., :1])[..., None]
+    return np.asarray(np.maximum(np.abs(q), step * np.abs(v)))
+
+
+def spread(fine: Reals, apart: Reals, of: Any) -> Reals:
+    """The error of a quantity over times, the last axis but the inputs', from how far two solutions lie apart: the largest so far, and its rounding."""
+    return np.asarray(np.maximum.accumulate(apart * of, axis=-2) + 4 * EPS * np.abs(fine))
 
 
 def rounding(t: Reals, q: Reals, v: Reals, a: Reals) -> Reals:

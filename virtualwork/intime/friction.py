@@ -37,6 +37,8 @@ from virtualwork.intime.watch import Floats, Rate, Value, Watch, sign
 # iterations of friction and joint forces; each gains a factor of some μ r / l
 LIMIT = 400
 CLOSE, NEARLY = 1e-15, 1e-12
+# by how much friction has grown from its first value where putting it in again does not settle
+GROWN = 1e6
 # rad, sizes, or of the largest rate: joints that turn back so near each other do so together
 TOGETHER = 1e-9
 # of the largest rate, or of a joint's largest friction: what rounding may make of zero
@@ -168,7 +170,15 @@ class Rubbing(Equations):
         rate, slip = [of[3][0] for of in joints], [of[2][0] for of in joints]
         slips = [of[2][1:] for of in joints]
         return Values(
-            a, per, [of[0] for of in forces], [of[1:] for of in forces], rate, slip, slips, next(rest)
+            a,
+            per,
+            [of[0] for of in forces],
+            [of[1:] for of in forces],
+            rate,
+            slip,
+            slips,
+            next(rest),
+            self._crossing(q[0]) is not None,
         )
 
     @property
@@ -197,13 +207,15 @@ class Rubbing(Equations):
         Raises
         ------
         Lost
-            Where the joints lock: no force balances its own friction.
+            Where the joints lock: no force balances its own friction. And close to a change point, where friction does
+            not settle by putting it in again: without it the joint forces grow beyond any bound there, with too few digits
+            left for what it takes from them.
         """
         c, mode = len(self.arms), self.mode
         # where one input moves a joint of mode 0 does not move with it: nothing rubs
         stuck = [n for n in range(c) if not mode[n]] if self.k > 1 else []
         inverse = np.linalg.pinv([[values.slips[n][m] for m in stuck] for n in stuck]) if stuck else None
-        phi = [0.0] * c
+        phi, first = [0.0] * c, 0.0
         for _ in range(LIMIT):
             after = [
                 -s * arm * values.force(n, phi) if s else x
@@ -216,14 +228,18 @@ class Rubbing(Equations):
                 for n, x in zip(stuck, (inverse @ rest).tolist(), strict=True):
                     after[n] = -x
             change = max(abs(x - y) for x, y in zip(after, phi, strict=True))
-            if not change < 1e300:
+            first = first or change
+            if not change <= GROWN * first:
                 break
             phi = after
             if change <= CLOSE * max(map(abs, phi)):
                 return phi
         if change <= NEARLY * max(map(abs, phi)):
             return phi
-        raise Lost
+        found = None if values.near else values.followed(self.mode, self.arms, inverse)
+        if found is None:
+            raise Lost
+        return found
 
     # --- modes ----------------------------------------------------------------------------------------------------
     def tendency(self, t: float, q: Floats, direction: float) -> float:

@@ -79,11 +79,11 @@ class Radau:
             return np.array([f(*state) for state in zip(t.tolist(), q.tolist(), v.tolist(), strict=True)])
 
         state = np.array([t]), np.array([q]), np.array([v]), np.array([rates]), np.array([h])
-        found = _stages(one_by_one, *state)
-        if found is None:
+        stages = _stages(one_by_one, *state)
+        if stages is None:
             raise Lost
         _, a, legendre = nodes()
-        values, k = found[0], len(q)
+        values, k = stages[0], len(q)
         dv = h * (a[-1] @ values[:, :k])
         dq = h * np.array(v) + h * h * ((a @ a)[-1] @ values[:, :k])
         size = np.abs(legendre @ values[:, :k])

@@ -24,6 +24,8 @@ from virtualwork.intime.watch import Floats
 Method = DormandPrince | Radau
 # nodes of a path at which rounding is looked at; how far from each, as a share of what an input's errors are relative to
 SAMPLES, BESIDE = 8, 2.0**-40
+# standard deviations of rounding that count
+DEVIATIONS = 3.0
 
 
 @dataclass
@@ -80,7 +82,13 @@ class Path:
 
     def drop(self) -> None:
         """Take the last node away, but for the first."""
-        del self.rows[max(1, self.steps) :]
+        self.cut(self.steps)
+
+    def cut(self, node: int) -> None:
+        """Take away a node and all after it, but for the first."""
+        del self.rows[max(1, node) :]
+        # it is that of every step
+        self.__dict__.pop("noise", None)
 
     def back(self, stops: Sequence[float]) -> None:
         """Take away the nodes that lie beyond the last of some times by no more than rounding of it."""
@@ -157,6 +165,15 @@ class Path:
         steps = np.arange(self.steps) + 0.5
         return np.asarray(np.exp(np.stack([np.interp(steps, which, of) for of in sizes.T], axis=1)))
 
+    @property
+    def noise_of_speeds(self) -> Reals:
+        """What rounding of the accelerations may make of the speeds over each step, (n − 1, k).
+
+        A step takes each stage with its weight, and each of them rounds by itself.
+        """
+        h = np.diff(self.nodes.t)[:, None]
+        return np.asarray(DEVIATIONS * self.noise * float(np.linalg.norm(self.method.stages[1])) * h)
+
     # --- the inputs -----------------------------------------------------------------------------------------------
     @cached_property
     def inputs(self) -> Reals:
@@ -192,5 +209,5 @@ def compiled(equations: Equations, method: Method) -> Loop | None:
     """The loop of steps, where compiled code does it."""
     if not isinstance(method, DormandPrince) or not equations.plain:
         return None
-    found = loop(equations.k, equations.rates)
-    return None if rounds.ready(found) is None else found
+    function = loop(equations.k, equations.rates)
+    return None if rounds.ready(function) is None else function

@@ -57,14 +57,14 @@ def _motion_of(
         right = [-x for x in by]
         return [right[0] / mass[0][0]] if k == 1 else solved(mass, right)
 
-    found = moved([still[effort] for effort in efforts])
+    powers = moved([still[effort] for effort in efforts])
     per = {name: moved([slope(effort, name) for effort in efforts]) for name in frictions}
-    out = dict(zip(accelerations, found, strict=True))
+    out = dict(zip(accelerations, powers, strict=True))
     for name, by in per.items():
         out |= {f"{a} {name}": x for a, x in zip(accelerations, by, strict=True)}
     for quantity in more:
         along = [slope(quantity, a) for a in accelerations]
-        out[quantity] = sum((s * x for s, x in zip(along, found, strict=True)), still[quantity])
+        out[quantity] = sum((s * x for s, x in zip(along, powers, strict=True)), still[quantity])
         for name, by in per.items():
             own = slope(quantity, name)
             out[f"{quantity} {name}"] = sum((s * x for s, x in zip(along, by, strict=True)), own)

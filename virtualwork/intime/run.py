@@ -15,17 +15,21 @@ from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
 from virtualwork.describe.parts import Input
-from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.asked import FORCES, Key
+from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.intime.coordinates import Coordinates
 from virtualwork.intime.equations import Equations
-from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, UNKNOWN, rounding, share, spread
+from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, UNKNOWN, apart, rounding, share, spread
 from virtualwork.intime.explicit import DormandPrince
 from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.implicit import Radau
-from virtualwork.intime.travel import UNDECIDED, Travel, travel
+from virtualwork.intime.travel import UNDECIDED, Moved, Travel, travel
 from virtualwork.intime.walk import MOST
 from virtualwork.intime.watch import Floats, Levels
 from virtualwork.motion import Motion
+
+# nodes at which quantities are compared, and by how many roundings their states are moved to see what rounds in them
+NODES, ROUNDINGS = 400, (-5.0, 3.0, 4.0)
 
 if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
@@ -92,10 +96,48 @@ class Run:
         scale = np.array(self.fine.legs[0].equations.scale)
         return np.asarray((self.error_estimate / scale).max(axis=1) > UNKNOWN)
 
-    def spread(self, fine: Reals, coarse: Reals) -> Reals:
-        """The error of a quantity from its values in the two solutions: the largest so far, and its rounding."""
-        rows = np.reshape(fine, (len(fine), -1)), np.reshape(coarse, (len(coarse), -1))
-        return spread(*rows, self.share).reshape(np.shape(fine))
+    def errors(self, of: Callable[[Travel, Reals, Moved | None], Sequence[Reals]]) -> list[Reals]:
+        """The errors of quantities at the times, (n,) each: how far those of states lie that are as wrong as these may be.
+
+        The distance of the two solutions counts too, the largest so far, at the nodes as well: they may meet by chance.
+
+        Parameters
+        ----------
+        of : function of a solution, times (m,), and by how much inputs and speeds are moved, (m, k) each
+            Gives the quantities, (m,) each.
+        """
+        nodes = self.coarse.nodes[self.coarse.nodes <= self.fine.end]
+        some = nodes[np.unique(np.linspace(0, len(nodes) - 1, min(len(nodes), NODES)).astype(int))]
+        t = np.union1d(some, self.t)
+        q, gap, faster = _apart(self.fine, self.coarse, t)
+        least, gap, faster = _least(self.fine, t), *(np.maximum.accumulate(x, axis=0) for x in (gap, faster))
+        shares = self.share + np.divide(least, gap, out=np.zeros_like(gap), where=gap > 0)
+        wrong, rates = np.maximum(gap * shares, least) + 4 * EPS * np.abs(q), faster * shares
+        units = np.eye(q.shape[1])
+        moves = [(wrong * unit, 0.0 * rates) for unit in units] + [
+            (0.0 * wrong, rates * unit) for unit in units
+        ]
+        size = EPS * np.maximum(np.abs(q), self.fine.legs[0].equations.scale)
+        moves += [(by * size, 0.0 * rates) for by in ROUNDINGS]
+        answers, moved = of(self.fine, t, None), [of(self.fine, t, by) for by in moves]
+        rows, result = np.searchsorted(t, self.t), []
+        for answer, other, *others in zip(answers, of(self.coarse, t, None), *moved, strict=True):
+            error = self.share * np.maximum.accumulate(np.abs(answer - other)) + 4 * EPS * np.abs(answer)
+            off = np.abs(np.array(others) - answer)
+            # a quantity rounds by itself, also where it vanishes
+            rounded = np.maximum.accumulate(off[-len(ROUNDINGS) :].max(axis=0))
+            result.append((error + off[: -len(ROUNDINGS)].sum(axis=0) + 2 * rounded)[rows])
+        return result
+
+    def rounding(self, key: Key) -> Reals:
+        """What the evaluation of a quantity at the states rounds, (n,), by its key (`Recording.value`): computed twice.
+
+        Friction at rest is no force by the formula, and redundant statics is solved in another way: of forces with these, 0.
+        """
+        m, motion = self.assembly.mechanism, self.motion
+        if key[0] in FORCES and (m.friction or self.first_motion.dynamics.statics is not None):
+            return np.zeros(len(self.t))
+        return np.asarray(motion.rounding.of(key))
 
     @cached_property
     def motion(self) -> Any:
@@ -261,9 +303,15 @@ def _simulated(
 def _error(fine: Travel, coarse: Travel, t: Reals, part: float) -> Reals:
     """How far the inputs may be from the truth at times, (n, k)."""
     nodes = coarse.nodes[coarse.nodes <= fine.end]
-    found = spread(fine.at(nodes)[0], coarse.at(nodes)[0], part) + _least(fine, nodes)
+    error = spread(*_apart(fine, coarse, nodes)[:2], part) + _least(fine, nodes)
     # between two nodes that of the later one
-    return np.asarray(found[np.minimum(np.searchsorted(nodes, t), len(nodes) - 1)])
+    return np.asarray(error[np.minimum(np.searchsorted(nodes, t), len(nodes) - 1)])
+
+
+def _apart(fine: Travel, coarse: Travel, nodes: Reals) -> tuple[Reals, Reals, Reals]:
+    """The inputs of the finer solution at nodes of the coarser, how far the two lie apart there, and their speeds, (n, k) each."""
+    (q, v, *_), (other, rate, *_) = fine.at(nodes), coarse.at(nodes)
+    return q, apart(nodes, q - other, v - rate), np.abs(v - rate)
 
 
 def _least(fine: Travel, t: Reals) -> Reals:

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from operator import mul
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from virtualwork.formulas.locking import balanced
+from virtualwork.formulas.numbers import Complexes
 from virtualwork.intime.watch import Floats, sign
 
 Mode = tuple[int, ...]
@@ -22,6 +26,8 @@ class Values(NamedTuple):
     slip: Floats
     slips: list[Floats]
     power: float
+    # whether it is so close to a change point that without friction it is interpolated
+    near: bool
 
     @property
     def signs(self) -> Mode:
@@ -42,3 +48,25 @@ class Values(NamedTuple):
         for x, per in zip(phi, self.per, strict=True):
             result = [a + x * b for a, b in zip(result, per, strict=True)]
         return result
+
+    def followed(self, mode: Mode, arms: Floats, inverse: Any) -> Floats | None:
+        """The friction of all joints in a mode where it does not settle by putting it in again and again; None where they lock.
+
+        What keeps a joint at rest is linear in the friction of those that slide, by the `inverse` of what the friction of
+        those at rest does to their slides: these alone are unknown.
+        """
+        slides = [n for n, sense in enumerate(mode) if sense]
+        stuck = [n for n, sense in enumerate(mode) if not sense]
+        if not slides:
+            return None
+        # the friction of every joint: its constant, and its share in that of each joint that slides
+        whole = np.zeros((len(mode), 1 + len(slides)))
+        whole[slides, 1 + np.arange(len(slides))] = 1.0
+        if inverse is not None:
+            rest = np.array(self.slips)[stuck] @ whole
+            rest[:, 0] += np.array(self.slip)[stuck]
+            whole[stuck] = -inverse @ rest
+        forces: Complexes = np.asarray(np.array(self.q)[slides] @ whole, dtype=complex)
+        forces[:, 0] += np.array(self.p)[slides]
+        phi = balanced(np.array([mode[n] * arms[n] for n in slides]), forces[:, 0], forces[:, 1:])
+        return None if phi is None else (whole @ np.append(1.0, phi)).tolist()

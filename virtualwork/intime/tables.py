@@ -20,7 +20,7 @@ def place(load: Tabled, plan: Plan) -> tuple[Value, Rate] | None:
     if load.axis == "input":
         return lambda t, q, v: q[0], lambda t, q, v, a: v[0]
     angle = plan.angles[load.body]
-    if angle.bases:
+    if not angle.by_inputs:
         return None
     const, terms = angle.const, angle.inputs
     if load.axis == "angle":
@@ -37,8 +37,8 @@ def place(load: Tabled, plan: Plan) -> tuple[Value, Rate] | None:
 def reader(load: Tabled, at: Value, *, imaginary: bool) -> Value:
     """One component of what a table gives, of what it is over; NaN outside."""
     places = [x for x, _ in load.table]
-    given = [y.imag if imaginary else y.real for _, y in load.table]
-    rows = zip(given[:-1], given[1:], places[:-1], places[1:], strict=True)
+    values = [y.imag if imaginary else y.real for _, y in load.table]
+    rows = zip(values[:-1], values[1:], places[:-1], places[1:], strict=True)
     slopes = [(b - a) / (y - x) for a, b, x, y in rows]
     first, span = places[0], places[-1] - places[0]
 
@@ -51,7 +51,7 @@ def reader(load: Tabled, at: Value, *, imaginary: bool) -> Value:
             if not -EDGE * span <= x - first <= (1 + EDGE) * span:
                 return math.nan
             i = min(max(i, 0), len(slopes) - 1)
-        return given[i] + slopes[i] * (x - places[i])
+        return values[i] + slopes[i] * (x - places[i])
 
     return value
 

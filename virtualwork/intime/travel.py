@@ -21,8 +21,6 @@ from virtualwork.intime.path import Method, Path, followed
 from virtualwork.intime.walk import MOST, Walk
 from virtualwork.intime.watch import Floats, noise
 
-# standard deviations of rounding that count
-DEVIATIONS = 3.0
 # changes of coordinates in one simulation
 CHANGES = 10_000
 # changes of the mode of friction at one time, for each joint that rubs
@@ -31,6 +29,10 @@ CHATTERS = "friction does not settle there which joints stick and which slide"
 GAINS = "friction would drive joint {} there: which way it slides is not settled"
 UNDECIDED = "it comes so near a change point that rounding decides how it goes on"
 NO_FURTHER = "it can go no further: a limit, or a pose where its motion is not determined"
+
+
+# changes of coordinates and of their speeds, (n, k) each
+Moved = tuple[Reals, Reals]
 
 
 @dataclass
@@ -123,9 +125,7 @@ class Travel:
         for leg in self.legs:
             if leg.steps:
                 h = np.diff(leg.nodes.t)[:, None]
-                # a step takes each stage with its weight, and each of them rounds by itself
-                each = DEVIATIONS * leg.noise * float(np.linalg.norm(leg.method.stages[1])) * h
-                squares = before + np.cumsum(each**2, axis=0)
+                squares = before + np.cumsum(leg.noise_of_speeds**2, axis=0)
                 way = place + np.cumsum(np.sqrt(squares) * h, axis=0)
                 t, places = [*t, leg.nodes.t[1:]], [*places, way]
                 before, place = squares[-1], way[-1]
@@ -167,12 +167,16 @@ class Travel:
             out[rows] = leg.equations.energies(times[rows], q, v)
         return out
 
-    def motion(self, times: Reals) -> Any:
-        """The motion through times: a `Motion`, or several joined."""
-        parts = [
-            (rows, leg.coordinates.motion(*leg.at(times[rows])[:3], times[rows]))
-            for leg, rows in self._parts(times)
-        ]
+    def motion(self, times: Reals, moved: Moved | None = None) -> Any:
+        """The motion through times: a `Motion`, or several joined; `moved`: with other inputs and speeds, by so much."""
+        parts = []
+        for leg, rows in self._parts(times):
+            q, v, a, _ = leg.at(times[rows])
+            if moved is not None:
+                # other coordinates may be as wrong as the inputs
+                q, v = q + moved[0][rows], v + moved[1][rows]
+                a = leg.equations.many(times[rows], q, v)[:, :-1]
+            parts.append((rows, leg.coordinates.motion(q, v, a, times[rows])))
         return parts[0][1] if len(parts) == 1 else Joined(parts, len(times))
 
     def link_angle(self, name: str, times: Reals) -> Reals:
@@ -257,9 +261,9 @@ def travel(
         found.legs.append(path)
         found.ended = path.ended
         if isinstance(equations, Rubbing):
-            fastest, gain = gains(equations, path.nodes, fastest)
+            fastest, gain = gains(path, fastest)
             if gain is not None:
-                del path.rows[max(1, gain[0]) :]
+                path.cut(gain[0])
                 found.ended = path.ended = GAINS.format(gain[1])
                 return found
         if path.ended.startswith("until"):

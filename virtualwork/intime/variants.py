@@ -27,7 +27,7 @@ from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.control import first_steps
 from virtualwork.intime.coordinates import FOLDING
 from virtualwork.intime.ends import events, passed, sides
-from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, rounding, share, spread
+from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, apart, rounding, share, spread
 from virtualwork.intime.marching import Nodes, beginning, follow, march, over
 from virtualwork.intime.powers import motion_of, names
 from virtualwork.intime.run import drift, levels_of, not_met, reached, rising, simulate
@@ -353,7 +353,8 @@ class _Lanes:
     def _error(self, coarse: Nodes, fine: Nodes, times: Reals, of: float) -> Reals:
         """The error of the inputs at all times, (lanes, n, k): that of the coarser way's next node."""
         q, v, a = (np.swapaxes(x[::2], 0, 1) for x in (fine.q, fine.v, fine.rates[..., :-1]))
-        result = spread(q, np.swapaxes(coarse.q, 0, 1), of) + rounding(coarse.t.T, q, v, a)
+        gap = apart(coarse.t.T, q - np.swapaxes(coarse.q, 0, 1), v - np.swapaxes(coarse.v, 0, 1))
+        result = spread(q, gap, of) + rounding(coarse.t.T, q, v, a)
         at = np.stack([(coarse.t < x).sum(axis=0) for x in times.T], axis=1)
         at = np.minimum(at, len(coarse.t) - 1)
         return np.asarray(result[np.arange(len(result))[:, None], at])

@@ -138,23 +138,23 @@ class Walk:
             path.rejected += 1
             self.h, self.grow, self.cut = shorter(h, wanted), 1.0, True
             return
-        done, found = taken
+        done, step = taken
         following = longer(h, wanted, before, self.grow)
         self.left, self.grow, self.cut, self.h = self.still, GROW, False, following
-        if found is not None:
-            self.left = {found.watch.name: found.level}
-            if found.done is None or t + found.h == t:
-                path.ended = found.watch.name if found.watch.ends else ""
+        if step is not None:
+            self.left = {step.watch.name: step.level}
+            if step.done is None or t + step.h == t:
+                path.ended = step.watch.name if step.watch.ends else ""
                 return
-            there, done = t + found.h if found.h < length else there, found.done
+            there, done = t + step.h if step.h < length else there, step.done
         self.stiff = stiffer(self.stiff, done.stiffness, path.method.stable)
         t = there
         q, self.low_q = _added(q, self.low_q, done.dq)
         v, self.low_v = _added(v, self.low_v, done.dv)
         self.fastest = [max(f, abs(x)) for f, x in zip(self.fastest, v, strict=True)]
         path.put(t, q, v, done.rates, work + done.work)
-        if found is not None and found.watch.ends:
-            path.ended = found.watch.name
+        if step is not None and step.watch.ends:
+            path.ended = step.watch.name
         else:
             path.ended = self.monitor(t, q, v)
         if not path.ended and self.stiff >= STIFF:
@@ -189,8 +189,8 @@ class Walk:
     def _marches(self) -> None:
         """Go on to the end (of the plan), to where the monitor ends it, or to the last node before a watch."""
         path, equations, k = self.path, self.path.equations, self.path.equations.k
-        given = {"end": self.end, "span": self.span, "tolerance": self.tolerance}
-        given |= {f"scale{j}": x for j, x in enumerate(equations.scale)}
+        inputs = {"end": self.end, "span": self.span, "tolerance": self.tolerance}
+        inputs |= {f"scale{j}": x for j, x in enumerate(equations.scale)}
         state = beginning(Nodes(np.array(path.rows[-1]), k), self.h, self.fastest)
         state |= {"grow": self.grow, "stiff": self.stiff}
         lows = [f"l{name}" for name in state_names(k)[1:]]
@@ -202,10 +202,10 @@ class Walk:
                 ends = [x for x in self.plan[ahead : ahead + ROUNDS] if x <= self.end]
                 if not ends:
                     break
-                found = follow(k, equations.rates, {}, state, np.array(ends)[:, None])
+                marched = follow(k, equations.rates, {}, state, np.array(ends)[:, None])
             else:
-                found = march(k, equations.rates, given, state)
-            nodes = found.nodes.at(np.s_[:, 0])
+                marched = march(k, equations.rates, inputs, state)
+            nodes = marched.nodes.at(np.s_[:, 0])
             taken = np.diff(nodes.t, prepend=path.end) > 0
             if not np.isfinite(nodes.table).all() or not equations.clear(nodes.q[:, 0]):
                 # change points or a limit are near: step by step
@@ -215,7 +215,7 @@ class Walk:
             if step is not None:
                 state = before | dict.fromkeys(lows, 0.0) | {"h": step, "grow": 1.0, "stiff": 0.0}
                 break
-            state = found.state
+            state = marched.state
             if path.ended:
                 break
             if path.steps >= self.budget:
@@ -223,7 +223,7 @@ class Walk:
             elif self.plan:
                 path.ended = "end" if path.end >= self.end else ""
             elif not state["left"][0] > 0:
-                path.ended = "end" if state["t"][0] >= self.end else "stiff" if found.stiff[0] else "lost"
+                path.ended = "end" if state["t"][0] >= self.end else "stiff" if marched.stiff[0] else "lost"
         own = ("h", "grow", "stiff", *lows, *(f"f{j}" for j in range(k)))
         self.h, self.grow, self.stiff, *rest = (float(np.ravel(state[name])[0]) for name in own)
         self.low_q, self.low_v, self.fastest = rest[:k], rest[k : 2 * k], rest[2 * k :]

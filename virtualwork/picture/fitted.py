@@ -27,7 +27,7 @@ class Fitted(NamedTuple):
     Attributes
     ----------
     name : str
-    kind : "point", "angle" or "slide"
+    kind : "point", "angle", "slide" or "effort"
     turning : bool
         Whether the input is an angle.
     q : array (k,)
@@ -89,7 +89,7 @@ def _path(axes: Axes, each: Fitted) -> tuple[Reals, Reals, str]:
 
 
 def _function(axes: Axes, each: Fitted) -> tuple[Reals, Reals, str]:
-    """An angle or a travel over the input."""
+    """An angle, a travel or an effort over the input."""
     along, of = (np.degrees(each.inputs), "deg") if each.turning else (each.inputs, "m")
     q = np.degrees(each.q) if each.turning else each.q
     if each.kind == "angle":
@@ -103,11 +103,15 @@ def _function(axes: Axes, each: Fitted) -> tuple[Reals, Reals, str]:
             before = before + 2 * np.pi * np.round(start / (2 * np.pi))
     else:
         after, before, target = each.after, each.before, each.target
-        scale, unit = _lengths(np.abs(target))
+        if each.kind == "effort":
+            scale, unit = 1.0, "N·m" if each.turning else "N"
+        else:
+            scale, unit = _lengths(np.abs(target))
     axes.plot(q, before * scale, color="0.7", lw=1.0, label="before")
     axes.plot(q, after * scale, **AFTER)
     axes.set_xlabel(f"input, {of}")
-    axes.set_ylabel(f"{'angle' if each.kind == 'angle' else 'travel'}, {unit}")
+    what = {"angle": "angle", "effort": "torque" if each.turning else "force"}.get(each.kind, "travel")
+    axes.set_ylabel(f"{what}, {unit}")
     return along, target * scale, f"{unit} over the input"
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 COLORS = {
     "weight": "tab:green", "inertia force": "tab:red", "inertia torque": "tab:red", "joint force": "tab:blue",
-    "joint moment": "tab:blue",
+    "joint moment": "tab:blue", "contact force": "tab:purple",
 }  # fmt: skip
 LENGTH = 0.8
 """The longest arrow, as a share of the largest link."""

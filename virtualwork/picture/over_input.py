@@ -31,15 +31,15 @@ def curves(poses: Poses, names: Sequence[str], figure: FigureBase | None = None)
     return curves_of(poses, quantities(poses, names), figure)
 
 
-def curves_of(poses: Poses, found: Sequence[Quantity], figure: FigureBase | None = None) -> Panels:
+def curves_of(poses: Poses, quantities: Sequence[Quantity], figure: FigureBase | None = None) -> Panels:
     """Draw quantities against the input, a panel for each unit; return their axes."""
-    units = list(dict.fromkeys(q.unit for q in found))
+    units = list(dict.fromkeys(q.unit for q in quantities))
     figure = sheet(7.6, 1.0 + 2.3 * len(units), figure)
     rows: Panels = figure.subplots(len(units), 1, sharex=True, squeeze=False)[:, 0]
     x, label = _input(poses)
     ends = []
     for axes, unit in zip(rows, units, strict=True):
-        mine = [q for q in found if q.unit == unit]
+        mine = [q for q in quantities if q.unit == unit]
         scale = max(q.scale for q in mine)
         ends.append(panel(axes, x, [Curve(q.name, q.values) for q in mine], "", unit, scale))
     _name_input(rows[-1], x, label)

@@ -34,6 +34,8 @@ LINES: dict[str, dict[str, Any]] = {
     "spoke": {"lw": 1.4},
     "belt": {"lw": 1.6},
     "rack": {"lw": 1.4},
+    "cam": {"lw": 1.6},
+    "roller": {"lw": 1.2},
     "slot": {"lw": 0.9},
     "block": {"lw": 1.4},
     "spring": {"color": "0.25", "lw": 0.9},
@@ -102,7 +104,7 @@ class _Paper:
             turns = max(1.0, (high - low) / (2 * np.pi))
             low = low if turns > 1 else self.m.at[0]
             high = low + 2 * np.pi * turns
-        return Poses(poses.branch, np.linspace(low, high, PATH)) if high > low else poses
+        return type(poses)(poses.branch, np.linspace(low, high, PATH)) if high > low else poses
 
     def _height(self, width: float) -> float:
         """Return how high a drawing of this width had best be: as high as what is drawn, within bounds."""

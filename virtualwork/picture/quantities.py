@@ -43,9 +43,9 @@ def _quantity(poses: Poses, word: str) -> Quantity:
     m = poses.mechanism
     name, _, what = word.rpartition(".")
     guides = {g.point: i for i, g in enumerate(m.guides)}
-    known = {*m.points, *m.links}
-    if name not in known:
-        raise DescriptionError(f"'{word}': no link or point is named '{name}'{nearest(name, known)}")
+    names = {*m.points, *m.links}
+    if name not in names:
+        raise DescriptionError(f"'{word}': no link or point is named '{name}'{nearest(name, names)}")
     if name in m.points and what in POINTS:
         order, part = POINTS[what]
         body, place = m.points[name]

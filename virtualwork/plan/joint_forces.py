@@ -84,11 +84,15 @@ class Order:
         """The unknown torques (guides, gears, inputs), and how the bodies' ΣM = 0 gives each: body -> factor.
 
         None in place of the factors where the torques are not all determined. The tooth force of a rack is one of them
-        only where its guide does not tell it.
+        only where its guide does not tell it; what a cam does acts as a load that virtual work has given.
         """
         bodies = list(self.mechanism.links)
-        told = set(self.along.values())
-        every = [r for r in relations(self.mechanism) if r.gear is None or r.gear not in told]
+        placed = set(self.along.values())
+        every = [
+            r
+            for r in relations(self.mechanism)
+            if r.kind != "cam" and (r.gear is None or r.gear not in placed)
+        ]
         tied = sorted(every, key=lambda r: r.kind == "input")
         pattern = [[r.torques.get(body, 0.0) for r in tied] for body in bodies]
         inverse = left_inverse(pattern)

@@ -17,6 +17,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
+from virtualwork.describe import MobilityError
 from virtualwork.describe.description import Description
 from virtualwork.describe.meshes import Coordinate
 from virtualwork.describe.parts import GROUND
@@ -72,7 +73,7 @@ class _Planner:
         self.m = m = topology.first
         self.merged, self.phases = topology.merged, topology.phases
         self.points: dict[str, dict[str, Any]] = {
-            body: {p: Vector.of(slot) for p, slot in given} for body, given in topology.bodies
+            body: {p: Vector.of(slot) for p, slot in slots} for body, slots in topology.bodies
         }
         # a point of each guide's line
         self.throughs: list[Any] = [Vector.of(line) for _, _, _, line, _ in topology.guides]
@@ -102,7 +103,7 @@ class _Planner:
         for body_point, z in self.points[GROUND].items():
             self._place(body_point, GROUND, z)
         pending = list(self.blocks.order)
-        if self.merged:
+        if self.merged and not self.m.cams:
             pending = [tuple(v for block in pending for v in block)]
         for block in pending:
             self._block(block)
@@ -168,8 +169,8 @@ class _Planner:
             links = tuple(b for b in self.m.links if b in held)
             group = Group(" + ".join(links), links, "Newton", tuple(free), unknown, tuple(closures), own)
             self.steps.append(replace(group, kind=self._kind(group)))
-            found: tuple[Coordinate, ...] = (*group.members, *unknown, *group.tied_slides)
-            for x in found:
+            coordinates: tuple[Coordinate, ...] = (*group.members, *unknown, *group.tied_slides)
+            for x in coordinates:
                 self._known(x)
         for tie in after:
             self.steps.append(tie)
@@ -194,7 +195,7 @@ class _Planner:
             if isinstance(tie.body, int):
                 return "Newton"
             bases = [(b, r) for b, r in tie.angle.bases if b in group.angles]
-            if len(bases) != 1 or len(tie.angle.bases) != 1 or bases[0][1] != 1.0 or tie.angle.gears:
+            if len(bases) != 1 or len(tie.angle.bases) != 1 or not _unit(bases[0][1]) or tie.angle.gears:
                 return "Newton"
             own[tie.body] = str(bases[0][0])
         held = {own.get(t.body) for t in terms} | {t.slide for t in terms}
@@ -215,11 +216,19 @@ class _Planner:
         relations = []
         for relation in self.relations:
             bodies = relation.shares.keys()
-            if bodies & new and all(body in new or body in self.angles for body in bodies):
+            if not all(body in new or body in self.angles for body in bodies):
+                continue
+            turned = {of.cam for of, _ in relation.right.cams} & new
+            if turned:
+                raise MobilityError(
+                    f"[[cams]] {relation.number + 1} ({turned.pop()}): its own follower would have to turn it; a cam "
+                    "moves its follower alone: drive the cam"
+                )
+            if bodies & new:
                 right = relation.right
                 if relation.gear is not None:
-                    known = self.phases.get(relation.gear)
-                    right = Angle(known) if known is not None else Angle(gears=((relation.gear, 1.0),))
+                    phase = self.phases.get(relation.gear)
+                    right = Angle(phase) if phase is not None else Angle(gears=((relation.gear, 1.0),))
                 relations.append((relation, right))
         return relations
 
@@ -233,22 +242,24 @@ class _Planner:
         wheels = {mesh.rack.gear for mesh in self.m.meshes if mesh.rack is not None}
         for relation, right in self._relations(fresh):
             c = relation.shares
-            known = replace(right, gears=())
+            relation_angle = replace(right, gears=())
             for body, factor in c.items():
                 if body not in fresh:
-                    known = known.plus(self.angles[body], -factor)
+                    relation_angle = relation_angle.plus(self.angles[body], -factor)
             unknown = {body: factor for body, factor in c.items() if body in fresh}
             if self.m.meshes:
-                there = known.at(self.m.at)
+                there = relation_angle.at(self.m.at)
                 stands = sum(factor * self.guess.get(body, 0.0) for body, factor in unknown.items())
                 if right.gears:
                     # its constant is that of the guess, at once where no link before it has to be placed
-                    known = known.plus(right if there is None else Angle(stands - there))
+                    relation_angle = relation_angle.plus(right if there is None else Angle(stands - there))
                 elif relation.kind == "guide" and there is not None and unknown.keys() <= self.guess.keys():
                     # gears count whole turns: those of a slider are the guess's
                     whole = round(complex(stands - there).real / (2 * math.pi))
-                    known = known.plus(Angle(2 * math.pi * whole)) if whole else known
-            rows.append((unknown, known))
+                    relation_angle = (
+                        relation_angle.plus(Angle(2 * math.pi * whole)) if whole else relation_angle
+                    )
+            rows.append((unknown, relation_angle))
         solved = eliminated(rows, fresh, wheels)
         free = [b for b in fresh if b not in solved]
         for x in free:
@@ -270,11 +281,11 @@ class _Planner:
             progress = False
             for body in self.m.links:
                 if body not in self.anchors and body in self.solved:
-                    found = self._attach(
+                    attached = self._attach(
                         body, set(self.anchors), lambda b, z: self._chain(b, z, self.anchors)
                     )
-                    if found is not None:
-                        self.anchors[body] = found
+                    if attached is not None:
+                        self.anchors[body] = attached
                         progress = True
             for body in [b for b in self.anchors if b not in self.settled]:
                 self.settled.add(body)
@@ -375,18 +386,18 @@ class _Planner:
                         if other in moving or other in anchors:
                             join(other, name)
             # pins first: a guide carries a slide and is a poorer branch of the tree
-            found = False
+            closed = False
             for i in list(guides):
                 g = self.m.guides[i]
                 for body in (g.link, g.on):
-                    if body in moving and body not in anchors and not found:
+                    if body in moving and body not in anchors and not closed:
                         entry = self._by_guide(i, body, set(anchors), chain)
                         if entry is not None:
                             anchors[body] = entry
                             queue.append(body)
                             guides.remove(i)
-                            found = True
-            if not found:
+                            closed = True
+            if not closed:
                 break
         for i in guides:
             g = self.m.guides[i]
@@ -408,3 +419,8 @@ class _Planner:
         (start, plus), (end, minus) = there, here
         terms = combined((*plus, *(Term(-t.z, t.body, t.slide) for t in minus)))
         closures.append(Closure(start, end, terms, joint, body, guide))
+
+
+def _unit(share: Any) -> bool:
+    """Whether an angle turns as another one does."""
+    return bool(share == 1.0 or (share.is_integer() and 1.0 <= share <= 1.0))

@@ -22,6 +22,7 @@ from functools import cached_property
 from typing import Literal, TypeVar
 
 from virtualwork.describe.description import Description
+from virtualwork.describe.laws import Lift
 from virtualwork.describe.meshes import Coordinate
 from virtualwork.describe.parts import GROUND
 
@@ -29,7 +30,7 @@ from virtualwork.describe.parts import GROUND
 Variable = tuple[str, str]
 # a point of a body; the number of a guide and what of it: where its line runs, which way
 Slot = tuple[str, str] | tuple[int, str]
-Key = TypeVar("Key", int, str, "str | int")
+Key = TypeVar("Key", int, str, "str | int", Lift)
 
 
 @dataclass(frozen=True)
@@ -57,15 +58,32 @@ def key_of(x: Coordinate) -> str:
 
 @dataclass(frozen=True)
 class Angle:
-    """θ = const + Σ k·input + Σ r·θ_base + Σ p·K_gear; a base may be a slide too, and so may be what is tied.
+    """θ = const + Σ k·input + Σ r·θ_base + Σ p·K_gear + Σ f·s_cam; a base may be a slide too, and so may be what is tied.
 
-    K is the constant of a gear, a belt or a rack, K = Σ c·x: the guess gives it once the links before it are placed.
+    s is the lift of a cam; K is the constant of a gear, a belt or a rack, K = Σ c·x: the guess gives it once the links before it are placed.
     """
 
     const: float = 0.0
     inputs: tuple[tuple[int, float], ...] = ()
     bases: tuple[tuple[Coordinate, float], ...] = ()
     gears: tuple[tuple[int, float], ...] = ()
+    cams: tuple[tuple[Lift, float], ...] = ()
+
+    @property
+    def by_inputs(self) -> bool:
+        """Whether the inputs alone say what it is, as a sum."""
+        return not self.bases and not self.cams
+
+    @property
+    def runs(self) -> bool:
+        """Whether it goes on and on where an input does: a lift alone comes back."""
+        return bool(self.inputs or self.bases)
+
+    @property
+    def reads(self) -> set[str]:
+        """What it depends on: `angle:BODY`, `slide:GUIDE`."""
+        turned = {f"angle:{body}" for of, _ in self.cams for body in (of.cam, of.on) if body != GROUND}
+        return {key_of(base) for base, _ in self.bases} | turned
 
     @property
     def turning(self) -> tuple[tuple[str, float], ...]:
@@ -74,7 +92,7 @@ class Angle:
 
     def at(self, inputs: tuple[float, ...]) -> float | None:
         """The angle at given inputs, or None where it depends on other angles."""
-        if self.bases or self.gears:
+        if self.bases or self.gears or self.cams:
             return None
         return self.const + sum(k * inputs[j] for j, k in self.inputs)
 
@@ -85,6 +103,7 @@ class Angle:
             _sums(self.inputs, other.inputs, factor),
             _sums(self.bases, other.bases, factor),
             _sums(self.gears, other.gears, factor),
+            _sums(self.cams, other.cams, factor),
         )
 
 
@@ -224,7 +243,7 @@ class Plan:
     def reads(self, step: Step) -> set[str]:
         """What a step reads: `angle:BODY`, `point:NODE`, `slide:GUIDE`."""
         if isinstance(step, Turn):
-            return {key_of(base) for base, _ in step.angle.bases}
+            return step.angle.reads
         if isinstance(step, Slide):
             return set()
         if isinstance(step, Place):
@@ -234,7 +253,7 @@ class Plan:
         for closure in step.closures:
             needs |= _term_reads(closure.terms) | _node(closure.start) | _node(closure.end)
         for tie in step.ties:
-            needs |= {key_of(base) for base, _ in tie.angle.bases}
+            needs |= tie.angle.reads
         return needs - own
 
     def writes(self, step: Step) -> tuple[str, ...]:
@@ -251,11 +270,16 @@ class Plan:
     def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
         """The steps that the targets depend on, in order; nothing more."""
         wanted, chosen = set(targets), []
-        for step in reversed(self.steps):
-            if wanted.intersection(self.writes(step)):
+        for step, writes, reads in self._backwards:
+            if not wanted.isdisjoint(writes):
                 chosen.append(step)
-                wanted |= self.reads(step)
+                wanted |= reads
         return tuple(reversed(chosen))
+
+    @cached_property
+    def _backwards(self) -> tuple[tuple[Step, tuple[str, ...], set[str]], ...]:
+        """The steps from the last to the first, each with what it writes and what it reads."""
+        return tuple((step, self.writes(step), self.reads(step)) for step in reversed(self.steps))
 
 
 def _term_reads(terms: tuple[Term, ...]) -> set[str]:
@@ -296,13 +320,13 @@ def guide_label(m: Description, i: int) -> str:
 
 @dataclass(frozen=True)
 class Relation:
-    """Angles and slides that a slider, a gear, a belt, a rack or a turning input ties: Σ share·x = right.
+    """Angles and slides that a slider, a gear, a belt, a rack, a cam or a turning input ties: Σ share·x = right.
 
-    `number` counts the guides, the meshes (`Description.meshes`) or the inputs of the file. The constant of a mesh is
+    `number` counts the guides, the meshes (`Description.meshes`), the cams or the inputs of the file. The constant of a mesh is
     that of the guess.
     """
 
-    kind: Literal["guide", "gear", "belt", "rack", "input"]
+    kind: Literal["guide", "gear", "belt", "rack", "cam", "input"]
     number: int
     label: str
     shares: Mapping[Coordinate, float]
@@ -311,7 +335,7 @@ class Relation:
     @property
     def gear(self) -> int | None:
         """The number of the mesh of a gear, a belt or a rack; None of others."""
-        return None if self.kind in ("guide", "input") else self.number
+        return None if self.kind in ("guide", "cam", "input") else self.number
 
     @property
     def torques(self) -> dict[str, float]:
@@ -320,7 +344,7 @@ class Relation:
 
 
 def relations(m: Description) -> Iterator[Relation]:
-    """Every relation between angles and slides: of inputs, sliders, gears, belts and racks."""
+    """Every relation between angles and slides: of inputs, sliders, gears, belts, racks and cams."""
     for j, e in enumerate(m.inputs):
         if e.link is not None:
             yield Relation(
@@ -332,3 +356,9 @@ def relations(m: Description) -> Iterator[Relation]:
             yield Relation("guide", i, guide_label(m, i), {g.link: 1.0, g.on: -1.0}, right)
     for i, mesh in enumerate(m.meshes):
         yield Relation(mesh.kind, i, mesh.label, mesh.shares)
+    for i, drive in enumerate(m.cam_drives):
+        right = Angle(drive.rest, cams=((drive.lift, drive.cam.sign),))
+        follower: dict[Coordinate, float] = (
+            {drive.body: 1.0, drive.on: -1.0} if drive.body else {int(drive.guide or 0): 1.0}
+        )
+        yield Relation("cam", i, drive.label, follower, right)

@@ -57,11 +57,11 @@ def eliminated(
         for x, f in unknown.items():
             sizes[x] = max(sizes.get(x, 0.0), abs(complex(f)))
     solved: dict[Coordinate, Row] = {}
-    for unknown, known in rows:
+    for unknown, value_of in rows:
         for body, (others, value) in solved.items():
             if body in unknown:
                 f = unknown.pop(body)
-                known = known.plus(value, -f)
+                value_of = value_of.plus(value, -f)
                 for other, o in others.items():
                     unknown[other] = unknown.get(other, 0.0) + f * o
         unknown = {b: f for b, f in unknown.items() if abs(f) > ABSENT * sizes[b]}
@@ -70,7 +70,7 @@ def eliminated(
         pivot = max(unknown, key=partial(_suits, unknown, fresh, wheels))
         p = unknown.pop(pivot)
         others = {b: -f / p for b, f in unknown.items()}
-        value = Angle().plus(known, 1 / p)
+        value = Angle().plus(value_of, 1 / p)
         for body, (was, val) in list(solved.items()):
             if pivot in was:
                 f = was.pop(pivot)

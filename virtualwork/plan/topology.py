@@ -9,14 +9,13 @@ The equations of the joints and the coordinates they hold form a bipartite graph
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
 from dalembert.arithmetic.recorded import Constant
-from dalembert.arithmetic.varied import Varied, rotation
+from dalembert.arithmetic.varied import direction
 from virtualwork.describe import MobilityError
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
@@ -35,20 +34,6 @@ from virtualwork.plan.steps import (
 )
 
 KEPT = 256
-
-
-def direction(angle: float) -> complex:
-    """e^{i·angle}, exact at the quarter turns, so that a guide at 90° is not tilted by a rounding.
-
-    >>> direction(math.pi / 2)
-    1j
-    """
-    if isinstance(angle, Varied):
-        return rotation(angle)
-    quarter = angle / (math.pi / 2)
-    if abs(quarter - round(quarter)) <= 1e-15 * max(1.0, abs(quarter)):
-        return (1 + 0j, 1j, -1 + 0j, -1j)[round(quarter) % 4]
-    return rotation(angle)  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True)
@@ -99,7 +84,7 @@ class Topology:
     def plan(self, make: Callable[[Topology], Plan]) -> Plan:
         """The order of solution in names: made once, but where a gear's constant, or a constant that varies, is in it."""
         tied = [angle for *_, angles in self.guides if angles for angle in angles]
-        if self.first.meshes or any(isinstance(angle, Constant) for angle in tied):
+        if self.first.meshes or self.first.cams or any(isinstance(angle, Constant) for angle in tied):
             return make(self)
         return _kept(self, make)
 
@@ -172,7 +157,7 @@ def equations(m: Description, tied: Sequence[Relation]) -> tuple[list[Variable],
     for relation in tied:
         angles = tuple(
             ("slide", str(x)) if isinstance(x, int) else ("angle", x) for x in relation.shares if x != GROUND
-        )
+        ) + tuple(("angle", key.removeprefix("angle:")) for key in sorted(relation.right.reads))
         rows.append(Equation(relation.label, angles, relation.kind == "input"))
     for pin, bodies in m.pins.items():
         for name in bodies:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,8 +16,12 @@ from virtualwork.describe import AssemblyError
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.constraints import Constraints, coordinates, dependent
-from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.positions import State
+
+if TYPE_CHECKING:
+    from virtualwork.study.cams import CamCheck, LiftOff
+    from virtualwork.study.strokes import Stroke
 
 # two sums of lengths nearer than this, relative, are equal
 EQUAL = 1e-12
@@ -79,6 +83,21 @@ class Check:
         return self.assembly.plan.blocks.mobility
 
     @cached_property
+    def cams(self) -> tuple[CamCheck, ...]:
+        """The largest pressure angle, the least radius of curvature and the steps of every cam."""
+        if not self.mechanism.cams:
+            return ()
+        from virtualwork.study.cams import check_cam
+
+        return tuple(check_cam(self.mechanism, number) for number in range(len(self.mechanism.cams)))
+
+    def lift_off(self, cam: int) -> LiftOff | None:
+        """The speed from which on a cam, from 0, would have to pull its follower; None where that has no meaning."""
+        from virtualwork.study.cams import lift_off
+
+        return lift_off(self.assembly, cam)
+
+    @cached_property
     def _rank(self) -> tuple[int, tuple[str, ...]]:
         m, plan = self.mechanism, self.assembly.plan
         here = Constraints.at(m, coordinates(m, plan, self._typical()), self.assembly.phases)
@@ -110,7 +129,7 @@ class Check:
         best, chosen = np.inf, None
         for q in qs:
             inputs = (q, *m.at[1:])
-            condition = float(Poses(self.assembly, np.array([inputs])).condition[0])
+            condition = float(Lanes(self.assembly, np.array([inputs])).condition[0])
             if condition < best or (chosen is None and condition == np.inf):
                 best, chosen = condition, inputs
         if chosen is None:
@@ -147,7 +166,7 @@ class Check:
         same angle a turn later is another pose (`virtualwork.branch.limits.Reach.turns`).
         """
         reach = self.assembly.reach
-        return self._in_period([limit.input for limit in reach.limits()] if reach.track.active else [])
+        return self._distinct([limit.input for limit in reach.limits()] if reach.track.active else [])
 
     @cached_property
     def change_points(self) -> tuple[float, ...]:
@@ -156,7 +175,7 @@ class Check:
         if not track.active:
             return ()
         track.cover(*self._span())
-        return self._in_period(track.crossings)
+        return self._distinct(track.crossings)
 
     @property
     def printed_limits(self) -> tuple[float, ...] | None:
@@ -164,22 +183,17 @@ class Check:
 
         The range goes from the first up to the second, through the end of the period where the second is the smaller.
         """
-        return None if self.input_limits is None else tuple(map(self._turned_back, self.input_limits))
+        return (
+            None
+            if self.input_limits is None
+            else tuple(map(self.assembly.reach.in_period, self.input_limits))
+        )
 
-    def _turned_back(self, q: float) -> float:
-        """An input in [0, period of the branch)."""
-        period = self.assembly.reach.period
-        if period is None or not math.isfinite(q):
-            return q
-        q %= period
-        # an input of −1e-15 is 0, not a whole period
-        return 0.0 if period - q < 1e-9 or q < 1e-9 else q
-
-    def _in_period(self, found: list[float]) -> tuple[float, ...]:
+    def _distinct(self, found: list[float]) -> tuple[float, ...]:
         if self.assembly.reach.period is None:
             return tuple(sorted(found))
         unique: list[float] = []
-        for q in sorted(map(self._turned_back, found)):
+        for q in sorted(map(self.assembly.reach.in_period, found)):
             if not unique or q - unique[-1] > 1e-8:
                 unique.append(q)
         return tuple(unique)
@@ -191,6 +205,13 @@ class Check:
         if track.active:
             track.cover(*self._span())
         return tuple(g.name for g in self.assembly.plan.groups if g.name in track.folded)
+
+    @cached_property
+    def strokes(self) -> tuple[Stroke, ...]:
+        """How far each slide, each point and each link that swings travels, with the inputs at both ends."""
+        from virtualwork.study.strokes import strokes
+
+        return strokes(self.assembly, self.input_limits)
 
     # --- parts ------------------------------------------------------------------------------------------------
     @property
@@ -244,11 +265,11 @@ class Check:
         return FourBar(links, lengths, grashof_class(*lengths), (angles[0], angles[-1]))
 
     @cached_property
-    def _sampled(self) -> Poses:
+    def _sampled(self) -> Lanes:
         """Poses over the whole span, for every four-bar the same."""
         low, high = self._span()
         q = np.linspace(low, high, 1441)
-        return Poses(self.assembly, q if self.assembly.track.active else np.array([self.mechanism.at]))
+        return Lanes(self.assembly, q if self.assembly.track.active else np.array([self.mechanism.at]))
 
     def _seen(self, bodies: tuple[str, ...], corners: list[str]) -> list[float]:
         """The transmission angle over the motion, sampled, for chains that are not driven at their own crank."""

@@ -4,11 +4,15 @@ At rest the effort is τ_j = −Q_j with the generalized force Q_j = Σ F·K_j +
 with Q = 0 is an equilibrium; it is stable where the second variation of the potential is positive (Lagrange and
 Dirichlet), V″ = −∂Q/∂q. The derivative is exact: ∂Q/∂q needs the second-order coefficients L = ∂²P/∂q², and no
 difference of neighbouring positions.
+
+About a stable position the mechanism swings with M q̈ + V″ q = 0, M the generalized mass: its periods are 2π √μ with
+V″ a μ = M a (Meriam & Kraige, Dynamics, §8/5; Lagrange).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import combinations, product
 from typing import Any
 
@@ -19,8 +23,8 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.parts import GROUND
 from virtualwork.digits.forces import ForceErrors
 from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import EPS, Number, Reals
-from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.scene import Scene
 from virtualwork.plan.steps import path_reads
 
@@ -42,6 +46,43 @@ class Equilibrium:
     stiffness: float
     potential: float | None
     assembly: Assembly | None = field(default=None, repr=False, compare=False)
+
+    @cached_property
+    def periods(self) -> tuple[float, ...]:
+        """The periods of small oscillations about it, s, the longest first; none where it is not stable.
+
+        Without dampers and friction. Parts that have no mass do not swing: where nothing that moves has any there is
+        no period.
+
+        Examples
+        --------
+        A rod of 1 m on a pin at its end, √(2 l / 3 g) · 2π:
+
+        >>> from virtualwork import Input, Link, Mechanism
+        >>> rod = Mechanism({"O": 0j}, {"rod": Link({"O": 0j}, mass=2, center=0.5, inertia=2 / 12)},
+        ...                 inputs=Input(link="rod"), gravity=-9.81j)
+        >>> [e.periods for e in equilibria(rod.assembly).found] == [(), (2 * np.pi * np.sqrt(2 / 3 / 9.81),)]
+        True
+        """
+        if not self.stable:
+            return ()
+        assert self.assembly is not None
+        rest = Rest(self.assembly, np.array([self.inputs]))
+        mass, stiffness = rest.mass()[0], rest.hessian()[0]
+        if len(mass) == 1:
+            values = mass[0] / stiffness[0]
+        else:
+            from scipy.linalg import eigh
+
+            values = eigh(mass, stiffness, eigvals_only=True)[::-1]
+        # what has no mass, to rounding, has no period
+        swings = values > len(mass) * EPS * np.abs(values).max()
+        return tuple((2 * np.pi * np.sqrt(values[swings])).tolist())
+
+    @property
+    def period(self) -> float | None:
+        """The period of small oscillations about it, s, with several inputs the longest; None where there is none."""
+        return self.periods[0] if self.periods else None
 
     def error_estimate(self) -> tuple[float, ...]:
         """Return a bound of the rounding error of each input, rad or m: the error of Q over its slope, |V″⁻¹|·δQ.
@@ -95,7 +136,7 @@ class Rest:
 
     def __init__(self, assembly: Assembly, inputs: Reals) -> None:
         self.assembly, self.inputs, self.k = assembly, inputs, inputs.shape[1]
-        self.poses = Poses(assembly, inputs if self.k > 1 else inputs[:, 0], 0.0, 0.0)
+        self.poses = Lanes(assembly, inputs if self.k > 1 else inputs[:, 0], 0.0, 0.0)
         self.scene = Scene(self.poses, at_rest=True)
 
     def force(self) -> tuple[Reals, Reals]:
@@ -138,6 +179,22 @@ class Rest:
         for i, j in combinations(range(k), 2):
             both = -self.along(unit[i] + unit[j])
             out[:, i, j] = out[:, j, i] = (both - out[:, i, i] - out[:, j, j]) / 2
+        return out
+
+    def mass(self) -> Reals:
+        """The generalized mass Σ m K_j·K_k + Σ I κ_j κ_k, (n, k, k)."""
+        k, rigid = self.k, self.assembly.mechanism.rigid
+        still: list[Number] = [0.0] * k
+        ways = [self.poses.again(self.inputs, [unit, still, still]) for unit in np.eye(k).tolist()]
+        out = np.zeros((len(self.inputs), k, k))
+        for body, of in rigid.items():
+            moved = [way.point(body, of.center, 1) for way in ways] if of.mass else None
+            turned = [way.angle(body, 1) for way in ways] if of.inertia else None
+            for i, j in product(range(k), repeat=2):
+                if moved is not None:
+                    out[:, i, j] += of.mass * (np.conj(moved[i]) * moved[j]).real
+                if turned is not None:
+                    out[:, i, j] += of.inertia * turned[i] * turned[j]
         return out
 
     def potential(self) -> Reals:
@@ -204,8 +261,9 @@ def _one(assembly: Assembly, span: Reals, samples: int) -> Equilibria:
     if not good.any():
         return Equilibria(())
     scale = float(size[good].max())
-    # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart
-    if not np.median(np.abs(force[good])) > 1e-12 * scale:
+    # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart; but for dwells
+    cams = bool(assembly.mechanism.cams)
+    if not (np.max if cams else np.median)(np.abs(force[good])) > 1e-12 * scale:
         return Equilibria((), everywhere=True, loaded=scale > 0)
     ends = _towards_limits(assembly, q, good)
     if len(ends):
@@ -218,7 +276,11 @@ def _one(assembly: Assembly, span: Reals, samples: int) -> Equilibria:
     shift = 2 * EPS * np.abs(q * np.where(np.isfinite(slope), slope, 0.0))
     tiny = np.abs(force) <= 64 * EPS * size + shift
     sign = np.where(tiny, 0.0, np.sign(force))
-    roots = list(q[tiny & good])
+    rests = tiny & good
+    if cams:
+        # of a dwell, in which every position is one of rest, its ends
+        rests[1:-1] &= ~(rests[:-2] & rests[2:])
+    roots = list(q[rests])
     here = np.flatnonzero(good[:-1] & good[1:] & (sign[:-1] * sign[1:] < 0))
     if len(here):
         roots += list(_refine(assembly, q[here], q[here + 1], force[here]))
@@ -320,8 +382,9 @@ def _many(assembly: Assembly, ranges: Reals) -> Equilibria:
         return Equilibria(())
     x = x[good]
     scale = float(size[good].max())
-    # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart
-    if not np.median(np.abs(force[good])) > 1e-12 * scale:
+    # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart; but for dwells
+    cams = bool(assembly.mechanism.cams)
+    if not (np.max if cams else np.median)(np.abs(force[good])) > 1e-12 * scale:
         return Equilibria((), everywhere=True, loaded=scale > 0)
     # the most promising starts: where no neighbour is nearer to balance would do; a few hundred suffice
     x = x[np.argsort(np.abs(force[good]).max(axis=1))[:400]]

@@ -12,12 +12,18 @@ import numpy as np
 
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.touches import Touch
 from virtualwork.plan.joint_forces import pairs
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from virtualwork.describe.description import Description
+    from virtualwork.formulas.asked import Key
     from virtualwork.formulas.block import Block
+    from virtualwork.formulas.load_case import LoadCase
     from virtualwork.formulas.numbers import Complexes, Number, Reals
-    from virtualwork.plan.steps import Path
+    from virtualwork.plan.steps import Joint
 
 SHORT = {
     "weight": "W",
@@ -43,6 +49,63 @@ class Torque(NamedTuple):
     name: str
     kind: str
     torque: Reals
+
+
+class Part(NamedTuple):
+    """What acts on a link, by the keys of its quantities: a force with its place, or a torque (`at` is None)."""
+
+    name: str
+    kind: str
+    key: Key
+    at: Key | None
+    sign: float
+    along: Key | None = None
+    """Of a drive along a guide: the direction of its effort."""
+
+
+def parts(m: Description, case: LoadCase, joints: Sequence[Joint]) -> dict[str, list[Part]]:
+    """Return what acts on every link, as `free_bodies` has it over poses, for tapes: friction apart."""
+    result: dict[str, list[Part]] = {body: [] for body in m.links}
+    for i, load in enumerate(case.loads):
+        if load.body != GROUND:
+            name = SHORT.get(load.kind, load.kind)
+            torque = load.path is None
+            key: Key = ("load torque", i) if torque else ("load", i)
+            result[load.body].append(Part(name, load.kind, key, None if torque else ("load at", i), 1.0))
+    for joint in joints:
+        for body in joint.bodies:
+            if body == GROUND:
+                continue
+            guide = joint.guide
+            at: Key | None = ("point", body, 0j, joint.name, 0) if guide is None else _block_key(m, guide)
+            name = f"{joint.name}: {_other(joint, body)}"
+            result[body].append(Part(name, "joint force", ("force", joint.key, body), at, 1.0))
+            if guide is not None and m.guides[guide].is_slider:
+                result[body].append(Part(name, "joint moment", ("moment", joint.key, body), None, 1.0))
+    for j, entry in enumerate(m.inputs):
+        guide = m.guide_of(entry) if entry.is_slide else None
+        ends = (
+            (str(entry.link), m.carrier(j)) if guide is None else (m.guides[guide].link, m.guides[guide].on)
+        )
+        for body, sign in zip(ends, (1.0, -1.0), strict=True):
+            if body == GROUND:
+                continue
+            at, along = (None, None) if guide is None else (_block_key(m, guide), ("rail", guide))
+            letter = "T" if guide is None else "F"
+            name = letter if sign > 0 else f"−{letter}"
+            result[body].append(Part(name, "drive", ("effort", j), at, sign, along))
+    return result
+
+
+def _block_key(m: Description, guide: int) -> Key:
+    g = m.guides[guide]
+    return ("point", g.link, 0j, g.point, 0)
+
+
+def _other(joint: Joint, body: str) -> str:
+    """The body that a joint's force on a body comes from."""
+    others = [of for _, on, of in pairs([joint]) if on == body]
+    return (others or [on for _, on, of in pairs([joint]) if of == body])[0]
 
 
 class FreeBody(NamedTuple):
@@ -100,24 +163,31 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
             (torque,) = over(load.form)
             result[load.body].torques.append(Torque(name, load.kind, torque))
         else:
-            force, at = over(load.form, partial(_position, path=load.path), kind=complex)
+            (force,) = over(load.form, kind=complex)
+            at = poses.point(load.body, load.place)
             result[load.body].forces.append(Force(name, load.kind, at, force))
     for joint in dynamics.reactions.joints:
         for body in joint.bodies:
             if body == GROUND:
                 continue
-            others = [of for _, on, of in pairs([joint]) if on == body] or [
-                on for _, on, of in pairs([joint]) if of == body
-            ]
             if joint.guide is None:
                 at = poses.point(body, 0j, 0, joint.name)
             else:
                 at = _block(dynamics, joint.guide)
-            name = f"{joint.name}: {others[0]}"
+            name = f"{joint.name}: {_other(joint, body)}"
             result[body].forces.append(Force(name, "joint force", at, dynamics.joint_force(joint, body)))
             moment = dynamics.joint_moment(joint, body)
             if np.any(np.nan_to_num(moment)):
                 result[body].torques.append(Torque(name, "joint moment", moment))
+    for number, touch in enumerate(dynamics.reactions.paths.touches.every):
+        way, at = over(partial(_normal, touch=touch), partial(_touching, touch=touch), kind=complex)
+        force = dynamics.contact(number) * way
+        for body, other, sign in (
+            (touch.body, touch.drive.cam.cam, 1.0),
+            (touch.drive.cam.cam, touch.body, -1.0),
+        ):
+            if body != GROUND:
+                result[body].forces.append(Force(f"N: {other}", "contact force", at, sign * force))
     for j, entry in enumerate(m.inputs):
         if not entry.is_slide:
             for body, sign in ((str(entry.link), 1.0), (m.carrier(j), -1.0)):
@@ -138,8 +208,15 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
     return list(result.values())
 
 
-def _position(block: Block, path: Path) -> Number:
-    return block.position(path)
+def _normal(block: Block, touch: Touch) -> Number:
+    """The direction in which a cam presses on its follower, a unit vector."""
+    unit = touch.at(block.st).unit()
+    return touch.drive.cam.sign * unit / abs(unit)
+
+
+def _touching(block: Block, touch: Touch) -> Number:
+    """Where a cam and its follower touch."""
+    return touch.axis(block.st) + touch.at(block.st).touch()
 
 
 def _block(dynamics: Dynamics, guide: int) -> Complexes:

@@ -70,6 +70,8 @@ def items(dynamics: Dynamics, unit: int | None = None) -> list[Item]:
     unknown [9.81] works
     joint force [0.] at rest
     """
+    # all terms by the same sums: their powers add up to zero but for these sums' own rounding
+    dynamics = dynamics.over_blocks
     effort = dynamics.effort
     result = [_applied(dynamics, load, unit) for load in dynamics.scene.case.everything]
     return [*result, *_drives(dynamics, effort, unit), *_joints(dynamics, unit)]

@@ -166,10 +166,10 @@ def _places(plan: Plan, st: State) -> None:
     """Place every point that the known angles and slides give."""
     for step in plan.steps:
         if isinstance(step, Place) and step.node not in st.point:
-            known = all(
+            placed = all(
                 (t.body == GROUND or t.body in st.turn) and (t.slide is None or t.slide in st.slide)
                 for t in step.terms
             )
-            if known and (step.base is None or step.base in st.point):
+            if placed and (step.base is None or step.base in st.point):
                 moved = st.sum(step.terms)
                 st.point[step.node] = moved if step.base is None else st.point[step.base] + moved

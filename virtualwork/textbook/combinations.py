@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dalembert.arithmetic.varied import direction
 from virtualwork.formulas.closed_forms import angle_and_slide, two_columns
 from virtualwork.formulas.numbers import MANY
-from virtualwork.plan.topology import direction
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -307,7 +307,7 @@ def crank_rod_piston(
     w2, a2 = np.asarray(omega, dtype=float), np.asarray(alpha, dtype=float)
     u = direction(incline)
     arm = crank * np.exp(1j * theta)
-    found = []
+    states = []
     with np.errstate(all="ignore"):
         for sign in (-1, 1):
             # R_A − R_through + rod·e^{iθ3} − s·u = 0
@@ -317,8 +317,8 @@ def crank_rod_piston(
             w3, v, _ = two_columns(1j * w2 * arm, 1j * turned, np.full_like(turned, -u))
             quadratic = 1j * a2 * arm - w2 * w2 * arm - w3 * w3 * turned
             a3, a, _ = two_columns(quadratic, 1j * turned, np.full_like(turned, -u))
-            found.append(Piston(np.angle(e), through + slide * u, slide, w3, v * u, a3, a * u))
-    first, second = found
+            states.append(Piston(np.angle(e), through + slide * u, slide, w3, v * u, a3, a * u))
+    first, second = states
     if np.nanmean(first.slide) < np.nanmean(second.slide):
         first, second = second, first
     return first, second

@@ -103,8 +103,8 @@ class LinkStates:
     @cached_property
     def shape(self) -> tuple[int, ...]:
         """The common shape (..., n)."""
-        given = [getattr(self, name) for name in self.__dataclass_fields__ if name != "gravity"]
-        return np.broadcast_shapes(*(np.shape(value) for value in given if value is not None), (1,))
+        fields = [getattr(self, name) for name in self.__dataclass_fields__ if name != "gravity"]
+        return np.broadcast_shapes(*(np.shape(value) for value in fields if value is not None), (1,))
 
     @cached_property
     def terms(self) -> dict[str, PowerTerm]:

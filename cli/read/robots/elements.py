@@ -100,13 +100,13 @@ def text(element: Element | None, *path: str) -> str | None:
 
 
 def stated(limits: Iterable[str | None], friction: str | None) -> tuple[str, ...]:
-    """Name what is said of a joint beyond its place: what is there and not zero."""
+    """Name the data of a joint beyond its place: what is there and not zero."""
     result = {"limits": list(limits), "friction": [friction]}
     return tuple(what for what, words in result.items() if any((word or "").strip("0. ") for word in words))
 
 
 class At(NamedTuple):
-    """A place in a file, as messages name it; `of` is what stands there."""
+    """A place in a file, as messages name it; `of` is the element there."""
 
     file: str
     where: str
@@ -115,9 +115,9 @@ class At(NamedTuple):
         """Return a place inside this one."""
         return At(self.file, f"{self.where}, {of}" if of else self.where)
 
-    def error(self, of: str, found: object, expected: object) -> DataError:
+    def error(self, of: str, value: object, expected: object) -> DataError:
         """Say what was found there, and what was expected."""
-        return DataError(f"{self.file}: {self.inside(of).where}: found {found}, expected {expected}")
+        return DataError(f"{self.file}: {self.inside(of).where}: found {value}, expected {expected}")
 
     def number(self, of: str, text: str | None) -> float:
         """Return a finite number."""

@@ -172,9 +172,9 @@ class _Reader:
         if child(e, "freejoint") is not None or any(self.whole(j, of).get("type") == "free" for j in joints):
             robot.notes.append(f"{where}: its free joint is left out: it is taken as fixed")
             joints = []
-        given = child(e, "inertial")
-        held = self._inertial(where, given)
-        if self.shapes == "true" or (self.shapes == "auto" and given is None):
+        inertial = child(e, "inertial")
+        held = self._inertial(where, inertial)
+        if self.shapes == "true" or (self.shapes == "auto" and inertial is None):
             held = self._of_shapes(where, e, of)
         robot.add(RobotLink(name, here, held))
         above = parent
@@ -223,11 +223,11 @@ class _Reader:
         texts = dict.fromkeys(DIAGONAL_FIRST, "0")
         for key, names in (("diaginertia", DIAGONAL_FIRST[:3]), ("fullinertia", DIAGONAL_FIRST)):
             if e.get(key) is not None:
-                found = e.get(key, "").split()
+                numbers = e.get(key, "").split()
                 at.numbers(key, e.get(key))
-                if len(found) != len(names):
-                    raise at.error(key, f"{len(found)} numbers", len(names))
-                texts |= dict(zip(names, found, strict=True))
+                if len(numbers) != len(names):
+                    raise at.error(key, f"{len(numbers)} numbers", len(names))
+                texts |= dict(zip(names, numbers, strict=True))
         return Inertial(mass, place, *printed(texts))
 
     def _of_shapes(self, where: str, body: Element, of: str) -> Inertial | None:

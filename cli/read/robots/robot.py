@@ -114,8 +114,8 @@ class Robot:
     def link(self, name: str, where: str) -> RobotLink:
         """Return a link that must be there."""
         if name not in self.links:
-            known = ", ".join(self.links)[:200]
-            raise DataError(f"{self.file}: {where}: no link is called '{name}': expected one of {known}")
+            names = ", ".join(self.links)[:200]
+            raise DataError(f"{self.file}: {where}: no link is called '{name}': expected one of {names}")
         return self.links[name]
 
     def add(self, link: RobotLink) -> None:

@@ -118,15 +118,15 @@ class _Model:
             raise DataError(f"{self.file}: {at.where}: the pose of '{name}' is relative to itself")
         self.asked.add(name)
         e = self.frames[name]
-        given = child(e, "pose")
-        base = "" if given is None else given.get("relative_to", "")
+        pose = child(e, "pose")
+        base = "" if pose is None else pose.get("relative_to", "")
         if not base:
             base = MODEL
             if plain(e) == "joint":
                 base = _named_text(At(self.file, f"joint '{name}'"), e, "child")
             elif plain(e) == "frame":
                 base = e.get("attached_to") or MODEL
-        self.at[name] = self.frame(base, at) @ read_pose(at, given)
+        self.at[name] = self.frame(base, at) @ read_pose(at, pose)
         return self.at[name]
 
     def _motors(self) -> None:

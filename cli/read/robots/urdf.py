@@ -112,8 +112,8 @@ def _shapes(at: At, link: Element) -> list[tuple[Array, float]]:
 
 
 def _end(robot: Robot, e: Element, tag: str, at: At) -> str:
-    found = child(e, tag)
-    name = None if found is None else found.get("link")
+    element = child(e, tag)
+    name = None if element is None else element.get("link")
     if name is None:
         raise DataError(f"{robot.file}: {at.where}: <{tag} link=…> is missing")
     robot.link(name, at.where)

@@ -229,13 +229,18 @@ class Repeated:
 
 def chosen(tape: Tape, n: int) -> str:
     """The engine for n lanes: compiled code only once the tape has been asked for so often that it pays."""
-    if n <= FEW:
+    if (_whole.get() or n) <= FEW:
         return "python"
+    return "llvm" if work_on(tape, n) > PAYS else "numpy"
+
+
+def work_on(tape: Tape, n: int) -> float:
+    """The work on a tape so far, n lanes more: lanes × operations; of a part of a whole, that of the whole."""
     whole = _whole.get()
     if whole:
-        return "llvm" if whole * tape.cost > PAYS else "numpy"
+        return float(whole * tape.cost)
     _done[tape] = _done.get(tape, 0.0) + n * tape.cost
-    return "llvm" if _done[tape] > PAYS else "numpy"
+    return _done[tape]
 
 
 def as_part(lanes: int, function: Callable[..., R], *arguments: Any) -> R:

@@ -16,12 +16,17 @@ from numpy.typing import NDArray
 
 from dalembert.arithmetic.arrays import EXPONENT, NUMPY
 from dalembert.arithmetic.engines import floats
-from dalembert.arithmetic.tape import Tape, shortened
+from dalembert.arithmetic.exact import UPPER, upper
+from dalembert.arithmetic.recorded import RECORDED
+from dalembert.arithmetic.sines import STEPS, table
+from dalembert.arithmetic.tape import Operation, Tape, performed, shortened
 
 Reals = NDArray[np.float64]
 # lanes of a block: as many as let the scratch fit the second cache. Longer ones pay numpy's calls by more lanes
 LEAST, MOST = 1024, 8192
 ROOM = 1 << 20  # bytes
+# of a tape in doubled numbers, whose operations are so many that numpy's calls cost more than the third cache
+LONG, LONG_ROOM = 16384, 1 << 24
 LONGEST = 1000  # operations of one generated function
 
 UFUNCS = {
@@ -37,11 +42,16 @@ UFUNCS = {
     "atan2": "arctan2",
 }
 
+_FUNCTIONS: dict[str, Any] = {kind: getattr(np, name) for kind, name in UFUNCS.items()}
+# what the formulas of plain numbers consist of
+SIMPLE = {*UFUNCS, "const", "input", "select", "binade"}
+
 
 class Blocks:
     """A tape prepared for lanes; `uniform` names the inputs that are one number for all lanes."""
 
     def __init__(self, tape: Tape, uniform: frozenset[str]) -> None:
+        whole, tape = tape, split(tape)
         self.tape = tape
         self.varying = [name for name in tape.inputs if name not in uniform]
         operations = tape.operations
@@ -94,12 +104,19 @@ class Blocks:
                     f"copyto({target}, {operands[1]}, where=mask)",
                 ]
                 free += sorted(ends)
+            elif kind == "upper":
+                lines.append(f"bitwise_and({operands[0]}.view(int64), {UPPER}, {target}.view(int64))")
+            elif kind == "place":
+                lines.append(f"bitwise_and({operands[0]}.view(int64), {STEPS - 1}, {target}.view(int64))")
+            elif kind.startswith("entry"):
+                lines.append(f"take(table[{kind[-1]}], {operands[0]}.view(int64), 0, {target}, 'clip')")
             elif kind == "binade":
                 lines.append(f"bitwise_and({operands[0]}.view(int64), {EXPONENT}, {target}.view(int64))")
             else:
                 lines.append(f"{UFUNCS[kind]}({', '.join(operands)}, {target})")
         self.slots = slots
-        self.block = min(MOST, max(LEAST, ROOM // (8 * max(slots, 1)) // LEAST * LEAST))
+        most, room = (MOST, ROOM) if tape is whole else (LONG, LONG_ROOM)
+        self.block = min(most, max(LEAST, room // (8 * max(slots, 1)) // LEAST * LEAST))
         self.parts = self._compiled(lines)
         self._own = threading.local()
 
@@ -118,8 +135,10 @@ class Blocks:
         names += [f"o{row}" for row in self.written] + [f"s{k}" for k in range(self.slots)] + ["mask"]
         room: dict[str, Any] = {
             name: getattr(np, name)
-            for name in (*UFUNCS.values(), "bitwise_and", "int64", "greater", "copyto")
+            for name in (*UFUNCS.values(), "bitwise_and", "int64", "greater", "copyto", "take")
         }
+        if any(line.startswith("take") for line in lines):
+            room["table"] = table()
         parts = []
         for start in range(0, len(lines), LONGEST):
             text = "".join(f"    {line}\n" for line in lines[start : start + LONGEST])
@@ -168,6 +187,46 @@ class Blocks:
         return self.same.on(dict(zip(self.same.inputs, map(np.float64, values), strict=True)), NUMPY)
 
 
+def split(tape: Tape) -> Tape:
+    """The tape with the rests of products in operations that numpy has (Dekker, as `exact.two_product`)."""
+    if all(operation[0] != "left" for operation in tape.operations):
+        return tape
+    made: list[Operation] = []
+    numbers: dict[Operation, int] = {}
+    place: list[int] = []
+
+    def node(*operation: Any) -> int:
+        if operation not in numbers:
+            numbers[operation] = len(made)
+            made.append(operation)
+        return numbers[operation]
+
+    def halves(a: int) -> tuple[int, int]:
+        kind, *of = made[a]
+        if kind == "const":
+            high = float(upper(np.array(of[0])))
+            return node("const", high), node("const", of[0] - high)
+        high = node("upper", a)
+        return high, node("sub", a, high)
+
+    for kind, *arguments in tape.operations:
+        if kind in ("const", "input"):
+            place.append(node(kind, *arguments))
+            continue
+        operands = [place[a] for a in arguments]
+        if kind != "left":
+            place.append(node(kind, *operands))
+            continue
+        (a1, a2), (b1, b2) = halves(operands[0]), halves(operands[1])
+        rest = node("sub", node("mul", a1, b1), operands[2])
+        if operands[0] == operands[1]:
+            rest = node("add", rest, node("mul", node("add", a1, a1), a2))
+        else:
+            rest = node("add", node("add", rest, node("mul", a1, b2)), node("mul", a2, b1))
+        place.append(node("add", rest, node("mul", a2, b2)))
+    return Tape(tuple(made), tuple((name, place[number]) for name, number in tape.outputs))
+
+
 @lru_cache(maxsize=128)
 def compiled(tape: Tape, uniform: frozenset[str]) -> Blocks:
     """The tape prepared for lanes, once."""
@@ -175,6 +234,55 @@ def compiled(tape: Tape, uniform: frozenset[str]) -> Blocks:
 
 
 def run(tape: Tape, columns: Sequence[Reals], out: Sequence[Reals] | Reals) -> None:
-    """Run a tape: inputs in its order, (n,), or () for one number; `out` a row an output, (n,)."""
+    """Run a tape: inputs in its order, (n,), or () for one number; `out` a row an output, (n,).
+
+    The first time on few lanes it is done operation by operation: to prepare it takes longer than that.
+    """
+    runs = _runs(tape)
+    runs[0] += 1
+    if (
+        runs[0] == 1
+        and len(out)
+        and len(out[0]) <= LEAST
+        and SIMPLE.issuperset(op[0] for op in tape.operations)
+    ):
+        _once(tape, columns, out)
+        return
     uniform = frozenset(name for name, x in zip(tape.inputs, columns, strict=True) if not x.ndim)
     compiled(tape, uniform)(columns, out)
+
+
+@lru_cache(maxsize=256)
+def _runs(tape: Tape) -> list[int]:
+    """How often a tape has been run."""
+    return [0]
+
+
+def _once(tape: Tape, columns: Sequence[Reals], out: Sequence[Reals] | Reals) -> None:
+    """Do a tape's operations one by one: of lanes by numpy, of what is the same for all of them on floats."""
+    inputs = {name: x if x.ndim else float(x) for name, x in zip(tape.inputs, columns, strict=True)}
+    values: list[Any] = []
+    with np.errstate(all="ignore"):
+        for kind, *arguments in tape.operations:
+            if kind == "const":
+                values.append(arguments[0])
+            elif kind == "input":
+                values.append(inputs[arguments[0]])
+            else:
+                of = [values[a] for a in arguments]
+                if isinstance(of[0], float) and all(isinstance(x, float) for x in of):
+                    values.append(_on_floats(kind, of))
+                elif kind in UFUNCS:
+                    values.append(_FUNCTIONS[kind](*of))
+                else:
+                    values.append(performed(kind, of, NUMPY))
+    for row, (_, number) in zip(out, tape.outputs, strict=True):
+        row[:] = values[number]
+
+
+def _on_floats(kind: str, of: list[float]) -> float:
+    """An operation on floats; where Python raises, with numpy's infinity or NaN."""
+    try:
+        return float(performed(kind, of, RECORDED))
+    except (ZeroDivisionError, ValueError, OverflowError):
+        return float(performed(kind, [np.float64(x) for x in of], NUMPY))

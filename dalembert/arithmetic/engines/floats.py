@@ -8,7 +8,7 @@ from functools import lru_cache
 
 from dalembert.arithmetic.loop import called
 from dalembert.arithmetic.recorded import binade
-from dalembert.arithmetic.tape import SIGNS, Tape
+from dalembert.arithmetic.tape import DOUBLED, SIGNS, Tape
 
 LONGEST = 2000  # operations of one function: Python's own compiler slows down on longer ones
 DEEPEST = 12  # operations of one expression
@@ -61,7 +61,7 @@ def compiled(
                     done.add(of[0])
             depth.append(0)
         else:
-            expression = SIGNS[kind].format(*(text[a] for a in arguments))
+            expression = (SIGNS | DOUBLED)[kind].format(*(text[a] for a in arguments))
             deep = 1 + max(depth[a] for a in arguments)
             if uses[number] == 1 and deep < DEEPEST:
                 text.append(f"({expression})")
@@ -77,6 +77,10 @@ def compiled(
     )
     room: dict[str, object] = {name: getattr(math, name) for name in ("sin", "cos", "atan2", "sqrt")}
     room["binade"] = binade
+    if any(operation[0] in DOUBLED for operation in tape.operations):
+        from dalembert.arithmetic.arrays import NUMPY
+
+        room |= {name: getattr(NUMPY, name) for name in DOUBLED if name != "left"}
     exec(compile(source, "<tape>", "exec"), room)
     return room["tape"]  # type: ignore[return-value]
 

@@ -12,8 +12,8 @@ from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files
 
-from dalembert.arithmetic import doubled_functions
 from dalembert.arithmetic.engines import polynomials
+from dalembert.arithmetic.sines import STEP, STEPS, WHOLE
 from dalembert.arithmetic.tape import SIGNS, Tape
 
 # the order of `KINDS` in engine.js
@@ -30,14 +30,14 @@ def engine() -> str:
         "largest": polynomials.LARGEST,
         "steep": polynomials.STEEP,
         "twoOverPi": polynomials.TWO_OVER_PI,
-        "whole": polynomials.WHOLE,
+        "whole": WHOLE,
         "quarter": polynomials.QUARTER,
         "halfPi": polynomials.HALF_PI,
         "sine": polynomials.SINE,
         "cosine": polynomials.COSINE,
         "arctangentOdd": polynomials.ARCTANGENT_ODD,
         "arctangentEven": polynomials.ARCTANGENT_EVEN,
-        "halfPiParts": doubled_functions.HALF_PI,
+        "halfPiParts": [part * (STEPS / 4) for part in STEP],
     }
     listed = ", ".join(f"{name}: {_value(value)}" for name, value in numbers.items())
     text = (files("dalembert.arithmetic.engines") / "engine.js").read_text(encoding="utf-8")

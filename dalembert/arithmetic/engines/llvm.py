@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.engines import circular
+from dalembert.arithmetic import circular
 from dalembert.arithmetic.tape import Tape
 
 Reals = NDArray[np.float64]
@@ -250,6 +250,8 @@ def _name_system_functions(binding: Any) -> None:
     for name in ("sin", "cos", "atan2"):
         address = ctypes.cast(getattr(library, name), ctypes.c_void_p).value
         binding.add_symbol(f"dalembert_{name}", address)
+    # what LLVM itself calls where the processor has no such operation
+    binding.add_symbol("fma", ctypes.cast(library.fma, ctypes.c_void_p).value)
     for name, function in _EXACT.items():
         binding.add_symbol(f"dalembert_exact_{name}", ctypes.cast(function, ctypes.c_void_p).value)
 

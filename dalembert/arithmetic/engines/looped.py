@@ -23,7 +23,7 @@ def looped(loop: Loop, width: int) -> ir.Module:
     pointer = v.double.as_pointer()
     kind = ir.FunctionType(ir.VoidType(), [v.long, *[pointer] * 4, v.long.as_pointer(), v.long])
     function = ir.Function(module, kind, "rounds")
-    groups, given, state, fed, nodes, counts, capacity = function.args
+    groups, inputs, state, fed, nodes, counts, capacity = function.args
 
     def number(value: int) -> ir.Constant:
         return ir.Constant(v.long, value)
@@ -43,7 +43,7 @@ def looped(loop: Loop, width: int) -> ir.Module:
     g = b.phi(v.long)
     g.add_incoming(number(0), entry)
     own = b.mul(g, number(len(loop.constants)))
-    constants = {name: b.load(place(given, own, i), align=8) for i, name in enumerate(loop.constants)}
+    constants = {name: b.load(place(inputs, own, i), align=8) for i, name in enumerate(loop.constants)}
     mine = b.mul(g, number(len(loop.states)))
     begin = [b.load(place(state, mine, i), align=8) for i in range(len(loop.states))]
     b.branch(again)

@@ -14,6 +14,7 @@ import llvmlite.ir as ir
 
 from dalembert.arithmetic.arrays import EXPONENT
 from dalembert.arithmetic.engines.vectors import Vectors
+from dalembert.arithmetic.sines import STEPS
 from dalembert.arithmetic.tape import Tape
 
 
@@ -155,6 +156,12 @@ def body(
             value = b.fneg(*operands)
         elif kind == "abs":
             value = v.intrinsic(b, "fabs", *operands)
+        elif kind == "left":
+            value = v.intrinsic(b, "fma", *operands[:2], b.fneg(operands[2]))
+        elif kind == "place":
+            value = b.and_(b.bitcast(operands[0], v.longs), v.integer(STEPS - 1))
+        elif kind.startswith("entry"):
+            value = v.entry(b, int(kind[-1]), operands[0])
         elif kind == "binade":
             value = b.bitcast(b.and_(b.bitcast(operands[0], v.longs), v.integer(EXPONENT)), v.vector)
         elif kind == "sqrt":

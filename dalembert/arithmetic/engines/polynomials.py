@@ -46,7 +46,5 @@ ARCTANGENT_EVEN = (
 QUARTER = (0.785398163397448279, 3.06161699786838301793e-17)
 """π/4 and its rest."""
 TWO_OVER_PI = 0.63661977236758134308
-WHOLE = 6755399441055744.0
-"""1.5·2⁵²: what is added to it is rounded to a whole number."""
 STEEP = 0.41421356237309503
 """tan 22.5°: beyond it an angle is counted from 45°."""

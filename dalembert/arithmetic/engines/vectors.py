@@ -9,6 +9,7 @@ cancel (large arguments next to a multiple of π/2: some lose eight units there)
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import llvmlite.ir as ir
 
@@ -26,8 +27,8 @@ from dalembert.arithmetic.engines.polynomials import (
     SMALLEST,
     STEEP,
     TWO_OVER_PI,
-    WHOLE,
 )
+from dalembert.arithmetic.sines import STEPS, WHOLE, table
 
 
 class Vectors:
@@ -46,7 +47,7 @@ class Vectors:
         self.vector = ir.VectorType(self.double, width)
         self.longs = ir.VectorType(self.long, width)
         self.bits = ir.VectorType(ir.IntType(1), width)
-        self._made: dict[str, ir.Function] = {}
+        self._made: dict[str, Any] = {}
 
     def constant(self, value: float) -> ir.Constant:
         """The same double in every lane."""
@@ -69,6 +70,21 @@ class Vectors:
         value = self.constant(coefficients[-1])
         for c in coefficients[-2::-1]:
             value = self.intrinsic(b, "fmuladd", value, z, self.constant(c))
+        return value
+
+    def entry(self, b: ir.IRBuilder, row: int, at: ir.Value) -> ir.Value:
+        """The entries of a row of the table of sines (`arithmetic.sines`) at places."""
+        name = f"sines{row}"
+        if name not in self._made:
+            numbers = ir.ArrayType(self.double, STEPS)
+            self._made[name] = ir.GlobalVariable(self.module, numbers, name)
+            self._made[name].initializer = ir.Constant(numbers, table()[row].tolist())
+            self._made[name].global_constant, self._made[name].linkage = True, "internal"
+        value: ir.Value = ir.Constant(self.vector, ir.Undefined)
+        for lane in range(self.width):
+            place = ir.Constant(ir.IntType(32), lane)
+            index = [ir.Constant(self.long, 0), b.extract_element(at, place)]
+            value = b.insert_element(value, b.load(b.gep(self._made[name], index)), place)
         return value
 
     def _all(self, b: ir.IRBuilder, test: ir.Value) -> ir.Value:

@@ -1,1 +1,0 @@
-"""`dalembert completion`: the script that lets a shell complete commands and options."""

@@ -1,0 +1,45 @@
+"""Numbers as they are written, for the second run in 32 digits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from math import ulp
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dalembert.arithmetic.doubled import Doubled
+from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array
+from dalembert.tables.table import Numbers
+from dalembert.units import UNITS
+
+
+def written(number: float) -> Fraction:
+    """A number of an option, in SI, as the short decimal that was written; one that is none is the float.
+
+    >>> written(0.1 + 0.2), written(1 / 3) == Fraction(1 / 3)
+    (Fraction(3, 10), True)
+    """
+    text = f"{number:.15g}"
+    return Fraction(text) if abs(float(text) - number) <= ulp(number) and len(text) < 15 else Fraction(number)
+
+
+def writtens(numbers: ArrayLike) -> Doubled:
+    """Numbers of options, in SI, as they were written; NaN stays."""
+    array = np.asarray(numbers, dtype=float)
+    there = np.isfinite(array)
+    exact = doubled_array([written(x) for x in np.where(there, array, 0.0).ravel().tolist()], array.shape)
+    return Doubled(np.where(there, exact.high, array), exact.low)
+
+
+def in_unit(number: Doubled, dimension: str, unit: str) -> Doubled:
+    """Convert from SI, as `dalembert.units.from_si` does."""
+    numerator, denominator = UNITS[dimension][unit]
+    return number * float(denominator) / float(numerator)
+
+
+def vectors(sizes: Iterable[Fraction], angle: Numbers) -> Vectors:
+    """Vectors of exact sizes at the angles of a column, (n,)."""
+    exact: Sequence[Fraction] = angle.exact
+    return Vectors.polar(doubled_array(sizes, (len(exact),)), exact, angle.unit, (len(exact),))

@@ -1,0 +1,89 @@
+"""`dalembert trial`: a trial mass for the first run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.read import options
+from cli.show.output import command
+from dalembert.results.way import Topic, figures
+from dalembert.units import G0
+
+if TYPE_CHECKING:
+    from cli.show.result import Result
+    from dalembert.results.columns import Table
+    from dalembert.results.way import Topic
+
+
+RULE = "centrifugal force a tenth of the static load of each plane: m r ω² = 0.1 (M/planes) g"
+OPTIONS = """
+What:
+  rotor_mass MASS  Mass of the rotor, such as 120kg.
+  speed SPEED  Speed of the run, such as 3000rpm.
+  radius LENGTH  Radius at which the trial mass goes on, such as 200mm.
+  planes N  Number of correction planes.
+"""
+
+
+@command(OPTIONS)
+def run(
+    rotor_mass: str,
+    speed: str,
+    radius: str,
+    planes: Annotated[int, typer.Option(min=1)] = 1,
+) -> Result:
+    """Suggest a trial mass for the first run: large enough to change the vibration, small enough to be safe.
+
+    Its centrifugal force is a tenth of the static load of each plane.
+    """
+    from cli.show.result import Result
+
+    mass = options.needed("--rotor-mass", rotor_mass, "mass", positive=True)
+    omega = options.needed("--speed", speed, "speed", positive=True)
+    arm = options.needed("--radius", radius, "length", positive=True)
+
+    def suggestion() -> Table:
+        from balancing import trial_unbalance
+        from dalembert.results.columns import Table, names, number
+
+        unbalance = float(trial_unbalance(mass, omega, planes))
+        return Table(
+            [
+                number("mass", "mass", [unbalance / arm], "g", lambda: [1e-14 * unbalance / arm]),
+                number("radius", "length", [arm], "mm"),
+                number("unbalance", "unbalance", [unbalance], "g_mm", lambda: [1e-14 * unbalance]),
+            ],
+            place="trial",
+            above="trial mass for each plane",
+            below=f"rule: {RULE}",
+            documented=[names("planes", [planes]), names("rule", [RULE])],
+        )
+
+    def steps() -> list[Topic]:
+        from balancing import trial_unbalance
+
+        return way(mass, omega, arm, planes, float(trial_unbalance(mass, omega, planes)))
+
+    return Result(
+        tables={"trial": suggestion}, way=steps, about={"title": "Trial mass"}, method=f"Rule: {RULE}."
+    )
+
+
+def way(mass: float, omega: float, arm: float, planes: int, unbalance: float) -> list[Topic]:
+    """The one topic; all in SI."""
+    load = mass / planes * G0
+    text = [
+        "A tenth of the static load of each plane as centrifugal force: m·r·ω² = 0.1·(M/planes)·g",
+        f"  (M/planes)·g = {figures(mass)}/{planes}·{figures(G0)} = {figures(load)} N",
+        f"  m·r = 0.1·{figures(load)}/{figures(omega)}² = {figures(unbalance)} kg·m",
+        f"  m = {figures(unbalance)}/{figures(arm)} = {figures(unbalance / arm)} kg",
+    ]
+    head = {
+        "static_load_N": load,
+        "force_N": unbalance * omega**2,
+        "unbalance_kg_m": unbalance,
+        "mass_kg": unbalance / arm,
+    }
+    return [Topic("trial mass", text, "Trial mass", head)]

@@ -1,1 +1,0 @@
-"""`dalembert trial`: a trial mass for the first run."""

@@ -1,0 +1,155 @@
+"""Estimates of the errors of what depends on a motion in time: rates, places, joint forces, energy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.stress.let_go import LINKAGES, _linkage, _slider_crank
+from tests.virtualwork.let_go import G, block, double_pendulum, four_bar, pendulum
+from tests.virtualwork.test_fast_parallelograms import parallelogram
+from virtualwork import Friction, Gear, Guess, Input, Link, Mechanism, MechanismError, Rack, Spring
+from virtualwork.intime.run import Run
+
+Values = dict[str, Any]
+
+
+def values(run: Run, way: Any, times: Any, moved: Any = None) -> Values:
+    """Everything that moves and every joint force, (n,) each."""
+    m, motion = run.assembly.mechanism, way.motion(times, moved)
+    result: Values = {"energy": way.energy(times)}
+    for name in m.links:
+        result |= {f"{name} {rate}": getattr(motion.link(name), rate) for rate in ("omega", "alpha")}
+    for name in set(m.points) - set(m.ground):
+        for rate in ("position", "velocity", "acceleration"):
+            x, y = getattr(motion.point(name), rate).T
+            result |= {f"{name} {rate} x": x, f"{name} {rate} y": y}
+    for of, on, *_ in run.first_motion.dynamics.reactions.order.pairs:
+        x, y = motion.reaction(of.name, on=on).T
+        result |= {f"{of.name} on {on} x": x, f"{of.name} on {on} y": y}
+    return result
+
+
+def estimated(run: Run) -> tuple[Values, Values]:
+    """The quantities, and the estimates of their errors."""
+    answers = values(run, run.fine, run.t)
+    errors = run.errors(lambda way, t, moved: list(values(run, way, t, moved).values()))
+    return answers, dict(zip(answers, errors, strict=True))
+
+
+@pytest.mark.parametrize("accuracy", [1e-5, 1e-8, 1e-12])
+def test_the_pull_of_a_pendulum_at_one_time(accuracy: float) -> None:
+    """From rest at the side the bar is pulled by 3 m g sin φ: by two solutions at that time alone the error may vanish by chance."""
+    from mpmath import asin, ellipfun, ellipk, mp, mpf, sin, sqrt
+
+    for end in np.linspace(0.1, 3.0, 12).tolist():
+        run = pendulum().simulate([0.0, end], angle=0.0, accuracy=accuracy)
+        with mp.workdps(40):
+            k, omega = sqrt(mpf(1) / 2), sqrt(mpf(G))
+            fallen = mp.pi / 2 - 2 * asin(k * ellipfun("sn", ellipk(k**2) - omega * end, k=k))
+            # beyond the lowest place the sine of the angle that is left
+            pull, angle = 3 * mpf(G) * sin(fallen), -fallen
+            exact = {
+                "O on bob x": -pull * mp.cos(angle),
+                "O on bob y": -pull * mp.sin(angle),
+                "P position y": sin(angle),
+            }
+            exact["bob alpha"] = -mpf(G) * mp.cos(angle)
+        answers, errors = estimated(run)
+        for name, value in exact.items():
+            assert abs(answers[name][-1] - float(value)) <= errors[name][-1], (name, end)
+
+
+def test_what_vanishes_by_symmetry() -> None:
+    """A slider goes along its guide, and the coupler of a parallelogram does not turn: rates are of rounding alone."""
+    run = parallelogram(0.1, 0.4, 1.0).simulate([0.0, 0.2, 0.4], angle=1.0, speed=20.0)
+    answers, errors = estimated(run)
+    for name in ("coupler omega", "coupler alpha"):
+        assert (np.abs(answers[name]) <= errors[name]).all()
+    assert errors["coupler omega"].max() < 1e-9
+
+
+def drawn(rng: np.random.Generator) -> tuple[Mechanism, Any]:
+    """A mechanism of any kind, and the speeds with which it is released."""
+    kind = int(rng.integers(9))
+    speed, turned = float(rng.uniform(-10, 10)), float(rng.uniform(0.2, 2.9))
+    if kind == 0:
+        return _linkage(rng, [*LINKAGES][int(rng.integers(len(LINKAGES)))]), 0.0
+    if kind == 1:
+        return _slider_crank(rng), 0.0
+    if kind == 2:
+        return double_pendulum(), rng.uniform(-3, 3, 2)
+    if kind == 3:
+        return replace(parallelogram(*(10 ** rng.uniform(-1, 0.3, 2)), turned), gravity=-1j * G), 2 * speed
+    if kind == 4:
+        anchor = complex(rng.uniform(-1, 1), rng.uniform(0.1, 1))
+        spring = Spring((("block", 0j), ("ground", anchor)), 10 ** rng.uniform(1, 3), rng.uniform(0.05, 0.5))
+        return block(gravity=-1j * G, springs=[spring]), 0.3 * speed
+    if kind == 5:
+        ends = ("rocker", 0.2 + 0j), ("ground", 0.3 + 0.4j)
+        damper = Spring(ends, 10 ** rng.uniform(0, 2), 0.1, damping=10 ** rng.uniform(-1, 1.5))
+        return four_bar(str(rng.choice(["crank", "rocker"])), springs=[damper]), speed
+    if kind == 6:
+        pins = [Friction(j, rng.uniform(0.05, 0.4), rng.uniform(0.003, 0.02)) for j in "ABCD"]
+        return four_bar(friction=pins[: rng.integers(1, 5)]), speed
+    wheel = Link({"O": 0j, "P": 0.1 + 0j}, mass=1, center=0.05 + 0.01j, inertia=0.02)
+    if kind == 7:
+        other = Link({"Q": 0j, "R": 0.1j}, mass=2, center=0.03j, inertia=0.03)
+        gear = Gear(("wheel", "other"), float(rng.choice([-2, -0.5, -3.3, 1.7])))
+        links, ground = {"wheel": wheel, "other": other}, {"O": 0j, "Q": 0.3 + 0j}
+        guess = Guess(0.4, {"other": 0.2})
+        return Mechanism(
+            ground, links, inputs=Input(link="wheel"), gears=[gear], gravity=-1j * G, guess=guess
+        ), speed
+    sled = block(gravity=0j)
+    return (
+        Mechanism(
+            {"O": 0.05j},
+            {"wheel": replace(wheel, points={"O": 0j}), "sled": Link({"S": 0j}, mass=2.0)},
+            guides=[replace(sled.guides[0], point="S", link="sled")],
+            racks=[Rack("wheel", "S", 0.05)],
+            inputs=Input(link="wheel"),
+            guess=Guess(0.3, {"sled": 0.0}, {"S": 0j}),
+            gravity=-1j * G,
+        ),
+        speed,
+    )
+
+
+def held(seed: int) -> float:
+    """The largest error over its estimate, against a run of the accuracy 1e-13; what that may err by is no error."""
+    rng = np.random.default_rng(seed)
+    m, speed = drawn(rng)
+    accuracy, end = 10 ** rng.uniform(-10, -5), float(rng.uniform(0.3, 1.5))
+    times = np.linspace(0, end, int(rng.choice([2, 3, 6, 20])))
+    try:
+        run, reference = (m.simulate(times, speed=speed, accuracy=a) for a in (accuracy, 1e-13))
+    except MechanismError:
+        return 0.0
+    if len(run.t) != len(times) or len(reference.t) != len(times):
+        # at a limit, or where rounding decides
+        return 0.0
+    answers, errors = estimated(run)
+    best, coarse = (values(reference, way, times) for way in (reference.fine, reference.coarse))
+    worst = 0.0
+    for name, estimate in errors.items():
+        own = np.maximum.accumulate(np.abs(best[name] - coarse[name])) + 1e-14 * np.abs(best[name])
+        error = np.maximum(np.abs(answers[name] - best[name]) - own, 0.0)
+        known = np.isfinite(error) & np.isfinite(estimate) & (error > 0)
+        worst = max(worst, float((error[known] / np.maximum(estimate[known], 1e-300)).max(initial=0.0)))
+    return worst
+
+
+@pytest.mark.parametrize("seed", [8, 14, 46])
+def test_estimates_that_were_too_small(seed: int) -> None:
+    """Two solutions that met by chance, a slide's rate across its guide, joint forces beside change points: up to 60 times."""
+    assert held(seed) <= 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(60))
+def test_errors_are_within_their_estimates(seed: int) -> None:
+    assert held(seed) <= 1.0

@@ -1,0 +1,58 @@
+"""One pose of a motion, asked for again and again: the same numbers as seldom, together or one by one, and bad input."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.scenes import four_bar, klann
+from virtualwork.formulas.lanes import OFTEN
+
+PINS = (("A", "crank"), ("B", "coupler"), ("C", "rocker"), ("D", "rocker"))
+
+
+def test_a_loop_over_poses_has_the_numbers_of_the_sweep() -> None:
+    m = four_bar(loaded=True)
+    angles = np.random.default_rng(1).uniform(0.0, 2 * np.pi, 3 * OFTEN)
+    sweep = m.motion(angles, speed=10.0)
+    for i, angle in enumerate(angles.tolist()):
+        motion = m.motion(angle, speed=10.0)
+        assert motion.effort == pytest.approx(sweep.effort[i : i + 1], rel=1e-11, abs=1e-11)
+        for pin in PINS:
+            assert motion.reaction(*pin)[0] == pytest.approx(sweep.reaction(*pin)[i], rel=1e-11, abs=1e-11)
+        # what was handed out once stays as it is, alone and beside others
+        keys = [("effort", 0), ("reaction", *PINS[1]), ("angle", "rocker", 1)]
+        effort, reaction, omega = motion.values(keys)
+        assert effort == motion.effort
+        assert (np.array([[reaction[0].real, reaction[0].imag]]) == motion.reaction(*PINS[1])).all()
+        assert omega == motion.link("rocker").omega
+
+
+def test_arrays_of_one_pose_are_the_callers_own() -> None:
+    m = klann()
+    for _ in range(2 * OFTEN):
+        motion = m.motion(1.0, speed=2.0)
+        first = motion.point("H").velocity
+        kept = first.copy()
+        first += 1.0
+        assert (motion.point("H").velocity == kept).all()
+
+
+def test_a_pose_that_cannot_be_assembled_has_no_number_however_often() -> None:
+    m = klann().changed({"links.crank.B.x": 2.0})
+    for _ in range(2 * OFTEN):
+        motion = m.motion(3.0, speed=1.0)
+        assert not motion.assembled[0]
+        assert np.isnan(motion.point("H").position).all()
+
+
+def test_own_rates_other_numbers_and_refusals() -> None:
+    m = klann()
+    for _ in range(2 * OFTEN):
+        own = m.motion(1.0)
+        assert own.link("leg").omega == m.motion([1.0]).link("leg").omega
+        assert m.motion(1, speed=2).n == 1
+        assert own.n == 1
+        assert own.inputs.shape == (1, 1)
+    with pytest.raises(ValueError, match="speed"):
+        m.motion(1.0, speed="fast")

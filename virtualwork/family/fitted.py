@@ -1,0 +1,132 @@
+"""The result of a fit: the dimensions, what they reach, and what is drawn of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+import numpy as np
+
+from virtualwork.describe.description import Description
+from virtualwork.describe.dimensions import Dimension, by_path, value
+from virtualwork.family.design import Design, place_key
+from virtualwork.family.keep import Kept
+from virtualwork.family.target import Reached
+from virtualwork.formulas.numbers import Complexes, Reals
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import FigureBase
+
+D = TypeVar("D", bound=Description)
+
+# poses of a look over the whole range
+FINE = 721
+
+
+@dataclass(frozen=True, eq=False)
+class Fit(Generic[D]):
+    """The dimensions that come nearest to a target.
+
+    Attributes
+    ----------
+    mechanism : Description
+        With the fitted numbers.
+    before : Description
+        Without them.
+    dimensions : tuple of Dimension
+    values : array (d,)
+        SI.
+    reached : tuple of Reached
+        What each point, link and slide of the target does.
+    starts, evaluations : int
+        Tried, and mechanisms worked out over a target in all.
+    remarks : tuple of str
+        What the designer should know: bounds reached, defects of assembly and of order.
+    others : tuple of Fit
+        Further solutions, where more than one was asked for: the next best first.
+    kept : tuple of Kept
+        Of each bound the extreme over the sweep.
+    """
+
+    mechanism: D
+    before: D
+    dimensions: tuple[Dimension, ...]
+    values: Reals
+    reached: tuple[Reached, ...]
+    starts: int
+    evaluations: int
+    remarks: tuple[str, ...]
+    others: tuple[Fit[D], ...] = ()
+    kept: tuple[Kept, ...] = ()
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The fitted numbers by path, SI."""
+        return by_path(self.dimensions, self.values.tolist())
+
+    @property
+    def inputs(self) -> Reals:
+        """(n,) rad or m, at each row of the (first) target."""
+        return self.reached[0].inputs
+
+    @property
+    def positions(self) -> Complexes:
+        """(n,) where the (first) point comes, x + iy in m."""
+        return self.reached[0].values
+
+    @property
+    def target(self) -> Complexes:
+        """(n,) where it should."""
+        return self.reached[0].target
+
+    @property
+    def distances(self) -> Reals:
+        """(n,) m; rad where it is a link's angle."""
+        return self.reached[0].distances
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean square of all distances, m; of angles (rad) or else of efforts, where there is nothing else."""
+        return float(np.sqrt(np.mean(self._all**2)))
+
+    @property
+    def max(self) -> float:
+        """The largest distance, m; of angles (rad) or else of efforts, where there is nothing else."""
+        return float(self._all.max())
+
+    @property
+    def _all(self) -> Reals:
+        for kinds in (("point", "slide"), ("angle",), ("effort",)):
+            distances = [each.distances for each in self.reached if each.kind in kinds]
+            if distances:
+                break
+        return np.concatenate(distances)
+
+    def plot(self, figure: FigureBase | None = None) -> list[Axes]:
+        """Draw the targets, and what the mechanism does over their range: a panel for each point, link and slide.
+
+        Parameters
+        ----------
+        figure : matplotlib figure
+            A new one of pyplot's where not given.
+        """
+        from virtualwork.picture.fitted import Fitted, fitted
+
+        own = np.array([float(value(self.before, d.path).real) for d in self.dimensions])
+        turning = not self.before.inputs[0].is_slide
+        panels = []
+        for each in self.reached:
+            design = Design(self.before, self.dimensions, [place_key(self.before, each.name)])
+            q = np.linspace(each.inputs.min(), each.inputs.max(), FINE)
+            lines = [design(numbers, q) for numbers in (self.values, own)]
+            after, before = (t[0] + 1j * t[1] if each.kind == "point" else t[0] for t in lines)
+            name = each.name.rpartition(".")[2]
+            panels.append(Fitted(name, each.kind, turning, q, after, before, each.inputs, each.target))
+        return fitted(panels, figure)
+
+    def __repr__(self) -> str:
+        result = ", ".join(f"{path}={number:.6g}" for path, number in self.parameters.items())
+        kinds, slide = {each.kind for each in self.reached}, self.before.inputs[0].is_slide
+        unit = "m" if kinds & {"point", "slide"} else "rad" if "angle" in kinds else "N" if slide else "N·m"
+        return f"Fit({result}; rms {self.rms:.3g} {unit})"
