@@ -115,20 +115,16 @@ def body(
 
     `enter` gives an input by its name and the values of all operations before it.
     """
-    uses = [0] * len(tape.operations)
-    for kind, *arguments in tape.operations:
-        if kind not in ("const", "input"):
-            for a in arguments:
-                uses[a] += 1
-    for _, number in tape.outputs:
-        uses[number] += 2
     values: list[ir.Value] = []
     circular: dict[int, tuple[ir.Value, ir.Value]] = {}
 
     def contracted(number: int) -> tuple[ir.Value, ir.Value] | None:
-        """The factors of a product that is wanted here alone: it goes into one rounding with the sum."""
+        """The factors of a product: it goes into one rounding with the sum, whatever else asks for it.
+
+        So no answer hangs on what is asked for beside it.
+        """
         kind, *factors = tape.operations[number]
-        return (values[factors[0]], values[factors[1]]) if kind == "mul" and uses[number] == 1 else None
+        return (values[factors[0]], values[factors[1]]) if kind == "mul" else None
 
     for b, (kind, *arguments) in zip(builders, tape.operations, strict=True):
         if kind == "const":
