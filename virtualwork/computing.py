@@ -32,8 +32,8 @@ from virtualwork.drawing import Drawing, draw
 from virtualwork.family.written import Written
 from virtualwork.forces import Forces
 from virtualwork.formulas.asked import FORCES, JOINTS, Key, names
-from virtualwork.formulas.balanced import Balanced
 from virtualwork.formulas.loads import Tabled
+from virtualwork.formulas.pose_forces import PoseForces
 from virtualwork.formulas.poses import Poses
 from virtualwork.picture.paper import travel_of
 from virtualwork.plan.steps import Group
@@ -58,7 +58,7 @@ class Computed(Series):
         if not self.forces:
             return {}
         assert self.of is not None
-        paths, reactions, _ = self.of.written.recording.forces
+        forces = self.of.written.recording.forces
         order = list(self.mechanism.bodies)
         loose = [
             {
@@ -75,7 +75,7 @@ class Computed(Series):
                     for part in every
                 ],
             }
-            for link, every in parts(self.mechanism, paths.case, reactions.joints).items()
+            for link, every in parts(self.mechanism, forces.case, forces.joints.joints).items()
         ]
         return {"loose": loose}
 
@@ -125,7 +125,7 @@ class Formulas:
         """The formulas with the dimensions as inputs."""
         fixed = [d for d in self.dimensions.values() if d.where[0] != "inputs"]
         moves = (True, True, self.order > ORDERS)
-        return Written(self.assembly, fixed, moves, True, settled=False, recording=Balanced)
+        return Written(self.assembly, fixed, moves, True, settled=False)
 
     def refused(self, keys: Sequence[Key]) -> str:
         """Say why a page cannot compute these quantities; empty where it can."""
@@ -144,7 +144,8 @@ class Formulas:
             return "its loops have a closed form for these numbers alone"
         if self.written.open_gears:
             return "a gear's phase depends on links that the guess places"
-        if not self.written.recording.takes(keys):
+        toothed = m.racks or m.cams
+        if toothed and not self.written.recording.takes(keys):
             return "the joint forces are statically redundant, and there are racks or cams"
         if forces:
             if any(load.axis == "time" for load in self.written.recording.tables) and self.poses.time is None:
@@ -189,7 +190,9 @@ class Formulas:
         }
         found |= profiles(written.mechanism, written.recording.recorder)
         if self._bears:
-            found["statics"] = self._bears.statics
+            system = self._bears.system.items()
+            entries = {f"{row} {column}": value for (row, column), value in system}
+            found["statics"] = written.recording.recorder.tape(entries)
         if self._loaded and self.written.recording.tables:
             found["over"] = written.tape([("over", i) for i in range(len(self.written.recording.tables))])
         if any(g.kind == "Newton" for g in groups):
@@ -240,16 +243,15 @@ class Formulas:
         return sorted({getattr(table, "name", "") for table in tables} - {""})
 
     @property
-    def _bears(self) -> Balanced | None:
-        """The formulas, where joint forces are among the quantities and statics alone is redundant."""
-        recording = self.written.recording
-        assert isinstance(recording, Balanced)
-        return recording if any(key[0] in JOINTS for key in self.keys) and recording.redundant else None
+    def _bears(self) -> PoseForces | None:
+        """The forces, where those of joints are among the quantities and statics alone is redundant."""
+        forces = self.written.recording.forces if any(key[0] in JOINTS for key in self.keys) else None
+        return forces if forces is not None and forces.redundant else None
 
     @staticmethod
-    def _statics(of: Balanced) -> dict[str, Any]:
+    def _statics(of: PoseForces) -> dict[str, Any]:
         """Where the entries of the equations of all links stand: (row, column) each, the last column that of b."""
-        count = len(of.unknown_forces)
+        count = len(of.unknowns)
         places = [[row, count if column is None else column] for row, column in of.system]
         return {"count": count, "rows": 1 + max(row for row, _ in places), "places": places}
 

@@ -16,7 +16,7 @@ from virtualwork import Mechanism
 from virtualwork.describe import MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.formulas.asked import Key, names
-from virtualwork.formulas.lanes import taped
+from virtualwork.formulas.tapes import taped
 from virtualwork.motion import Motion
 
 if TYPE_CHECKING:

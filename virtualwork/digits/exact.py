@@ -10,9 +10,7 @@ Further inputs of the tape
 `links.crank.B.x`    a dimension, by its path
 `guess crank`        an angle of the guess, and `at 0`, an input there: of gears, belts and racks, whose constant is that of the guess
 `phase 0`            the constant of one of these that the guess fixes by way of other links
-`friction 0`         of the first contact: the torque of a pin, the force along a guide
-`slip 0`             which way it slips, ±1
-`f 0`                the first unknown of redundant statics
+`slip 0`             which way the first contact slips, ±1
 """
 
 from __future__ import annotations
@@ -29,18 +27,11 @@ from dalembert.arithmetic.recorded import Number, Recorder, bare, lifted
 from dalembert.arithmetic.varied import Precise, Varied
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, dimensions, value
-from virtualwork.formulas.block import Block
-from virtualwork.formulas.dynamics import applied_loads, reduced
-from virtualwork.formulas.effort import generalized_force
-from virtualwork.formulas.lanes import Turning
-from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.newton import gaps, unknowns
-from virtualwork.formulas.numbers import Written, dot, plus
+from virtualwork.formulas.numbers import Written
 from virtualwork.formulas.positions import State
-from virtualwork.formulas.reactions import JointForces
-from virtualwork.formulas.recorded_forces import negative
 from virtualwork.formulas.recording import Recording
-from virtualwork.formulas.statics import equations
+from virtualwork.formulas.tapes import Turning
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, turns
 
@@ -145,9 +136,6 @@ class Exact(Recording):
 
     Further keys of `value`
     -----------------------
-    ("generalized", j)          the effort as if every motor sat on the body that its angle is measured from
-    ("applied", link)           complex: what acts on a link but its weight and inertia
-    ("applied moment", link)    about its centre of mass
     ("rub", n)                  the friction of the n-th contact by the force that it bears
     ("unknown", group, i)       an unknown of a group without a closed form
     ("gap", group, loop)        complex: what the unknowns of a group leave open of a loop
@@ -211,53 +199,12 @@ class Exact(Recording):
     def _gap(self, group: str, loop: int) -> Number:
         return gaps(self.solved(group), self.st)[loop]
 
-    # --- friction -------------------------------------------------------------------------------------------------
-    @property
-    def forces(self) -> tuple[LoadPaths, JointForces, Block]:
-        """The loads over the recorded pose; the friction of each joint enters."""
-        known = self._forces
-        paths, of, block = super().forces
-        if known is None and paths.case.contacts:
-            self.solve(*paths.case.targets(paths.case.places))
-            for n, (joint, *_) in enumerate(paths.case.contacts):
-                rub = self.recorder.input(f"friction {n}")
-                block.friction[n] = rub if joint.guide is None else rub * of.rail(block, joint.guide)
-        return paths, of, block
-
+    # --- forces ---------------------------------------------------------------------------------------------------
     def _rub(self, n: int) -> Number:
-        paths, of, block = self._places()
-        joint, body, _, coefficient, radius = paths.case.contacts[n]
-        force = plus(of.on_side(block, (joint.key, body)), of.borne(block, joint, body))
-        if force is None:
-            return None
+        joint, *_, coefficient, radius = self.forces.case.contacts[n]
         slip = self.recorder.input(f"slip {n}") * bare(coefficient)
-        if joint.guide is None:
-            return -(slip * bare(radius)) * abs(force)
-        return -slip * abs(dot(force, 1j * of.rail(block, joint.guide)))
-
-    def _moment(self, joint: str, body: str) -> Number:
-        value = super()._moment(joint, body)
-        paths, _, block = self.forces
-        for load in paths.case.friction:
-            if load.path is None and load.joint == joint and load.body == body:
-                value = plus(value, load.form(block))
-        return value
-
-    # --- further forces -------------------------------------------------------------------------------------------
-    def _generalized(self, j: int) -> Number:
-        paths, _, block = self.forces
-        return negative(generalized_force(paths, block, j))
-
-    def _applied(self, link: str) -> Number:
-        return self._reduced(link)[0]
-
-    def _applied_moment(self, link: str) -> Number:
-        return self._reduced(link)[1]
-
-    def _reduced(self, link: str) -> tuple[Number, Number]:
-        self.solve([f"angle:{link}"], 0)
-        paths, _, block = self.forces
-        return reduced(applied_loads(paths.case.loads, link), block, self.mechanism.rigid[link].center)
+        arm = slip * bare(radius) if joint.guide is None else slip
+        return -(arm * abs(self.value(("bearing", n))))
 
     def _balance(self, row: int) -> Number:
         return self._balances.get(row, 0.0)
@@ -265,11 +212,8 @@ class Exact(Recording):
     @cached_property
     def _balances(self) -> dict[int, Number]:
         """What the unknown forces that enter leave of every equation."""
-        self._places()
-        _, of, block = self.forces
         left: dict[int, Number] = {}
-        for row, column, part in equations(of, block):
-            part = bare(part)
+        for (row, column), part in self.forces.system.items():
             if column is not None:
                 part = part * self.recorder.input(f"f {column}")
             left[row] = left.get(row, 0.0) + part

@@ -25,7 +25,7 @@ from virtualwork.family.branches import meet_on_the_way, samples, signs, with_si
 from virtualwork.family.part import Part, Solver, assembled, parts
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import Key, names
-from virtualwork.formulas.lanes import Lanes, over_blocks
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.recording import NAMES
 
@@ -282,7 +282,7 @@ class Alone:
         if any(key[0] == "transmission" for key in self.keys):
             # sines that are on the tape alone
             return self._rows(self.written, x, poses)
-        return table(over_blocks(poses, key) for key in self.keys)
+        return table(poses.values(self.keys))
 
     def _rows(self, written: Written | None, x: Reals, poses: Lanes) -> Reals:
         """What is asked for, from the tape."""

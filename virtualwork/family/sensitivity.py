@@ -153,5 +153,5 @@ class Sensitivities:
         if any(key[0] in FORCES for key in keys):
             if m.friction:
                 raise MechanismError("sensitivity: forces with friction are not differentiated")
-            if any(key[0] in JOINTS for key in keys) and written.recording.forces[0].order.redundant:
+            if any(key[0] in JOINTS for key in keys) and written.recording.forces.redundant:
                 raise MechanismError("sensitivity: redundant joint forces are not differentiated")

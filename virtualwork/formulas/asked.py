@@ -28,13 +28,16 @@ FORCES = {
     "load at",
     "load torque",
     "rail",
+    "entry",
+    "bearing",
+    "rubbing",
 }
+# of these, what no friction changes
+UNRUBBED = {"shaking", "shaking moment", "load", "load at", "load torque", "rail", "rubbing"}
 # what the joints carry
 JOINTS = {"newton-euler", "force", "moment", "reaction", "contact", "rail"}
-# of one load, or of the guide along which an input drives
-LOADS = {"load", "load at", "load torque", "rail"}
 # what has two parts
-COMPLEX = {"point", "turn", "dpoint", "force", "reaction", "shaking", "applied", "gap", "column", "load", "load at", "rail"}  # fmt: skip
+COMPLEX = {"point", "turn", "dpoint", "force", "reaction", "shaking", "applied", "gap", "column", "load", "load at", "rail", "bearing", "group column", "right side"}  # fmt: skip
 
 
 def names(key: Key) -> tuple[str, ...]:

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from virtualwork.formulas.asked import Key
-from virtualwork.formulas.lanes import OFTEN, Ready, Turning, ready
+from virtualwork.formulas.lanes import OFTEN
+from virtualwork.formulas.tapes import Ready, Turning, ready
 
 RATES = ("speed", "acceleration", "jerk")
 

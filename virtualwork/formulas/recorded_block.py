@@ -7,7 +7,6 @@ from typing import Protocol
 from dalembert.arithmetic.recorded import Recorder
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import TorsionSpring
-from virtualwork.formulas.asked import Key
 from virtualwork.formulas.block import Block, Shared, Table
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import WRITTEN, Number
@@ -31,7 +30,6 @@ class Recording(Protocol):
     def rates(self) -> list[list[Number]]: ...
     @property
     def tables(self) -> list[Tabled]: ...
-    def value(self, key: Key) -> Number: ...
     def unwrapped(self, near: str, turn: Number) -> Number: ...
 
 
@@ -42,7 +40,8 @@ class RecordedSetting(Shared):
         super().__init__(recording.mechanism, recording.plan)
         self.recording = recording
 
-    def rates(self, rows: slice, many: bool) -> tuple[Number, Number]:
+    @property
+    def rates(self) -> tuple[Number, Number]:
         """q̇ and q̈ of the one input."""
         speed, acceleration, _ = self.recording.rates
         return speed[0], acceleration[0]
@@ -57,15 +56,11 @@ class RecordedBlock(Block):
     """The recorded pose as the loads see it."""
 
     def __init__(self, recording: Recording, along: Rates | None, by: list[Rates]) -> None:
-        super().__init__(RecordedSetting(recording), slice(None), recording.st, along, by)
+        super().__init__(RecordedSetting(recording), recording.st, along, by)
         self.recording = recording
-
-    def drive(self, j: int) -> Number:
-        """The torque of input j's motor."""
-        return self.recording.value(("effort", j))
 
     def table(self, load: Table) -> Number:
         """The force of a table, as it enters."""
-        number = next(i for i, of in enumerate(self.recording.tables) if of is load)
+        number = next(i for i, of in enumerate(self.recording.tables) if load.alike(of))
         enter = self.recording.recorder.input
         return WRITTEN.join(enter(f"table {number} x"), enter(f"table {number} y"))

@@ -1,22 +1,18 @@
-"""The forces on a tape: loads, effort by virtual work and joint forces over the one recorded pose."""
+"""The forces on a tape, over the one recorded pose."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import Protocol
 
-from dalembert.arithmetic.recorded import Number, bare
-from virtualwork.formulas import numbers
-from virtualwork.formulas.block import Block
-from virtualwork.formulas.effort import generalized_force
+from virtualwork.formulas import numbers, recorded_block
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.load_paths import LoadPaths
+from virtualwork.formulas.pose_forces import PoseForces
 from virtualwork.formulas.rates import Rates
-from virtualwork.formulas.reactions import JointForces
-from virtualwork.formulas.recorded_block import RecordedBlock, Recording
 
 
-class Written(Recording, Protocol):
+class Recording(recorded_block.Recording, Protocol):
     """A recording of positions and rates, as its forces need it; see `recording.Recording`."""
 
     @property
@@ -27,37 +23,11 @@ class Written(Recording, Protocol):
     def by(self) -> list[Rates]: ...
     @property
     def together(self) -> Rates | None: ...
-    @property
-    def forces(self) -> tuple[LoadPaths, JointForces, Block]: ...
     def solve(self, targets: Iterable[str], order: int) -> None: ...
 
 
-def forces_of(recording: Written) -> tuple[LoadPaths, JointForces, Block]:
-    """The loads over the recorded pose, with everything solved that they depend on."""
-    case = LoadCase(recording.mechanism, recording.plan, any(recording.moves[:2]))
-    paths = LoadPaths(case)
-    recording.solve(*case.targets())
-    return paths, JointForces(paths, set()), RecordedBlock(recording, recording.together, recording.by)
-
-
-def efforts(recording: Written) -> list[Number]:
-    """The effort at each input by virtual work, through the carriers of motors."""
-    paths, _, block = recording.forces
-    m, k = recording.mechanism, len(recording.mechanism.inputs)
-    force = [negative(generalized_force(paths, block, j)) for j in range(k)]
-    if not m.carried:
-        return force
-    matrix: list[list[Number]] = [[float(i == j) for j in range(k)] for i in range(k)]
-    for j in m.carried:
-        link, carrier = str(m.inputs[j].link), m.carrier(j)
-        recording.solve([f"angle:{link}", f"angle:{carrier}"], 1)
-        for i in range(k):
-            turned = [block.turning(body, i) for body in (link, carrier)]
-            driven, carried = (0.0 if t is None else t for t in turned)
-            matrix[i][j] = driven - carried
-    return recording.kind.system(matrix, force) if k > 1 else [force[0] / matrix[0][0]]
-
-
-def negative(value: Number) -> Number:
-    """−value, where None is zero."""
-    return 0.0 if value is None else -bare(value)
+def forces_of(recording: Recording) -> PoseForces:
+    """The forces of the recorded pose; friction and redundant joint forces enter the tape."""
+    paths = LoadPaths(LoadCase(recording.mechanism, recording.plan, any(recording.moves[:2])))
+    block = recorded_block.RecordedBlock(recording, recording.together, recording.by)
+    return PoseForces(paths, block, recording.solve, recording.kind.system, recording.recorder.input)

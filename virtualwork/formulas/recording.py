@@ -27,7 +27,7 @@ from dalembert.arithmetic.systems import regularity
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.asked import FORCES, JOINTS, LOADS, Key, names
+from virtualwork.formulas.asked import FORCES, JOINTS, Key, names
 from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.newton import gaps, put_unknowns, unknowns
 from virtualwork.formulas.numbers import PARTS, WRITTEN, Written
@@ -38,10 +38,8 @@ from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Path, Plan, Step, Term, path_reads
 
 if TYPE_CHECKING:
-    from virtualwork.formulas.block import Block
-    from virtualwork.formulas.load_paths import LoadPaths
     from virtualwork.formulas.loads import Tabled
-    from virtualwork.formulas.reactions import JointForces
+    from virtualwork.formulas.pose_forces import PoseForces
 
 # sin² of a transmission angle below which a force may have no digit left
 NEAR = 1e-18
@@ -97,13 +95,13 @@ class Recording:
             for name, there in zip(NAMES[1:], moves, strict=True)
         ]
         self.cases = {g.name: Case(g, bare) for g in plan.groups if g.kind != "Newton"}
-        self.by = [Rates(plan, self.st, [[1.0] if i == j else [] for i in range(k)]) for j in range(k)]
+        self.by = [self.rates_of(j, [[1.0] if i == j else [] for i in range(k)]) for j in range(k)]
         given = [[rate[j] for rate in self.rates] for j in range(k)]
         # in time, with several inputs
-        self.together = Rates(plan, self.st, given) if k > 1 else None
+        self.together = self.rates_of(k, given) if k > 1 else None
         self._done: set[tuple[int, int, int]] = set()
         self._values: dict[Key, Number] = {}
-        self._forces: tuple[LoadPaths, JointForces, Block] | None = None
+        self._forces: PoseForces | None = None
         # how far the loops of groups without a closed form are from closing as they enter, m
         self.open_loops: dict[str, Number] = {}
 
@@ -111,6 +109,10 @@ class Recording:
     def lock(self) -> Lock:
         """That of the recorder, into which motions of one assembly, and variants, write."""
         return own_lock(self.recorder)
+
+    def rates_of(self, way: int, given: list[list[Number]]) -> Rates:
+        """The derivatives over an input, or in time with several inputs (`way` is their count), before any is written down."""
+        return Rates(self.plan, self.st, given)
 
     # --- solving ------------------------------------------------------------------------------------------------
     def enters(self, group: Group) -> bool:
@@ -179,7 +181,7 @@ class Recording:
 
     # --- forces ---------------------------------------------------------------------------------------------------
     @property
-    def forces(self) -> tuple[LoadPaths, JointForces, Block]:
+    def forces(self) -> PoseForces:
         """The loads over the recorded pose, with everything solved that they depend on."""
         if self._forces is None:
             # a dozen files: a motion without forces does not load them
@@ -187,12 +189,6 @@ class Recording:
 
             self._forces = forces_of(self)
         return self._forces
-
-    def _places(self) -> tuple[LoadPaths, JointForces, Block]:
-        """The forces, with everything solved that the places of all joints depend on."""
-        case = self.forces[0].case
-        self.solve(*case.targets(case.places))
-        return self.forces
 
     # --- what can be asked ------------------------------------------------------------------------------------------
     def value(self, key: Key) -> Number:
@@ -209,8 +205,15 @@ class Recording:
         ("effort", j), ("newton-euler", j), ("force", joint's key, body), ("moment", joint's key, body)
         ("reaction", joint's name, body)             of all joints of that name: a pin, and the guide its point runs in
         ("shaking",), ("shaking moment",)            complex; real
-        ("load", n), ("load at", n), ("load torque", n), ("rail", guide)   see `single_loads.OF_ONE`
+        ("load", n), ("load at", n), ("load torque", n)   of the load case: a force, where it acts, a torque
+        ("rail", guide)                              a unit vector along a guide
         ("contact", cam)                             how hard a cam, from 0, presses on its follower
+        ("generalized", j)                           the effort as if every motor sat on the body its angle is measured from
+        ("applied", link), ("applied moment", link)  what acts on a link but its weight and inertia, about its centre of mass
+        ("bearing", n), ("rubbing", n)               of the n-th contact with friction: the force that it bears, a pin's complex, a
+                                                     guide's along its normal; the rate at which it slides
+        ("entry", row, column)                       of the equations of all links (`statics`): of A, or of b (column None)
+        ("over", number)                             what the table of a load is over
         ("pressure angle", cam), ("curvature radius", cam)
         ("closed", groups' names …)                  a finite number where these groups are assembled
         ("margin", group's name)                     the radicand of a closed form, relative
@@ -222,10 +225,8 @@ class Recording:
         """
         if key not in self._values:
             kind, *of = key
-            if kind in LOADS:
-                from virtualwork.formulas.single_loads import OF_ONE
-
-                found = OF_ONE[kind](*self._places(), *of)
+            if kind in FORCES:
+                found = self.forces.value(key)
             else:
                 found = getattr(self, f"_{kind.replace('-', '_').replace(' ', '_')}")(*of)
             self._values[key] = 0.0 if found is None else bare(found)
@@ -238,7 +239,7 @@ class Recording:
             return True
         if self.mechanism.friction:
             return False
-        return kinds.isdisjoint(JOINTS) or not self.forces[0].order.redundant
+        return kinds.isdisjoint(JOINTS) or not self.forces.redundant
 
     def tape(self, keys: Iterable[Key], more: Mapping[str, Number] | None = None) -> Tape:
         """The tape of quantities: outputs are called as `names` says; and of `more` numbers by name."""
@@ -259,7 +260,7 @@ class Recording:
         """What is written down that much depends on: directions, slides, and of forces what blocks keep too."""
         yield from (*self.st.turn.values(), *self.st.slide.values())
         if self._forces:
-            yield from (value[1] for of, value in self._forces[2].kept.items() if of.lasts)
+            yield from (value[1] for of, value in self._forces.block.kept.items() if of.lasts)
 
     def _point(self, body: str, z: complex, node: str | None, order: int) -> Number:
         path = self._path(body, z, node)
@@ -296,7 +297,7 @@ class Recording:
     @cached_property
     def tables(self) -> list[Tabled]:
         """The loads that tables give, in the order in which their forces enter."""
-        return self.forces[0].case.tables
+        return self.forces.case.tables
 
     def _angle(self, body: str, order: int) -> Number:
         if body == GROUND:
@@ -322,35 +323,6 @@ class Recording:
         self.solve((f"slide:{guide}",), order)
         return self.by[j].slide[guide][order - 1]
 
-    def _effort(self, j: int) -> Number:
-        from virtualwork.formulas.recorded_forces import efforts
-
-        return efforts(self)[j]
-
-    def _newton_euler(self, j: int) -> Number:
-        _, of, block = self._places()
-        return of.effort(block, j)
-
-    def _force(self, joint: str, body: str) -> Number:
-        _, of, block = self._places()
-        return of.joint_force(block, of.by_key[joint], body)
-
-    def _reaction(self, joint: str, body: str) -> Number:
-        from virtualwork.formulas.dynamics import joints_at
-
-        of = joints_at(self.forces[1].joints, joint, body)
-        return sum((self.value(("force", j.key, body)) for j in of), 0.0)
-
-    def _moment(self, joint: str, body: str) -> Number:
-        _, of, block = self._places()
-        guide = of.by_key[joint].guide
-        return None if guide is None else of.guide_moment(block, guide, body)
-
-    def _contact(self, cam: int) -> Number:
-        _, of, block = self._places()
-        self.solve(of.paths.touches.every[cam].targets, 0)
-        return of.contact(block, cam)
-
     def _pressure_angle(self, cam: int) -> Number:
         return self._touch(cam).at(self.st).pressure_angle()
 
@@ -362,14 +334,17 @@ class Recording:
         self.solve(touch.targets, 0)
         return touch
 
-    def _shaking(self, part: int = 0) -> Number:
-        from virtualwork.formulas.dynamics import resultant, shaking_loads
-
-        paths, _, block = self.forces
-        return resultant(shaking_loads(paths.case.loads), block)[part]
-
-    def _shaking_moment(self) -> Number:
-        return self._shaking(1)
+    def _over(self, number: int) -> Number:
+        """An angle of unknown turns in (−π, π]."""
+        load = self.tables[number]
+        if load.axis == "time":
+            return self.recorder.input("time")
+        if load.axis == "input":
+            return self.st.inputs[0]
+        angle = self.plan.angles[load.body]
+        if load.axis == "angle" and not angle.bases:
+            return self.st.affine(angle)
+        return self.value(("angle", load.body, int(load.axis == "speed")))
 
     def hangs_on(self, key: Key) -> tuple[str, ...]:
         """The groups that a quantity depends on, by name: where one of them is not assembled, it has no value.
@@ -393,7 +368,7 @@ class Recording:
             targets = Touch(self.mechanism, self.plan, self.mechanism.cam_drives[of[0]]).targets
         else:
             targets = {key for g in self.plan.groups for key in self.plan.writes(g)}
-            order = self.forces[0].case.targets()[1] if kind in FORCES else 0
+            order = self.forces.case.targets()[1] if kind in FORCES else 0
         return self.plan.needed(targets), order
 
     def _closed(self, *groups: str) -> Number:
