@@ -18,13 +18,12 @@ or (N + 2) planes?, J. Eng. Ind. 94 (1972) 548-560).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.dependence import adjoint, threshold
 from dalembert.arithmetic.records import record
+from dalembert.dataclass import dataclass
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -133,7 +133,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("arithmetic", "drawing", "page", "results", "tables"),
         ("angles", "figures", "quantities"),
         ("units",),
-        ("errors", "hints", "memory"),
+        ("dataclass", "errors", "hints", "memory"),
     ),
     "benchmarks": (
         ("__main__", "commands_page", "library_page", "same_outputs", "trace_passes"),
@@ -160,7 +160,7 @@ PACKAGES = (
     ),
     ("dalembert.angles", "dalembert.figures", "dalembert.quantities"),
     ("dalembert.units",),
-    ("dalembert.errors", "dalembert.hints", "dalembert.memory"),
+    ("dalembert.dataclass", "dalembert.errors", "dalembert.hints", "dalembert.memory"),
 )
 
 # What is not yet so, by file. An entry goes when its offence goes; none is added.

@@ -6,7 +6,6 @@ import re
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
 from functools import wraps
 from inspect import Parameter, signature
 from pathlib import Path
@@ -18,6 +17,7 @@ from typer.core import TyperCommand
 
 from cli.read.about import HEAD
 from cli.show.taking import take
+from dalembert.dataclass import dataclass
 
 if TYPE_CHECKING:
     from cli.show.result import Result
