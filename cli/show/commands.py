@@ -275,11 +275,12 @@ class Command(TyperCommand):
         except Exception as error:
             # of a NoSuchOption the option
             option = getattr(error, "option_name", None)
+            # one of its own lacks its value
+            if option is None or any(option in param.opts for param in self.get_params(ctx)):
+                raise
             from cli.renamed import renamed
 
-            # one of its own lacks its value
-            own = any(option in param.opts for param in self.get_params(ctx))
-            line = None if option is None or own else renamed(ctx.info_name or "", option)
+            line = renamed(ctx.info_name or "", option)
             if line is None:
                 raise
             typer.echo(line, err=True)
