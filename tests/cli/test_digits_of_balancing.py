@@ -288,3 +288,53 @@ def test_a_table_does_not_round_an_angle_to_a_full_turn() -> None:
     )
     assert cut.cells == {"angle_deg": [0.0, 12.3]}
     assert not unknown
+
+
+def test_a_trial_mass(dalembert: Dalembert) -> None:
+    """Speeds in rpm have π in them, which no float has."""
+    done = dalembert(
+        "trial",
+        "--rotor-mass",
+        "120.1kg",
+        "--speed",
+        "2999.3rpm",
+        "--radius",
+        "0.3in",
+        "--planes",
+        "3",
+        "--digits",
+    )
+    (row,) = rows(done)
+    with mp.workdps(40):
+        speed = mp.mpf("2999.3") * mp.pi / 30
+        unbalance = mp.mpf("0.1") * mp.mpf("120.1") / 3 * mp.mpf("9.80665") / speed**2
+        holds(row["unbalance_g_mm"], unbalance * 10**6, 14)
+        holds(row["mass_g"], unbalance / (mp.mpf("0.3") * mp.mpf("0.0254")) * 1000, 14)
+
+
+@pytest.mark.parametrize(("second", "fewest"), [("40", 13), ("10.0000001", 6)])
+def test_modes(second: str, fewest: int, dalembert: Dalembert, tmp_path: Path) -> None:
+    """A cubic through four stations, two masses; planes close together leave fewer digits."""
+    z = ["0", "10", "30", "40"]
+    shapes = [["0.1", "0.7", "0.9", "0.3"], ["0.3", "0.8", "-0.7", "-0.2"]]
+    table = [f"{at},{a},{b}" for at, a, b in zip(z, *shapes, strict=True)]
+    (tmp_path / "modes.csv").write_text("\n".join(["z_mm,first,second", *table]) + "\n")
+    masses = [("2.3", "31.7", "7"), ("1.9", "204.1", "33")]
+    head = "unbalance_g_mm,angle_deg,z_mm"
+    text = "\n".join([head, *(",".join(one) for one in masses)]) + "\n"
+    planes = ["--plane", "A:10mm:20mm", "--plane", f"B:{second}mm:20mm"]
+    both = rows(dalembert("balance", "-", *planes, "--modes", "modes.csv", "--digits", stdin=text))
+
+    def at(k: int, place: str) -> Any:
+        x = [mp.mpf(one) for one in z]
+        terms = [
+            mp.fprod((mp.mpf(place) - x[i]) / (x[j] - x[i]) for i in range(4) if i != j) for j in range(4)
+        ]
+        return mp.fsum(mp.mpf(shape) * term for shape, term in zip(shapes[k], terms, strict=True))
+
+    with mp.workdps(50):
+        a = mp.matrix([[at(k, place) for place in ("10", second)] for k in range(2)])
+        b = mp.matrix([sum(vector(m[0], m[1]) * at(k, m[2]) for m in masses) for k in range(2)])
+        for row, w in zip(both, mp.lu_solve(a, -b), strict=True):
+            holds(row["unbalance_g_mm"], abs(w), fewest)
+            holds(row["angle_deg"], mp.degrees(mp.arg(w)) % 360, fewest, 360)
