@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.arithmetic.doubled import Doubled
+from dalembert.arithmetic.doubled_functions import DOUBLED
 from dalembert.arithmetic.doubled_vectors import Vectors, part, total
 
 Real = NDArray[np.float64]
@@ -53,6 +54,24 @@ class ExactMasses(NamedTuple):
         lever = self.planes - part(about, (..., None))
         couple = self.about(part(about, (..., None)))[..., 0] + (made * lever).total()
         return self.static + made.total(), couple
+
+
+class ExactParts:
+    """Index balancing of readings (k,) with the rotor turned by e_k: as `balancing.indexing` has it, by least squares."""
+
+    def __init__(self, readings: Vectors, turn: Vectors) -> None:
+        rows = Vectors.joined([Vectors.of(np.ones((len(turn.x.high), 1))), turn[:, None]], axis=-1)
+        parts, left = smallest_squares(rows, -readings)
+        # rotor and mounting
+        self.parts, self.residuals = parts[::-1], -left
+        apart = turn - (turn.total() / np.array(float(turn.shape[0])))[None]
+        self.size = total(apart.square)
+
+    @property
+    def uncertainty(self) -> Doubled:
+        """√(Σ|residual|²/(k − 2)/(2 D))."""
+        spare = float(2 * (self.residuals.shape[0] - 2))
+        return DOUBLED.sqrt(total(self.residuals.square) / (self.size * spare))
 
 
 def smallest_squares(a: Vectors, b: Vectors) -> tuple[Vectors, Vectors]:

@@ -44,6 +44,11 @@ def quantity(text: str, dimension: str) -> Doubled:
     return Doubled.of(exactly(*parts))
 
 
+def turns(angle: Numbers) -> Vectors:
+    """e^{iφ} of the angles of a column, (n,)."""
+    return vectors([Fraction(1)] * len(angle.values), angle)
+
+
 def vectors(sizes: Iterable[Fraction], angle: Numbers) -> Vectors:
     """Vectors of exact sizes at the angles of a column, (n,)."""
     exact: Sequence[Fraction] = angle.exact

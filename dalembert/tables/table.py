@@ -46,6 +46,13 @@ class Numbers:
         return to_si(self.values, self.dimension, self.unit)
 
     @property
+    def decimals(self) -> list[Fraction]:
+        """The numbers of the file as they are written, in its unit."""
+        from fractions import Fraction
+
+        return [Fraction(repr(x)) for x in self.values.tolist()]
+
+    @property
     def exact(self) -> list[Fraction]:
         """The decimals of the file in SI, not rounded: `unit` of an angle in degrees."""
         from dalembert.quantities import exactly

@@ -338,3 +338,28 @@ def test_modes(second: str, fewest: int, dalembert: Dalembert, tmp_path: Path) -
         for row, w in zip(both, mp.lu_solve(a, -b), strict=True):
             holds(row["unbalance_g_mm"], abs(w), fewest)
             holds(row["angle_deg"], mp.degrees(mp.arg(w)) % 360, fewest, 360)
+
+
+@pytest.mark.parametrize(
+    ("last", "lag", "fewest"), [("213.7", False, 13), ("0.0031", False, 9), ("213.7", True, 13)]
+)
+def test_index_balancing(last: str, lag: bool, fewest: int, dalembert: Dalembert) -> None:
+    """Three positions, or nearly one; phases that lag; what the parts do not explain."""
+    read = [("0", "5.3", "31.7"), ("71.3", "3.1", "204.1"), (last, "4.7", "99")]
+    if fewest < 13:
+        del read[1]
+    text = "\n".join(["turned_deg,amplitude_um,phase_deg", *(",".join(one) for one in read)]) + "\n"
+    both = rows(dalembert("index", "-", *(["--phase-lag"] if lag else []), "--digits", stdin=text))
+    with mp.workdps(50):
+        v = [vector(size, f"-{angle}" if lag else angle) for _, size, angle in read]
+        e = [vector("1", turn) for turn, *_ in read]
+        mean, middle = (mp.fsum(x) / len(read) for x in (e, v))
+        size = mp.fsum(abs(x - mean) ** 2 for x in e)
+        rotor = mp.fsum(mp.conj(x - mean) * y for x, y in zip(e, v, strict=True)) / size
+        mandrel = middle - mean * rotor
+        for row, true in zip(both, (rotor, mandrel), strict=True):
+            holds(row["amplitude_um"], abs(true), fewest)
+            holds(row["phase_deg"], mp.degrees(mp.arg(true)) % 360, fewest, 360)
+            if len(read) == 3:
+                square = mp.fsum(abs(y - mandrel - rotor * x) ** 2 for x, y in zip(e, v, strict=True))
+                holds(row["uncertainty_um"], mp.sqrt(square / size / 2), fewest - 1)
