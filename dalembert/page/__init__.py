@@ -125,11 +125,9 @@ def page(
     rest
         What else the script reads.
     """
-    own = ["common.js", "player.js", f"{scene}.js"]
-    if script:
-        own = ["way.js", "model.js", *own, "loose.js", "entry.js", "editor.js"]
-    own = ["texts.js", *own]
-    return _filled(title, "page.html", script, own, {"series": series, **rest})
+    own = ["player.js", f"{scene}.js"]
+    own = ["way.js", "model.js", "common.js", "entry.js", *own, "loose.js", "editor.js"] if script else ["common.js", *own]
+    return _filled(title, "page.html", script, ["texts.js", *own], {"series": series, **rest})
 
 
 def sheet(title: str, kind: Literal["balance", "field"], script: str, sheet: Json) -> Page:

@@ -104,30 +104,27 @@ drawSheet = () => {
   const host = $("answers");
   host.replaceChildren();
   const [mass, unbalance] = [sheet.shown.mass, sheet.shown.unbalance];
-  const turn = Math.PI / 180;
   listed(
     host,
     sheet.remove ? TEXTS.toRemove : TEXTS.toAdd,
     ["", `${TEXTS.mass}, ${mass.unit}`, `${TEXTS.angle}, deg`, `${TEXTS.unbalance}, ${unbalance.unit}`, ...(sheet.sought ? [`${TEXTS.radius}, ${sheet.shown.radius.unit}`] : [])],
-    sheet.rotors.flatMap((rotor) => rotor.planes.map((plane) => [`${prefix(rotor)}${plane}`, shownAnswer(`${prefix(rotor)}${plane}.mass`, mass.si), shownAnswer(`${prefix(rotor)}${plane}.angle`, turn), shownAnswer(`${prefix(rotor)}${plane}.unbalance`, unbalance.si), ...(sheet.sought ? [shownAnswer(`${prefix(rotor)}${plane}.radius`, sheet.shown.radius.si)] : [])])),
+    sheet.rotors.flatMap((rotor) => rotor.planes.map((plane) => [`${prefix(rotor)}${plane}`, ...shownVector(`${prefix(rotor)}${plane}.`, "mass", mass.si, "angle"), shownAnswer(`${prefix(rotor)}${plane}.unbalance`, unbalance.si), ...(sheet.sought ? [shownAnswer(`${prefix(rotor)}${plane}.radius`, sheet.shown.radius.si)] : [])])),
   );
   listed(
     host,
     TEXTS.state,
-    ["", `${TEXTS.static}, ${unbalance.unit}`, `${TEXTS.angle}, deg`, ...(sheet.couple ? [`${TEXTS.couple}, ${sheet.shown.couple.unit}`, `${TEXTS.angle}, deg`] : []), `${TEXTS.residual}, ${unbalance.unit}`],
-    sheet.rotors.map((rotor) => [
-      rotor.name,
-      shownAnswer(`${prefix(rotor)}static.unbalance`, unbalance.si),
-      shownAnswer(`${prefix(rotor)}static.angle`, turn),
-      ...(sheet.couple ? [shownAnswer(`${prefix(rotor)}couple.unbalance`, sheet.shown.couple.si), shownAnswer(`${prefix(rotor)}couple.angle`, turn)] : []),
-      shownAnswer(`${prefix(rotor)}residual.static`, unbalance.si),
-    ]),
+    ["", TEXTS.before, `${TEXTS.angle}, deg`, TEXTS.after],
+    sheet.rotors.flatMap((rotor) => [["static", unbalance], ...(sheet.couple ? [["couple", sheet.shown.couple]] : [])].map(([kind, { unit, si }]) => [
+      `${prefix(rotor)}${TEXTS[kind]}, ${unit}`,
+      ...shownVector(`${prefix(rotor)}${kind}.`, "unbalance", si, "angle"),
+      shownAnswer(`${prefix(rotor)}residual.${kind}`, si),
+    ])),
   );
   if (sheet.rotors.some((rotor) => rotor.tolerance)) {
     listed(
       host,
-      TEXTS.tolerance,
-      ["", `${TEXTS.permissible}, ${unbalance.unit}`, `${TEXTS.before}, ${unbalance.unit}`, ""],
+      `${TEXTS.tolerance}, ${unbalance.unit}`,
+      ["", TEXTS.permissible, TEXTS.before, ""],
       sheet.rotors.flatMap((rotor) => (rotor.tolerance?.names ?? []).map((name, p) => {
         const [limit, x] = [rotor.tolerance.permissible[p], answer(`${prefix(rotor)}tolerance.${name}`)];
         return [`${prefix(rotor)}${name}`, short(limit / unbalance.si), shownAnswer(`${prefix(rotor)}tolerance.${name}`, unbalance.si), Number.isFinite(x) ? (x <= limit ? TEXTS.within : TEXTS.beyond) : "–"];
@@ -139,6 +136,7 @@ drawSheet = () => {
 };
 
 function csv() {
+  if (wrong.size) return "";
   const several = sheet.rotors.length > 1;
   const lines = [[...(several ? ["rotor"] : []), "name", ...sheet.columns.map((c) => c.header)].join(",")];
   for (const [r, rotor] of sheet.rotors.entries()) {

@@ -117,6 +117,43 @@ def test_what_is_typed_takes_a_unit_and_a_wrong_entry_leaves_no_answer(klann: Co
     assert klann.get("H.x") == before
     klann.button("undo")
     assert klann.get("H.x") == standing
+    # nothing is taken away with a wrong entry, nor stays from before it; undo takes the wrong entry back alone
+    outbox = "const box = document.getElementById('outbox'); return box.hidden ? '' : box.value"
+    klann.button("copy TOML")
+    assert "0.121" in klann(outbox)
+    klann.press("i")
+    klann.type("links.crank.B.x", "much")
+    klann.button("copy TOML")
+    klann.button("copy --set options")
+    assert [klann(outbox), klann("return dalembert.options()"), klann("return dalembert.toml()")] == [""] * 3
+    assert klann.text("limits") == ""
+    assert {cell for row in klann.table("Instant centres").values() for cell in row} == {"–"}
+    klann.button("undo")
+    assert klann.alert == ""
+    assert klann.get("links.crank.B.x") == 0.121
+    assert klann.get("H.x") == standing
+    assert klann.faults() == []
+
+
+def test_real_keys(klann: Computing) -> None:
+    """A number typed key by key is one change; the space key ticks the box that has the focus, and does not play."""
+    from selenium.webdriver.common.keys import Keys
+
+    klann("document.querySelectorAll('details').forEach((d) => (d.open = true))")
+    field = klann.browser.find_element("css selector", 'input[data-name="links.crank.B.x"]')
+    for text in ("125 mm", "13 cm"):
+        field.send_keys(Keys.CONTROL + "a")
+        field.send_keys(text + Keys.TAB)
+    assert klann.get("links.crank.B.x") == 0.13
+    for length in (0.125, 0.12):
+        klann.button("undo")
+        assert klann.get("links.crank.B.x") == length
+    assert klann("return document.getElementById('tools').firstChild.disabled")
+    box = klann.browser.find_element("css selector", "input[type=checkbox]")
+    ticked = box.is_selected()
+    box.send_keys(Keys.SPACE)
+    assert box.is_selected() != ticked
+    assert klann("return document.getElementById('play').getAttribute('aria-label')") == "play"
     assert klann.faults() == []
 
 
@@ -305,6 +342,7 @@ def test_a_table_of_masses(dalembert: Dalembert, tmp_path: Path, browser: Any) -
         assert page.alert
         assert math.isnan(page.get("A.unbalance"))
         assert page.table("Corrections: material to add")["A"] == ["–"] * 3
+        assert page("return dalembert.csv()") == ""
     page.button("undo")
     page.button("reset")
     hold(done.stdout)
