@@ -126,7 +126,11 @@ def page(
         What else the script reads.
     """
     own = ["player.js", f"{scene}.js"]
-    own = ["way.js", "model.js", "common.js", "entry.js", *own, "loose.js", "editor.js"] if script else ["common.js", *own]
+    own = (
+        ["way.js", "model.js", "common.js", "entry.js", *own, "loose.js", "editor.js"]
+        if script
+        else ["common.js", *own]
+    )
     return _filled(title, "page.html", script, ["texts.js", *own], {"series": series, **rest})
 
 
