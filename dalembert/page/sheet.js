@@ -32,6 +32,12 @@ function check(name, x, text, rules) {
     wrong.set(name, TEXTS.negative(name, text));
     return;
   }
+  const slack = rules.within ? 1e-9 * (rules.within[1] - rules.within[0]) : 0;
+  if (rules.within && (x < rules.within[0] - slack || x > rules.within[1] + slack)) {
+    const [low, high] = rules.within.map((end) => shortest(end, of.units, of.unit));
+    wrong.set(name, TEXTS.outside(name, text, low, `${high} ${of.unit}`));
+    return;
+  }
   if (!wrong.delete(name) || !Object.is(values[name], x)) remember();
   values[name] = x;
 }

@@ -13,8 +13,8 @@ from tests.cli.pages import Opened
 from tests.conftest import Dalembert
 
 WITH_PAGES = {"balance", "field", "mechanism", "forces", "simulate", "spin"}
-# these are balanced without phases, or by modes
-WITHOUT = {"fan-four-run", "two-planes-four-run", "modal-turbine"}
+# these are balanced without phases
+WITHOUT = {"fan-four-run", "two-planes-four-run"}
 PAGES = [
     name
     for name in names()
