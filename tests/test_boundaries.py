@@ -33,7 +33,8 @@ HEAVY = {
 LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
-        ("doubt", "fixed_weights", "next_run", "polygons"),
+        ("log_picture",),
+        ("doubt", "fixed_weights", "next_run", "objective", "polygons"),
         (
             "amplitudes",
             "engine",
@@ -41,6 +42,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "log_balance",
             "placement",
             "prior",
+            "run_means",
             "tolerance",
             "trial",
             "unbalance",

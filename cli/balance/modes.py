@@ -43,6 +43,12 @@ class Modes:
         """What is to vanish."""
         return [*(["force", "couple"] if self.rigid else []), *(f"mode {name}" for name in self.names)]
 
+    @property
+    def shaft(self) -> tuple[float, float] | None:
+        """Middle and length of the shaft, in which the couple is of the size of the force; None where both may stay."""
+        low, high = float(self.z[0]), float(self.z[-1])
+        return ((low + high) / 2, high - low) if self.rigid else None
+
     def at(self, z: Real, what: str) -> Real:
         """Return the rows of the conditions at places (...): (..., q, m)."""
         low, high = float(self.z[0]), float(self.z[-1])
@@ -55,10 +61,10 @@ class Modes:
                 "along the whole shaft"
             )
         shapes = np.moveaxis(shapes_at(self.z, self.shapes, np.clip(z, low, high)), 0, -2)
-        if not self.rigid:
+        if self.shaft is None:
             return shapes
-        # about the middle, in lengths of the shaft: of one size
-        arm = (z - (low + high) / 2) / (high - low)
+        middle, length = self.shaft
+        arm = (z - middle) / length
         return np.concatenate([np.ones_like(arm)[..., None, :], arm[..., None, :], shapes], axis=-2)
 
     def exactly_at(self, z: Doubled) -> Doubled:

@@ -172,6 +172,19 @@ class Table:
         return self.numbers[quantity]
 
 
+def numbered(codes: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Number codes in the order in which they first stand: the number of each code, and where each number first stands.
+
+    >>> numbered(np.array([7, 3, 7, 5]))
+    (array([0, 1, 0, 2]), array([0, 1, 3]))
+    """
+    _, first, inverse = np.unique(codes, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return rank[inverse], first[order]
+
+
 def read(
     path: str,
     *,

@@ -19,7 +19,7 @@ from balancing import (
     least_squares,
     minimax,
 )
-from cli.field.solution import Sought, confidence
+from balancing.objective import Objective
 from tests.balancing.measured import balance, fitted
 from tests.balancing.referee import least_squares_by_clarabel, minimax_by_clarabel
 
@@ -218,7 +218,7 @@ def test_uncertainties_under_limits_are_those_of_repeated_measurements(objective
     rng = np.random.default_rng(1)
     a, v, limit = problem(rng, 6, 2)
     top = 1.1 * float(minimax(a, v, limit).residual_max) if objective == "ceiling" else None
-    sought = Sought("minimax" if objective == "minimax" else "least-squares", limit, top, 0.0, 60)
+    limits = Objective(objective == "minimax", limit, top)
 
     def solved(v: Complex) -> Complex:
         if objective == "minimax":
@@ -230,7 +230,7 @@ def test_uncertainties_under_limits_are_those_of_repeated_measurements(objective
 
     w = solved(v)
     read = balance(fitted(v, influence=a), (0.02, np.radians(2)), w)
-    drawn, _ = confidence(read, w, 0 * w, sought, True)
+    drawn, _ = limits.confidence(read, w, 0 * w, 60)
     turn = (1 + 0.02 * rng.normal(size=(60, 6))) * np.exp(1j * np.radians(2) * rng.normal(size=(60, 6)))
     anew = np.array([solved(v * one) for one in turn]) - w
     total = float(np.square(np.abs(anew)).sum(axis=1).mean())
