@@ -96,13 +96,13 @@ class AmplitudeFit:
         from dalembert.arithmetic.doubled_vectors import Vectors, part, total
 
         unit, inverse = float(np.abs(self.trial_masses).max()), self._at.inverse
-        sure = np.isfinite(inverse).all(axis=(-2, -1))
+        sure = np.asarray(np.isfinite(inverse).all(axis=(-2, -1)))
         inverse = np.where(sure[:, None, None], inverse, 0.0)
         t = (trial_masses / np.array(unit))[None]
         read = Doubled(*(np.broadcast_to(x, trials.high.shape).T for x in (trials.high, trials.low)))
         read = read / part(initial, (..., None))
         z = Vectors.of(self._at.z)
-        reached, last = np.zeros(len(sure), dtype=bool), np.full(len(sure), np.inf)
+        reached, last = np.zeros(sure.shape, dtype=np.bool_), np.full(sure.shape, np.inf)
         for _ in range(60):
             y = z[:, None] * t + Vectors.of(np.ones((1, 1)))
             length = y.size
@@ -110,8 +110,8 @@ class AmplitudeFit:
             pull = (y * t.conj * (f / length)).total().value
             step = (inverse @ np.stack([pull.real, pull.imag], axis=-1)[..., None])[..., 0]
             reach = np.hypot(step[:, 0], step[:, 1])
-            reached |= reach <= 1e-29 * np.abs(z.value)
-            reached |= (reach >= last / 2) & (last <= 1e-20 * np.abs(z.value))
+            size = np.abs(z.value)
+            reached = reached | (reach <= 1e-29 * size) | ((reach >= last / 2) & (last <= 1e-20 * size))
             if (reached | ~sure).all():
                 break
             z, last = z - Vectors.of(step[:, 0] + 1j * step[:, 1]), reach
