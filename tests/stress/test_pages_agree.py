@@ -26,7 +26,7 @@ from virtualwork.quantities import Quantity, forces, places
 pytestmark = needs_node
 EXAMPLES = (
     "andrews/andrews", "belt-drive/belt-drive", "block-on-bar/bar", "cam-valve/cam-valve",
-    "rack-lift/rack-lift", "boom/boom", "crank-press/press", "desk-lamp/lamp", "door-closer/door", "engine-start/engine-start", "engine/engine", "five-bar/five-bar",
+    "doubling-rack/doubling-rack", "rack-lift/rack-lift", "boom/boom", "crank-press/press", "desk-lamp/lamp", "door-closer/door", "engine-start/engine-start", "engine/engine", "five-bar/five-bar",
     "inclined-slider-crank/piston", "jansen/jansen", "klann/klann", "moving-ramp/ramp", "parallelogram/parallelogram",
     "peaucellier/peaucellier", "planetary-gear/planetary", "quick-return/quick-return", "robot-arm/arm",
     "scissors-lift/lift", "scotch-yoke/yoke", "stephenson-six-bar/stephenson", "toggle-clamp/clamp",
@@ -46,8 +46,10 @@ class Tried(NamedTuple):
     conditions: list[float]
 
 
-def tried(name: str, m: Mechanism, rng: np.random.Generator, times: int, width: float) -> Tried | None:
-    """Some changes of a mechanism; None where its page replays, or it cannot be put together."""
+def tried(
+    name: str, m: Mechanism, rng: np.random.Generator, times: int, width: float, turns: float = 0.0
+) -> Tried | None:
+    """Some changes of a mechanism, its input up to so many turns away; None where its page replays, or it cannot be put together."""
     try:
         first = Motion(m.assembly, None, 3.0, 1.5)
     except MechanismError:
@@ -80,7 +82,10 @@ def tried(name: str, m: Mechanism, rng: np.random.Generator, times: int, width: 
             step = own or (0.1 * m.size if numbers[i].kind == "length" else 0.1)
             change[numbers[i].path] = own + width * step * rng.uniform(0 if own == 0 else -1, 1)
         at = [
-            float(q + width * rng.uniform(-1, 1) * (m.size if e.is_slide else 20.0))
+            float(
+                q
+                + rng.uniform(-1, 1) * (width * m.size if e.is_slide else 20.0 * width + 2 * math.pi * turns)
+            )
             for q, e in zip(m.at, m.inputs, strict=True)
         ]
         changes.append(change | dict(zip([e.name for e in m.inputs], at, strict=True)))

@@ -210,6 +210,15 @@ def turns(steps: Iterable[Step]) -> Iterator[Turn]:
             yield from step.ties
 
 
+def geared(steps: Iterable[Step]) -> set[str]:
+    """Bodies of which a gear of fractional ratio, or a rack, needs the angle with its whole turns, directly or indirectly."""
+    result: set[str] = set()
+    for turn in reversed(list(turns(steps))):
+        needs = turn.slides or turn.body in result
+        result |= {body for body, ratio in turn.angle.turning if needs or not ratio.is_integer()}
+    return result
+
+
 @dataclass(frozen=True)
 class Blocks:
     """The irreducible blocks of coordinates in their order of solution, and the redundant equations."""
