@@ -41,6 +41,8 @@ from virtualwork.quantities import Quantity, places
 from virtualwork.quantities import forces as quantities_of_forces
 from virtualwork.study.free_bodies import parts
 
+LOCKED = (*JOINTS, "effort")
+"""What depends on the friction of joints; nothing of it has a value where they lock."""
 ORDERS = 2
 """How often places are differentiated in time."""
 # input, speed, acceleration, jerk, as an input of a description calls them
@@ -85,8 +87,8 @@ class Computed(Series):
 
     def _unit_rates(self, key: Key) -> list[Any]:
         assert self.of is not None
-        row = self.of.row(key)
-        return [{"row": row + i} for i in range(len(names(key)))]
+        row, rest = self.of.row(key), self.of.locking(key)
+        return [{"row": row + i, **rest} for i in range(len(names(key)))]
 
     def _add(self, name: str, values: Any, header: str = "", owner: str = "", exact: bool = True) -> int:
         if not isinstance(values, dict):
@@ -136,12 +138,10 @@ class Formulas:
             return "nothing drives it"
         if own.folded:
             return "loops are singular in every pose"
-        if forces and m.friction:
-            return "friction is found by iteration"
         if {g.name: g.kind for g in self.written.plan.groups} != {g.name: g.kind for g in own.plan.groups}:
             return "its loops have a closed form for these numbers alone"
         if not self.written.recording.takes(keys):
-            return "the joint forces are statically redundant, and there are racks or cams"
+            return "the joint forces are statically redundant, and there are racks, cams or friction"
         if forces:
             if any(load.axis == "time" for load in self.written.recording.tables) and self.poses.time is None:
                 return "a torque is given over the time, which the poses have not"
@@ -160,7 +160,7 @@ class Formulas:
         """What a column or a name asks the tape of the poses for."""
         if not each.key:
             return {"zero": 1}
-        found: dict[str, Any] = {"row": self.row(each.key) + each.imaginary}
+        found: dict[str, Any] = {"row": self.row(each.key) + each.imaginary, **self.locking(each.key)}
         if each.less:
             found["less"] = self.row(each.less)
         if each.turns:
@@ -168,6 +168,10 @@ class Formulas:
         if each.order:
             found["order"] = each.order
         return found
+
+    def locking(self, key: Key) -> dict[str, Any]:
+        """That a quantity has no value where friction locks the joints."""
+        return {"locks": 1} if self.mechanism.friction and key[0] in LOCKED else {}
 
     # --- tapes ----------------------------------------------------------------------------------------------------
     def tapes(self, drawn: Mapping[str, Number]) -> dict[str, Tape]:
@@ -186,6 +190,12 @@ class Formulas:
         found |= profiles(written.mechanism, written.recording.recorder)
         if self._bears:
             found["statics"] = self._bears.statics
+        if self._rubs:
+            names = [f"friction {n}" for n in range(self._rubs)]
+            rubs = [("rub", n) for n in range(self._rubs)]
+            found["slips"] = written.tape([("slip", n) for n in range(self._rubs)])
+            found["rubs"] = written.tape(rubs)
+            found["slopes"] = written.evaluation(rubs, tuple(names), False)
         if self._loaded and self.written.recording.tables:
             found["over"] = written.tape([("over", i) for i in range(len(self.written.recording.tables))])
         if any(g.kind == "Newton" for g in groups):
@@ -233,6 +243,13 @@ class Formulas:
     def _loaded(self) -> bool:
         """Whether forces are among the quantities."""
         return any(key[0] in FORCES for key in self.keys)
+
+    @property
+    def _rubs(self) -> int:
+        """How many contacts have friction, where forces are among the quantities."""
+        recording = self.written.recording
+        assert isinstance(recording, Balanced)
+        return recording.contacts if self._loaded else 0
 
     def _files(self) -> list[str]:
         """The tables that stand beside the file."""

@@ -127,7 +127,7 @@ def page(
     """
     own = ["common.js", "player.js", f"{scene}.js"]
     if script:
-        own = ["way.js", "model.js", *own, "loose.js", "entry.js", "editor.js"]
+        own = ["solving.js", "way.js", "model.js", *own, "loose.js", "entry.js", "editor.js"]
     own = ["texts.js", *own]
     return _filled(title, "page.html", script, own, {"series": series, **rest})
 

@@ -113,8 +113,19 @@ class Machine extends Way {
     } else if (this.iterated.length + this.winding.length && !this.one) this.#alongLines(state, given, inputs);
     if (this.tapes.twists) this.#wind(state, given, inputs);
     if (this.tapes.over && pose === undefined) this.#load(given, this.tapes.over.run(given, inputs[0].length));
-    if (this.tapes.statics && !(this.tapes.over && pose !== undefined)) this.#bear(given, inputs[0].length);
+    if (!this.tapes.over || pose === undefined) {
+      const locked = this.#settle(given, inputs[0].length);
+      if (pose === undefined) state.locked = new Set(locked);
+    }
     return given;
+  }
+
+  // what the forces of n lanes depend on and is found from tapes; where friction locks the joints
+  #settle(given, n) {
+    if (this.tapes.statics) this.#bear(given, n);
+    if (!this.rubbing) return [];
+    this.tapes.slips.run(given, n).forEach((slip, k) => (given[`slip ${k}`] = slip));
+    return this.rubbing.fit(given, n);
   }
 
   // the equations of all links at one lane of the tape's outputs
@@ -301,7 +312,7 @@ class Machine extends Way {
           const over = precise(this.tapes.over, given);
           this.#load(given, over.map((row, i) => [between(row, poses[0], this.model.tables[i].turns)]));
           for (const [name, x] of Object.entries(given)) if (name.startsWith("table ")) given[name] = x[0];
-          if (this.tapes.statics) this.#bear(given, count);
+          this.#settle(given, count);
         }
         const values = precise(this.tapes.pose, given);
         if (!values.every((row) => row.every(Number.isFinite))) continue;
@@ -343,14 +354,16 @@ class Machine extends Way {
       this.model.phases.forEach((i, k) => (here[`phase ${i}`] = chosen[k]));
     }
     if (this.tapes.statics) this.#unbalanced(here).forEach((x, i) => (here[`f ${i}`] = [here[`f ${i}`], x || 0]));
+    this.rubbing?.refine(here);
     const twice = this.tapes.pose.twice(here);
     return twice.slice(0, -1).map(([high, low], r) => Math.abs(high - state.rows[r][l] + low));
   }
 
   // a quantity at a pose, SI and radians
-  value(state, { row, less, turns, order, zero }, l) {
+  value(state, { row, less, turns, order, zero, locks }, l) {
     if (!state.rows || !Number.isFinite(state.closed[l])) return NaN;
     if (zero) return 0;
+    if (locks && state.locked.has(l)) return NaN;
     if (order && !this.moves(state)) return NaN;
     const x = state.rows[row][l] - (less === undefined ? 0 : state.rows[less][l]);
     return turns && x < 0 ? (x + TAU < TAU ? x + TAU : 0) : x + 0;

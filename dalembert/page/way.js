@@ -25,71 +25,6 @@ function interpolated(nodes, values, at) {
   return values[low] + (values[high] - values[low]) * share;
 }
 
-// the x of least |Σ x_j·column_j + gap|, by Householder's reflections; columns are arrays
-function leastSquares(columns, gap) {
-  const [a, b] = [columns.map((column) => [...column]), gap.map((x) => -x)];
-  const count = a.length;
-  for (let j = 0; j < count; j++) {
-    const v = a[j].map((x, i) => (i < j ? 0 : x));
-    v[j] += Math.sign(v[j] || 1) * Math.hypot(...v);
-    const square = v.reduce((sum, x) => sum + x * x, 0);
-    for (const w of [...a.slice(j), b]) {
-      const share = (2 * v.reduce((sum, x, i) => sum + x * w[i], 0)) / square;
-      v.forEach((x, i) => (w[i] -= share * x));
-    }
-  }
-  const x = new Array(count);
-  for (let j = count - 1; j >= 0; j--) x[j] = (b[j] - a.slice(j + 1).reduce((sum, column, k) => sum + column[j] * x[j + 1 + k], 0)) / a[j][j];
-  return x;
-}
-
-// A·f + b = 0 of dependent equations, by reflections with the longest column next: what is determined of f, NaN for the rest;
-// all NaN where b asks for what no f gives. Shares below `null` of the largest are none.
-function determined(a, b, count, none = 1e-9) {
-  const columns = Array.from({ length: count }, (_, j) => a.map((row) => row[j]));
-  const right = b.map((x) => -x);
-  const order = columns.map((_, j) => j);
-  const largest = Math.max(...right.map(Math.abs));
-  let rank = 0;
-  for (let first = 0; rank < Math.min(count, right.length); rank++) {
-    const size = (j) => Math.hypot(...columns[j].slice(rank));
-    let [next, most] = [rank, -1];
-    for (let j = rank; j < count; j++) if (size(j) > most) [next, most] = [j, size(j)];
-    first = rank ? first : most;
-    if (!(most > none * first)) break;
-    for (const list of [columns, order]) [list[rank], list[next]] = [list[next], list[rank]];
-    const v = columns[rank].map((x, i) => (i < rank ? 0 : x));
-    v[rank] += (v[rank] < 0 ? -1 : 1) * most;
-    const square = v.reduce((sum, x) => sum + x * x, 0);
-    for (const w of [...columns.slice(rank), right]) {
-      let share = 0;
-      for (let i = rank; i < v.length; i++) share += v[i] * w[i];
-      share *= 2 / square;
-      for (let i = rank; i < v.length; i++) w[i] -= share * v[i];
-    }
-  }
-  const back = (y) => {
-    const x = new Array(rank);
-    for (let i = rank - 1; i >= 0; i--) {
-      let rest = y[i];
-      for (let k = i + 1; k < rank; k++) rest -= columns[k][i] * x[k];
-      x[i] = rest / columns[i][i];
-    }
-    return x;
-  };
-  const f = new Array(count).fill(NaN);
-  if (!right.every(Number.isFinite) || right.slice(rank).some((x) => Math.abs(x) > 1e-9 * largest)) return f;
-  back(right).forEach((x, i) => (f[order[i]] = x));
-  // a state of self-stress for each column that depends on those before it
-  for (let j = rank; j < count; j++) {
-    const stress = back(columns[j]);
-    const length = Math.hypot(1, ...stress);
-    stress.forEach((x, i) => Math.abs(x) > 1e-7 * length && (f[order[i]] = NaN));
-    f[order[j]] = NaN;
-  }
-  return f;
-}
-
 class Way {
   constructor(model, tapes) {
     this.model = model;
@@ -105,6 +40,7 @@ class Way {
     if (model.time) this.time = along(model.time);
     this.closed = model.groups.filter((g) => !g.start);
     this.iterated = model.groups.filter((g) => g.start);
+    if (this.tapes.rubs) this.rubbing = new Fitted(this.tapes.rubs, this.tapes.slopes, this.tapes.rubs.outputs.map((_, k) => `friction ${k}`));
     this.winding = this.closed.flatMap((g) => g.winds);
     let [place, guess] = [0, 0];
     for (const g of this.iterated) {
