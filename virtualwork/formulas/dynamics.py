@@ -23,7 +23,6 @@ from virtualwork.formulas.scene import Scene
 from virtualwork.formulas.statics import Statics
 from virtualwork.plan.steps import Joint
 
-
 V = TypeVar("V", Reals, Complexes)
 
 
