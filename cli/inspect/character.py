@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,6 +11,7 @@ from cli.cases.analysis import Analysis
 from cli.cases.case import TableCase, TableStudy
 from cli.cases.poses import listed
 from cli.cases.study import METHOD
+from dalembert.dataclass import dataclass, field, replace
 from dalembert.results.columns import Table, finite, names
 from dalembert.results.way import Topic, figures
 from virtualwork.plan.steps import Group, Place, Slide, Turn, joints, relations

@@ -11,12 +11,12 @@ import io
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError, quote
 from dalembert.quantities import number_expected, parse_number
 from dalembert.tables.headers import Heading, find_columns, offers, spellings
@@ -44,6 +44,13 @@ class Numbers:
     def si(self) -> NDArray[np.float64]:
         """The numbers in SI."""
         return to_si(self.values, self.dimension, self.unit)
+
+    @property
+    def decimals(self) -> list[Fraction]:
+        """The numbers of the file as they are written, in its unit."""
+        from fractions import Fraction
+
+        return [Fraction(repr(x)) for x in self.values.tolist()]
 
     @property
     def exact(self) -> list[Fraction]:

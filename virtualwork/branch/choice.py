@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property, partial
 
 import numpy as np
 
 from dalembert.arithmetic.guard import Lock, guarded, own_lock
 from dalembert.arithmetic.records import Record, record
+from dalembert.dataclass import dataclass, field
 from virtualwork.describe.description import Description
 from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.numbers import Reals

@@ -17,10 +17,10 @@ perhaps times a slide. That is all that derivatives, virtual displacements and r
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, TypeVar
 
+from dalembert.dataclass import dataclass, field
 from virtualwork.describe.description import Description
 from virtualwork.describe.laws import Lift
 from virtualwork.describe.meshes import Coordinate
