@@ -94,8 +94,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("animation", "picture"),
         ("rounding_in_time", "solids", "traced"),
         ("inertia",),
-        ("rounding",),
-        ("attitude", "elliptic", "shapes", "top_roots"),
+        ("attitude", "eigenvectors", "elliptic", "shapes", "top_roots"),
     ),
     "cli": (
         ("__main__",),
