@@ -29,17 +29,15 @@ from dalembert.arithmetic.recorded import Number, Recorder, bare, lifted
 from dalembert.arithmetic.varied import Precise, Varied
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, dimensions, value
-from virtualwork.formulas.block import Block
 from virtualwork.formulas.dynamics import applied_loads, reduced
 from virtualwork.formulas.effort import generalized_force
 from virtualwork.formulas.lanes import Turning
-from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.newton import gaps, unknowns
-from virtualwork.formulas.numbers import Written, dot, plus
+from virtualwork.formulas.numbers import Written
 from virtualwork.formulas.positions import State
-from virtualwork.formulas.reactions import JointForces
 from virtualwork.formulas.recorded_forces import negative
 from virtualwork.formulas.recording import Recording
+from virtualwork.formulas.rubbing import Rubbing
 from virtualwork.formulas.statics import equations
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, turns
@@ -140,7 +138,7 @@ class Numbers:
 
 
 @guarded
-class Exact(Recording):
+class Exact(Rubbing):
     """The formulas of an assembly, with its numbers as inputs.
 
     Further keys of `value`
@@ -210,38 +208,6 @@ class Exact(Recording):
 
     def _gap(self, group: str, loop: int) -> Number:
         return gaps(self.solved(group), self.st)[loop]
-
-    # --- friction -------------------------------------------------------------------------------------------------
-    @property
-    def forces(self) -> tuple[LoadPaths, JointForces, Block]:
-        """The loads over the recorded pose; the friction of each joint enters."""
-        known = self._forces
-        paths, of, block = super().forces
-        if known is None and paths.case.contacts:
-            self.solve(*paths.case.targets(paths.case.places))
-            for n, (joint, *_) in enumerate(paths.case.contacts):
-                rub = self.recorder.input(f"friction {n}")
-                block.friction[n] = rub if joint.guide is None else rub * of.rail(block, joint.guide)
-        return paths, of, block
-
-    def _rub(self, n: int) -> Number:
-        paths, of, block = self._places()
-        joint, body, _, coefficient, radius = paths.case.contacts[n]
-        force = plus(of.on_side(block, (joint.key, body)), of.borne(block, joint, body))
-        if force is None:
-            return None
-        slip = self.recorder.input(f"slip {n}") * bare(coefficient)
-        if joint.guide is None:
-            return -(slip * bare(radius)) * abs(force)
-        return -slip * abs(dot(force, 1j * of.rail(block, joint.guide)))
-
-    def _moment(self, joint: str, body: str) -> Number:
-        value = super()._moment(joint, body)
-        paths, _, block = self.forces
-        for load in paths.case.friction:
-            if load.path is None and load.joint == joint and load.body == body:
-                value = plus(value, load.form(block))
-        return value
 
     # --- further forces -------------------------------------------------------------------------------------------
     def _generalized(self, j: int) -> Number:

@@ -12,12 +12,12 @@ from functools import cached_property
 from dalembert.arithmetic.recorded import Number, bare
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.asked import Key
-from virtualwork.formulas.recording import Recording
+from virtualwork.formulas.asked import FORCES, JOINTS, Key
+from virtualwork.formulas.rubbing import Rubbing
 from virtualwork.formulas.statics import Column, equations, unknowns
 
 
-class Balanced(Recording):
+class Balanced(Rubbing):
     """The formulas of an assembly; where its statics is redundant, the unknown forces enter.
 
     A further key of `value`: ("over", number), what a load's table is over.
@@ -29,9 +29,10 @@ class Balanced(Recording):
         return bool(self.forces[0].order.redundant)
 
     def takes(self, keys: Iterable[Key]) -> bool:
-        """Whether quantities can be written down: not with friction, nor with racks or cams where statics is redundant."""
-        toothed = bool(self.mechanism.racks or self.mechanism.cams)
-        return super().takes(keys) or not (self.mechanism.friction or toothed)
+        """Whether quantities can be written down: not where statics is redundant with friction, racks or cams."""
+        m, kinds = self.mechanism, {key[0] for key in keys}
+        concerned = FORCES if m.friction else JOINTS if m.racks or m.cams else set[str]()
+        return kinds.isdisjoint(concerned) or not self.redundant
 
     @cached_property
     def unknown_forces(self) -> list[Column]:
