@@ -7,7 +7,6 @@ from typing import Protocol
 from dalembert.arithmetic.recorded import Recorder
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import TorsionSpring
-from virtualwork.formulas.asked import Key
 from virtualwork.formulas.block import Block, Shared, Table
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import WRITTEN, Number
@@ -31,7 +30,8 @@ class Recording(Protocol):
     def rates(self) -> list[list[Number]]: ...
     @property
     def tables(self) -> list[Tabled]: ...
-    def value(self, key: Key) -> Number: ...
+    @property
+    def efforts(self) -> list[Number]: ...
     def unwrapped(self, near: str, turn: Number) -> Number: ...
 
 
@@ -62,7 +62,7 @@ class RecordedBlock(Block):
 
     def drive(self, j: int) -> Number:
         """The torque of input j's motor."""
-        return self.recording.value(("effort", j))
+        return self.recording.efforts[j]
 
     def table(self, load: Table) -> Number:
         """The force of a table, as it enters."""

@@ -11,6 +11,7 @@ from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import generalized_force
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.load_paths import LoadPaths
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.reactions import JointForces
 from virtualwork.formulas.recorded_block import RecordedBlock, Recording
@@ -29,7 +30,16 @@ class Written(Recording, Protocol):
     def together(self) -> Rates | None: ...
     @property
     def forces(self) -> tuple[LoadPaths, JointForces, Block]: ...
+    @property
+    def shaking(self) -> tuple[Number, Number]: ...
     def solve(self, targets: Iterable[str], order: int) -> None: ...
+    def placed_forces(self) -> tuple[LoadPaths, JointForces, Block]: ...
+    def value(self, quantity: Quantity) -> Number: ...
+    def generalized(self, j: int) -> Number: ...
+    def newton_euler(self, j: int) -> Number: ...
+    def joint_force(self, joint: str, body: str) -> Number: ...
+    def joint_moment(self, joint: str, body: str) -> Number: ...
+    def applied(self, link: str) -> tuple[Number, Number]: ...
 
 
 def forces_of(recording: Written) -> tuple[LoadPaths, JointForces, Block]:
@@ -42,9 +52,9 @@ def forces_of(recording: Written) -> tuple[LoadPaths, JointForces, Block]:
 
 def efforts(recording: Written) -> list[Number]:
     """The effort at each input by virtual work, through the carriers of motors."""
-    paths, _, block = recording.forces
+    _, _, block = recording.forces
     m, k = recording.mechanism, len(recording.mechanism.inputs)
-    force = [negative(generalized_force(paths, block, j)) for j in range(k)]
+    force = [generalized(recording, j) for j in range(k)]
     if not m.carried:
         return force
     matrix: list[list[Number]] = [[float(i == j) for j in range(k)] for i in range(k)]
@@ -58,6 +68,8 @@ def efforts(recording: Written) -> list[Number]:
     return recording.kind.system(matrix, force) if k > 1 else [force[0] / matrix[0][0]]
 
 
-def negative(value: Number) -> Number:
-    """−value, where None is zero."""
-    return 0.0 if value is None else -bare(value)
+def generalized(recording: Written, j: int) -> Number:
+    """The effort at input j as if every motor sat on the body that its angle is measured from."""
+    paths, _, block = recording.forces
+    force = generalized_force(paths, block, j)
+    return 0.0 if force is None else -bare(force)
