@@ -22,7 +22,7 @@ from virtualwork.describe.dimensions import dimensions, value
 from virtualwork.describe.parts import Force, Torque
 from virtualwork.family.sensitivity import Sensitivities
 from virtualwork.family.written import Written
-from virtualwork.formulas.forces import Effort, JointForce
+from virtualwork.formulas.forces import Effort, JointForce, NewtonEuler
 from virtualwork.formulas.kinematics import Angle, Point
 
 # between them every kind: lengths, angles, masses, guides, gears, springs, motors, loads
@@ -178,6 +178,6 @@ def test_torques_to_the_ratios_of_gears(gear: int) -> None:
         below, above = (Exact(_Nudged(motion, gear, ratio + s * h)).forces() for s in (-1, 1))
         true = [float((above["input", j, 0] - below["input", j, 0]) / (2 * h)) for j in "01"]
     assert max(map(abs, true)) > 1e-3
-    for way in "effort", "newton-euler":
-        found = [motion.derivative((way, j), f"gears.{gear + 1}.ratio")[0] for j in (0, 1)]
+    for way in Effort, NewtonEuler:
+        found = [motion.derivative(way(j), f"gears.{gear + 1}.ratio")[0] for j in (0, 1)]
         assert found == pytest.approx(true, rel=1e-12, abs=1e-13)

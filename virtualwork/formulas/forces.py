@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from virtualwork.describe.description import Description
 from virtualwork.formulas.numbers import Number
-from virtualwork.formulas.quantity import Quantity
+from virtualwork.formulas.quantity import Quantity, Recording
 from virtualwork.plan.steps import joints, joints_at
-
-if TYPE_CHECKING:
-    from virtualwork.formulas.recorded_forces import Written
 
 
 class Force(Quantity):
@@ -19,7 +16,7 @@ class Force(Quantity):
 
     is_force = True
 
-    def steps(self, recording: Written) -> tuple[tuple[Any, ...], int]:
+    def steps(self, recording: Recording) -> tuple[tuple[Any, ...], int]:
         """The steps that it depends on, as often differentiated as the loads need."""
         return super().steps(recording)[0], recording.forces[0].case.targets()[1]
 
@@ -42,7 +39,7 @@ class Effort(Force, kind="effort"):
 
     input: int
 
-    def write(self, recording: Written) -> Number:
+    def write(self, recording: Recording) -> Number:
         return recording.efforts[self.input]
 
     def read(self, forces: Any) -> Any:
@@ -54,7 +51,7 @@ class Generalized(Force, kind="generalized"):
 
     input: int
 
-    def write(self, recording: Written) -> Number:
+    def write(self, recording: Recording) -> Number:
         return recording.generalized(self.input)
 
     def read(self, forces: Any) -> Any:
@@ -67,7 +64,7 @@ class NewtonEuler(Force, kind="newton-euler"):
     is_joint_force = True
     input: int
 
-    def write(self, recording: Written) -> Number:
+    def write(self, recording: Recording) -> Number:
         return recording.newton_euler(self.input)
 
     def read(self, forces: Any) -> Any:
@@ -81,7 +78,7 @@ class JointForce(Force, kind="force"):
     joint: str
     body: str
 
-    def write(self, recording: Written) -> Number:
+    def write(self, recording: Recording) -> Number:
         return recording.joint_force(self.joint, self.body)
 
     def read(self, forces: Any) -> Any:
@@ -95,7 +92,7 @@ class JointMoment(Force, kind="moment"):
     joint: str
     body: str
 
-    def write(self, recording: Written) -> Number:
+    def write(self, recording: Recording) -> Number:
         return recording.joint_moment(self.joint, self.body)
 
     def read(self, forces: Any) -> Any:
@@ -109,7 +106,7 @@ class Reaction(Force, kind="reaction"):
     name: str
     body: str
 
-    def write(self, recording: Written) -> Number:
+    def write(self, recording: Recording) -> Number:
         here = joints_at(recording.forces[1].joints, self.name, self.body)
         return sum((recording.value(JointForce(joint.key, self.body)) for joint in here), 0.0)
 
@@ -123,7 +120,7 @@ class Contact(Force, kind="contact"):
     is_joint_force = True
     cam: int
 
-    def write(self, recording: Written) -> Number:
+    def write(self, recording: Recording) -> Number:
         _, of, block = recording.placed_forces()
         recording.solve(of.paths.touches.every[self.cam].targets, 0)
         return of.contact(block, self.cam)
@@ -137,7 +134,7 @@ class Shaking(Force, kind="shaking"):
 
     is_vector = True
 
-    def write(self, recording: Written) -> Number:
+    def write(self, recording: Recording) -> Number:
         return recording.shaking[0]
 
     def read(self, forces: Any) -> Any:
@@ -148,7 +145,7 @@ class Shaking(Force, kind="shaking"):
 class ShakingMoment(Force, kind="shaking moment"):
     """The shaking moment about the ground's origin, N·m."""
 
-    def write(self, recording: Written) -> Number:
+    def write(self, recording: Recording) -> Number:
         return recording.shaking[1]
 
     def read(self, forces: Any) -> Any:
@@ -161,7 +158,7 @@ class Applied(Force, kind="applied"):
     is_vector = True
     link: str
 
-    def write(self, recording: Written) -> Number:
+    def write(self, recording: Recording) -> Number:
         return recording.applied(self.link)[0]
 
     def read(self, forces: Any) -> Any:
@@ -173,7 +170,7 @@ class AppliedMoment(Force, kind="applied moment"):
 
     link: str
 
-    def write(self, recording: Written) -> Number:
+    def write(self, recording: Recording) -> Number:
         return recording.applied(self.link)[1]
 
     def read(self, forces: Any) -> Any:
@@ -186,7 +183,7 @@ class LoadTorque(Force, kind="load torque"):
 
     number: int
 
-    def write(self, recording: Written) -> Number:
+    def write(self, recording: Recording) -> Number:
         paths, _, block = recording.placed_forces()
         return paths.case.loads[self.number].form(block)
 
@@ -203,7 +200,7 @@ class LoadPlace(Force, kind="load at"):
     is_vector = True
     number: int
 
-    def write(self, recording: Written) -> Number:
+    def write(self, recording: Recording) -> Number:
         paths, _, block = recording.placed_forces()
         path = paths.case.loads[self.number].path
         assert path is not None
@@ -216,6 +213,6 @@ class Rail(Force, kind="rail"):
     is_vector = is_joint_force = True
     guide: int
 
-    def write(self, recording: Written) -> Number:
+    def write(self, recording: Recording) -> Number:
         _, of, block = recording.placed_forces()
         return of.rail(block, self.guide)

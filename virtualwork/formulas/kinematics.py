@@ -2,30 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from typing import ClassVar, Protocol
+from collections.abc import Iterable, Iterator
+from typing import ClassVar
 
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.numbers import Number
 from virtualwork.formulas.positions import State
-from virtualwork.formulas.quantity import Planned, Quantity
+from virtualwork.formulas.quantity import Planned, Quantity, Recording
 from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.touches import Touch
 from virtualwork.plan.steps import Path, Term, path_reads
-
-
-class Solving(Planned, Protocol):
-    """A recording, as these need it; see `recording.Recording`."""
-
-    @property
-    def st(self) -> State: ...
-    @property
-    def along(self) -> Rates: ...
-    @property
-    def by(self) -> list[Rates]: ...
-    def solve(self, targets: Iterable[str], order: int) -> None: ...
-    def in_time(self, order: int, get: Callable[[int], Number]) -> Number: ...
 
 
 class Kinematic(Quantity):
@@ -42,7 +29,7 @@ class Kinematic(Quantity):
         """Its k-th derivative along the rates; None where it is zero."""
         raise NotImplementedError
 
-    def write(self, recording: Solving) -> Number:
+    def write(self, recording: Recording) -> Number:
         recording.solve(self.targets(recording), self.order)
         if not self.order:
             return self.place(recording, recording.st)
@@ -59,7 +46,7 @@ class Partial(Kinematic):
         """The number of that input."""
         raise NotImplementedError
 
-    def write(self, recording: Solving) -> Number:
+    def write(self, recording: Recording) -> Number:
         recording.solve(self.targets(recording), self.order)
         return self.rate(recording, recording.by[self.input], self.order)
 

@@ -2,31 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Protocol
-
 from dalembert.arithmetic.recorded import RECORDED, bare
 from dalembert.arithmetic.systems import regularity
-from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.newton import unknowns
 from virtualwork.formulas.numbers import PARTS, WRITTEN, Number
-from virtualwork.formulas.positions import State, columns
-from virtualwork.formulas.quantity import Planned, Quantity
-from virtualwork.plan.steps import Group
-
-
-class Closing(Planned, Protocol):
-    """A recording, as these need it; see `recording.Recording`."""
-
-    @property
-    def st(self) -> State: ...
-    @property
-    def cases(self) -> Mapping[str, Case]: ...
-    @property
-    def loops(self) -> Group | None: ...
-    def enters(self, group: Group) -> bool: ...
-    def solve(self, targets: Iterable[str], order: int) -> None: ...
-    def solved(self, group: str) -> Group: ...
+from virtualwork.formulas.positions import columns
+from virtualwork.formulas.quantity import Quantity, Recording
 
 
 class Closed(Quantity, kind="closed"):
@@ -38,7 +19,7 @@ class Closed(Quantity, kind="closed"):
     def names(self) -> tuple[str, ...]:
         return (" ".join((self.kind, *self.of)),)
 
-    def write(self, recording: Closing) -> Number:
+    def write(self, recording: Recording) -> Number:
         total: Number = 0.0
         for group in map(recording.solved, self.of):
             if recording.enters(group):
@@ -53,7 +34,7 @@ class Closed(Quantity, kind="closed"):
 class Everywhere(Quantity):
     """A quantity that has a value where nothing is assembled too."""
 
-    def groups(self, recording: Planned) -> tuple[str, ...]:
+    def groups(self, recording: Recording) -> tuple[str, ...]:
         return ()
 
 
@@ -62,7 +43,7 @@ class Margin(Everywhere, kind="margin"):
 
     group: str
 
-    def write(self, recording: Closing) -> Number:
+    def write(self, recording: Recording) -> Number:
         return recording.st.margin[recording.solved(self.group).name]
 
 
@@ -74,7 +55,7 @@ class Transmission(Everywhere, kind="transmission"):
 
     group: str
 
-    def write(self, recording: Closing) -> Number:
+    def write(self, recording: Recording) -> Number:
         of = recording.solved(self.group)
         margin: Number = recording.st.margin[of.name]
         if of.kind != "RPR":
@@ -88,7 +69,7 @@ class Regularity(Quantity, kind="regularity"):
 
     group: str
 
-    def write(self, recording: Closing) -> Number:
+    def write(self, recording: Recording) -> Number:
         entries = columns(recording.solved(self.group), recording.st)
         return regularity([[part(c) for c in row] for row in entries for part in PARTS])
 
@@ -98,7 +79,7 @@ class Twist(Quantity, kind="twist"):
 
     spring: int
 
-    def write(self, recording: Closing) -> Number:
+    def write(self, recording: Recording) -> Number:
         spring = recording.mechanism.torsion_springs[self.spring]
         if all(recording.plan.angles[body].by_inputs for body in spring.links):
             # the inputs alone fix it, whole turns included
@@ -116,7 +97,7 @@ class Column(Quantity, kind="column"):
     loop: int
     unknown: int
 
-    def write(self, recording: Closing) -> Number:
+    def write(self, recording: Recording) -> Number:
         assert recording.loops is not None
         recording.solve([key for step in recording.plan.steps for key in recording.plan.writes(step)], 0)
         return columns(recording.loops, recording.st)[self.loop][self.unknown]
@@ -125,7 +106,7 @@ class Column(Quantity, kind="column"):
 class Size(Everywhere, kind="size"):
     """The mechanism's characteristic length, m."""
 
-    def write(self, recording: Planned) -> Number:
+    def write(self, recording: Recording) -> Number:
         longest: Number = 0.0
         for span in map(bare, recording.mechanism.spans):
             longest = RECORDED.select(span - longest, span, longest)
