@@ -3,8 +3,8 @@
 Primal-dual interior-point method with Nesterov-Todd scaling (Math. Oper. Res. 22 (1997) 1-42; the predictor and
 corrector as in Andersen, Roos and Terlaky, Math. Program. 95 (2003) 249-277), all cones side by side in numpy, and
 finished by Newton's method on the active constraints. It works in coordinates z in which the rows are orthonormal;
-the values of the rows are taken at the unknowns w themselves, so that a bad condition of w = start + to_w z costs
-steps of Newton's method and no digits.
+the values of the rows are taken at the steps w = to_w z themselves, so that a bad condition of to_w costs steps of
+Newton's method and no digits. The steps begin where the values of the rows are given.
 
 Nothing here says whether the end is the optimum: `balancing.limited` holds it against its dual bound.
 """
@@ -39,15 +39,16 @@ MOST = 200
 
 @dataclass
 class ConeProblem:
-    """min ½|B w + b|² + t  with  |E_k w + e_k| <= h_k + f_k t, w = start + to_w z; without t where all f are zero."""
+    """min ½|B w + b|² + t  with  |E_k w + e_k| <= h_k + f_k t, w = to_w z; without t where all f are zero."""
 
     e: Complex
     offset: Complex
+    rounding: float
+    """By how much the largest e may be wrong."""
     h: Real
     f: Real
     square: Complex | None
     at: Complex | None
-    start: Complex
     to_w: Complex
 
     def __post_init__(self) -> None:
@@ -65,8 +66,11 @@ class ConeProblem:
         """Return the real and imaginary parts of B w + b."""
         assert self.square is not None
         assert self.at is not None
-        left = self.at + self.square @ w
-        return np.concatenate([left.real, left.imag])
+        return _parts(self.at + self.square @ w)
+
+
+def _parts(z: Complex) -> Real:
+    return np.concatenate([z.real, z.imag])
 
 
 def real_rows(e: Complex) -> tuple[Real, Real]:
@@ -75,7 +79,7 @@ def real_rows(e: Complex) -> tuple[Real, Real]:
 
 
 def solve(problem: ConeProblem) -> tuple[Complex, Complex]:
-    """Return w (p,) and the dual forces of the cones, complex (k,): the best point that was reached.
+    """Return the step w (p,) and the dual forces of the cones, complex (k,): the best point that was reached.
 
     In the standard form min ½|Bx + b|² + cᵀx, Gx + s = h, s in the cones, dual z in the cones, with
     s_k = (h_k + f_k t, Re, Im of E_k z + e_k). Each step solves the least-squares form of
@@ -134,7 +138,7 @@ class _Path:
         k, p = problem.e.shape
         with_t, n = problem.with_t, 2 * p + problem.with_t
         self.k, self.half = k, 2 * p
-        offset, _ = problem.values(problem.start, 0.0)
+        offset = problem.offset
         g = np.zeros((3, k, n))
         g[1, :, : 2 * p], g[2, :, : 2 * p] = (-part for part in real_rows(problem.rows))
         self.c, self.x = np.zeros(n), np.zeros(n)
@@ -145,7 +149,7 @@ class _Path:
         self.g, self.flat = g.transpose(1, 0, 2), g.reshape(3 * k, n)
         self.h = np.concatenate((problem.h, offset.real, offset.imag))
         self.square = problem.squares
-        self.at = np.zeros(0) if self.square is None else problem.left(problem.start)
+        self.at = np.zeros(0) if problem.at is None else _parts(problem.at)
         # the rows [B; W⁻¹G], of which those of B stay as they are
         above = len(self.at)
         self.stack = np.zeros((above + 3 * k, n))
@@ -295,10 +299,10 @@ def _polish(problem: ConeProblem, point: _Point) -> _Polished:
     """
     p, half, n = problem.e.shape[1], 2 * problem.e.shape[1], len(point.x)
     s, z = np.split(point.pair, 2, axis=1)
-    w = problem.start + problem.to_w @ (point.x[:p] + 1j * point.x[p:half])
+    w = problem.to_w @ (point.x[:p] + 1j * point.x[p:half])
     t = float(point.x[-1]) if problem.with_t else 0.0
-    # what rounding the masses does to the values of the rows
-    rounding = 16 * EPS * max(1.0, float((np.abs(problem.e) @ np.abs(w)).max()))
+    # what rounding does to the values of the rows
+    rounding = 16 * (problem.rounding + EPS * max(1.0, float((np.abs(problem.e) @ np.abs(w)).max())))
     nu = np.where(_active(s, z), z[0] / s[0], 0.0)
     slope, along = np.zeros(n), np.empty((len(nu), n))
     slope[half:] = 1.0

@@ -6,10 +6,13 @@ come from `correct`; the tapes hold the vectors of the entries, their sums, size
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from balancing.correction import correct
+from balancing.modal import modal_corrections
 from balancing.tapes import Number, Outputs, parts, size_and_angle, vector
 from dalembert.arithmetic.recorded import RECORDED, Recorder
 from dalembert.arithmetic.tape import Tape
@@ -32,6 +35,47 @@ def shares(planes: Real) -> tuple[Real, Real, float]:
     return first, (last - first) / span, about
 
 
+@dataclass(frozen=True, eq=False)
+class Modal:
+    """Conditions that the corrections meet in place of force and couple: modes whose shapes are cubics along the shaft.
+
+    The tape takes the cubic of a mode k where a mass stands as `shape K 0` to `shape K 3`, in powers of z less `station`.
+    """
+
+    at_planes: Real
+    """(q, p); see `modal_corrections`."""
+    shaft: tuple[float, float] | None = None
+    """Middle and length of the shaft, m, where force and couple are the first two conditions."""
+
+    @property
+    def first(self) -> int:
+        """The number of the first mode among the conditions."""
+        return 0 if self.shaft is None else 2
+
+    def conditions(self, recorder: Recorder, z: Number) -> list[Number]:
+        """What an unbalance of 1 at z does to each condition."""
+        s = z - recorder.input("station")
+        rigid = [] if self.shaft is None else [1.0, (z - self.shaft[0]) * (1.0 / self.shaft[1])]
+        for k in range(len(self.at_planes) - self.first):
+            c = [recorder.input(f"shape {k} {power}") for power in range(4)]
+            rigid.append(((c[3] * s + c[2]) * s + c[1]) * s + c[0])
+        return rigid
+
+    @property
+    def solution(self) -> Real:
+        """What a condition of 1 asks of every plane, (q, p)."""
+        q = len(self.at_planes)
+        return modal_corrections(np.ones((q, 1)), np.eye(q)[:, :, None], self.at_planes).unbalance.real
+
+    def left(self, sums: list[Number], made: list[Number]) -> Outputs:
+        """What corrections leave of each mode, and the size of the terms that it is the sum of."""
+        outputs: Outputs = {}
+        for k, row in enumerate(self.at_planes[self.first :].tolist()):
+            outputs[f"left mode {k}"] = abs(sum((w * f for w, f in zip(made, row, strict=True)), sums[k]))
+            outputs[f"terms mode {k}"] = sum((abs(w) * abs(f) for w, f in zip(made, row, strict=True)), 0.0)
+        return outputs
+
+
 def known_masses(
     planes: Real,
     radius: Real,
@@ -40,6 +84,7 @@ def known_masses(
     bearings: Real | None = None,
     remove: bool = False,
     fixed: Real | None = None,
+    modal: Modal | None = None,
 ) -> dict[str, Tape]:
     """The tapes of a rotor whose masses are known.
 
@@ -61,6 +106,8 @@ def known_masses(
         Whether corrections are material to remove.
     fixed : array (p,), optional
         The mass that stands in a plane, kg; NaN where it is free.
+    modal : Modal, optional
+        The modes that the corrections leave without excitation.
     """
     recorder = Recorder()
     amount, arm, angle, z = (recorder.input(name) for name in ("amount", "radius", "angle", "z"))
@@ -70,13 +117,18 @@ def known_masses(
     outputs: Outputs = {}
     sums = {"static": u, "couple": u * (z - about)}
     places = {"plane": planes} | ({} if bearings is None else {"bearing": bearings})
-    for what, at in places.items():
-        first, slope, start = shares(np.asarray(at, dtype=float))
-        for p in range(len(at)):
-            share = u * (float(first[p]) + float(slope[p]) * (z - start))
-            sums[f"{what} {p}"] = share
-            if what == "plane":
-                outputs |= parts(f"share {p}", -share)
+    asked = {what: _asked(np.asarray(at, dtype=float), z) for what, at in places.items()}
+    if modal is not None:
+        conditions = modal.conditions(recorder, z)
+        asked["plane"] = [
+            sum((float(x) * phi for x, phi in zip(column, conditions, strict=True)), 0.0)
+            for column in modal.solution.T
+        ]
+        sums |= {f"mode {k}": u * phi for k, phi in enumerate(conditions[modal.first :])}
+    for what, each in asked.items():
+        sums |= {f"{what} {p}": u * factor for p, factor in enumerate(each)}
+    for p in range(len(planes)):
+        outputs |= parts(f"share {p}", -sums[f"plane {p}"])
     for name, share in sums.items():
         outputs |= parts(f"sum {name}", vector(recorder, f"sum {name}") + share)
     mass = recorder.tape(outputs)
@@ -93,6 +145,11 @@ def known_masses(
         results |= parts(f"made {p}", w)
     results |= size_and_angle("static", static) | size_and_angle("couple", couple)
     results |= _left(static, couple, made, planes - about)
+    if modal is not None:
+        modes = _modes(recorder, modal)
+        for k, total in enumerate(modes):
+            results |= size_and_angle(f"mode {k}", total)
+        results |= modal.left(modes, made)
     if bearings is not None:
         for p in range(len(bearings)):
             results[f"before {p}"] = abs(vector(recorder, f"sum bearing {p}"))
@@ -107,8 +164,22 @@ def known_masses(
         put.append(-w if remove else w)
         outputs |= {f"plane {p} size": abs(w)} | parts(f"made {p}", put[p])
     static, couple = (vector(recorder, f"sum {name}") for name in ("static", "couple"))
-    given = recorder.tape(outputs | _left(static, couple, put, planes - about))
+    outputs |= _left(static, couple, put, planes - about)
+    if modal is not None:
+        outputs |= modal.left(_modes(recorder, modal), put)
+    given = recorder.tape(outputs)
     return {"mass": mass, "result": result, "given": given}
+
+
+def _asked(planes: Real, z: Number) -> list[Number]:
+    """What an unbalance of 1 at z asks of every plane, so that force and couple vanish."""
+    first, slope, about = shares(planes)
+    return [float(a) + float(b) * (z - about) for a, b in zip(first, slope, strict=True)]
+
+
+def _modes(recorder: Recorder, modal: Modal) -> list[Number]:
+    """The sums of the modes."""
+    return [vector(recorder, f"sum mode {k}") for k in range(len(modal.at_planes) - modal.first)]
 
 
 def _left(static: Number, couple: Number, made: list[Number], arms: Real) -> Outputs:

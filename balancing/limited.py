@@ -24,13 +24,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing.cone_problem import ConeProblem, solve
-from balancing.dependence import DependentPlanes, columns_scaled, roundings
+from balancing.dependence import DependentPlanes, adjoint, columns_scaled, roundings
 from balancing.qr import smallest_squares
 from balancing.triangle import triangle
 from dalembert.arithmetic.exact import EPS
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Residual = Callable[[Complex, Complex, Complex], Complex]
 
 CLOSED = 1e-12
 """An answer whose gap is at most this, or rounding, is not solved again."""
@@ -40,6 +41,8 @@ ROOM = 4.0
 """Units of the last place of a row's terms that it keeps from its limit where an answer is solved again."""
 REFUSED = 1e-6
 """Above this gap there is no answer."""
+SQUARES = 10.0
+"""The squares count so often as much as the room that the limits leave: then the multipliers have the size of 1."""
 
 
 class Infeasible(ValueError):
@@ -161,6 +164,18 @@ def _caps(limit: Real) -> Complex:
     return np.diag(1 / limit).astype(complex)[np.isfinite(limit)]
 
 
+def _in_floats(a: Complex, b: Complex, w: Complex) -> Complex:
+    """Return b + a w."""
+    return np.asarray(b + a @ w)
+
+
+def _in_32_digits(a: Complex, b: Complex, w: Complex) -> Complex:
+    """Return b + a w, rounded once: of large masses that leave little it has all its digits."""
+    from dalembert.arithmetic.doubled_vectors import Vectors
+
+    return (Vectors.of(b) + (Vectors.of(a) * Vectors.of(w)[None]).total()).value
+
+
 class _Limited:
     """One of the two problems: `squares` (B, b) to make least, or none; the `cones` (E, e) are within 1, or to make least.
 
@@ -181,28 +196,33 @@ class _Limited:
         self.limit, self.squares, self.cones, self.inside, self.kept = limit, squares, cones, inside, kept
         self.limited = np.flatnonzero(np.isfinite(limit))
         self.a, self.b = cones if squares is None else squares
-        self.tight = False
+        self.tight, self.room = False, 1.0
         if inside is not None:
             # limits that leave nothing to choose from in all digits that count: any corrections within them will do
             room = 1 - float(np.abs(cones[1] + cones[0] @ inside).max())
-            self.tight = min(room, 1 - float((np.abs(inside) / limit).max())) <= DOUBTFUL
+            self.room = min(room, 1 - float((np.abs(inside) / limit).max()))
+            self.tight = self.room <= DOUBTFUL
 
     def solved(self) -> Optimum:
         """Solve, again from what was reached where the gap is not closed; refuse what is not the optimum."""
         start = self.start
         best: Optimum | None = None
         for again in range(1 if self.tight else 3):
-            unit = float(np.abs(self.b + self.a @ start).max()) or 1.0
-            problem = self._problem(start, unit)
+            # where digits are missing, what is left is taken in 32 of them
+            residual = _in_32_digits if again else _in_floats
+            unit = float(np.abs(residual(self.a, self.b, start)).max()) or 1.0
+            problem = self._problem(start, unit, residual)
             if again and self.squares is not None:
                 # limits that leave room for rounding each row, so that the masses need not be moved away from all of them
-                own = np.abs(problem.offset) + np.abs(problem.e) @ np.abs(start)
+                e, offset = self.cones
+                own = np.concatenate(
+                    [np.abs(offset) + np.abs(e) @ np.abs(start), np.full(len(self.limited), 1 / ROOM)]
+                )
                 problem.h -= np.minimum(ROOM * EPS * own, DOUBTFUL)
-            w, force = solve(problem)
-            w = self._within(w)
-            reached = self._judged(
-                w, force[: len(self.cones[1])], unit, self._reach(problem.to_w, unit, self.b + self.a @ w)
-            )
+            step, force = solve(problem)
+            w = self._within(start + step)
+            force = force[: len(self.cones[1])] / self._share
+            reached = self._judged(w, force, unit, problem.to_w, residual)
             if best is None or reached.gap < best.gap:
                 best = reached
             if best.gap <= CLOSED:
@@ -214,8 +234,13 @@ class _Limited:
             raise NotConverged(best.gap, float(sigma[0] / sigma[-1]) if sigma[-1] > 0 else np.inf)
         return best
 
-    def _problem(self, start: Complex, unit: float) -> ConeProblem:
-        """Put the problem into coordinates in which its rows are orthonormal, and neither κ(α) nor any unit is left.
+    @property
+    def _share(self) -> float:
+        """The factor of the squares in the problem as it is solved: next to infeasible the multipliers are large without it."""
+        return float(np.clip(SQUARES * self.room, DOUBTFUL, 1.0))
+
+    def _problem(self, start: Complex, unit: float, residual: Residual) -> ConeProblem:
+        """Put the steps from `start` into coordinates in which its rows are orthonormal, and neither κ(α) nor any unit is left.
 
         Where masses are limited the limits' own rows |w_p/m_p| stand below the coefficients: with QR of both together
         even dependent planes have coordinates.
@@ -228,14 +253,15 @@ class _Limited:
         readings, ones, none = len(offset), np.ones(len(caps)), np.zeros(len(caps), dtype=complex)
         free = self.squares is None
         of_cones = unit if free else 1.0
+        exact, root = residual is _in_32_digits, np.sqrt(self._share) / unit
         return ConeProblem(
             np.concatenate([e / of_cones, caps]),
-            np.concatenate([offset / of_cones, none]),
+            np.concatenate([residual(e, offset, start) / of_cones, residual(caps, none, start)]),
+            0.0 if exact else EPS * float((np.abs(e) @ np.abs(start)).max(initial=0.0)) / of_cones,
             np.concatenate([np.full(readings, 0.0 if free else 1.0), ones]),
             np.concatenate([np.full(readings, 1.0 if free else 0.0), 0 * ones]),
-            None if free else self.a / unit,
-            None if free else self.b / unit,
-            start,
+            None if free else self.a * root,
+            None if free else residual(self.a, self.b, start) * root,
             to_w,
         )
 
@@ -266,9 +292,10 @@ class _Limited:
         length = 2 * np.hypot(most / unit, np.sqrt(len(self.limited)))
         return np.asarray(1.01 * length * np.linalg.norm(to_w, axis=1))
 
-    def _judged(self, w: Complex, y: Complex, unit: float, reach: Real) -> Optimum:
-        """Hold what w leaves against the dual bound of the forces y of the cones; the optimum is within `reach` of w."""
-        left = self.b + self.a @ w
+    def _judged(self, w: Complex, y: Complex, unit: float, to_w: Complex, residual: Residual) -> Optimum:
+        """Hold what w leaves against the dual bound of the forces y of the cones."""
+        left = residual(self.a, self.b, w)
+        reach = self._reach(to_w, unit, left)
         # the rounding of a residual that is small against the readings is no gap
         excused = min(2 * _rounding(self.a, self.b, w), DOUBTFUL * float(np.abs(self.b).max()))
         if self.squares is None:
@@ -278,17 +305,20 @@ class _Limited:
             excused *= 2 * float(np.abs(left).sum()) + len(left) * excused
         bound = 0.0
         # planes that do not touch their limit pull nothing at the optimum; where that is not so to rounding, y is made
-        # orthogonal to them
-        none = np.zeros(len(w), dtype=bool)
-        for loose in (none, np.abs(w) < (1 - 1e-9) * self.limit, ~np.isfinite(self.limit)):
-            bound = max(bound, self._bound(w, y, unit, reach, loose))
+        # orthogonal to them. Of large masses that leave little a limit may be missed by less than 1e-9 and yet be free
+        none, size = np.zeros(len(w), dtype=bool), np.abs(w)
+        near, nearest = (size < (1 - share) * self.limit for share in (1e-9, 64 * EPS))
+        for loose in (none, near, nearest, ~np.isfinite(self.limit)):
+            bound = max(bound, self._bound(w, y, unit, reach, loose, residual))
             if value - bound <= 32 * EPS * value:
                 break
         gap = max(value - bound - excused, 0.0) / value if value > 0 else 0.0
         return Optimum(w, bound, gap)
 
-    def _bound(self, w: Complex, y: Complex, unit: float, reach: Real, loose: NDArray[np.bool_]) -> float:
-        """Return the lower bound that the forces of the cones prove, made orthogonal to the `loose` planes.
+    def _bound(
+        self, w: Complex, y: Complex, unit: float, reach: Real, loose: NDArray[np.bool_], residual: Residual
+    ) -> float:
+        """Return the lower bound that the forces y prove, made orthogonal to the `loose` planes; the optimum is in `reach`.
 
         The products with readings are taken as those with what w leaves, which is small: no digits cancel.
         """
@@ -309,13 +339,18 @@ class _Limited:
             constant = 0.5 * float(np.square(np.abs(forces[: len(self.b)])).sum()) + total
         elif total > 0:
             forces = forces / total
-        pull = rows.conj().T @ forces
-        size = np.abs(pull)
+        left = residual(rows, at, w)
+        size = np.abs(pull := residual(adjoint(rows), np.zeros(len(w), dtype=complex), forces))
         lost = size * reach
         k = self.limited
-        lost[k] = np.minimum(lost[k], size[k] * self.limit[k] + (pull[k].conj() * w[k]).real)
-        proof = float(np.vdot(forces, at + rows @ w).real) - float(lost.sum()) - constant
+        # m_p|pull| + Re pull* w: its parts along and across as products, for both terms are large
+        turned, most = pull[k].conj() * w[k], size[k] * np.abs(w[k])
+        across = np.divide(
+            np.square(turned.imag), most - turned.real, out=most + turned.real, where=turned.real < 0
+        )
+        lost[k] = np.minimum(lost[k], size[k] * (self.limit[k] - np.abs(w[k])) + across)
+        proof = float(np.vdot(forces, left).real) - float(lost.sum()) - constant
         # less what rounding may have added
-        terms = np.abs(at) + np.abs(rows) @ np.abs(w)
+        terms = np.abs(left) if residual is _in_32_digits else np.abs(at) + np.abs(rows) @ np.abs(w)
         proof -= roundings(len(w)) * float(np.abs(forces) @ terms) + 8 * EPS * constant
         return proof * (1.0 if self.squares is None else 2.0 * unit**2)

@@ -52,6 +52,20 @@ class Spread(NamedTuple):
     degrees_of_freedom: Real
 
 
+class CoefficientSpread(NamedTuple):
+    """How well influence coefficients are known; SI."""
+
+    along: Real
+    """Standard deviation along each coefficient and across it, (..., s, p); NaN where it is not known."""
+    across: Real
+    correlation: Complex
+    """Of the errors of each channel's planes, E δ_p δ̄_q/√(E|δ_p|² E|δ_q|²), (..., s, p, p)."""
+    reading_sd: Real
+    """√E|ε|² of the readings, (...); NaN where it is not known."""
+    degrees_of_freedom: Real
+    """Complex, (...); inf where the errors are stated."""
+
+
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class LogBalance:
@@ -189,6 +203,36 @@ class LogBalance:
             whole > 0, both / np.where(whole > 0, whole, 1.0), np.where(np.isnan(whole), np.nan, np.inf)
         )
         return Spread(own + before, freedom)
+
+    @property
+    def coefficients(self) -> CoefficientSpread | None:
+        """How well the influence coefficients are known; None where nothing tells."""
+        fit, errors = self.fit, self.errors
+        gain = fit.gain[..., 1:, :]
+        unit, along, across = self._by_channel()
+        covariance = components(gain, None, fit.influence, unit, along, across)
+        shared = (gain * (np.square(along) + np.square(across))[..., None, :]) @ np.swapaxes(
+            gain, -1, -2
+        ).conj()
+        if fit.foreknown is not None:
+            sources = fit.foreknown.sources[..., 1:, :]
+            more = sources @ np.swapaxes(sources, -1, -2).conj()
+            shared = shared + more
+            own = np.diagonal(more, axis1=-2, axis2=-1).real / 2
+            covariance = covariance + own[..., None, None] * np.eye(2)
+        if not np.isfinite(covariance).any():
+            return None
+        size = np.sqrt(np.diagonal(shared, axis1=-2, axis2=-1).real)
+        both = size[..., :, None] * size[..., None, :]
+        square = np.where(fit.present, np.square(errors.along) + np.square(errors.across), 0.0)
+        finite = np.isfinite(errors.degrees_of_freedom)
+        return CoefficientSpread(
+            np.sqrt(covariance[..., 0, 0]),
+            np.sqrt(covariance[..., 1, 1]),
+            np.where(both > 0, shared / np.where(both > 0, both, 1.0), 0.0),
+            np.sqrt(square.sum(axis=(-2, -1)) / fit.present.sum(axis=(-2, -1))),
+            np.where(finite, errors.degrees_of_freedom, np.inf),
+        )
 
     def unknown_samples(self, n: int = 200, seed: int = 0) -> Complex:
         """Draw x₀ and α of one machine from the errors of its readings, (n, s, 1 + p)."""

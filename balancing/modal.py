@@ -19,12 +19,16 @@ or (N + 2) planes?, J. Eng. Ind. 94 (1972) 548-560).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.dependence import adjoint, threshold
 from dalembert.arithmetic.records import record
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -122,12 +126,26 @@ def shapes_at(stations: ArrayLike, shapes: ArrayLike, z: ArrayLike) -> Real:
     >>> shapes_at([0, 1, 2, 3], [[0, 1, 8, 27]], [1.5, 2.0])
     array([[3.375, 8.   ]])
     """
-    from scipy.interpolate import CubicSpline
-
-    x, y = np.asarray(stations, dtype=float), np.asarray(shapes, dtype=float)
-    at = np.asarray(z, dtype=float)
-    if x.ndim != 1 or len(x) < 2 or not (np.diff(x) > 0).all():
-        raise ValueError("expected at least two stations, ascending")
+    x, at = np.asarray(stations, dtype=float), np.asarray(z, dtype=float)
+    spline = _spline(x, shapes)
     if ((at < x[0]) | (at > x[-1])).any():
         raise ValueError(f"a place beyond the stations, which reach from {x[0]:g} to {x[-1]:g}")
-    return np.asarray(CubicSpline(x, y, axis=1)(at))
+    return np.asarray(spline(at))
+
+
+def shape_pieces(stations: ArrayLike, shapes: ArrayLike) -> Real:
+    """The cubics of `shapes_at` from each station to the next, in powers of the distance from it: (n − 1, k, 4).
+
+    >>> shape_pieces([0, 1, 2, 3], [[0, 1, 8, 27]])[1].round(12)
+    array([[1., 3., 3., 1.]])
+    """
+    return np.moveaxis(np.asarray(_spline(stations, shapes).c)[::-1], 0, -1)
+
+
+def _spline(stations: ArrayLike, shapes: ArrayLike) -> CubicSpline:
+    from scipy.interpolate import CubicSpline
+
+    x = np.asarray(stations, dtype=float)
+    if x.ndim != 1 or len(x) < 2 or not (np.diff(x) > 0).all():
+        raise ValueError("expected at least two stations, ascending")
+    return CubicSpline(x, np.asarray(shapes, dtype=float), axis=1)

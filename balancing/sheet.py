@@ -79,8 +79,10 @@ def machine_sheet(
     tape = measured(influence, weights, ridge, RUNS, errors, runout, covariance)
     values: dict[str, float] = {}
     for sensor, v in zip(sensors, initial, strict=True):
-        values[f"{first}/{sensor}/amplitude"] = float(abs(v))
-        values[f"{first}/{sensor}/phase"] = float(np.radians(degrees(v.conjugate() if against else v)))
+        # fifteen digits: a reading stands there as it was typed
+        turned = float(f"{degrees(v.conjugate() if against else v):.15g}")
+        values[f"{first}/{sensor}/amplitude"] = float(f"{abs(v):.15g}")
+        values[f"{first}/{sensor}/phase"] = float(np.radians(turned))
     kind, unit = mass
     amplitude = spelled(amplitude_unit)
     coefficients = [

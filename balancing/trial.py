@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,7 +31,12 @@ def trial_unbalance(
     mass, omega = np.asarray(rotor_mass, dtype=float), np.asarray(speed, dtype=float)
     if not ((mass > 0).all() and (omega > 0).all() and planes >= 1 and share > 0):
         raise ValueError("rotor mass, speed, planes and share must be positive")
-    return np.asarray(share * mass / planes * STANDARD_GRAVITY / omega**2)
+    return np.asarray(load_rule(mass, omega, planes, share, STANDARD_GRAVITY))
+
+
+def load_rule(mass: Any, omega: Any, planes: float, share: Any, gravity: Any) -> Any:
+    """m·r = share·(M/planes)·g/ω², of floats or of numbers in 32 digits."""
+    return share * mass / planes * gravity / (omega * omega)
 
 
 @record

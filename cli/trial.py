@@ -13,6 +13,7 @@ from dalembert.units import G0
 
 if TYPE_CHECKING:
     from cli.show.result import Result
+    from dalembert.arithmetic.doubled import Doubled
     from dalembert.results.columns import Table
     from dalembert.results.way import Topic
 
@@ -46,14 +47,28 @@ def run(
 
     def suggestion() -> Table:
         from balancing import trial_unbalance
+        from balancing.trial import load_rule
         from dalembert.results.columns import Table, names, number
+
+        def exact() -> Doubled:
+            from cli.read.exact import quantity, written
+            from dalembert.arithmetic.doubled import Doubled
+
+            numbers = quantity(rotor_mass, "mass"), quantity(speed, "speed"), float(planes)
+            result: Doubled = load_rule(*numbers, *(Doubled.of(written(x)) for x in (0.1, G0)))
+            return result
+
+        def mass_exact() -> Doubled:
+            from cli.read.exact import quantity
+
+            return exact() / quantity(radius, "length")
 
         unbalance = float(trial_unbalance(mass, omega, planes))
         return Table(
             [
-                number("mass", "mass", [unbalance / arm], "g", lambda: [1e-14 * unbalance / arm]),
+                number("mass", "mass", [unbalance / arm], "g", exact=mass_exact),
                 number("radius", "length", [arm], "mm"),
-                number("unbalance", "unbalance", [unbalance], "g_mm", lambda: [1e-14 * unbalance]),
+                number("unbalance", "unbalance", [unbalance], "g_mm", exact=exact),
             ],
             place="trial",
             above="trial mass for each plane",

@@ -33,7 +33,8 @@ HEAVY = {
 LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
-        ("doubt", "fixed_weights", "next_run", "polygons"),
+        ("log_picture",),
+        ("doubt", "fixed_weights", "next_run", "objective", "polygons"),
         (
             "amplitudes",
             "engine",
@@ -41,6 +42,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "log_balance",
             "placement",
             "prior",
+            "run_means",
             "tolerance",
             "trial",
             "unbalance",
@@ -130,7 +132,8 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "dalembert": (
         ("__init__",),
-        ("arithmetic", "drawing", "page", "results", "tables"),
+        ("drawing", "page", "results", "tables"),
+        ("arithmetic",),
         ("angles", "figures", "quantities"),
         ("units",),
         ("errors", "hints", "memory"),
@@ -151,13 +154,8 @@ PACKAGES = (
     ("dalembert.__init__",),
     ("cli",),
     CORE,
-    (
-        "dalembert.arithmetic",
-        "dalembert.drawing",
-        "dalembert.page",
-        "dalembert.results",
-        "dalembert.tables",
-    ),
+    ("dalembert.drawing", "dalembert.page", "dalembert.results", "dalembert.tables"),
+    ("dalembert.arithmetic",),
     ("dalembert.angles", "dalembert.figures", "dalembert.quantities"),
     ("dalembert.units",),
     ("dalembert.errors", "dalembert.hints", "dalembert.memory"),

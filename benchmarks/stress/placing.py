@@ -108,7 +108,7 @@ def _vector(size: str, phase: str) -> Any:
 def _wrapped(rng: np.random.Generator) -> Pairs:
     """Single-plane balancing from a written table to the columns of the command."""
     from cli.field.field_balancing import FieldBalancing
-    from cli.field.reading import read_measured
+    from cli.field.groups import measured_groups
     from cli.field.request import Request
     from cli.field.tables import corrections
 
@@ -125,7 +125,7 @@ def _wrapped(rng: np.random.Generator) -> Pairs:
         path = Path(folder) / "runs.csv"
         path.write_text("\n".join(rows) + "\n")
         request = Request()
-        runs, _ = read_measured(str(path), request, (), None)
+        runs, _ = measured_groups(str(path), request)
         columns = {c.header: c for c in corrections(FieldBalancing(runs, request), []).columns}
     size, angle = (float(str(columns[name].values[0])) for name in ("mass_g", "angle_deg"))
     bound = {name: column.error() for name, column in columns.items() if column.error is not None}

@@ -92,7 +92,7 @@ def run(
     if modes is None:
         options.refuse("needs --modes", mode_count=mode_count, rigid=rigid)
     else:
-        options.refuse("shows rigid balancing: it does not go with --modes", mass=mass, page=page)
+        options.refuse("shows rigid balancing: it does not go with --modes", mass=mass)
     shapes = None
     if modes is not None:
         from cli.balance.modes import read_modes

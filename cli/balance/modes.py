@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,9 @@ from dalembert.tables.headers import Heading
 from dalembert.tables.sources import Source
 from dalembert.tables.table import read
 from dalembert.units import parted
+
+if TYPE_CHECKING:
+    from dalembert.arithmetic.doubled import Doubled
 
 Real = NDArray[np.float64]
 
@@ -30,11 +35,19 @@ class Modes:
     rigid: bool
     """Whether force and couple are to vanish too."""
     warnings: list[str]
+    exact: Callable[[], tuple[Doubled, Doubled]]
+    """Stations and shapes in 32 digits, as the file has them."""
 
     @property
     def conditions(self) -> list[str]:
         """What is to vanish."""
         return [*(["force", "couple"] if self.rigid else []), *(f"mode {name}" for name in self.names)]
+
+    @property
+    def shaft(self) -> tuple[float, float] | None:
+        """Middle and length of the shaft, in which the couple is of the size of the force; None where both may stay."""
+        low, high = float(self.z[0]), float(self.z[-1])
+        return ((low + high) / 2, high - low) if self.rigid else None
 
     def at(self, z: Real, what: str) -> Real:
         """Return the rows of the conditions at places (...): (..., q, m)."""
@@ -48,11 +61,30 @@ class Modes:
                 "along the whole shaft"
             )
         shapes = np.moveaxis(shapes_at(self.z, self.shapes, np.clip(z, low, high)), 0, -2)
-        if not self.rigid:
+        if self.shaft is None:
             return shapes
-        # about the middle, in lengths of the shaft: of one size
-        arm = (z - (low + high) / 2) / (high - low)
+        middle, length = self.shaft
+        arm = (z - middle) / length
         return np.concatenate([np.ones_like(arm)[..., None, :], arm[..., None, :], shapes], axis=-2)
+
+    def exactly_at(self, z: Doubled) -> Doubled:
+        """Return the same rows in 32 digits."""
+        from balancing.second_run import spline
+        from dalembert.arithmetic.doubled import Doubled
+        from dalembert.arithmetic.doubled_vectors import part
+
+        x, y = self.exact()
+        rows = spline(x, y, z)
+        parts = [part(rows, k) for k in range(len(self.names))]
+        if self.rigid:
+            first, last = part(x, 0), part(x, -1)
+            parts = [Doubled(np.ones(z.high.shape)), (z - (first + last) / 2.0) / (last - first), *parts]
+        return Doubled(
+            *(
+                np.stack([getattr(row, name) + 0.0 * row.high for row in parts], axis=-2)
+                for name in ("high", "low")
+            )
+        )
 
     def unreached(self, error: UnreachedMode) -> str:
         """Say on which conditions the planes do not act."""
@@ -94,7 +126,18 @@ def read_modes(path: str, count: int | None, rigid: bool) -> Modes:
             raise DataError(f"{table.file}: mode {quote(name)} is zero everywhere: expected a shape")
     if len(stations) < 2:
         raise DataError(f"{table.file}: one station along the shaft: expected two at least")
-    return Modes(table.file, names, stations, shapes, rigid, table.warnings)
+
+    def exact() -> tuple[Doubled, Doubled]:
+        from dalembert.arithmetic.doubled_vectors import doubled_array
+
+        places, values = table.numbers["z"].exact, table.numbers["shape"].exact
+        there = dict(zip(at.tolist(), places, strict=True))
+        of = {(k, j): values[i] for i, (k, j) in enumerate(zip(code.tolist(), at.tolist(), strict=True))}
+        every = [of[k, j] for k in range(len(names)) for j in range(len(stations))]
+        x = doubled_array([there[j] for j in range(len(stations))], stations.shape)
+        return x, doubled_array(every, shapes.shape)
+
+    return Modes(table.file, names, stations, shapes, rigid, table.warnings, exact)
 
 
 def _by_mode(source: Source) -> Source:

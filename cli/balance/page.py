@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from balancing.known_masses import known_masses
+from balancing.known_masses import Modal, known_masses
+from balancing.modal import shape_pieces
 from cli.balance.rotors import Balancing
 from dalembert.arithmetic.engines.javascript import engine, written
 from dalembert.errors import DataError
@@ -41,7 +42,7 @@ def sheet(b: Balancing) -> Page:
     documents, rows, values = [], [], dict[str, float]()
     named = rotors.table.texts.get("name")
     several = len(rotors.names) > 1
-    steps = _steps(b)
+    steps, shapes = _steps(b), request.modes
     for r, rotor in enumerate(rotors.names):
         here = b.rows_of(r)
         at = b.plane_of_row[here]
@@ -57,6 +58,7 @@ def sheet(b: Balancing) -> Page:
             bearings,
             request.remove,
             b.given_mass[here],
+            None if shapes is None else Modal(shapes.at(planes, "a plane"), shapes.shaft),
         )
         text = f"{{ {', '.join(f'{name}: {written(tape)}' for name, tape in made.items())} }}"
         if text not in tapes:
@@ -111,6 +113,13 @@ def sheet(b: Balancing) -> Page:
         "remove": request.remove,
         "steps": steps,
         "sought": bool(b.sought.any()),
+        "modes": None
+        if shapes is None
+        else {
+            "names": shapes.names,
+            "stations": shapes.z.tolist(),
+            "pieces": shape_pieces(shapes.z, shapes.shapes).tolist(),
+        },
         "shown": {
             "mass": _shown("mass", rotors.mass_unit),
             "radius": _shown("length", rotors.radius_unit or b.planes.radius_unit),

@@ -319,20 +319,15 @@ class Balancing:
         return list(map(Verdict, names, shares.tolist(), before.tolist(), after.tolist()))
 
     @cached_property
-    def exact(self) -> Vectors | None:
-        """The ideal corrections in 32 digits, of the decimals as they are written, one for each row.
-
-        None with modes: the shapes are read and interpolated.
-        """
+    def exact(self) -> Vectors:
+        """The ideal corrections in 32 digits, of the decimals as they are written, one for each row."""
         from fractions import Fraction
 
-        from balancing.second_run import ExactMasses
+        from balancing.second_run import ExactMasses, least_norm
         from cli.read.exact import writtens
         from dalembert.arithmetic.doubled import Doubled
         from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array, part
 
-        if self.modal:
-            return None
         rotors, none = self.rotors, Doubled(np.zeros(1))
         # behind the masses nothing, which index -1 means
         moment = Vectors.joined([rotors.exact(self.request.gravity), Vectors(none, none)])
@@ -341,9 +336,17 @@ class Balancing:
         z = doubled_array([*places, Fraction(0)], (len(places) + 1,))
         planes = writtens(np.zeros(len(self.planes.name)) if self.planes.z is None else self.planes.z)
         result = Vectors.of(np.zeros(len(self.rotor_of_row)))
+        modes = self.request.modes
         for _, masses, rows in self._groups():
-            there = part(planes, self.plane_of_row[rows])
-            result[rows] = ExactMasses(moment[masses], part(z, masses), there).corrections
+            there, at = part(planes, self.plane_of_row[rows]), part(z, masses)
+            if modes is None:
+                result[rows] = ExactMasses(moment[masses], at, there).corrections
+                continue
+            # where there is no mass any place will do
+            at.high[masses < 0], at.low[masses < 0] = modes.z[0], 0.0
+            modal = (moment[masses][..., None, :] * modes.exactly_at(at)).total()
+            shapes = modes.exactly_at(there)
+            result[rows] = least_norm(Vectors(shapes, shapes * 0.0), modal)
         return result
 
 

@@ -13,7 +13,7 @@ from balancing import GRADES
 from cli.balance.rotors import Balancing
 from cli.read.tolerance import verdict_table
 from dalembert.angles import degrees
-from dalembert.results.columns import Column, Table, names, number, read_number, vector
+from dalembert.results.columns import Column, Table, apart, names, number, read_number, vector
 from dalembert.units import from_si
 
 if TYPE_CHECKING:
@@ -88,16 +88,9 @@ def corrections(b: Balancing) -> Table:
     z_unit = read["z"].unit if "z" in read else planes.z_unit
     radius, gravity = b.radius, b.request.gravity
 
-    def wrong(shown: Real, exact: Callable[[Vectors], Doubled]) -> Real:
-        """The errors of sizes as they are before they are rounded to a step; NaN where no second run is."""
-        from dalembert.arithmetic.doubled_vectors import off
-
-        return np.full(len(row), np.nan) if b.exact is None else off(shown, exact(b.exact))
-
-    def exactly_in(x: Doubled, dimension: str, unit: str) -> Doubled:
-        from cli.read.exact import in_unit
-
-        return in_unit(x, dimension, unit)
+    def wrong(shown: Real, dimension: str, unit: str, exact: Callable[[Vectors], Doubled]) -> Real:
+        """The errors of sizes as they are before they are rounded to a step."""
+        return apart(shown, dimension, unit, lambda: exact(b.exact))()
 
     def mass_of(w: Vectors) -> Doubled:
         from cli.read.exact import writtens
@@ -110,19 +103,21 @@ def corrections(b: Balancing) -> Table:
         return mass_of(w) * writtens(gravity)
 
     def turn() -> Real:
-        return np.full(len(row), np.nan) if b.exact is None else b.exact.turned(b.ideal)
+        return b.exact.turned(b.ideal)
 
     size, masses = np.abs(b.ideal), np.abs(b.ideal) / np.where(radius > 0, radius, np.nan)
     unit, mass_unit = rotors.unbalance_unit, rotors.mass_unit
     unbalance = number("unbalance", "unbalance", np.abs(b.made), unit)
     unbalance.error = lambda: wrong(
-        from_si(size, "unbalance", unit), lambda w: exactly_in(w.size, "unbalance", unit)
+        from_si(size, "unbalance", unit), "unbalance", unit, lambda w: w.size
     ).tolist()
-    weight = number("weight", "force", b.mass_kg * gravity, error=lambda: wrong(masses * gravity, weight_of))
+    weight = number(
+        "weight", "force", b.mass_kg * gravity, error=lambda: wrong(masses * gravity, "force", "N", weight_of)
+    )
     mass = read_number("mass", "mass", b.mass, rotors.mass_unit)
     mass.error = lambda: np.where(
         np.isnan(b.given_mass),
-        wrong(from_si(masses, "mass", mass_unit), lambda w: exactly_in(mass_of(w), "mass", mass_unit)),
+        wrong(from_si(masses, "mass", mass_unit), "mass", mass_unit, mass_of),
         0.0,
     ).tolist()
     at = np.full(len(row), np.nan) if planes.z is None else planes.z[row]

@@ -26,6 +26,7 @@ What:
   students NUMBER|ROSTER.csv  How many students, or a table with a column student; others are kept (default 1).
   seed N  Random seed of the draws (default 1).
   folder -o --output FOLDER  Where the sheets, answers.csv, key.csv, solutions.html and moodle.xml go.
+  page  Put the page that computes on each sheet: for practice, as it shows the answers too.
   system --for prairielearn|numbas  Write the questions for this system too; repeatable.
 """
 SYSTEMS = ("prairielearn", "numbas")
@@ -37,6 +38,7 @@ def _run(
     students: str = "1",
     seed: int = 1,
     folder: str | None = None,
+    page: bool = False,
     system: list[str] | None = None,
 ) -> Result:
     """Make the variants of an exercise for a class: a sheet for each student, a table for the answers, key and solutions.
@@ -47,7 +49,7 @@ def _run(
     are well conditioned are drawn.
     """
     from cli.exercise.description import read_exercise
-    from cli.exercise.drawings import figure
+    from cli.exercise.drawings import figure, moving
     from cli.exercise.files import put
     from cli.exercise.mistakes import candidates
     from cli.exercise.moodle import moodle
@@ -57,6 +59,7 @@ def _run(
     from cli.exercise.tables import tables
     from cli.exercise.variants import variants
     from cli.show.result import Result
+    from cli.show.taking import options_of
 
     if folder is None:
         raise options.bad("-o", "expected -o FOLDER, where the sheets go")
@@ -64,6 +67,8 @@ def _run(
         if name not in SYSTEMS:
             raise options.bad("--for", f"'{name}': expected {' or '.join(SYSTEMS)}")
     exercise = read_exercise(file)
+    if page and "--page" not in options_of(exercise.command[0]):
+        raise options.bad("--page", f"found an exercise on {exercise.command[0]}, which has no page")
     warnings = list(exercise.warnings)
     people = _students(students)
     with workshop(exercise) as shop:
@@ -72,8 +77,11 @@ def _run(
         drawings = {id(variant): "" for variant in drawn}
         for variant in drawn:
             drawings[id(variant)] = drawings[id(variant)] or figure(variant)
+        frames = {id(variant): moving(variant) for variant in dict.fromkeys(drawn)} if page else {}
         files = {
-            f"sheet-{student.file}.html": sheet_page(exercise, student, variant, drawings[id(variant)])
+            f"sheet-{student.file}.html": sheet_page(
+                exercise, student, variant, drawings[id(variant)], frames.get(id(variant), "")
+            )
             for student, variant in zip(people, drawn, strict=True)
         }
         files["answers.csv"] = answers_csv(exercise, people, drawn)

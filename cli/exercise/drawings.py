@@ -6,10 +6,12 @@ import base64
 import html
 from collections.abc import Iterator, Sequence
 from math import cos, radians, sin
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cli.exercise.variants import Variant
 from dalembert.errors import DataError
+from dalembert.page import Page
 
 if TYPE_CHECKING:
     from virtualwork import Mechanism
@@ -39,6 +41,16 @@ def figure(variant: Variant) -> str:
     if exercise.command[0] == "balance":
         return rotor(variant)
     return ""
+
+
+def moving(variant: Variant) -> str:
+    """Return the page that computes with this student's numbers, in a frame that opens on the sheet and is not printed."""
+    place = Path("page.html")
+    solved = variant.problem.result("--page", str(place))
+    with solved.result.within():
+        html_of = solved.result.beside[place]()
+    frame = Page(bytes(html_of).decode(), height=720).frame("allow-scripts allow-downloads allow-modals")
+    return f'<details class="page"><summary>The page that computes</summary>{frame}</details>\n'
 
 
 def _given(path: Any) -> str:

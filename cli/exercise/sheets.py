@@ -30,6 +30,7 @@ th, td { padding: 1mm 1.6mm; border: .2mm solid #bbb; text-align: left; vertical
 .n { text-align: right; font-variant-numeric: tabular-nums } tr { break-inside: avoid } .wide { overflow-x: auto }
 .dense { font-size: 9pt } .dense th, .dense td { padding: .7mm 1mm } figure { margin: 4mm 0; break-inside: avoid } figure svg, figure img { display: block; width: 100%; max-width: 132mm; height: auto; margin: 0 auto }
 .blank { width: 40mm; min-width: 20mm } .small { font-size: 9pt; color: #444 } pre { font: 9pt/1.35 monospace; white-space: pre-wrap; margin: 1.5mm 0 }
+details.page summary { min-height: 32px; line-height: 32px; cursor: pointer } @media print { details.page { display: none } }
 section + section { break-before: page }
 @media (max-width: 480px) { table { font-size: 9pt } th, td { padding: .6mm .8mm } .blank { width: auto; min-width: 13mm } }
 @page { size: A4; margin: 14mm 13mm } @media print { body { margin: 0; padding: 0; max-width: none } .wide { overflow: visible } }
@@ -159,8 +160,10 @@ def sheet_html(sheet: Sheet) -> str:
     return f'<div class="wide"><table{dense}><thead><tr>{header}</tr></thead><tbody>{rows}</tbody></table></div>\n'
 
 
-def sheet_page(exercise: Exercise, student: Student, variant: Variant, drawing: str) -> bytes:
-    """Return the sheet of a student."""
+def sheet_page(
+    exercise: Exercise, student: Student, variant: Variant, drawing: str, frame: str = ""
+) -> bytes:
+    """Return the sheet of a student, perhaps with the page that computes in a frame."""
     others = "".join(
         f"<span>{html.escape(k)}: {html.escape(v)}</span>" for k, v in student.others.items() if v
     )
@@ -177,7 +180,7 @@ def sheet_page(exercise: Exercise, student: Student, variant: Variant, drawing: 
     body = (
         f"<h1>{html.escape(exercise.title)}</h1>\n"
         f'<div class="student"><span>student: <b>{html.escape(student.name)}</b></span>{others}</div>\n'
-        f"{problem_html(variant, drawing)}<h2>Find</h2>\n"
+        f"{problem_html(variant, drawing)}{frame}<h2>Find</h2>\n"
         '<div class="wide"><table><thead><tr><th>quantity</th><th>unit</th><th>figures</th><th>points</th><th>answer</th></tr></thead>'
         f"<tbody>{rows}</tbody></table></div>\n"
         f'<p class="small">“Figures” says how many significant figures the answer has. The numbers of this sheet count as exact.{angles}</p>'

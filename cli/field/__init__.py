@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -14,14 +13,11 @@ from cli.show.output import command
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from types import ModuleType
 
     from matplotlib.figure import Figure
 
     from cli.field.field_balancing import FieldBalancing
-    from cli.field.tables import Tables
     from cli.show.result import Result, Sheet
-    from dalembert.results.columns import Column, Table
     from dalembert.results.way import Topic
 
 
@@ -153,7 +149,7 @@ def run(
 
     from cli.field import request as read
     from cli.field.field_balancing import FieldBalancing
-    from cli.field.reading import read_measured
+    from cli.field.groups import measured_groups
     from cli.read.tolerance import tolerance_of
 
     request = read.Request(
@@ -178,7 +174,7 @@ def run(
         view=view,
         zone_class=zone_class,
     )
-    measured, stored = read_measured(runs, request, influence or (), runout)
+    measured, stored = measured_groups(runs, request, influence or (), runout)
     with options.processes(workers) as executor:
         balancing = FieldBalancing(measured, request, stored, executor)
     return _result(balancing, save_influence, page)
@@ -186,32 +182,32 @@ def run(
 
 def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -> Result:
     from cli.field.doubts import warnings
-    from cli.field.rows import latest
-    from cli.field.tables import METHOD, sense
+    from cli.field.tables import METHOD, sense, tables
+    from cli.read.runs.reading import latest
     from cli.show.result import Result
 
     if b.runs.fitted:
-        from cli.field.fits import check
+        from cli.field.logs import check
 
         check(b)
-    remarks = warnings(b)
-    day = latest(b.runs.table)
-    tables = _tables(b, remarks)
+    remarks, day = warnings(b), latest(b.runs.table)
+    made = tables(b, remarks)
 
     def stored() -> bytes:
         from dalembert.results.text import csv_text
 
-        return csv_text(tables["influence"]().cells).encode()
+        return csv_text(made["influence"]().cells).encode()
 
     def sheets() -> Iterator[Sheet]:
         from cli.field.report import sheets
 
-        return sheets(b, tables)
+        return sheets(b, made)
 
     def figure() -> Figure:
         from cli.field.picture import draw
+        from cli.field.rotor import each
 
-        return draw(b, range(min(len(b.runs.rotors), 3)))
+        return draw(b, list(each(b, 3)))
 
     def way() -> list[Topic]:
         from cli.field.way import way
@@ -221,7 +217,7 @@ def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -
     def aside() -> list[str]:
         if b.predict is None:
             return []
-        from cli.field.fits import prediction_lines
+        from cli.field.logs import prediction_lines
 
         return prediction_lines(b)
 
@@ -232,7 +228,7 @@ def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -
         html = sheet(b).html.encode()
         beside[page] = lambda: html
     return Result(
-        tables=tables,
+        tables=made,
         head={
             "correction": "add",
             "state": "as it stands" if b.request.from_here else "initial",
@@ -240,7 +236,7 @@ def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -
             "amplitude_unit": b.runs.amplitude_unit,
         },
         aside=aside,
-        companions=[name for name in ("prediction", "split", "predict", "zones") if name in tables],
+        companions=[name for name in ("prediction", "split", "predict", "zones") if name in made],
         figure=figure,
         method=METHOD,
         sheets=sheets,
@@ -250,50 +246,3 @@ def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -
         beside=beside,
         warnings=remarks,
     )
-
-
-def _tables(b: FieldBalancing, warnings: list[str]) -> Tables:
-    """The tables of a result, the CSV's first. `warnings` takes in why --digits leaves a correction whole."""
-    from cli.field import tables as of
-
-    def influence() -> Table:
-        # loaded where it is asked for
-        from cli.field.coefficients import coefficients
-
-        return coefficients(b)
-
-    fits: Tables = {}
-    further: list[Column] = []
-    if b.runs.fitted:
-        from cli.field.fits import tables, unsuggested
-
-        fits = tables(b)
-        further = [unsuggested(b)] if b.request.suggest else []
-    made: Tables = {
-        "corrections": cache(lambda: of.corrections(b, warnings)),
-        "influence": influence,
-        "prediction": lambda: of.prediction(b),
-    }
-    if b.request.places is not None:
-        made |= {"split": lambda: of.split(b), "trim_split": lambda: of.trim_split(b)}
-    made |= {
-        "trim": lambda: of.trim(b),
-        "standing": lambda: of.standing(b),
-        "rotors": lambda: of.rotors(b, further),
-    }
-    if b.request.tolerance is not None:
-        made["tolerance"] = lambda: _limits().tolerance(b)
-    if b.request.zone_class is not None:
-        made["zones"] = lambda: _limits().zones(b)
-    if b.request.four_run:
-        made |= {"misfit": lambda: of.misfit(b), "alternatives": lambda: of.alternatives(b)}
-    if b.request.view is not None:
-        made |= {"static": lambda: of.static_couple(b, 0), "couple": lambda: of.static_couple(b, 1)}
-    return {**made, **fits}
-
-
-def _limits() -> ModuleType:
-    """What is held against limits, loaded where it is asked for."""
-    from cli.field import limits
-
-    return limits

@@ -1,9 +1,12 @@
-"""From measured runs to corrections, with their uncertainty."""
+"""From measured runs to corrections, with their trim and uncertainty."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, TypeVar
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,26 +19,20 @@ from balancing import (
     LogBalance,
     NotConverged,
     condition_number,
-    influence_from_amplitudes,
     initial_alone,
     initial_unbalance,
     least_squares,
     place,
     unseen,
 )
+from balancing.dependence import directions
+from balancing.objective import Objective
+from cli.field.groups import by_amplitudes
 from cli.field.request import Request, ceiling_in, limits_in, masses_at
-from cli.field.runs import SHOWN, Complex, Group, Real, Runs
-from cli.field.solution import (
-    Problem,
-    Solved,
-    Sought,
-    confidence,
-    errors_of_means,
-    least_maximum,
-    within_limits,
-)
-from cli.field.stored import Stored
 from cli.read.options import bad
+from cli.read.rounding import EPS
+from cli.read.runs.runs import SHOWN, Complex, Group, Real, Runs
+from cli.read.runs.stored import Stored
 from dalembert.angles import degrees
 from dalembert.arithmetic.parts import in_parts
 from dalembert.errors import DataError
@@ -46,10 +43,91 @@ if TYPE_CHECKING:
 
     from balancing.reading_errors import Errors
 
-Result = TypeVar("Result")
-
 SINGULAR = 1e12  # a condition number beyond which the planes count as dependent
 MANY = 200  # rotors whose uncertainties are worked out unasked
+UNKNOWN_ANGLE = 60.0  # an angle that is uncertain by more (degrees) is not known
+
+
+@dataclass(eq=False, repr=False)
+class Solved:
+    """A group and its corrections."""
+
+    group: Group
+    planes: list[str]
+    fit: JointFit
+    """Initial vibration and coefficients, run-out and all."""
+    fits: list[list[AmplitudeFit]]
+    """Of the four-run method, rotor by rotor, plane by plane."""
+    initial: Complex
+    """(g, s), run-out off."""
+    standing: Complex
+    """(g, p): what is on the rotor in its last run."""
+    start: Complex
+    """(g, p): what is on the rotor where the corrections start from: that, or nothing."""
+    objective: Objective
+    corrections: Complex
+    """(g, p), as given out (from here, where that was requested)."""
+    bound: Real | None = None
+    """Of the largest residual, as the dual problem proves it."""
+    condition: Real = field(init=False)
+    """(g,)."""
+    unbalance: Complex | None = None
+    """(g, p): the rotor's own in its initial state; NaN where the readings do not determine it."""
+    covariance: Real | None = None
+    residual_95: Real | None = None
+    balance: LogBalance | None = None
+    """Where the errors of the readings are known: what the corrections leave, and how sure it is."""
+
+    @property
+    def alpha(self) -> Complex:
+        """The influence coefficients, (g, s, p)."""
+        return self.fit.influence
+
+    @cached_property
+    def here(self) -> Complex:
+        """The vibration where the corrections start from, (g, s)."""
+        return self.initial + np.matvec(self.alpha, self.start) if self.start.any() else self.initial
+
+    @cached_property
+    def residual(self) -> Complex:
+        """The vibration with the corrections on, (g, s); zero where it is below the rounding of its terms."""
+        left = self.here + np.matvec(self.alpha, self.corrections)
+        put = np.abs(self.corrections) + np.abs(self.start)
+        noise = np.abs(self.initial) + np.matvec(np.abs(self.alpha), put)
+        return np.where(np.abs(left) > 1e-15 * noise, left, 0)
+
+    @property
+    def fitted(self) -> LogBalance:
+        """The balance of a group that has one."""
+        assert self.balance is not None
+        return self.balance
+
+    @property
+    def total(self) -> Complex:
+        """What is added to the rotor in its initial state, (g, p)."""
+        return self.corrections + self.start
+
+    @cached_property
+    def trim(self) -> Complex:
+        """What is added to the rotor as it stands in its last run, (g, p)."""
+        trim = self.corrections + (self.start - self.standing)
+        terms = np.abs(self.total) + np.abs(self.standing)
+        return np.where(np.abs(trim) > 4 * EPS * terms, trim, 0)
+
+    def uncertainty(self, masses: Complex) -> tuple[Real, Real]:
+        """Return the standard deviations of size (SI) and angle (degrees), (g, p) each; NaN where they are not known.
+
+        The masses differ from the corrections by masses that are known.
+        """
+        size = np.abs(masses)
+        if self.covariance is None:
+            return np.full(size.shape, np.nan), np.full(size.shape, np.nan)
+        turn = directions(self.corrections) * directions(masses).conj()
+        axes = np.moveaxis(np.array([[turn.real, -turn.imag], [turn.imag, turn.real]]), (0, 1), (-2, -1))
+        covariance = axes @ self.covariance @ np.swapaxes(axes, -1, -2)
+        along, across = (np.sqrt(covariance[..., k, k]) for k in (0, 1))
+        angle = np.where(size > 0, np.degrees(across / np.where(size > 0, size, 1.0)), np.nan)
+        return along, np.where(angle <= UNKNOWN_ANGLE, angle, np.nan)
 
 
 class FieldBalancing:
@@ -96,7 +174,6 @@ class FieldBalancing:
     def _solve(self, group: Group) -> Solved:
         request = self.request
         planes, fit, fits = self._fit(group)
-        alpha = fit.influence
         standing = self._standing(group, planes)
         start = standing if request.from_here else np.zeros_like(standing)
         if request.from_here and not standing.any():
@@ -104,21 +181,16 @@ class FieldBalancing:
                 "--from-here: the last run has no mass on the rotor, so that it stands as in the initial run"
             )
         initial = group.initial - self.runout(group)
-        problem = Problem(group, planes, fit, fits, initial, standing, start, self._limits(planes))
-        corrections, bound, condition = self._corrections(problem)
+        limits = self._limits(planes), self.ceiling, request.ridge
+        objective = Objective(request.objective == "minimax", *limits)
+        solved = Solved(group, planes, fit, fits, initial, standing, start, objective, 0 * standing)
+        self._correct(solved)
         if request.view is not None and len(planes) != 2:
             raise bad(
                 "--view", f"static and couple parts need two planes, found {len(planes)}: {', '.join(planes)}"
             )
-        residual = problem.here + np.matvec(alpha, corrections)
-        # below the rounding of its terms a residual is zero
-        noise = np.abs(initial) + np.matvec(np.abs(alpha), np.abs(corrections) + np.abs(start))
-        residual = np.where(np.abs(residual) > 1e-15 * noise, residual, 0)
-        unbalance = None
         if request.tolerance is not None:
-            unbalance = initial_unbalance(alpha, initial, group.weights, singular=SINGULAR)
-        arguments = (group, planes, fit, fits, initial, standing, start, problem.limit)
-        solved = Solved(*arguments, corrections, residual, condition, bound, unbalance)
+            solved.unbalance = initial_unbalance(fit.influence, initial, group.weights, singular=SINGULAR)
         if self.runs.fitted or request.reading_error is not None or self._repeats_tell(group):
             self._doubt(solved)
         return solved
@@ -146,7 +218,7 @@ class FieldBalancing:
         if group.fit is not None:
             return group.planes, group.fit, []
         if self.request.four_run:
-            fits = self._amplitudes(group)
+            fits = by_amplitudes(group, self.runs, self.warnings)
             alpha = np.array([[fit.influence for fit in one] for one in fits]).swapaxes(1, 2)
             first = group.readings[:, group.trials[0].lines]
             return group.planes, initial_alone(first, alpha), fits
@@ -162,7 +234,7 @@ class FieldBalancing:
 
     def _repeats_tell(self, group: Group) -> bool:
         """Whether the scatter of repeats is to give uncertainties that nobody asked for."""
-        if self.request.four_run or not group.reading_sd.any():
+        if self.request.four_run or not group.repeats.reading_sd.any():
             return False
         if len(group.rotors) <= (SHOWN if self.limited else MANY):
             return True
@@ -177,63 +249,49 @@ class FieldBalancing:
         limit = np.array([bound.get(plane, bound.get("", np.inf)) for plane in planes])
         return limit if np.isfinite(limit).any() else None
 
-    def _corrections(self, problem: Problem) -> tuple[Complex, Real | None, Real]:
-        """Return the corrections, for minimax the proven bounds, and the condition numbers."""
-        request, weights = self.request, problem.group.weights
-        alpha, here, limit, ceiling = problem.alpha, problem.here, problem.limit, self.ceiling
-        minimax = request.objective == "minimax"
-        fix = None
-        if not minimax and limit is None and ceiling is None:
-            fix = self._one(
-                problem,
-                lambda: least_squares(alpha, here, weights, ridge=request.ridge),
-            )
-        condition = condition_number(alpha, weights) if fix is None else fix.condition_number
-        if limit is None and not request.ridge:
+    def _correct(self, solved: Solved) -> None:
+        """Find the corrections, the condition numbers, and for minimax the proven bounds."""
+        objective, weights = solved.objective, solved.group.weights
+        alpha, here, rotors = solved.alpha, solved.here, range(len(solved.here))
+        plain = None
+        if not objective.limited:
+            with self._named(solved):
+                plain = least_squares(alpha, here, weights, ridge=objective.ridge)
+        solved.condition = condition_number(alpha, weights) if plain is None else plain.condition_number
+        if objective.max_mass is None and not objective.ridge:
             # the coefficients are differences of readings: what lies in their rounding is no information
-            beyond = np.flatnonzero(~(condition < SINGULAR))
+            beyond = np.flatnonzero(~(solved.condition < SINGULAR))
             if len(beyond):
                 i = int(beyond[0])
-                hidden = unseen(alpha[i], problem.group.own_weights(i))[0]
-                raise DataError(self.of(problem.group, i) + planes_say(problem.planes, hidden))
-        if fix is not None:
-            return fix.corrections, None, condition
-        if minimax:
-            proven = self._one_by_one(least_maximum, problem, range(len(here)))
-            return (
-                np.stack([fix.corrections for fix in proven]),
-                np.array([fix.bound for fix in proven], dtype=float),
-                np.array([fix.condition_number for fix in proven]),
-            )
-        # rotors that keep the limits by themselves all at once, the others one by one
-        corrections = np.zeros((len(here), len(problem.planes)), dtype=complex)
-        beyond = np.ones(len(here), dtype=bool)
-        try:
-            free = least_squares(alpha, here, weights)
-            corrections[:] = free.corrections
-            beyond[:] = False
-            if limit is not None:
-                beyond |= (np.abs(free.corrections) > limit).any(axis=1)
-            if ceiling is not None:
-                beyond |= (np.abs(free.residual) > ceiling).any(axis=1)
-        except DependentPlanes:
-            pass
-        rest = np.flatnonzero(beyond).tolist()
-        for i, one in zip(rest, self._one_by_one(within_limits, problem, rest), strict=True):
-            corrections[i] = one.corrections
-        return corrections, None, condition
+                hidden = unseen(alpha[i], solved.group.own_weights(i))[0]
+                raise DataError(self.of(solved.group, i) + planes_say(solved.planes, hidden))
+        if plain is not None:
+            solved.corrections = plain.corrections
+        elif objective.minimax:
+            proven = self._one_by_one(solved, rotors)
+            solved.corrections = np.stack([fix.corrections for fix in proven])
+            solved.bound = np.array([fix.bound for fix in proven], dtype=float)
+            solved.condition = np.array([fix.condition_number for fix in proven])
+        else:
+            # rotors that keep the limits by themselves all at once, the others one by one
+            met = np.zeros(len(here), dtype=bool)
+            try:
+                free = least_squares(alpha, here, weights)
+                met, solved.corrections = objective.met(free), free.corrections.astype(complex)
+            except DependentPlanes:
+                pass
+            rest = np.flatnonzero(~met).tolist()
+            for i, one in zip(rest, self._one_by_one(solved, rest), strict=True):
+                solved.corrections[i] = one.corrections
 
-    def _one_by_one(
-        self, solve: Callable[..., tuple[Balance, bool]], problem: Problem, rotors: Sequence[int]
-    ) -> list[Balance]:
-        """Solve for rotors, each by itself."""
-        ceiling, group = self.ceiling, problem.group
-        parts = (
-            (problem.alpha[i], problem.here[i], problem.limit, ceiling, group.own_weights(i)) for i in rotors
-        )
-        results, answers = in_parts(solve, parts, self.executor), []
+    def _one_by_one(self, solved: Solved, rotors: Sequence[int]) -> list[Balance]:
+        """Solve for rotors under limits, each by itself."""
+        group = solved.group
+        parts = ((solved.alpha[i], solved.here[i], group.own_weights(i)) for i in rotors)
+        results, answers = in_parts(solved.objective.solve, parts, self.executor), []
         for i in rotors:
-            fix, beyond = self._one(problem, lambda: next(results), i)
+            with self._named(solved, i):
+                fix, beyond = next(results)
             if beyond:
                 self.warnings.append(
                     "with these weights a residual is beyond --max-residual, which without them could be met"
@@ -243,79 +301,29 @@ class FieldBalancing:
             answers.append(fix)
         return answers
 
-    def _one(self, problem: Problem, solve: Callable[[], Result], i: int | None = None) -> Result:
-        """Solve for one rotor, or for all; an error names the rotor."""
+    @contextmanager
+    def _named(self, solved: Solved, i: int | None = None) -> Iterator[None]:
+        """Name the rotor in errors: this one, or of all the one that the error is about."""
         try:
-            return solve()
+            yield
         except DependentPlanes as error:
-            of = self.of(problem.group, *(error.case[:1] if i is None else [i]))
-            raise DataError(of + planes_say(problem.planes, error.combination)) from None
+            of = self.of(solved.group, *(error.case[:1] if i is None else [i]))
+            raise DataError(of + planes_say(solved.planes, error.combination)) from None
         except Infeasible as error:
             unit = self.runs.amplitude_unit
             with_limits = " with the limits of the masses" if self.max_mass else ""
             raise DataError(
-                f"{self.of(problem.group, i or 0)}no corrections{with_limits} leave every residual within "
+                f"{self.of(solved.group, i or 0)}no corrections{with_limits} leave every residual within "
                 f"{self.ceiling:g} {unit}: infeasible; the smallest limit that can be met is {error.rounded_up} {unit}"
             ) from None
         except NotConverged as error:
-            raise DataError(f"{self.of(problem.group, i or 0)}{error}") from None
-
-    def _amplitudes(self, group: Group) -> list[list[AmplitudeFit]]:
-        """The four-run method, rotor by rotor, plane by plane: each run with masses has them in one plane.
-
-        Several planes (Everett, J. Vib. Acoust. 109 (1987) 162-167): at each sensor the phases of all coefficients count from
-        that sensor's own initial vibration, so that O + Σ α w = 0 is one linear system whatever these phases are.
-        """
-        several = np.flatnonzero((group.on[:, 1:] != 0).sum(axis=2).max(axis=0, initial=0) > 1)
-        if len(several):
-            raise DataError(
-                f"{self.of(group)}run {group.trials[1 + several[0]].run}: masses in several planes: without phase each trial run "
-                "has a mass in one plane, the others empty: four runs for the first plane, then three for each other one"
-            )
-        return [
-            [self._amplitudes_of(group, i, p) for p in range(len(group.planes))]
-            for i in range(len(group.rotors))
-        ]
-
-    def _amplitudes_of(self, group: Group, i: int, p: int) -> AmplitudeFit:
-        """Fit one plane's coefficients to the amplitudes of its trial runs."""
-        named = f" plane {group.planes[p]}:" if len(group.planes) > 1 else ""
-        first, *runs = group.means[i].real
-        tried = np.flatnonzero(group.on[i, 1:, p] != 0)
-        try:
-            fit = influence_from_amplitudes(first, np.array(runs)[tried], group.on[i, 1 + tried, p])
-        except ValueError as error:
-            raise DataError(
-                f"{self.runs.table.file}: {self.of(group, i)}{named.lstrip()}{' ' * bool(named)}{error}"
-            ) from None
-        unit = self.runs.amplitude_unit
-        for channel, misfit, size in zip(group.channels, fit.misfit, first, strict=True):
-            text = (
-                f"{self.of(group, i)}sensor {channel}:{named} the readings are inconsistent: no influence coefficient fits them "
-                f"better than {misfit:.3g} {unit} (r.m.s.), {misfit / size:.0%} of the initial reading"
-            )
-            if misfit > 0.25 * size:
-                raise DataError(
-                    f"{self.runs.table.file}: {text}: expected four readings that fit one plane's effect"
-                )
-            if misfit > 0.05 * size:
-                self.warnings.append(text)
-        if named and not np.isnan(fit.other).all():
-            raise DataError(
-                f"{self.runs.table.file}: {self.of(group, i)}two coefficients of plane {group.planes[p]} fit the amplitudes: expected "
-                "a third trial run in this plane, at an angle off the line of the others"
-            )
-        return fit
-
-    def _sought(self, solved: Solved) -> Sought:
-        request = self.request
-        return Sought(request.objective, solved.limit, self.ceiling, request.ridge, request.monte_carlo)
+            raise DataError(f"{self.of(solved.group, i or 0)}{error}") from None
 
     def _errors(self, solved: Solved) -> Errors:
         """Return the errors of the readings: stated, as repeats or residuals scatter, or as those of sisters did."""
         fit, group, stated = solved.fit, solved.group, self.request.reading_error
         if group.trials:
-            return errors_of_means(fit, group, *(stated or (0.0, 0.0)))
+            return group.repeats.errors(fit, *(stated or (0.0, 0.0)))
         if stated is not None:
             return fit.stated(*stated)
         before = group.before
@@ -344,11 +352,9 @@ class FieldBalancing:
             else:
                 solved.covariance = balance.covariance
             return
-        sought, rotors = self._sought(solved), range(len(solved.corrections))
-        tasks = (
-            (balance.machine(i), solved.corrections[i], solved.start[i], sought, self.limited) for i in rotors
-        )
-        doubts = list(in_parts(confidence, tasks, self.executor))
+        rotors, draws = range(len(solved.corrections)), request.monte_carlo
+        tasks = ((balance.machine(i), solved.corrections[i], solved.start[i], draws) for i in rotors)
+        doubts = list(in_parts(solved.objective.confidence, tasks, self.executor))
         solved.covariance = np.stack([covariance for covariance, _ in doubts])
         solved.residual_95 = np.array([left for _, left in doubts])
         self._unknown(solved)
@@ -391,13 +397,6 @@ class FieldBalancing:
         return [
             (str(k + 1), self.request.places[k] % 360.0, mass) for k, mass in enumerate(masses) if mass > 0
         ]
-
-    # -- rotor by rotor --------------------------------------------------------------------------------------
-
-    def each(self, most: int | None = None) -> Iterator[tuple[str, Solved, int]]:
-        """Yield of each rotor its name as it is shown, its group's result, and its place in that."""
-        for rotor, (k, i) in zip(self.runs.rotors[:most], self.place, strict=False):
-            yield rotor if self.runs.several else "", self.solved[k], i
 
     @property
     def uncertain(self) -> bool:

@@ -1,35 +1,65 @@
-"""Rotors of like shape and names side by side, and what is fitted to their runs."""
+"""Rotors that were measured in the same way, side by side, and what is fitted to their runs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from balancing import (
+    AmplitudeFit,
     DependentTrials,
     JointFit,
     Undetermined,
     determined,
     fit_with_prior,
+    influence_from_amplitudes,
     joint_fit,
     phase_sense,
 )
 from cli.field.request import Request
-from cli.field.rows import Sorted
-from cli.field.runs import SHOWN, Before, Complex, Group, Part, Real, Rows, Runs
-from cli.field.stored import Sisters
+from cli.read import options
+from cli.read.runs.reading import Measured, read_measured
+from cli.read.runs.runs import SHOWN, Before, Complex, Group, Rows, Runs
+from cli.read.runs.stored import Stored, read_runout
 from dalembert.angles import degrees
 from dalembert.errors import DataError, quote
 
 Flags = NDArray[np.bool_]
 
 
+def measured_groups(
+    path: str, request: Request, influence: Sequence[str] = (), runout: str | None = None
+) -> tuple[Runs, Stored | None]:
+    """Read the runs and fit them; return them, and the stored coefficients that stand for trial runs."""
+    requests = {name: getattr(request, name) for name in ("fit", "exclude", "predict", "suggest", "robust")}
+    if request.four_run:
+        options.refuse("fits all runs: it does not go with --method four-run", **requests)
+    measured = read_measured(
+        path,
+        influence,
+        fit=any(requests.values()),
+        exclude=request.exclude,
+        four_run=request.four_run,
+        against=request.against,
+    )
+    runs, stored = measured.rows.rows.of, measured.stored
+    _Groups(measured, request).read()
+    runs.warnings = [*runs.table.warnings, *runs.warnings, *measured.warnings]
+    lags = request.against or runs.lags
+    if runout is not None:
+        runs.runout = read_runout(runout, runs, lagging=lags)
+    elif lags:
+        runs.runout = {sensor: vector.conjugate() for sensor, vector in runs.runout.items()}
+    return runs, stored
+
+
 def _sense(
     runs: Runs, rotors: Rows, fit: JointFit, lagging: bool | None, again: Callable[[Complex], JointFit]
 ) -> tuple[JointFit, list[str | None]]:
-    """Tell the sense of the phase, and fit again where the runs tell another than was taken and no option says it."""
+    """Determine the sense of the phase, and fit again where the runs show another one and no option states it."""
     certain, taken, other = phase_sense(fit.alone)
     turn = -1 if lagging else 1
     against = np.flatnonzero(certain < 0)
@@ -53,83 +83,92 @@ def _sense(
     return fit, [words[int(turn * sense)] for sense in certain.tolist()]
 
 
-def read_groups(rows: Sorted, request: Request, sisters: Sisters | None, stored: bool) -> None:
-    """Make groups of the rotors, and fit their runs; with `stored` coefficients the initial run stands alone."""
-    groups = _Groups(rows, request, sisters, stored)
-    named = None if sisters is None else [sisters.key(name) for name in groups.runs.rotors]
-    for part in rows.parts(named, stored):
-        if groups.runs.fitted:
-            groups.fit(part)
-        else:
-            groups.tried(part)
-    groups.runs.warnings += rows.warnings
-    if groups.lost > SHOWN:
-        groups.runs.warnings.append(
-            f"… and {groups.lost - SHOWN} further channels that the runs do not determine"
-        )
-
-
 class _Groups:
     """The rotors of a table; those of like shape and names become a group."""
 
-    def __init__(self, rows: Sorted, request: Request, sisters: Sisters | None, stored: bool) -> None:
-        self.sorted, self.rows, self.runs = rows, rows.rows, rows.rows.of
-        self.request, self.sisters, self.stored = request, sisters, stored
+    def __init__(self, measured: Measured, request: Request) -> None:
+        self.sorted, self.sisters, self.stored = measured.rows, measured.sisters, measured.stored
+        self.runs, self.request = measured.rows.rows.of, request
         self.lost = 0
 
-    def tried(self, part: Part) -> None:
+    def read(self) -> None:
+        """Make groups of the rotors, and fit their runs; with stored coefficients the initial run stands alone."""
+        sisters = self.sisters
+        named = None if sisters is None else [sisters.key(name) for name in self.runs.rotors]
+        for group in self.sorted.parts(named, self.stored is not None):
+            if self.runs.fitted:
+                self._log(group)
+            else:
+                self._trials(group)
+        self.runs.warnings += self.sorted.warnings
+        if self.lost > SHOWN:
+            self.runs.warnings.append(
+                f"… and {self.lost - SHOWN} further channels that the runs do not determine"
+            )
+
+    def _add(self, group: Group) -> None:
+        if "ref" in self.runs.table.texts:
+            # each mass may be a sum of all that went before
+            group.sizes = 2 * group.sizes.sum(axis=1, keepdims=True) + 0 * group.sizes
+        self.runs.groups.append(group)
+
+    # -- an initial run with trial runs ----------------------------------------------------------------------
+
+    def _trials(self, group: Group) -> None:
         """Take an initial run with trial runs: a fit with nothing to spare, but for repeated readings."""
-        self._complete(part)
-        for trial in part.trials:
-            many = np.isfinite(part.readings[0, trial.lines]).sum(axis=0).tolist()
+        self._complete(group)
+        of = self.runs.of(group.rotors[0])
+        for trial in group.trials:
+            many = np.isfinite(group.readings[0, trial.lines]).sum(axis=0).tolist()
             self.runs.warnings += [
-                f"{self.runs.of(part.rotors[0])}sensor {channel.sensor} was read {n} times in one run: the mean is taken (as vectors)"
-                for channel, n in zip(part.channels, many, strict=True)
+                f"{of}sensor {channel.sensor} was read {n} times in one run: the mean is taken (as vectors)"
+                for channel, n in zip(group.channels, many, strict=True)
                 if n > 1
             ]
-        group = self._made(part, None)
+        self._add(group)
         if self.stored:
-            self._unused(part)
+            self._unused(group)
         elif not self.request.four_run:
             try:
-                group.fit = joint_fit(part.readings, part.masses)
+                group.fit = joint_fit(group.readings, group.masses)
             except (DependentTrials, Undetermined) as error:
                 raise DataError(
-                    f"{self.runs.of(part.rotors[error.case[0]])}{_not_told(part, error)}"
+                    f"{self.runs.of(group.rotors[error.case[0]])}{_dependent(group, error)}"
                 ) from None
         self._contradictions(group)
 
-    def _complete(self, part: Part) -> None:
+    def _complete(self, group: Group) -> None:
         """Refuse a trial run that lacks a channel of the initial one."""
-        first = part.trials[0]
-        for trial in part.trials:
-            lacking = ~np.isfinite(part.readings[:, trial.lines]).any(axis=1)
+        first = group.trials[0]
+        for trial in group.trials:
+            lacking = ~np.isfinite(group.readings[:, trial.lines]).any(axis=1)
             if lacking.any():
                 i, s = np.argwhere(lacking)[0].tolist()
                 raise DataError(
-                    f"{self.runs.table.file}: {self.runs.of(part.rotors[i])}run {quote(trial.run)} has no reading of sensor "
-                    f"{part.channels[s]}, which the initial run {quote(first.run)} has"
+                    f"{self.runs.table.file}: {self.runs.of(group.rotors[i])}run {quote(trial.run)} has no reading of sensor "
+                    f"{group.channels[s]}, which the initial run {quote(first.run)} has"
                 )
 
-    def _unused(self, part: Part) -> None:
-        """Say that stored coefficients stand for the trial runs."""
-        rows, rotor = self.sorted, int(part.rotors[0])
-        start = rows.runs.start[rotor]
-        if not rows.tried[start : start + rows.runs.count[rotor]].any():
+    def _unused(self, group: Group) -> None:
+        """Warn that stored coefficients take the place of the trial runs."""
+        ordered, rotor = self.sorted, int(group.rotors[0])
+        start = ordered.runs.start[rotor]
+        if not ordered.tried[start : start + ordered.runs.count[rotor]].any():
             return
-        of = self.runs.of(rotor)
+        of, stated = self.runs.of(rotor), ordered.rows.masses.stated
         self.runs.warnings.append(f"{of}--influence gives the coefficients: the trial runs are not used")
-        if rows.rows.masses.told.size and not rows.rows.masses.told.any():
+        if stated.size and not stated.any():
             self.runs.warnings.append(
                 f"{of}the stored coefficients are per {self.runs.per}, and the runs have other masses: what is on the "
                 "rotor in its last run is not known, and the trim leaves it out"
             )
 
     def _contradictions(self, group: Group) -> None:
-        """Say which repeats contradict each other, with their figures."""
-        if not group.repeats:
+        """Warn of repeats that contradict each other, with their figures."""
+        repeats = group.repeats
+        if not repeats.degrees_of_freedom:
             return
-        contradictory = np.argwhere(group.contradictory & (group.counts > 1))
+        contradictory = np.argwhere(repeats.contradictory & (repeats.counts > 1))
         unit, against = self.runs.amplitude_unit, self.request.against
         for i, j, s in contradictory[:SHOWN].tolist():
             trial = group.trials[j]
@@ -152,58 +191,45 @@ class _Groups:
                 f"… and {len(contradictory) - SHOWN} further readings that contradict each other"
             )
 
-    def fit(self, part: Part) -> None:
+    # -- a log -----------------------------------------------------------------------------------------------
+
+    def _log(self, group: Group) -> None:
         """Fit the runs of a log all at once."""
         if self.sisters is not None:
-            self._group(self._in_known_planes(part))
+            self._fit(self._in_known_planes(group))
             return
-        present = np.isfinite(part.readings)
-        keep = determined(part.masses, present)
+        present = np.isfinite(group.readings)
+        keep = determined(group.masses, present)
         if keep.all():
-            self._group(part)
+            self._fit(group)
             return
-        self._say_lost(part, keep)
+        self._undetermined(group, keep)
         # without channels that the runs do not determine, and without runs in which no other was read
         left = (present & keep[:, None, :]).any(axis=2)
         kinds, kind = np.unique(np.concatenate([keep, left], axis=1), axis=0, return_inverse=True)
         for k in np.argsort([np.argmax(kind == k) for k in range(len(kinds))]).tolist():
             channels, lines = np.split(kinds[k], [keep.shape[1]])
-            self._group(part.only(*(np.flatnonzero(of) for of in (kind == k, lines, channels))))
+            self._fit(group.only(*(np.flatnonzero(of) for of in (kind == k, lines, channels))))
 
-    def _group(self, part: Part) -> None:
-        channels, readings, masses = part.channels, part.readings, part.masses
-        prior = None
+    def _fit(self, group: Group) -> None:
+        """Fit a group, in the sense of the phase that its runs show."""
+        readings, masses, prior = group.readings, group.masses, None
         if self.sisters is not None:
-            prior = self.sisters.known(self.runs.rotors[part.rotors[0]], channels, self.runs)
+            prior = self.sisters.known(self.runs.rotors[group.rotors[0]], group.channels, self.runs)
         fit = self._fitted(readings, masses, prior)
         if prior is None or determined(masses, np.isfinite(readings)).all():
-            fit, part.lines.senses = _sense(
+            fit, group.lines.senses = _sense(
                 self.runs,
-                part.rotors,
+                group.rotors,
                 fit,
                 self.request.lagging,
                 lambda turned: self._fitted(turned, masses, prior),
             )
-        self._made(part, fit).before = prior
-
-    def _made(self, part: Part, fit: JointFit | None) -> Group:
-        """Add a group."""
-        share = self.rows.reading_share, self.rows.mass_share
-        if "ref" in self.runs.table.texts:
-            # each may be a sum of all that went before
-            part = part._replace(sizes=2 * part.sizes.sum(axis=1, keepdims=True) + 0 * part.sizes)
-        readings = part.readings if fit is None else fit.readings
-
-        def errors() -> tuple[Real, Real]:
-            return share[0] * np.nan_to_num(np.abs(readings)), share[1] * part.sizes
-
-        shape = (part.rotors, part.channels, part.planes, part.lines, readings, part.masses)
-        group = Group(*shape, part.standing, part.last, part.weights, errors, fit, part.trials)
-        self.runs.groups.append(group)
-        return group
+        group.readings, group.fit, group.before = fit.readings, fit, prior
+        self._add(group)
 
     def _fitted(self, readings: Complex, masses: Complex, prior: Before | None) -> JointFit:
-        """Fit runs, with what is known before."""
+        """Fit runs, with coefficients that are stored from earlier ones."""
         if prior is None:
             return joint_fit(readings, masses)
         if self.request.reading_error is not None:
@@ -217,54 +243,53 @@ class _Groups:
             fit = fit_with_prior(readings, masses, prior.prior, sd[:, None, None])
         return fit
 
-    def _in_known_planes(self, part: Part) -> Part:
-        """Return rotors with the planes whose coefficients are known before; a log that names none has the only one."""
+    def _in_known_planes(self, group: Group) -> Group:
+        """Return rotors with the planes whose coefficients are stored; a log that names none has the only one."""
         assert self.sisters is not None
-        covered = self.sisters.planes(self.runs.rotors[part.rotors[0]])
-        planes = part.planes
+        covered = self.sisters.planes(self.runs.rotors[group.rotors[0]])
+        planes = group.planes
         if len(covered) == 1 and "trial_plane" not in self.runs.table.texts:
             planes = covered[: len(planes)]
         for plane in planes:
             if plane not in covered:
                 raise DataError(
-                    f"{self.runs.table.file}: {self.runs.of(part.rotors[0])}a mass in plane {plane}, of which no coefficient is stored: "
+                    f"{self.runs.table.file}: {self.runs.of(group.rotors[0])}a mass in plane {plane}, of which no coefficient is stored: "
                     f"expected {', '.join(covered)}"
                 )
         at = [covered.index(plane) for plane in planes]
         masses, sizes, standing = (
             np.zeros((*of.shape[:-1], len(covered)), dtype=of.dtype)
-            for of in (part.masses, part.sizes, part.standing)
+            for of in (group.masses, group.sizes, group.standing)
         )
-        masses[..., at], sizes[..., at], standing[..., at] = part.masses, part.sizes, part.standing
-        return part._replace(planes=covered, masses=masses, sizes=sizes, standing=standing)
+        masses[..., at], sizes[..., at], standing[..., at] = group.masses, group.sizes, group.standing
+        return replace(group, planes=covered, masses=masses, sizes=sizes, standing=standing)
 
-    def _say_lost(self, part: Part, keep: Flags) -> None:
-        """Say which channels (g, s) the runs do not determine, and which run would; refuse a rotor without others."""
+    def _undetermined(self, group: Group, keep: Flags) -> None:
+        """Warn of channels (g, s) that the runs do not determine; refuse a rotor without others."""
         some = keep.any(axis=1)
         if not some.all():
             i = int(np.argmin(some))
-            raise DataError(f"{self.runs.table.file}: {self._lost(part, i, 0)}")
+            raise DataError(f"{self.runs.table.file}: {self._lost(group, i, 0)}")
         for i, s in np.argwhere(~keep).tolist():
             self.lost += 1
             if self.lost <= SHOWN:
-                self.runs.warnings.append(f"{self._lost(part, i, s)}; it takes no part in the fit")
+                self.runs.warnings.append(f"{self._lost(group, i, s)}; it takes no part in the fit")
 
-    def _lost(self, part: Part, i: int, s: int) -> str:
-        """Say why a channel of a rotor is not determined."""
-        read = np.flatnonzero(np.isfinite(part.readings[i, :, s]))
-        masses = part.masses[i, read]
-        rows = part.lines[i].rows
-        runs = [rows[j][0] for j in read]
+    def _lost(self, group: Group, i: int, s: int) -> str:
+        """Write why a channel of a rotor is not determined, and which run would determine it."""
+        read = np.flatnonzero(np.isfinite(group.readings[i, :, s]))
+        masses, lines = group.masses[i, read], group.lines.of(i)
+        runs = [lines[j] for j in read]
         clause = "its vibration without masses is known, " if not masses.any() else ""
         times = "once" if len(read) == 1 else f"{len(read)} times"
         return (
-            f"{self.runs.of(part.rotors[i])}sensor {part.channels[s]} was read {times} (run{'s' * (len(runs) > 1)} {', '.join(runs)}), which "
-            f"does not determine {1 + len(part.planes)} unknowns: {clause}{_missing(part.planes, masses)}"
+            f"{self.runs.of(group.rotors[i])}sensor {group.channels[s]} was read {times} (run{'s' * (len(runs) > 1)} {', '.join(runs)}), which "
+            f"does not determine {1 + len(group.planes)} unknowns: {clause}{_missing(group.planes, masses)}"
         )
 
 
 def _missing(planes: list[str], masses: Complex) -> str:
-    """Say what is not known, and which run would tell it."""
+    """Write what the runs do not determine, and which run would."""
     if masses.all(axis=0).any() and len(masses):
         return (
             "every run has a trial mass, and what it does is not told from the vibration without it; a run without, or "
@@ -279,17 +304,64 @@ def _missing(planes: list[str], masses: Complex) -> str:
     return "the masses of these runs do not tell the planes apart; a run with one plane's mass alone changed would"
 
 
-def _not_told(part: Part, error: DependentTrials | Undetermined) -> str:
-    """Say which planes the trial runs do not tell apart."""
-    runs = len(part.trials) - 1
-    if runs < len(part.planes):
+def _dependent(group: Group, error: DependentTrials | Undetermined) -> str:
+    """Write which planes the trial runs do not separate."""
+    runs = len(group.trials) - 1
+    if runs < len(group.planes):
         return (
-            f"{len(part.planes)} planes ({', '.join(part.planes)}) and {runs} trial run{'s' * (runs != 1)}: expected a trial run "
+            f"{len(group.planes)} planes ({', '.join(group.planes)}) and {runs} trial run{'s' * (runs != 1)}: expected a trial run "
             "for every plane"
         )
-    shares = error.combination[-len(part.planes) :]
-    unseen = [name for name, share in zip(part.planes, shares, strict=True) if abs(share) > 1e-6]
+    shares = error.combination[-len(group.planes) :]
+    unseen = [name for name, share in zip(group.planes, shares, strict=True) if abs(share) > 1e-6]
     return (
         f"the trial runs do not tell the planes {' and '.join(unseen)} apart: expected each plane tried by itself, or in "
         "different proportions"
     )
+
+
+def by_amplitudes(group: Group, runs: Runs, warnings: list[str]) -> list[list[AmplitudeFit]]:
+    """The four-run method, rotor by rotor, plane by plane: each run with masses has them in one plane.
+
+    Several planes (Everett, J. Vib. Acoust. 109 (1987) 162-167): at each sensor the phases of all coefficients count from
+    that sensor's own initial vibration, so that O + Σ α w = 0 is one linear system whatever these phases are.
+    """
+    several = np.flatnonzero((group.on[:, 1:] != 0).sum(axis=2).max(axis=0, initial=0) > 1)
+    if len(several):
+        raise DataError(
+            f"{runs.of(group.rotors[0])}run {group.trials[1 + several[0]].run}: masses in several planes: without phase each trial run "
+            "has a mass in one plane, the others empty: four runs for the first plane, then three for each other one"
+        )
+    return [
+        [_of_plane(group, i, p, runs, warnings) for p in range(len(group.planes))]
+        for i in range(len(group.rotors))
+    ]
+
+
+def _of_plane(group: Group, i: int, p: int, runs: Runs, warnings: list[str]) -> AmplitudeFit:
+    """Fit one plane's coefficients to the amplitudes of its trial runs."""
+    named = f" plane {group.planes[p]}:" if len(group.planes) > 1 else ""
+    first, *read = group.means[i].real
+    tried = np.flatnonzero(group.on[i, 1:, p] != 0)
+    try:
+        fit = influence_from_amplitudes(first, np.array(read)[tried], group.on[i, 1 + tried, p])
+    except ValueError as error:
+        raise DataError(
+            f"{runs.table.file}: {runs.of(group.rotors[i])}{named.lstrip()}{' ' * bool(named)}{error}"
+        ) from None
+    unit = runs.amplitude_unit
+    for channel, misfit, size in zip(group.channels, fit.misfit, first, strict=True):
+        text = (
+            f"{runs.of(group.rotors[i])}sensor {channel}:{named} the readings are inconsistent: no influence coefficient fits them "
+            f"better than {misfit:.3g} {unit} (r.m.s.), {misfit / size:.0%} of the initial reading"
+        )
+        if misfit > 0.25 * size:
+            raise DataError(f"{runs.table.file}: {text}: expected four readings that fit one plane's effect")
+        if misfit > 0.05 * size:
+            warnings.append(text)
+    if named and not np.isnan(fit.other).all():
+        raise DataError(
+            f"{runs.table.file}: {runs.of(group.rotors[i])}two coefficients of plane {group.planes[p]} fit the amplitudes: expected "
+            "a third trial run in this plane, at an angle off the line of the others"
+        )
+    return fit

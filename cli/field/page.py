@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from balancing.sheet import machine_sheet
-from cli.field.coefficients import spread
 from cli.field.field_balancing import FieldBalancing
+from cli.field.logs import spread
 from cli.field.tables import sense
 from cli.read.options import bad
 from dalembert.page import Page
@@ -60,7 +60,7 @@ def sheet(b: FieldBalancing) -> Page:
         first=group.trials[0].run if group.trials else "initial",
         amplitude_unit=runs.amplitude_unit,
         mass=(runs.per, runs.mass_unit),
-        channels=[(channel.sensor, channel.speed_given) for channel in group.channels],
+        channels=[(channel.sensor, channel.speed_written) for channel in group.channels],
         speed_unit=runs.speed_unit,
         spread=deviations,
         limits=[b.max_mass.get(plane, b.max_mass.get("")) for plane in solved.planes] if b.max_mass else (),

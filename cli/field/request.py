@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cli.field.runs import Runs
 from cli.read import options
+from cli.read.runs.runs import Runs
 from cli.read.tolerance import Tolerance
 from dalembert.angles import phasor
 from dalembert.quantities import parse_number

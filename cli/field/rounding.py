@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from balancing import Balance, condition_number
-from cli.field.field_balancing import FieldBalancing
-from cli.field.runs import Real
-from cli.field.solution import Solved
+from cli.field.field_balancing import FieldBalancing, Solved
 from cli.read.rounding import EPS
+from cli.read.runs.runs import Real
 
 
 def fit_errors(balancing: FieldBalancing, solved: Solved) -> Real:
@@ -46,7 +45,7 @@ def correction_errors(balancing: FieldBalancing, solved: Solved, warnings: list[
         return np.full(solved.corrections.shape, np.nan)
     of_all = fit_errors(balancing, solved)
     initial, of_alpha = of_all[..., 0], of_all[..., 1:]
-    here, limit, ceiling = solved.here, solved.limit, balancing.ceiling
+    here, limit, ceiling = solved.here, solved.objective.max_mass, balancing.ceiling
     of_here = initial + 8 * EPS * (np.abs(balancing.runout(group)) + np.abs(solved.initial))
     if solved.start.any():
         size = np.abs(solved.start)
@@ -114,9 +113,15 @@ def uncertainty_share(balancing: FieldBalancing, solved: Solved, bound: Real) ->
     elif balancing.stored is None:
         share = share + 8 * EPS * condition_number(solved.group.on[:, 1:])
     # the scatter of repeats is a difference of readings
-    sd = solved.group.reading_sd
+    sd = solved.group.repeats.reading_sd
     of_scatter = EPS * 8 * np.abs(solved.group.initial).max(axis=1) / np.where(sd > 0, sd, 1.0)
     share = share + np.where(sd > 0, of_scatter, 0.0)
     size = np.abs(solved.corrections)
     own = np.where(size > 0, bound / np.where(size > 0, size, 1.0), 0.0)
     return np.asarray(4 * share[:, None] + own)
+
+
+def errors(balancing: FieldBalancing, solved: Solved, warnings: list[str]) -> tuple[Real, Real, Real]:
+    """Bound the errors of corrections and trims, SI, and the relative errors of the uncertainties, (g, p) each."""
+    bound = correction_errors(balancing, solved, warnings)
+    return bound, trim_errors(solved, bound), uncertainty_share(balancing, solved, bound)

@@ -12,10 +12,10 @@ import io
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import combinations
 from typing import Any
 
 from cli.imports.drawn import GROUND, Drawing, Drive, Place, direction, finite, place
+from cli.read.names import Groups
 from cli.read.robots.elements import LARGEST_FILE, parse
 from dalembert.errors import DataError
 
@@ -119,27 +119,15 @@ def _is_construction(geometry: Any) -> bool:
     return str(flag).lower() in ("1", "true")
 
 
-class _Joined(dict[Any, Any]):
-    """Things that are one, by what stands for them."""
-
-    def of(self, x: Any) -> Any:
-        """What stands for it."""
-        while self.get(x, x) != x:
-            x = self[x]
-        return x
-
-    def join(self, a: Any, b: Any) -> None:
-        """Make two one; the first stands for both."""
-        self[self.of(b)] = self.of(a)
-
-
 class _Linkage:
     """A sketch as links and pins."""
 
     def __init__(self, sketch: Sketch) -> None:
         self.s, self.d = sketch, Drawing(name=sketch.name, length="mm")
-        self.points, self.links = _Joined(), _Joined()
-        self.fixed: tuple[set[Any], set[Any]] = (set(), set())
+        ends = [(line, end) for line in sketch.lines for end in (START, END)]
+        self.points = Groups([ORIGIN, *ends, *(v for c in sketch.constraints for v in (c.first, c.second))])
+        self.links = Groups(sketch.lines)
+        self.fixed: tuple[set[Vertex], set[Vertex]] = (set(), set())
 
     def drawing(self) -> Drawing:
         s, d = self.s, self.d
@@ -164,21 +152,20 @@ class _Linkage:
             d.notes.append(f"a sketch names no input: {driven[0]}, pinned to the ground, drives")
         return d
 
-    def _vertex(self, line: int, end: int) -> Any:
+    def _vertex(self, line: int, end: int) -> Vertex:
         return self.points.of((line, end))
 
     def _stiffen(self) -> None:
         """Lines of a triangle, and lines that meet at an angle that is held, are one link."""
         ends = {i: {self._vertex(i, START), self._vertex(i, END)} for i in self.s.lines}
-        for a, b, c in combinations(sorted(ends), 3):
-            corners = ends[a] | ends[b] | ends[c]
-            if (
-                len(corners) == 3
-                and all(len(ends[i]) == 2 for i in (a, b, c))
-                and ends[a] != ends[b] != ends[c] != ends[a]
-            ):
-                self.links.join(a, b)
-                self.links.join(a, c)
+        at: dict[Vertex, dict[Vertex, list[int]]] = {}
+        for i, (u, v) in ((i, tuple(pair)) for i, pair in ends.items() if len(pair) == 2):
+            at.setdefault(u, {}).setdefault(v, []).append(i)
+            at.setdefault(v, {}).setdefault(u, []).append(i)
+        for sides in at.values():
+            for v in sides:
+                for w in sides.keys() & at[v].keys():
+                    self.links.join(*sorted((*sides[v], *sides[w], *at[v][w])))
         for each in self.s.constraints:
             a, b = each.first[0], each.second[0]
             if each.kind in STIFF and a in ends and b in ends and ends[a] & ends[b]:
@@ -207,14 +194,14 @@ class _Linkage:
             if len(x) + len(y) == before:
                 break
 
-    def _carry(self, held: set[Any], first: Vertex, second: Vertex) -> None:
+    def _carry(self, held: set[Vertex], first: Vertex, second: Vertex) -> None:
         a, b = self.points.of(first), self.points.of(second)
         if a in held or b in held:
             held.update((a, b))
 
     def _bodies(self) -> None:
-        d, names = self.d, dict[Any, str]()
-        vertices: dict[Any, str] = {}
+        d, names = self.d, dict[int, str]()
+        vertices: dict[Vertex, str] = {}
         for i in self.s.lines:
             corners = [self._vertex(i, end) for end in (START, END)]
             standing = all(v in self.fixed[0] and v in self.fixed[1] for v in corners)

@@ -239,7 +239,7 @@ class _Layer:
                     held[d.fresh(point)] = z
 
     # --- what ties and what drives ---------------------------------------------------------------------------
-    def _turning_alike(self) -> Groups:
+    def _turning_alike(self) -> Groups[str]:
         """Return the bodies that slides join, which turn alike. The ground stands for its own, blocks for none."""
         result = Groups([GROUND, *(g.name for g in self.groups.values())])
         for s in self.slides.values():

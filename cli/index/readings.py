@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from balancing import index_balancing
 from balancing.indexing import Indexed
-from cli.read.rounding import vector_error
 from dalembert.angles import phasor
+from dalembert.arithmetic.exact import EPS
 from dalembert.errors import DataError, quote
 from dalembert.tables.table import Table, read
 from dalembert.units import Scaled, from_si, to_si, written
+
+if TYPE_CHECKING:
+    from balancing.second_run import ExactParts
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -31,8 +35,26 @@ class Positions:
     """Degrees."""
     readings: Complex
     parts: Indexed
-    bound: float
-    """Of the rounding errors of either part."""
+    against: bool
+    """Whether the instrument's phase lags."""
+
+    @property
+    def noise(self) -> float:
+        """Below this a residual is rounding."""
+        terms = np.abs(self.readings).sum() + len(self.turned) * abs(self.parts.rotor)
+        return float(24 * EPS * self.parts.amplification**2 * terms)
+
+    @cached_property
+    def exact(self) -> ExactParts:
+        """The parts in 32 digits, of the decimals as they are written."""
+        from balancing.second_run import ExactParts
+        from cli.read.exact import turns, vectors
+
+        numbers = self.table.numbers
+        size, angle = numbers[self.quantity], numbers["angle" if self.quantity == "unbalance" else "phase"]
+        sizes = size.exact if self.quantity == "unbalance" else size.decimals
+        read = vectors(sizes, angle)
+        return ExactParts(read.conj if self.against else read, turns(numbers["turned"]))
 
     def shown(self, value: Scaled) -> Scaled:
         """A value in the unit of the file."""
@@ -90,9 +112,5 @@ def read_positions(path: str, phase_lag: bool) -> Positions:
         parts = index_balancing(readings, to_si(turned.values, "angle", turned.unit))
     except ValueError as error:
         raise DataError(f"{table.file}: column {turned.header}: {error}") from None
-    # the readings' own vectors, and the turns' on the parts
-    wrong = vector_error(values, angle.values, angle.unit)
-    wrong = wrong + vector_error(np.full(len(values), abs(parts.rotor)), turned.values, turned.unit)
-    bound = float(parts.amplification**2 * wrong.sum()) * 2
     degrees = turned.values if turned.unit == "deg" else np.degrees(turned.si)
-    return Positions(table, quantity, size.unit, degrees, readings, parts, bound)
+    return Positions(table, quantity, size.unit, degrees, readings, parts, phase_lag)

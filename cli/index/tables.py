@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.read.rounding import angle_error, size_error
 from dalembert.angles import degrees
-from dalembert.results.columns import Column, Table, names, number
+from dalembert.results.columns import Column, Table, apart, names, number
 from dalembert.results.way import Topic, figures, vector_text
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from cli.index.readings import Complex, Positions
+    from dalembert.arithmetic.doubled import Doubled
+    from dalembert.arithmetic.doubled_vectors import Vectors
 
 
 NEAR = 3.0  # from this growth of errors on the positions are named as near each other
@@ -36,37 +37,40 @@ def tables(p: Positions) -> dict[str, Callable[[], Table]]:
     }
 
 
-def size(p: Positions, name: str, values: ArrayLike, place: str | None, error: bool = False) -> Column:
+def size(
+    p: Positions, name: str, values: ArrayLike, place: str | None, exact: Callable[[], Doubled] | None = None
+) -> Column:
     """Sizes in the unit of the file; JSON has unbalances in kg·m, amplitudes in the unit of the file."""
     result = np.asarray(values, dtype=float)
-
-    def bound() -> ArrayLike:
-        return np.broadcast_to(size_error(result, p.bound), result.shape)
-
-    bounds = bound if error else None
     if p.quantity == "unbalance":
-        return number(name, "unbalance", result, p.unit, bounds, place)
-    return Column(name, p.unit, result, bounds, place)  # type: ignore[arg-type]
+        return number(name, "unbalance", result, p.unit, place=place, exact=exact)
+    return Column(name, p.unit, result, None if exact is None else apart(result, "number", "", exact), place)
 
 
-def direction(p: Positions, values: Complex, place: str | None, error: bool = False) -> Column:
+def direction(
+    p: Positions, values: Complex, place: str | None, exact: Callable[[], Vectors] | None = None
+) -> Column:
     """Directions: of an unbalance its angle, of a vibration its phase."""
     name = "angle" if p.quantity == "unbalance" else "phase"
-    result = degrees(values)
-    bound = (lambda: angle_error(values, p.bound, result)) if error else None
-    return number(name, "angle", result, error=bound, place=place and place.format(name))
+    error = None if exact is None else lambda: exact().turned(values)
+    return number(name, "angle", degrees(values), error=error, place=place and place.format(name))
 
 
 def parts(p: Positions) -> Table:
     """A row for the rotor, a row for the mandrel."""
     both = np.array([complex(p.parts.rotor), complex(p.parts.mounting)])
+
+    def exact() -> Vectors:
+        return p.exact.parts
+
     columns = [
         names("part", ["rotor", "mandrel"], None),
-        size(p, p.quantity, np.abs(both), None, error=True),
-        direction(p, both, None, error=True),
+        size(p, p.quantity, np.abs(both), None, lambda: exact().size),
+        direction(p, both, None, exact),
     ]
     if np.isfinite(p.parts.uncertainty):
-        columns.append(size(p, "uncertainty", np.full(2, p.parts.uncertainty), None))
+        doubt = np.full(2, p.parts.uncertainty)
+        columns.append(size(p, "uncertainty", doubt, None, lambda: p.exact.uncertainty))
     if p.quantity == "unbalance":
         opposite = float(degrees(-both[0]))
         amount = f"{p.shown(abs(both[0])):.6g} {p.spoken_unit}"
@@ -82,13 +86,18 @@ def readings(p: Positions) -> Table:
     """A row for each position: the reading, and what the two parts do not explain of it."""
     left = p.parts.residuals
     # two readings are met exactly
-    shown = np.where(np.abs(left) > 4 * p.bound, np.abs(left), 0.0)
+    shown = np.where(np.abs(left) > p.noise, np.abs(left), 0.0)
     columns = [
         number("turned", "angle", p.turned),
         size(p, p.quantity, np.abs(p.readings), p.quantity),
         direction(p, p.readings, "{}"),
-        size(p, "residual", shown, "residual"),
-        number("residual_angle", "angle", np.where(shown > 0, degrees(left), np.nan)),
+        size(p, "residual", shown, "residual", lambda: p.exact.residuals.size),
+        number(
+            "residual_angle",
+            "angle",
+            np.where(shown > 0, degrees(left), np.nan),
+            error=lambda: np.where(shown > 0, p.exact.residuals.turned(left), 0.0),
+        ),
     ]
     below = ""
     if np.isfinite(p.parts.residual_sd):

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from dalembert.arithmetic.doubled import Doubled
 from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array
+from dalembert.quantities import decimals, exactly
 from dalembert.tables.table import Numbers
-from dalembert.units import UNITS
 
 
 def written(number: float) -> Fraction:
@@ -33,10 +33,20 @@ def writtens(numbers: ArrayLike) -> Doubled:
     return Doubled(np.where(there, exact.high, array), exact.low)
 
 
-def in_unit(number: Doubled, dimension: str, unit: str) -> Doubled:
-    """Convert from SI, as `dalembert.units.from_si` does."""
-    numerator, denominator = UNITS[dimension][unit]
-    return number * float(denominator) / float(numerator)
+def quantity(text: str, dimension: str) -> Doubled:
+    """A quantity of an option, in SI, as its decimals say.
+
+    >>> quantity("0.1 mm", "length").high
+    0.0001
+    """
+    parts = decimals(text, dimension)
+    assert parts is not None
+    return Doubled.of(exactly(*parts))
+
+
+def turns(angle: Numbers) -> Vectors:
+    """e^{iφ} of the angles of a column, (n,)."""
+    return vectors([Fraction(1)] * len(angle.values), angle)
 
 
 def vectors(sizes: Iterable[Fraction], angle: Numbers) -> Vectors:

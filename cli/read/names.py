@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
+from typing import Generic, TypeVar
+
+Thing = TypeVar("Thing", bound=Hashable)
 
 
 def unused(wanted: str, used: Iterable[str], between: str = "_") -> str:
@@ -18,7 +21,7 @@ def unused(wanted: str, used: Iterable[str], between: str = "_") -> str:
     return name
 
 
-class Groups:
+class Groups(Generic[Thing]):
     """Things that are joined into groups, each of which is called as one of its things.
 
     >>> groups = Groups("abcd")
@@ -28,24 +31,24 @@ class Groups:
     ('b', [['a', 'b', 'd'], ['c']])
     """
 
-    def __init__(self, names: Iterable[str]) -> None:
+    def __init__(self, names: Iterable[Thing]) -> None:
         self._above = {name: name for name in names}
 
-    def of(self, name: str) -> str:
+    def of(self, name: Thing) -> Thing:
         """Return what the group of a thing is called."""
         while self._above[name] != name:
             name = self._above[name]
         return name
 
-    def join(self, *names: str) -> bool:
+    def join(self, *names: Thing) -> bool:
         """Join the groups of things under the name of the first's; return whether they were several."""
         groups = [self.of(name) for name in names]
         self._above |= dict.fromkeys(groups, groups[0]) if groups else {}
         return len(set(groups)) > 1
 
-    def all(self) -> list[list[str]]:
+    def all(self) -> list[list[Thing]]:
         """Return the groups, in the order in which their first things were named."""
-        result: dict[str, list[str]] = {}
+        result: dict[Thing, list[Thing]] = {}
         for name in self._above:
             result.setdefault(self.of(name), []).append(name)
         return list(result.values())

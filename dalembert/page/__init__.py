@@ -96,11 +96,15 @@ class Page:
     def __repr__(self) -> str:
         return f"Page({len(self.html) / 1e3:.0f} kB of HTML; .save(FILE) writes it)"
 
-    def _repr_html_(self) -> str:
+    def frame(self, allow: str = "allow-scripts") -> str:
+        """The page in a frame of another one, out of whose reach it is; `allow` as HTML's `sandbox` has it."""
         return (
-            f'<iframe srcdoc="{escape(self.html)}" sandbox="allow-scripts" style="width:100%;'
+            f'<iframe srcdoc="{escape(self.html)}" sandbox="{allow}" style="width:100%;'
             f'height:{self.height}px;border:0" title="a moving picture"></iframe>'
         )
+
+    def _repr_html_(self) -> str:
+        return self.frame()
 
 
 def page(
@@ -125,11 +129,13 @@ def page(
     rest
         What else the script reads.
     """
-    own = ["common.js", "player.js", f"{scene}.js"]
-    if script:
-        own = ["way.js", "model.js", *own, "loose.js", "entry.js", "editor.js"]
-    own = ["texts.js", *own]
-    return _filled(title, "page.html", script, own, {"series": series, **rest})
+    own = ["player.js", f"{scene}.js"]
+    own = (
+        ["way.js", "model.js", "common.js", "entry.js", *own, "loose.js", "editor.js"]
+        if script
+        else ["common.js", *own]
+    )
+    return _filled(title, "page.html", script, ["texts.js", *own], {"series": series, **rest})
 
 
 def sheet(title: str, kind: Literal["balance", "field"], script: str, sheet: Json) -> Page:

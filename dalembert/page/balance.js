@@ -12,6 +12,17 @@ function rounded(x, [unit, step]) {
   return (inverse && Math.abs(inverse * step - 1) < 4e-16 ? even((x / unit) * inverse) / inverse : even(x / unit / step) * step) * unit;
 }
 
+// the cubics of the mode shapes where a mass stands
+function shapesAt(z) {
+  const { stations, pieces } = sheet.modes;
+  const piece = Math.max(0, Math.min(pieces.length - 1, stations.findLastIndex((station) => station <= z)));
+  const entry = { station: stations[piece] };
+  pieces[piece].forEach((cubic, k) => cubic.forEach((c, power) => (entry[`shape ${k} ${power}`] = c)));
+  return entry;
+}
+const along = sheet.modes && [sheet.modes.stations[0], sheet.modes.stations.at(-1)];
+const rulesOf = (name) => ({ positive: name !== "angle" && name !== "z", within: name === "z" ? along : null });
+
 solveSheet = () => {
   polygons = [];
   for (const [r, rotor] of sheet.rotors.entries()) {
@@ -23,6 +34,7 @@ solveSheet = () => {
     for (const row of sheet.rows[r]) {
       const entry = { ...sums, radius: 1, z: 0 };
       for (const { name } of sheet.columns) entry[name === sheet.amount ? "amount" : name] = values[cellName(rotor, row, name)];
+      if (sheet.modes) Object.assign(entry, shapesAt(entry.z));
       const out = solved(mass, names.mass, entry, { ...entry, ...pairs });
       for (const name of Object.keys(sums)) [sums[name], pairs[name]] = [out.get(name)[0], out.get(name)[2]];
       rotor.planes.forEach((_, p) => drawn[p].push([row, out.get(`share ${p} x`)[0], out.get(`share ${p} y`)[0]]));
@@ -57,6 +69,13 @@ solveSheet = () => {
       set("couple.angle", "couple angle", true);
       set("residual.couple", "left couple");
     }
+    sheet.modes?.names.forEach((name, k) => {
+      set(`mode ${name}.unbalance`, `mode ${k} size`);
+      set(`mode ${name}.angle`, `mode ${k} angle`, true);
+      // rounding of nothing is nothing, as in the program
+      if (out.get(`left mode ${k}`)[0] > 1e-12 * out.get(`terms mode ${k}`)[0]) set(`residual.mode ${name}`, `left mode ${k}`);
+      else answers.set(`${prefix(rotor)}residual.mode ${name}`, [0, 0]);
+    });
     rotor.tolerance?.names.forEach((name, p) => answers.set(`${prefix(rotor)}tolerance.${name}`, before.get(`before ${p}`) ?? before.get(`plane ${p} size`)));
   }
 };
@@ -74,7 +93,7 @@ function build() {
     for (const row of sheet.rows[r]) {
       const line = put(body, "tr");
       put(line, "th", { scope: "row" }, row);
-      for (const { name, kind, unit } of sheet.columns) cell(put(line, "td"), cellName(rotor, row, name), kind, unit, { positive: name !== "angle" && name !== "z" });
+      for (const { name, kind, unit } of sheet.columns) cell(put(line, "td"), cellName(rotor, row, name), kind, unit, rulesOf(name));
       const away = put(put(line, "td"), "button", { type: "button", "aria-label": TEXTS.removeRow(row), title: TEXTS.removeRow(row) }, "×");
       away.addEventListener("click", () => {
         remember();
@@ -93,7 +112,7 @@ function build() {
       const named = /^[A-Za-z]+(?=\d+$)/.exec(sheet.rows[r].at(-1) ?? "")?.[0] ?? "";
       while (sheet.rows[r].includes(`${named}${k}`)) k++;
       sheet.rows[r].push(`${named}${k}`);
-      for (const { name } of sheet.columns) values[cellName(rotor, `${named}${k}`, name)] = 0;
+      for (const { name } of sheet.columns) values[cellName(rotor, `${named}${k}`, name)] = name === "z" && along ? Math.max(along[0], Math.min(along[1], 0)) : 0;
       build();
     });
   }
@@ -104,30 +123,35 @@ drawSheet = () => {
   const host = $("answers");
   host.replaceChildren();
   const [mass, unbalance] = [sheet.shown.mass, sheet.shown.unbalance];
-  const turn = Math.PI / 180;
   listed(
     host,
     sheet.remove ? TEXTS.toRemove : TEXTS.toAdd,
     ["", `${TEXTS.mass}, ${mass.unit}`, `${TEXTS.angle}, deg`, `${TEXTS.unbalance}, ${unbalance.unit}`, ...(sheet.sought ? [`${TEXTS.radius}, ${sheet.shown.radius.unit}`] : [])],
-    sheet.rotors.flatMap((rotor) => rotor.planes.map((plane) => [`${prefix(rotor)}${plane}`, shownAnswer(`${prefix(rotor)}${plane}.mass`, mass.si), shownAnswer(`${prefix(rotor)}${plane}.angle`, turn), shownAnswer(`${prefix(rotor)}${plane}.unbalance`, unbalance.si), ...(sheet.sought ? [shownAnswer(`${prefix(rotor)}${plane}.radius`, sheet.shown.radius.si)] : [])])),
+    sheet.rotors.flatMap((rotor) => rotor.planes.map((plane) => [`${prefix(rotor)}${plane}`, ...shownVector(`${prefix(rotor)}${plane}.`, "mass", mass.si, "angle"), shownAnswer(`${prefix(rotor)}${plane}.unbalance`, unbalance.si), ...(sheet.sought ? [shownAnswer(`${prefix(rotor)}${plane}.radius`, sheet.shown.radius.si)] : [])])),
   );
   listed(
     host,
     TEXTS.state,
-    ["", `${TEXTS.static}, ${unbalance.unit}`, `${TEXTS.angle}, deg`, ...(sheet.couple ? [`${TEXTS.couple}, ${sheet.shown.couple.unit}`, `${TEXTS.angle}, deg`] : []), `${TEXTS.residual}, ${unbalance.unit}`],
-    sheet.rotors.map((rotor) => [
-      rotor.name,
-      shownAnswer(`${prefix(rotor)}static.unbalance`, unbalance.si),
-      shownAnswer(`${prefix(rotor)}static.angle`, turn),
-      ...(sheet.couple ? [shownAnswer(`${prefix(rotor)}couple.unbalance`, sheet.shown.couple.si), shownAnswer(`${prefix(rotor)}couple.angle`, turn)] : []),
-      shownAnswer(`${prefix(rotor)}residual.static`, unbalance.si),
-    ]),
+    ["", TEXTS.before, `${TEXTS.angle}, deg`, TEXTS.after],
+    sheet.rotors.flatMap((rotor) => [["static", unbalance], ...(sheet.couple ? [["couple", sheet.shown.couple]] : [])].map(([kind, { unit, si }]) => [
+      `${prefix(rotor)}${TEXTS[kind]}, ${unit}`,
+      ...shownVector(`${prefix(rotor)}${kind}.`, "unbalance", si, "angle"),
+      shownAnswer(`${prefix(rotor)}residual.${kind}`, si),
+    ])),
   );
+  if (sheet.modes) {
+    listed(
+      host,
+      `${TEXTS.modalSums}, ${unbalance.unit}`,
+      [TEXTS.mode, TEXTS.before, `${TEXTS.angle}, deg`, TEXTS.after],
+      sheet.rotors.flatMap((rotor) => sheet.modes.names.map((name) => [`${prefix(rotor)}${name}`, ...shownVector(`${prefix(rotor)}mode ${name}.`, "unbalance", unbalance.si, "angle"), shownAnswer(`${prefix(rotor)}residual.mode ${name}`, unbalance.si)])),
+    );
+  }
   if (sheet.rotors.some((rotor) => rotor.tolerance)) {
     listed(
       host,
-      TEXTS.tolerance,
-      ["", `${TEXTS.permissible}, ${unbalance.unit}`, `${TEXTS.before}, ${unbalance.unit}`, ""],
+      `${TEXTS.tolerance}, ${unbalance.unit}`,
+      ["", TEXTS.permissible, TEXTS.before, ""],
       sheet.rotors.flatMap((rotor) => (rotor.tolerance?.names ?? []).map((name, p) => {
         const [limit, x] = [rotor.tolerance.permissible[p], answer(`${prefix(rotor)}tolerance.${name}`)];
         return [`${prefix(rotor)}${name}`, short(limit / unbalance.si), shownAnswer(`${prefix(rotor)}tolerance.${name}`, unbalance.si), Number.isFinite(x) ? (x <= limit ? TEXTS.within : TEXTS.beyond) : "–"];
@@ -139,6 +163,7 @@ drawSheet = () => {
 };
 
 function csv() {
+  if (wrong.size) return "";
   const several = sheet.rotors.length > 1;
   const lines = [[...(several ? ["rotor"] : []), "name", ...sheet.columns.map((c) => c.header)].join(",")];
   for (const [r, rotor] of sheet.rotors.entries()) {

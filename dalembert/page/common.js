@@ -73,8 +73,7 @@ function short(x) {
   return Number.isFinite(x) ? String(Number(x.toPrecision(6))) : "–";
 }
 // a cell with every digit, those beyond the sixth small
-function fill(cell, x) {
-  const text = exact(x);
+function fill(cell, text) {
   const [, lead, rest, power] = /^(-?(?:0\.0*)?(?:\d\.?){1,6})(\d*\.?\d*)(e.*)?$/.exec(text) ?? [0, text, "", ""];
   cell.replaceChildren(lead);
   if (rest) put(cell, "small", {}, rest);
@@ -128,9 +127,9 @@ function onKey(key, words, act) {
 document.addEventListener("keydown", (event) => {
   const act = keys.get(event.key);
   const here = event.target;
-  if (!act || event.ctrlKey || event.metaKey || event.altKey || here.tagName === "SELECT") return;
-  // a button that has the focus is pressed by space itself
-  if (event.key === " " && (here.tagName === "BUTTON" || here.tagName === "SUMMARY")) return;
+  if (!act || event.ctrlKey || event.metaKey || event.altKey || ["SELECT", "TEXTAREA"].includes(here.tagName)) return;
+  // what has the focus keeps its own keys: space presses it, arrows move in a text
+  if (event.key === " " && (["BUTTON", "SUMMARY"].includes(here.tagName) || here.type === "checkbox")) return;
   event.preventDefault();
   act(event);
 });

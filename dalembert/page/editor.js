@@ -11,11 +11,9 @@ const shownInput = (j) => (shown < n ? machine.sweep[j][shown] : freePose[j]);
 const present = (name) => (inputNames.includes(name) ? shownInput(inputNames.indexOf(name)) : numbers[name]);
 const isName = (name) => inputNames.includes(name) || machine.kinds.has(name);
 
-const past = []; // [numbers, freePose, shown] before each change
-function remember() {
-  past.push([{ ...numbers }, freePose.slice(), shown]);
-  if (past.length > 500) past.shift();
-}
+const snapshot = () => [{ ...numbers }, freePose.slice(), shown];
+const restore = (before) => ([numbers, freePose, shown] = before);
+const anew = () => update();
 // put numbers by name, SI and radians; the free pose is shown where an input is among them
 function put_(changed) {
   let moved = false;
@@ -48,8 +46,8 @@ function fillHeld(cell, k, i, every) {
   const error = k === null ? 0 : errorAt(whole.columns[k], i);
   if (k === null) cell.textContent = "";
   else if (!every) cell.textContent = short(Number(held(x, error) === "–" ? NaN : held(x, error)));
-  else if (error === 0) fill(cell, x);
-  else cell.textContent = held(x, error);
+  else if (error === 0) fill(cell, exact(x));
+  else fill(cell, held(x, error));
 }
 
 // --- all anew -------------------------------------------------------------------------------------------------------------
@@ -57,6 +55,8 @@ let due = 0;
 function update() {
   cancelAnimationFrame(due);
   due = 0;
+  copied("");
+  if (wrong.size) $("limits").textContent = "";
   recompute(whole);
   for (const { series, parts } of figures) {
     for (const [k, shape] of series.shapes.entries()) if (shape.s !== undefined) parts[k].setAttribute("r", Math.max(shape.s * scale, LEAST[shape.r] ?? 0).toFixed(2));
@@ -80,34 +80,21 @@ function whyNot() {
   return found ? TEXTS.short(found[0], lengthText(found[1])) : TEXTS.open;
 }
 function tell(text = "") {
-  say(text || [...wrong.values()].map((name) => complaints.get(name)).join("; ") || whyNot());
+  say(text || [...wrong.values()].join("; ") || whyNot());
   missing.textContent = whyNot() || TEXTS.open;
 }
-const complaints = new Map();
 let waiting = 0;
 function listLimits() {
-  const found = wrong.size ? [] : machine.limits(numbers).map(([q]) => q);
+  // where it stands nowhere there is nothing to say of limits
+  const stands = !wrong.size && state.chosen && state.closed.some(Number.isFinite);
+  const found = stands ? machine.limits(numbers).map(([q]) => q) : [];
   const unit = unitOf(inputKind(0));
-  $("limits").textContent = !machine.one ? "" : found.length ? TEXTS.limits(found.map((q) => `${short(Number(shortest(q, model.units[inputKind(0)], unit)))} ${unit}`).join(", ")) : TEXTS.noLimits;
+  $("limits").textContent = !machine.one || !stands ? "" : found.length ? TEXTS.limits(found.map((q) => `${short(Number(shortest(q, model.units[inputKind(0)], unit)))} ${unit}`).join(", ")) : TEXTS.noLimits;
 }
 
 // --- buttons --------------------------------------------------------------------------------------------------------------
-const tools = make("div", { id: "tools", role: "group" });
-const alertLine = make("p", { id: "alert", role: "alert" });
 $("toggles").before(alertLine);
 $("legend").after(tools);
-function tool(text, act) {
-  const button = put(tools, "button", { type: "button" }, text);
-  button.addEventListener("click", act);
-  return button;
-}
-const undoButton = tool(TEXTS.undo, () => {
-  if (!past.length) return;
-  const [before, inputs, pose] = past.pop();
-  [numbers, freePose, shown] = [before, inputs, pose];
-  wrong.clear();
-  update();
-});
 tool(TEXTS.reset, () => {
   remember();
   [numbers, freePose] = [{ ...machine.own }, model.first.slice()];
@@ -120,24 +107,12 @@ tool(TEXTS.fitDrawing, () => {
   fit();
   show(shown);
 });
-const given = make("textarea", { id: "given", readonly: "", rows: "3", "aria-label": TEXTS.toCopy, hidden: "" });
-function handOver(text) {
-  given.hidden = false;
-  given.value = text;
-  given.select();
-  navigator.clipboard?.writeText(text).then(() => say(TEXTS.copied), () => {});
-}
-tool(TEXTS.copyOptions, () => handOver(options()));
-tool(TEXTS.copyFile, () => handOver(toml() || TEXTS.noFile));
-tool(TEXTS.saveFile, () => {
-  const text = toml();
-  if (!text) return say(TEXTS.noFile);
-  const link = make("a", { href: URL.createObjectURL(new Blob([text], { type: "application/toml" })), download: `${document.title.replace(/[^\w-]+/g, "-") || "mechanism"}.toml` });
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-});
-tools.after(given);
-given.after(make("p", { id: "limits" }));
+const file = () => toml() || (wrong.size ? "" : TEXTS.noFile);
+tool(TEXTS.copyOptions, () => copied(options()));
+tool(TEXTS.copyFile, () => copied(file()));
+tool(TEXTS.saveFile, () => (model.toml ? saved(toml(), "application/toml", "toml") : say(TEXTS.noFile)));
+tools.after(outbox);
+outbox.after(make("p", { id: "limits" }));
 
 // --- what is given back ---------------------------------------------------------------------------------------------------
 const quoted = (text) => (/^[\w@%+=:,./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
@@ -148,12 +123,13 @@ function optionText(name, x) {
   return String(x);
 }
 function options() {
+  if (wrong.size) return "";
   const sets = changes().map((path) => `--set ${quoted(`${path}=${optionText(path, numbers[path])}`)}`);
   const at = inputNames.map((name, j) => (machine.one ? "" : `${name}=`) + optionText(name, shownInput(j)));
   return [...sets, `--at ${quoted(at.join(","))}`].join(" ");
 }
 function toml() {
-  if (!model.toml) return "";
+  if (!model.toml || wrong.size) return "";
   const lines = model.toml.filter(({ of, needed }) => needed || of.some((piece) => Array.isArray(piece) && numbers[piece[0]] !== machine.own[piece[0]]));
   const beside = model.files.length ? `# ${TEXTS.beside(model.files.join(", "))}\n` : "";
   return `${beside}${lines.map(({ of }) => of.map((piece) => (Array.isArray(piece) ? tomlNumber(numbers[piece[0]]) : piece)).join("")).join("\n")}\n`;
@@ -171,8 +147,7 @@ function change(name, x, text) {
   const kind = kindOf(name);
   const refused = Number.isNaN(x) ? TEXTS.wrong(name, text, `${shortest(present(name), model.units[kind], unitOf(kind))} ${unitOf(kind)}`) : x < 0 && positive.has(kind) ? TEXTS.negative(name, text) : "";
   if (refused) {
-    complaints.set(name, refused);
-    wrong.add(name);
+    wrong.set(name, refused);
   } else {
     if (!wrong.delete(name) || !Object.is(present(name), x)) remember();
     put_({ [name]: x });
@@ -184,7 +159,7 @@ function numberRow(body, name) {
   const [units, unit] = [model.units[kind], unitOf(kind)];
   const line = put(body, "div", { class: "number" });
   put(line, "label", {}, name);
-  const input = numberField(line, name, name, units, unit, (x, text) => change(name, x, text));
+  const input = numberField(line, name, units, unit, !positive.has(kind), (x, text) => change(name, x, text));
   input.addEventListener("blur", listFields);
   put(line, "span", { class: "soft" }, unit);
   const range = put(line, "input", { type: "range", min: "0", max: "400", step: "1", "aria-label": TEXTS.slider(name) });
@@ -212,7 +187,7 @@ function listFields() {
     range.value = place(present(name));
     input.parentNode.classList.toggle("changed", machine.kinds.has(name) && !Object.is(numbers[name], machine.own[name]));
   }
-  undoButton.disabled = !past.length;
+  listUndo();
 }
 const groupsOf = new Map([[TEXTS.inputs, [...inputNames]]]);
 for (const path of machine.kinds.keys()) {
@@ -270,18 +245,22 @@ const handleParts = model.handles.map((handle) => {
   };
   const place = () => carried(lastStands[bodyIndex(body)], ...local(...handle));
   let grip = null;
+  let moved = false;
   group.addEventListener("pointerdown", (event) => {
     if (!lastStands) return;
     group.setPointerCapture(event.pointerId);
-    remember();
     play(false);
     const [x, y] = place();
     grip = [px(x) - event.clientX, py(y) - event.clientY];
+    moved = false;
     event.preventDefault();
     group.focus();
   });
   group.addEventListener("pointermove", (event) => {
     if (!grip) return;
+    // a touch alone changes nothing
+    if (!moved) remember();
+    moved = true;
     const [u, v] = [event.clientX + grip[0], event.clientY + grip[1]];
     move((left + right) / 2 + (u - width / 2) / scale, (low + high) / 2 - (v - height / 2) / scale);
   });
@@ -333,8 +312,7 @@ window.dalembert = {
       wrong.delete(name);
       const kind = kindOf(name);
       if (typeof x !== "number" || !Number.isFinite(x) || (x < 0 && positive.has(kind))) {
-        wrong.add(name);
-        complaints.set(name, TEXTS.wrong(name, String(x), ""));
+        wrong.set(name, TEXTS.wrong(name, String(x), ""));
       } else put_({ [name]: x });
     }
     update();
@@ -361,6 +339,7 @@ window.dalembert = {
   shown = first ?? n;
 }
 watchers.push(() => {
+  copied("");
   listFields();
   tell();
 });

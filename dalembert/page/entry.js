@@ -40,17 +40,74 @@ function held(x, error) {
   if (digits < 1) return error < 1e-9 ? "0" : "–";
   return digits > 15 ? exact(x) : exact(Number(x.toPrecision(digits)));
 }
-function say(text) {
-  $("alert").textContent = text;
-}
-// a field for a number: `read` gives what is shown, `write` takes what was typed, or NaN
-function numberField(parent, name, label, units, unit, write) {
-  const input = put(parent, "input", { type: "text", inputmode: "decimal", autocomplete: "off", spellcheck: "false", "data-name": name, "aria-label": label });
-  input.addEventListener("input", () => {
+// a field for a number: `write` takes what was typed, or NaN. Keypads of decimals have no sign and no letters on some phones.
+function numberField(parent, name, units, unit, signed, write) {
+  const input = put(parent, "input", { type: "text", inputmode: signed ? "text" : "decimal", autocapitalize: "off", autocomplete: "off", spellcheck: "false", enterkeyhint: "done", "data-name": name, "aria-label": name });
+  input.addEventListener("input", (event) => {
     const x = typed(input.value, units, unit);
     input.setAttribute("aria-invalid", Number.isNaN(x));
+    byHand = event.inputType ? name : "";
     write(x, input.value);
+    byHand = "";
   });
+  input.addEventListener("blur", () => (begun = ""));
   input.addEventListener("keydown", (event) => event.stopPropagation());
   return input;
 }
+
+// --- undo: `snapshot`, `restore` and `anew` are the page's own ------------------------------------------------------------------
+const wrong = new Map(); // entries that are no number: what to say
+const past = [];
+let begun = ""; // the field whose entry is being typed and stands in `past` as it was before
+let byHand = ""; // the field in which a key was pressed just now
+function remember() {
+  // what is typed key by key is one change
+  if (byHand && byHand === begun) return;
+  begun = byHand;
+  past.push(snapshot());
+  if (past.length > 500) past.shift();
+}
+function undo() {
+  // a wrong entry changed no number: the one before it comes back
+  if (wrong.size) wrong.clear();
+  else if (past.length) restore(past.pop());
+  begun = "";
+}
+function listUndo() {
+  undoButton.disabled = !past.length && !wrong.size;
+}
+
+// --- buttons, and texts to take away --------------------------------------------------------------------------------------
+const alertLine = make("p", { id: "alert", role: "alert" });
+const tools = make("div", { id: "tools", role: "group" });
+const outbox = make("textarea", { id: "outbox", readonly: "", rows: "4", "aria-label": TEXTS.toCopy, hidden: "" });
+function say(text) {
+  if (alertLine.textContent !== text) alertLine.textContent = text;
+}
+function tool(text, act) {
+  const button = put(tools, "button", { type: "button" }, text);
+  button.addEventListener("click", act);
+  return button;
+}
+// a wrong entry leaves nothing to take away, as it leaves no answer
+function copied(text) {
+  outbox.hidden = !text;
+  outbox.value = text;
+  if (!text) return;
+  outbox.select();
+  const done = () => {
+    say(TEXTS.copied);
+    setTimeout(() => alertLine.textContent === TEXTS.copied && say(""), 2000);
+  };
+  navigator.clipboard?.writeText(text).then(done, () => {});
+}
+function saved(text, type, suffix) {
+  if (!text) return;
+  const link = make("a", { href: URL.createObjectURL(new Blob([text], { type })), download: `${document.title.replace(/[^\w-]+/g, "-") || "page"}.${suffix}` });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+const undoButton = tool(TEXTS.undo, () => {
+  undo();
+  anew();
+});

@@ -113,11 +113,13 @@ solveSheet = () => {
   }
 };
 
+const boxes = []; // of each run
 function build() {
   $("entries").querySelectorAll("fieldset, .scroll").forEach((one) => one.remove());
   inputs.clear();
   for (const [k, run] of sheet.runs.entries()) {
-    const box = put($("entries"), "fieldset", {});
+    const box = put($("entries"), "fieldset");
+    boxes[k] = box;
     put(box, "legend", {}, run);
     const table = put(put(box, "div", { class: "scroll" }), "table", { class: "cells" });
     const head = put(put(table, "thead"), "tr");
@@ -131,35 +133,43 @@ function build() {
     });
     if (!k) continue;
     put(box, "p", { class: "soft" }, TEXTS.standing);
-    const on = put(put(put(box, "div", { class: "scroll" }), "table", { class: "cells" }), "tbody");
+    const masses = put(put(box, "div", { class: "scroll" }), "table", { class: "cells" });
+    const heads = put(put(masses, "thead"), "tr");
+    for (const text of ["", `${TEXTS[word]}, ${sheet.mass.unit}`, `${TEXTS.angle}, deg`]) put(heads, "th", { scope: "col" }, text);
+    const on = put(masses, "tbody");
     sheet.planes.forEach((plane, p) => {
       const line = put(on, "tr");
-      put(line, "th", { scope: "row" }, `${plane}, ${sheet.mass.unit}`);
+      put(line, "th", { scope: "row" }, plane);
       cell(put(line, "td"), onRotor(k, p, word), sheet.mass.kind, sheet.mass.unit, { positive: true, empty: true });
       cell(put(line, "td"), onRotor(k, p, "angle"), "angle", "deg", { empty: true });
     });
   }
   update();
 }
+const R = 78; // of a dial
 function dial(parent, plane) {
   const host = put(parent, "figure");
   put(host, "figcaption", {}, TEXTS.dial(plane));
   const picture = put(host, "svg", { role: "img", "aria-label": TEXTS.dial(plane), viewBox: "0 0 300 260", class: "polygon" });
-  put(picture, "circle", { class: "dial", cx: 150, cy: 130, r: 92 });
+  put(picture, "circle", { class: "dial", cx: 150, cy: 130, r: R });
   const at = (angle, r) => [(150 + r * Math.cos(angle)).toFixed(1), (130 - r * Math.sin(angle)).toFixed(1)];
   for (const place of sheet.places ?? []) {
-    const [x, y] = at(place, 92);
+    const [x, y] = at(place, R);
     put(picture, "circle", { class: "place", cx: x, cy: y, r: 4 });
   }
-  const marks = sheet.places ? [1, 2].map((i) => [answer(`split.${plane}.${i}.angle`), answer(`split.${plane}.${i}.${word}`)]) : [[answer(`trim.${plane}.angle`), answer(`trim.${plane}.${word}`)]];
-  for (const [angle, size] of marks) {
-    if (!Number.isFinite(angle + size)) continue;
-    const [x, y] = at(angle, 92);
+  const marks = (sheet.places ? [`split.${plane}.1`, `split.${plane}.2`] : [`trim.${plane}`]).map((name) => [answer(`${name}.angle`), answer(`${name}.${word}`)]).filter(([angle, size]) => Number.isFinite(angle) && size > 0);
+  // the words of two marks that are close stand farther apart
+  const between = marks.length < 2 ? 0 : Math.atan2(Math.sin(marks[1][0] - marks[0][0]), Math.cos(marks[1][0] - marks[0][0]));
+  const apart = between ? (Math.sign(between) * Math.max(0, 0.6 - Math.abs(between))) / 2 : 0;
+  for (const [k, [angle, size]] of marks.entries()) {
+    const [x, y] = at(angle, R);
     put(picture, "circle", { class: "place on", cx: x, cy: y, r: 7 });
-    const [u, v] = at(angle, 115);
-    put(picture, "text", { x: u, y: v }, amount(size));
-    const [c, d] = at(angle, 70);
-    put(picture, "text", { x: c, y: d }, `${Number(((angle * 180) / Math.PI).toFixed(1))}°`);
+    const words = angle + (k ? apart : -apart);
+    const [u, v] = at(words, R + 13);
+    const side = Math.abs(Math.cos(words)) < 0.3 ? "" : Math.cos(words) > 0 ? "start" : "end";
+    const y0 = Number(v) - 8 * Math.sin(words);
+    put(picture, "text", { x: u, y: y0 - 7, class: side }, amount(size));
+    put(picture, "text", { x: u, y: y0 + 7, class: side }, `${Number(((angle * 180) / Math.PI).toFixed(1))}°`);
   }
   put(picture, "text", { x: 150, y: 130 }, "0° →");
 }
@@ -167,16 +177,26 @@ drawSheet = () => {
   keep();
   const host = $("answers");
   host.replaceChildren();
+  for (const [k, box] of boxes.entries()) box.classList.toggle("unused", k > 0 && !readIn(k));
   const turn = Math.PI / 180;
   for (const text of beyond) put(host, "p", { class: "doubt", role: "status" }, text);
   for (const text of idle) put(host, "p", { role: "status" }, text);
-  const sure = (name, by) => (sheet.errors && Number.isFinite(answer(name)) ? ` ± ${Number((answer(name) / by).toPrecision(2))}` : "");
-  const vectors = (lead, more) => sheet.planes.map((plane) => [plane, shownAnswer(`${lead}${plane}.${word}`, sheet.mass.si) + (more ? sure(`${lead}${plane}.${word}_uncertainty`, sheet.mass.si) : ""), shownAnswer(`${lead}${plane}.angle`, turn) + (more ? sure(`${lead}${plane}.angle_uncertainty`, turn) : "")]);
-  listed(host, TEXTS.corrections, ["", `${TEXTS[word]}, ${sheet.mass.unit}`, `${TEXTS.angle}, deg`], vectors("", true));
-  listed(host, TEXTS.trim, ["", `${TEXTS[word]}, ${sheet.mass.unit}`, `${TEXTS.angle}, deg`], vectors("trim.", true));
-  if (sheet.planes.some((plane) => answers.has(`fresh.${plane}.${word}`))) listed(host, TEXTS.fresh, ["", `${TEXTS[word]}, ${sheet.mass.unit}`, `${TEXTS.angle}, deg`], vectors("fresh.", false));
+  // as many digits as the standard deviation leaves: two of its own
+  const sure = (name, by, plain) => {
+    const [x, error] = [answer(name) / by, answer(`${name}_uncertainty`) / by];
+    if (!sheet.errors || !Number.isFinite(x) || !(error > 0)) return plain;
+    const places = Math.min(15, Math.max(0, 1 - Math.floor(Math.log10(error))));
+    return `${x.toFixed(places)} ± ${error.toFixed(places)}`;
+  };
+  const vectors = (lead) => sheet.planes.map((plane) => {
+    const [size, angle] = shownVector(`${lead}${plane}.`, word, sheet.mass.si, "angle");
+    return [plane, sure(`${lead}${plane}.${word}`, sheet.mass.si, size), angle === "–" ? angle : sure(`${lead}${plane}.angle`, turn, angle)];
+  });
+  listed(host, TEXTS.corrections, ["", `${TEXTS[word]}, ${sheet.mass.unit}`, `${TEXTS.angle}, deg`], vectors(""));
+  listed(host, TEXTS.trim, ["", `${TEXTS[word]}, ${sheet.mass.unit}`, `${TEXTS.angle}, deg`], vectors("trim."));
+  if (sheet.planes.some((plane) => answers.has(`fresh.${plane}.${word}`))) listed(host, TEXTS.fresh, ["", `${TEXTS[word]}, ${sheet.mass.unit}`, `${TEXTS.angle}, deg`], vectors("fresh."));
   if (doubts.length) put(host, "p", { class: "doubt", role: "status" }, doubts.join(" "));
-  listed(host, TEXTS.expected, ["", `${TEXTS.amplitude}, ${amplitudeUnit}`, `${TEXTS.phase}, deg`], sheet.sensors.map((sensor) => [sensor, shownAnswer(`residual/${sensor}/amplitude`), shownAnswer(`residual/${sensor}/phase`, turn)]));
+  listed(host, TEXTS.expected, ["", `${TEXTS.amplitude}, ${amplitudeUnit}`, `${TEXTS.phase}, deg`], sheet.sensors.map((sensor) => [sensor, ...shownVector(`residual/${sensor}/`, "amplitude", 1, "phase")]));
   const drawn = put(host, "div", { class: "polygons" });
   if (answers.size) for (const plane of sheet.planes) dial(drawn, plane);
   const box = put(host, "details");
@@ -193,6 +213,7 @@ drawSheet = () => {
 };
 
 function csv() {
+  if (wrong.size) return "";
   const speeds = sheet.channels.some(([, speed]) => speed !== null);
   const lines = [["run", "sensor", ...(speeds ? [`speed_${sheet.speedUnit}`] : []), `amplitude_${sheet.amplitude}`, "phase_deg", "trial_plane", `trial_${word}_${sheet.mass.header}`, "trial_angle_deg"].join(",")];
   for (const [k, run] of sheet.runs.entries()) {

@@ -3,7 +3,7 @@ const loose = { host: null, panels: [] };
 const SHADES = { weight: "weight", "inertia force": "inertia", "joint force": "force" };
 function looseOn(on) {
   loose.host?.remove();
-  loose.host = on ? make("section", { id: "loose", "aria-label": "free-body diagrams" }) : null;
+  loose.host = on ? make("section", { id: "loose", "aria-label": TEXTS.freeBodies }) : null;
   if (!on) return;
   $("values").prepend(loose.host);
   loose.note = put(loose.host, "p", { class: "soft" });
@@ -11,7 +11,7 @@ function looseOn(on) {
     const box = put(loose.host, "figure");
     put(box, "figcaption", {}, whole.bodies[b].name);
     const picture = svgIn(box);
-    picture.setAttribute("aria-label", `free-body diagram of ${whole.bodies[b].name}`);
+    picture.setAttribute("aria-label", TEXTS.freeBodyOf(whole.bodies[b].name));
     return { b, parts, picture, lines: put(picture, "g"), words: texts(picture), line: put(box, "p", { class: "soft" }) };
   });
 }
@@ -36,7 +36,7 @@ function drawLoose(i) {
   const real = links.every(({ points }) => points.flat().every(Number.isFinite));
   const sizes = links.flatMap(({ forces }) => forces.map(({ force }) => Math.hypot(...force)).filter(Number.isFinite));
   const largest = Math.max(0, ...sizes);
-  loose.note.textContent = real ? `Free bodies: all to one scale; the longest arrow is ${four(largest)} N.` : TEXTS.open;
+  loose.note.textContent = real ? TEXTS.toOneScale(four(largest)) : TEXTS.open;
   const across = (values) => (values.length ? Math.max(...values) - Math.min(...values) : 0);
   const widest = Math.max(0, ...links.flatMap(({ points }) => [0, 1].map((k) => across(points.map((z) => z[k]))))) || 1;
   const each = largest ? (0.8 * widest) / largest : 0;
@@ -80,7 +80,7 @@ function drawLink({ b, points, forces, lines, words }, spot, each, side) {
   }
 }
 if (whole.loose) {
-  toggle("b", "free bodies", false, (on) => {
+  toggle("b", TEXTS.freeBodies, false, (on) => {
     looseOn(on);
     drawLoose(shown);
   });

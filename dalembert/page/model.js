@@ -349,7 +349,6 @@ class Machine extends Way {
 
 // --- the numbers of the moment ------------------------------------------------------------------------------------------
 let machine, numbers, freePose, state;
-const wrong = new Set(); // what was typed and is no number
 function begin(data) {
   machine = new Machine(data.model, tapes);
   [numbers, freePose] = [{ ...machine.own }, data.model.first.slice()];

@@ -170,8 +170,9 @@ function drawCentres(i) {
   for (const [k, [a, b]] of pairs.entries()) {
     const [x, y] = drawn.centres ? centre(a, b, i) : [NaN, NaN];
     const [u, v] = [px(x), py(y)];
+    const real = [...field(a, i), ...field(b, i)].every(Number.isFinite);
     const far = !(Math.hypot(x, y) < 1e6 * (right - left + high - low));
-    centreCells?.[k].forEach((cell, axis) => (cell.textContent = far ? "∞" : short([x, y][axis] / lengths)));
+    centreCells?.[k].forEach((cell, axis) => (cell.textContent = real ? (far ? "∞" : short([x, y][axis] / lengths)) : "–"));
     if (!(u > -20 && u < width + 20 && v > -20 && v < height + 20)) continue;
     d += `M${fixed(u - 5, v - 5)}L${fixed(u + 5, v + 5)}M${fixed(u - 5, v + 5)}L${fixed(u + 5, v - 5)}`;
     const text = `${whole.bodies[a].name} / ${whole.bodies[b].name}`;
@@ -374,7 +375,7 @@ function resize() {
 
 // --- values and controls ------------------------------------------------------------------------------------------------
 table(TEXTS.points, [...pointHeads, TEXTS.path], whole.points.map((p) => [p.name, [p.x, p.y]]), () => true, (row, name) => {
-  const box = put(put(row, "td"), "input", { type: "checkbox", "aria-label": TEXTS.pathOf(name) });
+  const box = put(put(put(row, "td"), "label", { class: "box" }), "input", { type: "checkbox", "aria-label": TEXTS.pathOf(name) });
   box.checked = traced.has(name);
   box.addEventListener("change", () => {
     traced[box.checked ? "add" : "delete"](name);

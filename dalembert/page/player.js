@@ -133,7 +133,7 @@ function table(caption, heads, rows, exactly, more) {
     for (const [cell, k, every] of cells) {
       const x = k === null ? NaN : whole.columns[k].values[i];
       if (data.model) fillHeld(cell, k, i, every);
-      else if (every) fill(cell, x);
+      else if (every) fill(cell, exact(x));
       else cell.textContent = k === null ? "" : short(x);
     }
   });

@@ -2,20 +2,17 @@
 const sheet = data.sheet;
 let values = { ...sheet.values }; // SI and radians, amplitudes as the file has them; NaN where a cell is empty
 const own = { ...sheet.values };
-const wrong = new Map(); // cells that are no number: what to say
-const past = [];
 let answers = new Map(); // name -> [number, how far a second computation with 32 digits is from it]
 let solveSheet, drawSheet; // of the kind of sheet
 const inputs = new Map(); // name -> {input, units, unit}
 
-function remember() {
-  past.push(structuredClone({ values, rows: sheet.rows }));
-  if (past.length > 500) past.shift();
-}
+const snapshot = () => structuredClone({ values, rows: sheet.rows });
+const restore = (before) => ([values, sheet.rows] = [before.values, before.rows]);
+const anew = () => build();
 // a cell of a table: what was typed is checked at once, and a wrong one leaves no answer standing
 function cell(parent, name, kind, unit, rules = {}) {
   const units = sheet.units[kind];
-  const input = numberField(parent, name, name, units, unit, (x, text) => {
+  const input = numberField(parent, name, units, unit, !rules.positive && kind !== "angle", (x, text) => {
     const empty = text.trim() === "";
     check(name, empty && rules.empty ? NaN : x, text, rules);
     update();
@@ -35,6 +32,12 @@ function check(name, x, text, rules) {
     wrong.set(name, TEXTS.negative(name, text));
     return;
   }
+  const slack = rules.within ? 1e-9 * (rules.within[1] - rules.within[0]) : 0;
+  if (rules.within && (x < rules.within[0] - slack || x > rules.within[1] + slack)) {
+    const [low, high] = rules.within.map((end) => shortest(end, of.units, of.unit));
+    wrong.set(name, TEXTS.outside(name, text, low, `${high} ${of.unit}`));
+    return;
+  }
   if (!wrong.delete(name) || !Object.is(values[name], x)) remember();
   values[name] = x;
 }
@@ -46,10 +49,11 @@ function listCells() {
     input.removeAttribute("aria-invalid");
     input.classList.toggle("changed", !Object.is(values[name], own[name]));
   }
-  undoButton.disabled = !past.length;
+  listUndo();
 }
 function update() {
   answers = new Map();
+  copied("");
   if (!wrong.size) solveSheet();
   say([...wrong.values()].join("; "));
   drawSheet();
@@ -61,27 +65,18 @@ function shownAnswer(name, by = 1) {
   const [x, error] = answers.get(name) ?? [NaN, 0];
   return Number.isFinite(x) ? short(Number(held(x / by, error / by)) || 0) : "–";
 }
+// a vector's size and angle; what is nothing has no angle
+function shownVector(name, what, by, angle) {
+  const size = shownAnswer(`${name}${what}`, by);
+  return [size, Number(size) ? shownAnswer(`${name}${angle}`, Math.PI / 180) : "–"];
+}
 const whole = (x) => (x < 0 ? (x + 2 * Math.PI < 2 * Math.PI ? x + 2 * Math.PI : 0) : x + 0);
 // the outputs of a tape by their names, with how far 32 digits are from them
 function solved(tape, names, given, twice) {
   const [out, more] = [tape.one(given), tape.twice(twice)];
   return new Map(names.map((name, k) => [name, [out[k], Math.abs(more[k][0] - out[k] + more[k][1]), more[k]]]));
 }
-const tools = put($("entries"), "div", { id: "tools", role: "group" });
-put($("entries"), "p", { id: "alert", role: "alert" });
-function tool(text, act) {
-  const button = put(tools, "button", { type: "button" }, text);
-  button.addEventListener("click", act);
-  return button;
-}
-const undoButton = tool(TEXTS.undo, () => {
-  if (!past.length) return;
-  const before = past.pop();
-  values = before.values;
-  sheet.rows = before.rows;
-  wrong.clear();
-  build();
-});
+$("entries").append(tools, outbox, alertLine);
 tool(TEXTS.reset, () => {
   remember();
   values = { ...own };
@@ -89,19 +84,8 @@ tool(TEXTS.reset, () => {
   wrong.clear();
   build();
 });
-const given = make("textarea", { id: "given", readonly: "", rows: "4", "aria-label": TEXTS.toCopy, hidden: "" });
-tools.after(given);
-tool(TEXTS.copyRows, () => {
-  given.hidden = false;
-  given.value = csv();
-  given.select();
-  navigator.clipboard?.writeText(given.value).then(() => say(TEXTS.copied), () => {});
-});
-tool(TEXTS.saveRows, () => {
-  const link = make("a", { href: URL.createObjectURL(new Blob([csv()], { type: "text/csv" })), download: `${document.title.replace(/[^\w-]+/g, "-") || "sheet"}.csv` });
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-});
+tool(TEXTS.copyRows, () => copied(csv()));
+tool(TEXTS.saveRows, () => saved(csv(), "text/csv", "csv"));
 tool(TEXTS.print, () => print());
 const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
 const inUnit = (x, kind, unit) => (Number.isNaN(x ?? NaN) ? "" : shortest(x, sheet.units[kind], unit));

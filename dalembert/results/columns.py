@@ -11,11 +11,13 @@ from itertools import pairwise
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from dalembert.units import LISTED, RESULTS, from_si, to_si
+from dalembert.units import LISTED, RESULTS, UNITS, from_si, to_si
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
+
+    from dalembert.arithmetic.doubled import Doubled
 
     Cell = str | float | None
     Values = Sequence[Cell] | NDArray[np.float64]
@@ -86,6 +88,7 @@ def number(
     unit: str = "",
     error: Callable[[], ArrayLike] | None = None,
     place: Place = "",
+    exact: Callable[[], Doubled] | None = None,
 ) -> Column:
     """A quantity, shown in a unit.
 
@@ -103,6 +106,8 @@ def number(
         Their rounding errors, in the same unit as `si`.
     place
         Where it stands in a row of the JSON document, without its unit; by default under its name, None: not in JSON.
+    exact
+        The same numbers in 32 digits: the errors are by what those shown differ from them.
 
     Examples
     --------
@@ -128,7 +133,28 @@ def number(
         return from_si(to_si(values, dimension, own), dimension, unit)
 
     errors = None if error is None else lambda: shown(error())
+    if exact is not None:
+        errors = apart(shown(array), dimension, unit, exact)
     return Column(name, unit, shown(array), errors, key, array)
+
+
+def apart(
+    values: NDArray[np.float64], dimension: str, unit: str, exact: Callable[[], Doubled]
+) -> Callable[[], NDArray[np.float64]]:
+    """By what numbers in a unit differ from the same in 32 digits, which are in the unit of JSON; worked out on request."""
+
+    def errors() -> NDArray[np.float64]:
+        import numpy as np
+
+        from dalembert.arithmetic.doubled_vectors import off
+
+        second = exact()
+        if unit != document_unit(dimension):
+            numerator, denominator = UNITS[dimension][unit]
+            second = second * float(denominator) / float(numerator)
+        return np.broadcast_to(off(values, second, 360.0 if unit == "deg" else 0.0), values.shape)
+
+    return errors
 
 
 def vector(

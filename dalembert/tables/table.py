@@ -46,6 +46,13 @@ class Numbers:
         return to_si(self.values, self.dimension, self.unit)
 
     @property
+    def decimals(self) -> list[Fraction]:
+        """The numbers of the file as they are written, in its unit."""
+        from fractions import Fraction
+
+        return [Fraction(repr(x)) for x in self.values.tolist()]
+
+    @property
     def exact(self) -> list[Fraction]:
         """The decimals of the file in SI, not rounded: `unit` of an angle in degrees."""
         from dalembert.quantities import exactly
@@ -163,6 +170,19 @@ class Table:
         if quantity not in self.numbers:
             raise DataError(f"{self.file}: no column {spellings(quantity, dimension)} {self.told}")
         return self.numbers[quantity]
+
+
+def numbered(codes: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Number codes in the order in which they first stand: the number of each code, and where each number first stands.
+
+    >>> numbered(np.array([7, 3, 7, 5]))
+    (array([0, 1, 0, 2]), array([0, 1, 3]))
+    """
+    _, first, inverse = np.unique(codes, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return rank[inverse], first[order]
 
 
 def read(

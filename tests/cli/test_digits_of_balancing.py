@@ -288,3 +288,78 @@ def test_a_table_does_not_round_an_angle_to_a_full_turn() -> None:
     )
     assert cut.cells == {"angle_deg": [0.0, 12.3]}
     assert not unknown
+
+
+def test_a_trial_mass(dalembert: Dalembert) -> None:
+    """Speeds in rpm have π in them, which no float has."""
+    done = dalembert(
+        "trial",
+        "--rotor-mass",
+        "120.1kg",
+        "--speed",
+        "2999.3rpm",
+        "--radius",
+        "0.3in",
+        "--planes",
+        "3",
+        "--digits",
+    )
+    (row,) = rows(done)
+    with mp.workdps(40):
+        speed = mp.mpf("2999.3") * mp.pi / 30
+        unbalance = mp.mpf("0.1") * mp.mpf("120.1") / 3 * mp.mpf("9.80665") / speed**2
+        holds(row["unbalance_g_mm"], unbalance * 10**6, 14)
+        holds(row["mass_g"], unbalance / (mp.mpf("0.3") * mp.mpf("0.0254")) * 1000, 14)
+
+
+@pytest.mark.parametrize(("second", "fewest"), [("40", 13), ("10.0000001", 6)])
+def test_modes(second: str, fewest: int, dalembert: Dalembert, tmp_path: Path) -> None:
+    """A cubic through four stations, two masses; planes close together leave fewer digits."""
+    z = ["0", "10", "30", "40"]
+    shapes = [["0.1", "0.7", "0.9", "0.3"], ["0.3", "0.8", "-0.7", "-0.2"]]
+    table = [f"{at},{a},{b}" for at, a, b in zip(z, *shapes, strict=True)]
+    (tmp_path / "modes.csv").write_text("\n".join(["z_mm,first,second", *table]) + "\n")
+    masses = [("2.3", "31.7", "7"), ("1.9", "204.1", "33")]
+    head = "unbalance_g_mm,angle_deg,z_mm"
+    text = "\n".join([head, *(",".join(one) for one in masses)]) + "\n"
+    planes = ["--plane", "A:10mm:20mm", "--plane", f"B:{second}mm:20mm"]
+    both = rows(dalembert("balance", "-", *planes, "--modes", "modes.csv", "--digits", stdin=text))
+
+    def at(k: int, place: str) -> Any:
+        x = [mp.mpf(one) for one in z]
+        terms = [
+            mp.fprod((mp.mpf(place) - x[i]) / (x[j] - x[i]) for i in range(4) if i != j) for j in range(4)
+        ]
+        return mp.fsum(mp.mpf(shape) * term for shape, term in zip(shapes[k], terms, strict=True))
+
+    with mp.workdps(50):
+        a = mp.matrix([[at(k, place) for place in ("10", second)] for k in range(2)])
+        b = mp.matrix([sum(vector(m[0], m[1]) * at(k, m[2]) for m in masses) for k in range(2)])
+        for row, w in zip(both, mp.lu_solve(a, -b), strict=True):
+            holds(row["unbalance_g_mm"], abs(w), fewest)
+            holds(row["angle_deg"], mp.degrees(mp.arg(w)) % 360, fewest, 360)
+
+
+@pytest.mark.parametrize(
+    ("last", "lag", "fewest"), [("213.7", False, 13), ("0.0031", False, 9), ("213.7", True, 13)]
+)
+def test_index_balancing(last: str, lag: bool, fewest: int, dalembert: Dalembert) -> None:
+    """Three positions, or nearly one; phases that lag; what the parts do not explain."""
+    read = [("0", "5.3", "31.7"), ("71.3", "3.1", "204.1"), (last, "4.7", "99")]
+    if fewest < 13:
+        del read[1]
+    text = "\n".join(["turned_deg,amplitude_um,phase_deg", *(",".join(one) for one in read)]) + "\n"
+    both = rows(dalembert("index", "-", *(["--phase-lag"] if lag else []), "--digits", stdin=text))
+    with mp.workdps(50):
+        v = [vector(size, f"-{angle}" if lag else angle) for _, size, angle in read]
+        e = [vector("1", turn) for turn, *_ in read]
+        mean, middle = (mp.fsum(x) / len(read) for x in (e, v))
+        size = mp.fsum(abs(x - mean) ** 2 for x in e)
+        rotor = mp.fsum(mp.conj(x - mean) * y for x, y in zip(e, v, strict=True)) / size
+        mandrel = middle - mean * rotor
+        for row, true in zip(both, (rotor, mandrel), strict=True):
+            holds(row["amplitude_um"], abs(true), fewest)
+            holds(row["phase_deg"], mp.degrees(mp.arg(true)) % 360, fewest, 360)
+            if len(read) == 3:
+                square = mp.fsum(abs(y - mandrel - rotor * x) ** 2 for x, y in zip(e, v, strict=True))
+                holds(row["uncertainty_um"], mp.sqrt(square / size / 2), fewest - 1)

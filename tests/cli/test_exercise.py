@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from tests.cli.pages import Opened
 from tests.conftest import Dalembert
 
 ROTOR = """name,weight_N,radius_mm,angle_deg,z_mm
@@ -322,3 +324,49 @@ def test_an_unknown_system_is_status_2(dalembert: Dalembert, folder: Path) -> No
     done = dalembert("exercise", "e.toml", "-o", "out", "--for", "canvas")
     assert done.returncode == 2
     assert "prairielearn or numbas" in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["exercise-rotor", "exercise-klann"])
+def test_a_sheet_carries_its_page(name: str, dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """The page in the sheet's frame has the student's numbers and answers, on a phone too; it is not printed."""
+    assert dalembert("examples", name).returncode == 0
+    done = dalembert("exercise", f"{name}.toml", "--students", "2", "--page", "-o", "week")
+    assert done.returncode == 0, done.stderr
+    phone = {"width": 360, "height": 740, "deviceScaleFactor": 2, "mobile": True}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", phone)
+    try:
+        for student in ("1", "2"):
+            opened = Opened(browser, tmp_path / "week" / f"sheet-{student}.html")
+            opened("document.querySelector('details').open = true")
+            assert opened("return document.documentElement.scrollWidth") <= 360
+            browser.switch_to.frame(0)
+            assert opened("return document.documentElement.scrollWidth <= innerWidth")
+            for row in rows(tmp_path / "week" / "key.csv"):
+                if row["student"] != student:
+                    continue
+                quantity, plane = row["quantity"], row.get("plane", "")
+                name_of = {"mass_kg": f"{plane}.mass", "angle_deg": f"{plane}.angle"}.get(quantity)
+                asked = name_of or quantity.replace("_angle_deg", ".angle").replace("_m", "").replace(
+                    "_", "."
+                )
+                shown = float(opened("return dalembert.get(arguments[0])", asked))
+                value, unit = float(row["value"]), row["unit"]
+                if unit in ("deg", "°"):
+                    assert math.cos(shown - math.radians(value)) == pytest.approx(1, abs=1e-12)
+                else:
+                    scale = {"kg": 1, "g": 1e-3, "m": 1, "mm": 1e-3}[unit]
+                    assert shown == pytest.approx(value * scale, rel=1e-9)
+            browser.switch_to.default_content()
+            assert opened.faults() == []
+    finally:
+        browser.switch_to.default_content()
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_a_page_where_the_command_has_none(dalembert: Dalembert, tmp_path: Path) -> None:
+    assert dalembert("examples", "exercise-rod").returncode == 0
+    done = dalembert("exercise", "exercise-rod.toml", "--page", "-o", "week")
+    assert done.returncode == 2
+    assert "which has no page" in " ".join(done.stderr.split())
+    assert not (tmp_path / "week").exists()

@@ -175,7 +175,7 @@ def test_many_machines_with_runs_of_their_own(dalembert: Dalembert) -> None:
 
 def test_machines_with_runs_planes_and_repeats_of_their_own_are_each_least_squares(tmp_path: Any) -> None:
 
-    from cli.field.reading import read_measured
+    from cli.field.groups import measured_groups
     from cli.field.request import Request
 
     rng = np.random.default_rng(11)
@@ -212,7 +212,7 @@ def test_machines_with_runs_planes_and_repeats_of_their_own_are_each_least_squar
         "rotor,run,state,amplitude_um,phase_deg,trial_plane,trial_mass_kg,trial_angle_deg\n"
         + "".join(lines[i] for i in mixed)
     )
-    runs, _ = read_measured(str(path), Request(rotation="ccw"), (), None)
+    runs, _ = measured_groups(str(path), Request(rotation="ccw"))
     seen = 0
     for group in runs.groups:
         assert group.fit is not None

@@ -117,6 +117,43 @@ def test_what_is_typed_takes_a_unit_and_a_wrong_entry_leaves_no_answer(klann: Co
     assert klann.get("H.x") == before
     klann.button("undo")
     assert klann.get("H.x") == standing
+    # nothing is taken away with a wrong entry, nor stays from before it; undo takes the wrong entry back alone
+    outbox = "const box = document.getElementById('outbox'); return box.hidden ? '' : box.value"
+    klann.button("copy TOML")
+    assert "0.121" in klann(outbox)
+    klann.press("i")
+    klann.type("links.crank.B.x", "much")
+    klann.button("copy TOML")
+    klann.button("copy --set options")
+    assert [klann(outbox), klann("return dalembert.options()"), klann("return dalembert.toml()")] == [""] * 3
+    assert klann.text("limits") == ""
+    assert {cell for row in klann.table("Instant centres").values() for cell in row} == {"–"}
+    klann.button("undo")
+    assert klann.alert == ""
+    assert klann.get("links.crank.B.x") == 0.121
+    assert klann.get("H.x") == standing
+    assert klann.faults() == []
+
+
+def test_real_keys(klann: Computing) -> None:
+    """A number typed key by key is one change; the space key ticks the box that has the focus, and does not play."""
+    from selenium.webdriver.common.keys import Keys
+
+    klann("document.querySelectorAll('details').forEach((d) => (d.open = true))")
+    field = klann.browser.find_element("css selector", 'input[data-name="links.crank.B.x"]')
+    for text in ("125 mm", "13 cm"):
+        field.send_keys(Keys.CONTROL + "a")
+        field.send_keys(text + Keys.TAB)
+    assert klann.get("links.crank.B.x") == 0.13
+    for length in (0.125, 0.12):
+        klann.button("undo")
+        assert klann.get("links.crank.B.x") == length
+    assert klann("return document.getElementById('tools').firstChild.disabled")
+    box = klann.browser.find_element("css selector", "input[type=checkbox]")
+    ticked = box.is_selected()
+    box.send_keys(Keys.SPACE)
+    assert box.is_selected() != ticked
+    assert klann("return document.getElementById('play').getAttribute('aria-label')") == "play"
     assert klann.faults() == []
 
 
@@ -305,6 +342,7 @@ def test_a_table_of_masses(dalembert: Dalembert, tmp_path: Path, browser: Any) -
         assert page.alert
         assert math.isnan(page.get("A.unbalance"))
         assert page.table("Corrections: material to add")["A"] == ["–"] * 3
+        assert page("return dalembert.csv()") == ""
     page.button("undo")
     page.button("reset")
     hold(done.stdout)
@@ -431,3 +469,83 @@ def test_a_sheet_is_of_readings_with_phases(dalembert: Dalembert, tmp_path: Path
     assert done.returncode == 2
     assert "amplitudes with phases" in " ".join(done.stderr.split())
     assert not (tmp_path / "f.html").exists()
+
+
+def modal_page_holds(
+    words: tuple[str, ...], changes: list[dict[str, float]], dalembert: Dalembert, folder: Path, browser: Any
+) -> Computing:
+    """A page of modal balancing beside the program, for the table as it is and as it is edited."""
+    for name in ("rotor.csv", "modes.csv"):
+        (folder / name).write_text((EXAMPLES / "modal-turbine" / name).read_text())
+    options = (*words, "--modes", "modes.csv")
+    assert dalembert("balance", "rotor.csv", *options, "--page", "b.html").returncode == 0
+    page = Computing(browser, folder / "b.html")
+    for change in ({}, *changes):
+        assert page.put(**change)
+        (folder / "again.csv").write_text(page("return dalembert.csv()"))
+        done = dalembert("balance", "again.csv", *options, "--json")
+        assert done.returncode == 0, done.stderr
+        (rotor,) = json.loads(done.stdout)["rotors"]
+        largest = max(row["unbalance_kg_m"] for row in rotor["corrections"])
+        for row in rotor["corrections"]:
+            found = page.get(f"{row['plane']}.mass") * np.exp(1j * page.get(f"{row['plane']}.angle"))
+            expected = row["mass_kg"] * np.exp(1j * math.radians(row["angle_deg"]))
+            assert abs(found - expected) < 1e-12 * largest / row["radius_m"]
+        for mode in rotor["modes"]:
+            name, size = f"mode {mode['mode']}", mode["initial"]["modal_unbalance_kg_m"]
+            assert page.get(f"{name}.unbalance") == pytest.approx(size, rel=1e-12)
+            assert page.get(f"{name}.angle") == pytest.approx(
+                math.radians(mode["initial"]["angle_deg"]), rel=1e-12
+            )
+            left = mode["residual"]["modal_unbalance_kg_m"]
+            assert page.get(f"residual.{name}") == pytest.approx(left, rel=1e-9, abs=1e-12 * largest)
+        residual = rotor["residual"]["static_unbalance_kg_m"]
+        assert page.get("residual.static") == pytest.approx(residual, abs=1e-12 * largest)
+    return page
+
+
+TURBINE = ("--plane", "A:300mm:80mm", "--plane", "B:900mm:80mm")
+
+
+def test_modes(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """A mass moves along the shaft from one cubic of the shapes to another; beyond the shaft there is no shape, and no answer."""
+    names = [
+        line.split(",")[0]
+        for line in (EXAMPLES / "modal-turbine" / "rotor.csv").read_text().splitlines()[1:3]
+    ]
+    first, second = (f"{name}__z" for name in names)
+    page = modal_page_holds(TURBINE, [{first: 0.71, second: 0.0}], dalembert, tmp_path, browser)
+    corrections = page.table("Corrections: material to add")
+    assert "–" not in {cell for cells in corrections.values() for cell in cells}
+    for z in ("-1 mm", "9 m"):
+        page.type(first.replace("__", "."), z)
+        assert "where the mode shapes are known" in page.alert
+        assert math.isnan(page.get("A.mass"))
+    page.button("undo")
+    page.button("add a row")
+    assert not math.isnan(page.get("A.mass"))
+    assert page.faults() == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "words",
+    [
+        (*TURBINE, "--plane", "C:1m:70mm"),
+        (*TURBINE, "--mode-count", "1"),
+        (*TURBINE, "--plane", "C:500mm:70mm", "--plane", "D:1m:70mm", "--rigid"),
+        (*TURBINE, "--round-mass", "0.1g", "--round-angle", "1deg"),
+        (*TURBINE, "--remove", "--grade", "G2.5", "--speed", "3000rpm", "--rotor-mass", "60kg"),
+    ],
+    ids=" ".join,
+)
+def test_modes_of_all_kinds(
+    words: tuple[str, ...], dalembert: Dalembert, tmp_path: Path, browser: Any
+) -> None:
+    rng = np.random.default_rng(17)
+    table = (EXAMPLES / "modal-turbine" / "rotor.csv").read_text().splitlines()[1:]
+    changes = [
+        {f"{row.split(',')[0]}__z": float(rng.uniform(0.01, 1.1)) for row in table[:4]} for _ in range(3)
+    ]
+    page = modal_page_holds(words, changes, dalembert, tmp_path, browser)
+    assert page.faults() == []

@@ -96,7 +96,7 @@ def tried(name: str, m: Mechanism, rng: np.random.Generator, times: int, width: 
     # a moment is a sum of forces at arms of about a metre: rounding is of their size
     alike = dict.fromkeys(("force", "effort", "newton-euler", "shaking", "moment", "shaking moment"), "load")
     alike |= {"point": "place", "slide": "place"}
-    kinds = [(alike.get(each.key[0], each.key[0]), each.order) for each in named.values()]
+    kinds = [(alike.get(each.key.kind, each.key.kind), each.order) for each in named.values()]
     return Tried(name, page, changes, list(named), kinds, true, conditions)
 
 

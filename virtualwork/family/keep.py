@@ -79,47 +79,50 @@ class Bounds:
 
     def __init__(self, m: Description, dimensions: Sequence[Dimension], bounds: Sequence[Bound]) -> None:
         self.m, self.bounds = m, tuple(bounds)
-        self._rows: list[list[tuple[Quantity, int]]] = [_rows(m, bound) for bound in self.bounds]
-        keys = list(dict.fromkeys(key for rows in self._rows for key, _ in rows))
-        self._designs = [Design(m, dimensions, [key]) for key in keys]
-        self._of = dict(zip(keys, self._designs, strict=True))
+        quantities = [_rows(m, bound) for bound in self.bounds]
+        keys = list(dict.fromkeys(key for rows in quantities for key, _ in rows))
+        first = {key: sum(len(k.names) for k in keys[:n]) for n, key in enumerate(keys)}
+        # of each bound the keys of its quantity and their rows in the design's one table
+        self._rows = [[(key, first[key] + row) for key, row in rows] for rows in quantities]
+        self._design = Design(m, dimensions, keys)
         # transmissions are judged by their sines, so that they have derivatives where they are largest
         self._limits = [self.limit(i, bound.value) for i, bound in enumerate(self.bounds)]
 
     @property
     def evaluations(self) -> int:
         """Mechanisms worked out over the sweep so far."""
-        return sum(design.evaluations for design in self._designs)
+        return self._design.evaluations
 
     def hold(self, values: Reals | None) -> None:
-        """Hold every loop on the branch that it has at some numbers; None: let it go."""
-        for design in self._designs:
-            design.hold(values)
+        """Hold every loop on the branch that it has at some numbers; None: on each design's own again."""
+        self._design.hold(values)
 
     def margins(self, values: Reals, q: Reals) -> Reals:
         """How far inside its bound each quantity is at each pose, (rows, n): relative, of the size, or rad."""
-        found = np.array([margin for i in range(len(self.bounds)) for margin in self._of_one(i, values, q)])
-        return np.where(np.isfinite(found), found, -AWAY)
+        result = np.concatenate(self._margins(values, q))
+        return np.where(np.isfinite(result), result, -AWAY)
 
-    def _of_one(self, i: int, values: Reals, q: Reals) -> list[Reals]:
-        return [self._margin(i, key, self._of[key](values, q)[row]) for key, row in self._rows[i]]
+    def _margins(self, values: Reals, q: Reals) -> list[Reals]:
+        """Of each bound the margins of its rows, (its rows, n); not finite where a pose cannot be assembled."""
+        table = self._design(values, q)
+        return [
+            np.array([self._margin(i, key, table[row]) for key, row in rows])
+            for i, rows in enumerate(self._rows)
+        ]
 
     def slopes(self, values: Reals, q: Reals) -> Reals:
         """Their derivatives to the dimensions, (rows, n, d); 0 where a pose cannot be assembled."""
-        out = []
+        table, out = self._design.slopes(values, q), []
         for i, rows in enumerate(self._rows):
             sign = -1.0 if self.bounds[i].least is None else 1.0
-            for key, row in rows:
-                slope = self._of[key].slopes(values, q)[row, :, :-1]
-                out.append(sign * slope / self._unit(i, key))
-        found = np.array(out)
-        return np.where(np.isfinite(found), found, 0.0)
+            out += [sign * table[row, :, :-1] / self._unit(i, key) for key, row in rows]
+        return np.where(np.isfinite(out), out, 0.0)
 
     def judged(self, values: Reals, q: Reals) -> tuple[Kept, ...]:
         """The extremes over a fine sweep, between its poses by the parabola through the three about the extreme."""
         result = []
-        for i, bound in enumerate(self.bounds):
-            margins = np.array(self._of_one(i, values, q)).min(axis=0)
+        for i, (bound, rows) in enumerate(zip(self.bounds, self._margins(values, q), strict=True)):
+            margins = rows.min(axis=0)
             k = int(np.argmin(np.where(np.isfinite(margins), margins, -np.inf)))
             least, at = float(margins[k]), float(q[k])
             if not np.isfinite(margins).all():
@@ -129,7 +132,7 @@ class Bounds:
                 bend = before - 2 * here + after
                 if bend > 0:
                     vertex = at + (q[1] - q[0]) * (before - after) / (2 * bend)
-                    lower = float(np.array(self._of_one(i, values, np.array([vertex]))).min())
+                    lower = float(self._margins(values, np.array([vertex]))[i].min())
                     least, at = (lower, float(vertex)) if lower < least else (least, at)
             result.append(Kept(bound, self._extreme(i, least), least >= -MET, at))
         return tuple(result)

@@ -440,4 +440,9 @@ def _said(
         )
     elif worst > accuracy:
         found.append(f"accuracy {accuracy:g} is beyond rounding here: {worst:.1e} is reached")
+    drives = run.assembly.mechanism.cam_drives
+    if drives:
+        from virtualwork.intime.contacts import contacts_lost
+
+        found += contacts_lost(run.fine, drives)
     return found

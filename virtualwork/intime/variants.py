@@ -170,7 +170,8 @@ class Variants(Family):
         levels = levels_of(self.mechanism.inputs, until)
         runs = Runs.of(self, t)
         alone = np.ones(len(self), dtype=bool)
-        lanes = _Lanes.of(self, t, q, v, levels)
+        # a cam that loses its follower is looked for in each motion
+        lanes = None if self.mechanism.cam_drives else _Lanes.of(self, t, q, v, levels)
         if lanes is not None:
             alone = lanes.fill(runs, accuracy) | lanes.meet()
             for i in np.flatnonzero(lanes.late & ~alone):

@@ -118,13 +118,16 @@ def body(
     values: list[ir.Value] = []
     circular: dict[int, tuple[ir.Value, ir.Value]] = {}
 
-    def contracted(number: int) -> tuple[ir.Value, ir.Value] | None:
-        """The factors of a product: it goes into one rounding with the sum, whatever else asks for it.
+    # where sums and products are split without error each operation rounds by itself
+    split = any(kind == "left" for kind, *_ in tape.operations)
 
-        So no answer hangs on what is asked for beside it.
+    def contracted(number: int) -> tuple[ir.Value, ir.Value] | None:
+        """The factors of a product: it goes into one rounding with the sum, whatever else needs it.
+
+        So an answer has the same digits whatever is computed with it.
         """
         kind, *factors = tape.operations[number]
-        return (values[factors[0]], values[factors[1]]) if kind == "mul" else None
+        return (values[factors[0]], values[factors[1]]) if kind == "mul" and not split else None
 
     for b, (kind, *arguments) in zip(builders, tape.operations, strict=True):
         if kind == "const":

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from balancing import pooled_prior, stored_prior
-from cli.field.layouts import Alpha, alpha_of
-from cli.field.runs import Before, Channel, Complex, Real, Rows, Runs, apart
+from cli.read.runs.layouts import Alpha, alpha_of
+from cli.read.runs.runs import Before, Channel, Complex, Real, Rows, Runs, apart
 from dalembert.angles import phasor
 from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cli.field.wide import is_wide, long_form
+from cli.read.runs.wide import is_wide, long_form
 from dalembert.angles import phasor
 from dalembert.errors import DataError
 from dalembert.quantities import parse_number

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.field.rows import numbered
-from cli.field.runs import NEAR_SPEED, Channel, Rows, Runs, apart
+from cli.read.runs.runs import NEAR_SPEED, Channel, Rows, Runs, apart
 from dalembert.errors import DataError
-from dalembert.tables.table import Table
+from dalembert.tables.table import Table, numbered
 
 Flags = NDArray[np.bool_]
 
@@ -96,14 +95,14 @@ class OfInitialRun:
 
     def _nearest(self, row: int, speed: float, same: list[tuple[int, Channel]]) -> int | None:
         """Return the channel that is meant: the speed of a run is never quite that of another."""
-        off = [apart(channel.speed_given, speed) for _, channel in same]
+        off = [apart(channel.speed_written, speed) for _, channel in same]
         nearest = min(range(len(same)), key=off.__getitem__, default=None)
         if nearest is None or (off[nearest] > NEAR_SPEED and len(same) > 1):
             return None
         if off[nearest] > 0.01:
             self.runs.warnings.append(
                 f"{self.runs.of(int(self.rotor[row]))}run {self.table.texts['run'][row]} ran at {speed:g}, the initial run at "
-                f"{same[nearest][1].speed_given or 0:g}: coefficients hold at one speed"
+                f"{same[nearest][1].speed_written or 0:g}: coefficients hold at one speed"
             )
         return same[nearest][0]
 

@@ -1,0 +1,381 @@
+"""The tables of a log: its fit, residuals, drift, a predicted run, the next run, a robust fit; influence coefficients as stored."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from balancing import (
+    Drift,
+    LogBalance,
+    NextRun,
+    drift,
+    least_squares,
+    robust_fit,
+    suggest_run,
+)
+from balancing.doubt import LEVEL
+from balancing.log_balance import CoefficientSpread
+from cli.field.field_balancing import FieldBalancing, Solved
+from cli.field.rotor import Rotor, each
+from cli.field.rows import READINGS, Rows, Tables, amplitude, masses, masses_text, vibration
+from cli.read.options import bad
+from cli.read.runs.runs import Before, Complex, Group, Real
+from dalembert.angles import degrees
+from dalembert.results.columns import ABSENT, Column, Table, names, number
+from dalembert.results.text import printed
+from dalembert.units import from_si, to_si
+
+
+def check(b: FieldBalancing) -> None:
+    """Refuse a prediction for planes that do not exist, and a next run without limits."""
+    for solved in b.solved:
+        run_to_predict(b, solved.planes)
+    if b.request.suggest and not b.max_mass:
+        raise bad("--suggest", "needs --max-mass, the largest mass of the next run")
+
+
+def run_to_predict(b: FieldBalancing, planes: list[str]) -> Complex:
+    """Return the masses of the run to be predicted, (p,)."""
+    masses = dict(b.predict or {})
+    if "" in masses and len(planes) == 1 and planes[0] not in masses:
+        masses[planes[0]] = masses.pop("")
+    for name in masses:
+        if name not in planes:
+            wrong = f"no plane {name}" if name else "several planes"
+            raise bad("--predict", f"{wrong}: expected PLANE=MASS@ANGLE with one of {', '.join(planes)}")
+    return np.array([masses.get(plane, 0) for plane in planes], dtype=complex)
+
+
+def predicted(b: FieldBalancing, solved: Solved) -> tuple[Complex, Real]:
+    """What every channel should read in the run to be predicted, and one standard deviation, (g, s) each."""
+    balance = solved.fitted
+    on = np.broadcast_to(run_to_predict(b, solved.planes), solved.corrections.shape)
+    return balance.fit.fitted(on[:, None])[:, 0], balance.vibration_deviation(on, reading=True)
+
+
+def suggested(rotor: Rotor) -> NextRun | None:
+    """The next run of a rotor; None where nothing tells how sure its corrections are."""
+    limit = rotor.solved.objective.max_mass
+    if limit is None or not np.isfinite(limit).all():
+        raise bad("--suggest", f"needs a --max-mass for every plane: {', '.join(rotor.planes)}")
+    one = rotor.solved.fitted.machine(rotor.i)
+    if not np.isfinite(one.covariance).all():
+        return None
+    free = least_squares(one.fit.influence, one.fit.initial, one.weights).corrections
+    return suggest_run(LogBalance(one.fit, free, one.errors, one.weights), limit)
+
+
+def robust(b: FieldBalancing, solved: Solved) -> tuple[Complex, Complex]:
+    """The initial vibration of the robust fits of a group, (g, s), and their corrections by least squares, (g, p)."""
+    fit, before, readings = solved.fitted.fit, solved.group.before, solved.group.fitted.readings
+    if before is None:
+        fit = robust_fit(fit)
+    else:
+        # where the runs leave nothing over, the readings scatter as those of the sisters did
+        scatter = 0.0 if before.reading is None else before.reading[0]
+        deviation = np.where(fit.degrees_of_freedom > 0, np.nan, scatter)[:, None, None]
+        if (error := b.request.reading_error) is not None:
+            deviation = float(np.hypot(*error)) * np.abs(np.where(fit.present, readings, 0.0))
+        fit = robust_fit(fit, before.prior, deviation)
+    here = fit.initial + np.matvec(fit.influence, solved.start)
+    fix = least_squares(fit.influence, here, solved.group.weights, ridge=b.request.ridge)
+    return fit.initial, fix.corrections
+
+
+def drifts(group: Group) -> Drift | None:
+    """How the vibration of each rotor changes in a year, and how often so much by chance; None without dates."""
+    years = group.lines.years
+    return None if years is None else drift(group.fitted, years)
+
+
+def tables(b: FieldBalancing) -> Tables:
+    """The tables of a fit."""
+    made: Tables = {
+        "residuals": lambda: residuals(b),
+        "fit": lambda: of_fit(b),
+        "fit_initial": lambda: initial(b),
+    }
+    if any(drifts(solved.group) is not None for solved in b.solved):
+        made["drift"] = lambda: drift_rates(b)
+    if b.predict is not None:
+        made["predict"] = lambda: predicted_run(b)
+    if b.request.suggest:
+        made |= {"suggest": lambda: suggested_run(b), "suggest_gain": lambda: suggested_gain(b)}
+    if b.request.robust:
+        of = cache(lambda solved: robust(b, solved))
+        made["robust"] = lambda: robust_corrections(b, of)
+        made["robust_initial"] = lambda: robust_initial(b, of)
+    return made
+
+
+def residuals(b: FieldBalancing) -> Table:
+    """One row per reading of a fit: what was read, and how far it lies from the fitted vibration."""
+    every = [
+        (rotor, row)
+        for solved in b.solved
+        for rotor in (Rotor(b, solved, i) for i in range(len(solved.corrections)))
+        for row in rotor.readings()
+    ]
+    of = [row for _, row in every]
+    read, left = np.array([row.value for row in of]), np.array([row.residual for row in of])
+    rows = Rows.of(b, [rotor.name for rotor, _ in every])
+    rows.shown, rows.hidden = [rows.rotor, names("run", [row.run for row in of])], []
+    rows.read(b, [row.channel for row in of])
+    # speeds, and states that say nothing, are of the document alone
+    unseen = [c for c in rows.shown if c.name == "speed" or (c.name == "state" and not any(c.values))]
+    rows.shown = [column for column in rows.shown if column not in unseen]
+    rows.hidden += unseen
+    for column in rows.shown:
+        if column.name == "state":
+            column.values = [value or "" for value in column.values]
+    outlier = [row.outlier for row in of]
+    columns = [
+        amplitude(b, "amplitude", np.abs(read), None),
+        number("phase", "angle", degrees(read), place=None),
+        amplitude(b, "residual", np.abs(left), "amplitude"),
+        number("residual_phase", "angle", degrees(left), place="phase"),
+        Column("standardized", "", [row.standardized for row in of], None, "standardized"),
+        Column("outlier", "", ["yes" if one else "" for one in outlier], None, "outlier", outlier),
+    ]
+    return rows.table(columns, ("rotor", "run", "sensor"), "fit.residuals[]")
+
+
+def of_fit(b: FieldBalancing) -> Table:
+    """One row per rotor: how many runs and readings were fitted, how well, and what the runs say of drift and phase."""
+    rows, rotors = Rows.each(b), list(each(b))
+    senses = [rotor.group.lines.senses[rotor.i] for rotor in rotors]
+    named = [sense or "not determined" for sense in senses]
+    freedom, sd = rows.several(lambda s: (s.group.fitted.degrees_of_freedom, s.group.fitted.residual_sd))
+    columns = [
+        names("runs", [len(rotor.group.lines.runs(rotor.i)) for rotor in rotors]),
+        names("readings", [int(rotor.group.fitted.present[rotor.i].sum()) for rotor in rotors]),
+        names("degrees_of_freedom", [int(n) for n in freedom]),
+        amplitude(b, "residual_sd", sd),
+        Column("phase_sense", "", named, None, "phase_sense", senses),
+    ]
+    priors, hidden = [rotor.group.before for rotor in rotors], list[Column]()
+
+    def prior(name: str, unit: str, of: Callable[[Before], float | None]) -> None:
+        stored = [ABSENT if before is None else of(before) for before in priors]
+        cells = [None if cell is ABSENT else cell for cell in stored]
+        columns.append(Column(f"prior_{name}", unit, cells, None, f"prior.{name}", stored))
+
+    if any(before is not None for before in priors):
+        prior("machines", "", lambda before: before.machines)
+        prior("scatter_between_machines", "", lambda before: before.scatter)
+        prior("reading_sd", b.runs.amplitude_unit, lambda before: before.reading and before.reading[0])
+    below = ["runs and readings fitted together; residual_sd: standard deviation of one reading as a vector"]
+    if None in senses:
+        below.append(
+            "the sense of the phase cannot be determined: add a run with a mass at an angle off the line of the others"
+        )
+
+    def probability(solved: Solved) -> Real | None:
+        of = drifts(solved.group)
+        return None if of is None else of.probability
+
+    chance, stored = rows.some(probability)
+    if any(v is not ABSENT for v in stored):
+        verdict = [v if v is ABSENT else None if v != v else v < LEVEL for v in stored]
+        words = ["yes" if v is True else "no" if v is False else "" for v in verdict]
+        level = [v if v is ABSENT else LEVEL for v in stored]
+        columns.append(Column("drift_probability", "", chance, None, "drift.probability", stored))
+        columns.append(Column("drifts", "", words, None, "drift.drifts", verdict))
+        hidden.append(Column("level", "", [None] * len(stored), None, "drift.level", level))
+        below.append(f"drift_probability: by chance in so many logs (F test at {LEVEL:.0%})")
+    return rows.table(columns, ("rotor",), "fit", below="\n".join(below), hidden=hidden)
+
+
+def initial(b: FieldBalancing) -> Table:
+    """The vibration without masses as fitted, and its uncertainty."""
+    rows = Rows.sensors(b)
+    value = rows.numbers(lambda s: s.group.fitted.initial)
+    deviation = rows.numbers(lambda s: s.fitted.vibration_deviation(np.zeros_like(s.total)))
+    columns = [*vibration(b, value), amplitude(b, "amplitude_uncertainty", deviation)]
+    return rows.table(columns, READINGS, "fit.initial[]", "vibration without masses, as fitted")
+
+
+def drift_rates(b: FieldBalancing) -> Table:
+    """How the vibration without masses changes in a year: a row for each rotor and sensor."""
+    every = [
+        (rotor.name, *row)
+        for rotor in each(b)
+        if (of := drifts(rotor.group)) is not None
+        for row in zip(rotor.channels, of.rate[rotor.i].tolist(), of.deviation[rotor.i].tolist(), strict=True)
+    ]
+    rows = Rows.of(b, [name for name, *_ in every]).read(b, [channel for _, channel, *_ in every])
+    rate, deviation = np.array([row[2] for row in every]), [row[3] for row in every]
+    columns = [
+        amplitude(b, "amplitude_per_year", np.abs(rate)),
+        number("phase", "angle", np.where(np.isfinite(rate), degrees(rate), np.nan)),
+        amplitude(b, "amplitude_per_year_uncertainty", deviation),
+    ]
+    return rows.table(columns, READINGS, "fit.drift.rates[]")
+
+
+def predicted_run(b: FieldBalancing) -> Table:
+    """What the run with the masses of --predict should read: a row for each rotor and sensor."""
+    rows = Rows.sensors(b)
+    value, deviation = rows.several(lambda solved: predicted(b, solved))
+    columns = [*vibration(b, value), amplitude(b, "amplitude_uncertainty", deviation)]
+    planes = b.solved[0].planes
+    above = f"a run with {masses_text(b, planes, run_to_predict(b, planes)) or 'no masses'} should read"
+    return rows.table(columns, READINGS, "predict[]", above)
+
+
+def prediction_lines(b: FieldBalancing) -> list[str]:
+    """The predicted readings as sentences, for standard error where a pipe takes the corrections."""
+    table = predicted_run(b)
+    cells = {header: printed(header, values) for header, values in table.cells.items()}
+    rows = zip(*cells.values(), strict=True)
+    return [f"{table.above}: {', '.join(map(' '.join, zip(cells, row, strict=True)))}" for row in rows]
+
+
+def _suggestions(b: FieldBalancing) -> Iterator[tuple[Rotor, NextRun]]:
+    """Yield the rotors of which a run is suggested, and that run."""
+    for rotor in each(b):
+        run = suggested(rotor)
+        if run is not None:
+            yield rotor, run
+
+
+def unsuggested(b: FieldBalancing) -> Column:
+    """Return the column of JSON that is null where no run is suggested."""
+    stored = [ABSENT if suggested(rotor) is not None else None for rotor in each(b)]
+    return Column("suggest", "", [None] * len(stored), None, "suggest", stored)
+
+
+def suggested_run(b: FieldBalancing) -> Table:
+    """The masses of the next run that tells most: a row for each rotor and plane."""
+    every = [
+        (rotor.name, *row)
+        for rotor, run in _suggestions(b)
+        for row in zip(rotor.planes, run.masses.tolist(), strict=True)
+    ]
+    on = masses(b, np.array([w for *_, w in every], dtype=complex))
+    above = (
+        "the next run that tells most (A-optimal) has these masses"
+        if every
+        else "no run is suggested: nothing tells how sure the corrections are"
+    )
+    rows = Rows.of(b, [name for name, *_ in every])
+    columns = [names("plane", [plane for _, plane, _ in every]), *on]
+    return rows.table(columns, ("rotor", "plane"), "suggest.masses[]", above)
+
+
+def suggested_gain(b: FieldBalancing) -> Table:
+    """How the next run changes the uncertainty of the corrections."""
+    every = list(_suggestions(b))
+    per, unit = b.runs.per, b.runs.mass_unit
+    columns = [
+        number("uncertainty_before", per, [run.before for _, run in every], unit),
+        number("uncertainty_after", per, [run.after for _, run in every], unit),
+    ]
+    above = "uncertainty of the corrections before and after the next run"
+    return Rows.of(b, [rotor.name for rotor, _ in every]).table(columns, ("rotor",), "suggest", above)
+
+
+RobustFits = Callable[[Solved], tuple[Complex, Complex]]
+
+
+def robust_corrections(b: FieldBalancing, of: RobustFits) -> Table:
+    """The corrections of a robust fit."""
+    rows = Rows.planes(b)
+    fix, above = rows.numbers(lambda s: of(s)[1]), "corrections of a robust fit (Huber)"
+    return rows.table(masses(b, fix), ("rotor", "plane"), "robust.corrections[]", above)
+
+
+def robust_initial(b: FieldBalancing, of: RobustFits) -> Table:
+    """The vibration without masses as a robust fit has it."""
+    rows = Rows.sensors(b)
+    value, above = rows.numbers(lambda s: of(s)[0]), "vibration without masses of a robust fit"
+    return rows.table(vibration(b, value), READINGS, "robust.initial[]", above)
+
+
+# -- coefficients --------------------------------------------------------------------------------------------
+
+
+def spread(b: FieldBalancing, solved: Solved) -> CoefficientSpread | None:
+    """Return how well a group's coefficients are known, from its fit or from stated errors; None where nothing tells."""
+    if b.stored is not None or not (b.runs.fitted or b.request.reading_error) or solved.balance is None:
+        return None
+    return solved.balance.coefficients
+
+
+def influence(b: FieldBalancing) -> Table:
+    """The influence coefficients, as --save-influence stores them."""
+    per, unit = b.runs.per, b.runs.mass_unit
+    rows = Rows.each(b, lambda solved: len(solved.group.channels) * len(solved.planes))
+    channels = rows.cells(lambda s: [c for c in s.group.channels for _ in s.planes])
+    alpha = rows.numbers(lambda solved: solved.alpha)
+    size = np.abs(alpha)
+    states = [channel.state for channel in channels]
+    rpm = b.runs.speed_unit == "rpm"
+    speeds = [
+        None if c.speed is None else c.speed_written if rpm else from_si(c.speed, "speed", "rpm")
+        for c in channels
+    ]
+    stored = [ABSENT if c.state is not None and c.speed is None else c.speed for c in channels]
+    in_json = [ABSENT if of is None else of for of in states]
+    state = Column("state", "", [of or "" for of in states], None, "state", in_json)
+    columns = [
+        names("sensor", [channel.sensor for channel in channels]),
+        *([state] if any(states) else []),
+        Column("speed", "rpm", speeds, None, "speed_rad_s", stored),
+        names("plane", rows.cells(lambda s: s.planes * len(s.group.channels))),
+        Column("magnitude_per", unit, to_si(size, per, unit), None, f"magnitude_per_{b.runs.per_si}", size),
+        number("phase", "angle", degrees(alpha)),
+        names("amplitude_unit", [b.runs.amplitude_unit] * len(size), place=None),
+        *_errors(b, rows, size),
+    ]
+    return rows.table(columns, (), "influence[]", hidden=[] if any(states) else [state])
+
+
+def _errors(b: FieldBalancing, rows: Rows, size: Real) -> list[Column]:
+    """Return the columns that say how well the coefficients are known; none where nothing tells."""
+    spreads = {id(solved): spread(b, solved) for solved in b.solved}
+    if not any(of is not None for of in spreads.values()):
+        return []
+
+    def cells(of: Callable[[CoefficientSpread], ArrayLike]) -> Any:
+        def of_group(solved: Solved) -> ArrayLike:
+            one = spreads[id(solved)]
+            empty = np.full(solved.alpha.shape, None, dtype=object)
+            return empty if one is None else np.broadcast_to(np.asarray(of(one)), solved.alpha.shape)
+
+        return rows.numbers(of_group)
+
+    def of_rotor(of: Callable[[CoefficientSpread], Real]) -> Real:
+        return np.asarray(cells(lambda one: of(one)[:, None, None]).astype(float))
+
+    along, across = cells(lambda one: one.along).astype(float), cells(lambda one: one.across).astype(float)
+    per, unit = b.runs.per, b.runs.mass_unit
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turn = np.degrees(across / size)
+    columns = [
+        Column("magnitude_uncertainty_per", unit, to_si(along, per, unit)),
+        Column("phase_uncertainty", "deg", np.where(size > 0, turn, np.nan)),
+    ]
+    if any(len(solved.planes) > 1 for solved in b.solved):
+        columns.append(names("correlation", cells(_correlations).tolist(), place=None))
+    freedom = of_rotor(lambda one: one.degrees_of_freedom)
+    return [
+        *columns,
+        Column("reading_sd", b.runs.amplitude_unit, of_rotor(lambda one: one.reading_sd)),
+        Column("degrees_of_freedom", "", np.where(np.isfinite(freedom), freedom, np.nan)),
+    ]
+
+
+def _correlations(one: CoefficientSpread) -> NDArray[np.object_]:
+    """Return for each coefficient the correlations of its error with those of the planes before it, as text."""
+    made = np.full(one.along.shape, None, dtype=object)
+    if one.along.shape[-1] > 1:
+        for at in np.ndindex(*made.shape):
+            before = one.correlation[at][: at[-1]].tolist()
+            made[at] = ";".join(f"{abs(z)!r}@{float(degrees(z))!r}" for z in before)
+    return made

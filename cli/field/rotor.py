@@ -1,0 +1,249 @@
+"""One rotor: what was read and what was on it in its runs, its trim and whether that is needed, its tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing import initial_unbalance
+from cli.field.field_balancing import SINGULAR, FieldBalancing, Solved
+from cli.read.rounding import EPS
+from cli.read.runs.runs import Channel, Complex, Group, Real
+from cli.read.tolerance import Verdict
+
+Flags = NDArray[np.bool_]
+
+
+class Trim:
+    """The trims of a group of rotors."""
+
+    def __init__(self, b: FieldBalancing, solved: Solved) -> None:
+        self.b, self.solved = b, solved
+        self.masses: Complex = solved.trim
+        """(g, p), SI."""
+        self.along, self.angle = solved.uncertainty(self.masses)
+        """Standard deviations of size (SI) and angle (degrees), (g, p) each; NaN where they are not known."""
+
+    @cached_property
+    def vibration(self) -> Complex:
+        """The vibration of the rotors as they stand, (g, s): as read in the last run, else by the coefficients."""
+        solved = self.solved
+        read = np.stack([Rotor(self.b, solved, i).last_reading for i in range(len(self.masses))])
+        expected = solved.initial + np.matvec(solved.alpha, solved.standing)
+        return np.where(np.isfinite(read), read, expected)
+
+    @cached_property
+    def _holds(self) -> dict[str, Flags]:
+        """Why no trim is needed, and in which planes."""
+        solved, size = self.solved, np.abs(self.masses)
+        terms = np.abs(solved.total).max(axis=1, keepdims=True) + np.abs(solved.standing)
+        condition = np.where(np.isfinite(solved.condition), solved.condition, 1.0)[:, None]
+        return {
+            "nothing is left to correct": size <= 16 * EPS * condition * terms,
+            "below its own uncertainty": size < np.where(np.isfinite(self.along), self.along, 0.0),
+            **self._limits(),
+        }
+
+    def _limits(self) -> dict[str, Flags]:
+        """Where the rotor as it stands is within every limit that was requested."""
+        b, solved = self.b, self.solved
+        within: dict[str, Flags] = {}
+        if b.ceiling is not None:
+            fine = np.all(np.abs(self.vibration) <= b.ceiling * (1 + 1e-9), axis=1, keepdims=True)
+            within["the vibration is within the limit"] = np.repeat(fine, len(solved.planes), axis=1)
+        if b.request.tolerance is not None and solved.unbalance is not None:
+            left = solved.unbalance + solved.standing
+            if not b.request.four_run:
+                weights = solved.group.weights
+                left = initial_unbalance(solved.alpha, self.vibration, weights, singular=SINGULAR)
+            share = b.request.tolerance.shares(len(solved.planes))
+            within["the unbalance is within the tolerance"] = b.in_kg_m(left) <= share
+        if not within:
+            return {}
+        return {" and ".join(within): np.logical_and.reduce(list(within.values()))}
+
+    @property
+    def reasons(self) -> list[list[str]]:
+        """Why a rotor's plane needs no trim, rotor by rotor; "" where it does."""
+        rotors, planes = self.masses.shape
+        return [
+            [next((why for why, holds in self._holds.items() if holds[i, p]), "") for p in range(planes)]
+            for i in range(rotors)
+        ]
+
+
+class LastRun(NamedTuple):
+    """A run with masses on the rotor that was made once the coefficients were known."""
+
+    run: str
+    on: Complex
+    """What was on the rotor, SI, (p,)."""
+    vibration: Complex
+    """As read, run-out off, (s,); NaN where a sensor was not read."""
+
+
+class Reading(NamedTuple):
+    """A reading of a log, fitted."""
+
+    run: str
+    channel: Channel
+    value: complex
+    residual: complex
+    standardized: float
+    outlier: bool
+    """Whether it does not go with the others."""
+    chance: float
+    """How often by chance a residual is as large."""
+
+
+@dataclass(eq=False, repr=False)
+class Rotor:
+    """A rotor among those of its group."""
+
+    b: FieldBalancing
+    solved: Solved
+    i: int
+
+    @property
+    def group(self) -> Group:
+        """Its group as measured."""
+        return self.solved.group
+
+    @property
+    def number(self) -> int:
+        """Its number in the table."""
+        return int(self.group.rotors[self.i])
+
+    @property
+    def name(self) -> str:
+        """Its name in the table."""
+        return self.b.runs.rotors[self.number]
+
+    @property
+    def heading(self) -> str:
+        """Its name where there are several, as pages and pictures show it."""
+        return self.name if self.b.runs.several else ""
+
+    @property
+    def planes(self) -> list[str]:
+        """Its correction planes."""
+        return self.solved.planes
+
+    @property
+    def channels(self) -> list[Channel]:
+        """What was read."""
+        return self.group.channels
+
+    @property
+    def standing(self) -> Complex:
+        """What is on it in its last run, (p,)."""
+        return np.asarray(self.solved.standing[self.i])
+
+    @cached_property
+    def reasons(self) -> list[str]:
+        """Why a plane needs no trim; "" where it does."""
+        return Trim(self.b, self.solved).reasons[self.i]
+
+    def readings(self) -> Iterator[Reading]:
+        """Yield the readings of its log."""
+        from balancing.doubt import LEVEL
+
+        fit, lines = self.group.fitted, self.group.lines.of(self.i)
+        for j, s in np.argwhere(fit.present[self.i]).tolist():
+            value, residual, far, chance = (
+                of[self.i, j, s].item()
+                for of in (fit.readings, fit.residuals, fit.standardized, self.group.chance)
+            )
+            yield Reading(lines[j], self.channels[s], value, residual, far, chance < LEVEL, chance)
+
+    # -- its runs ------------------------------------------------------------------------------------------
+
+    @cached_property
+    def last(self) -> LastRun | None:
+        """Its last run, where that shows how well it is balanced; None where it was a trial run."""
+        group, request = self.group, self.b.request
+        if self.b.runs.fitted:
+            masses = self._runs
+            run = list(masses)[-1]
+            on = masses[run]
+            if not on.any() or sum(mass.any() for mass in masses.values()) <= len(self.planes):
+                return None
+            return LastRun(run, on, self._read(run))
+        if request.four_run or len(group.trials) < 2:
+            return None
+        if not (request.from_here and self.standing.any()):
+            return None
+        return LastRun(group.last[self.i], self.standing, self.last_reading)
+
+    @property
+    def last_reading(self) -> Complex:
+        """What was read in its last run, run-out off, (s,); NaN where a sensor was not read."""
+        group, run, initial = self.group, self.group.last[self.i], self.solved.initial[self.i]
+        if self.b.runs.fitted:
+            return self._read(run)
+        if len(group.trials) > 1 and group.trials[-1].run == run:
+            return np.asarray(group.means[self.i, -1] - self.b.runout(group))
+        bare = not group.standing[self.i].any()
+        return np.asarray(initial if bare else np.full_like(initial, np.nan))
+
+    @property
+    def first_reading(self) -> Complex | None:
+        """What was read in the first run without masses, run-out off, (s,); None where there is no such run."""
+        if not self.b.runs.fitted:
+            return np.asarray(self.solved.initial[self.i])
+        bare = next((run for run, on in self._runs.items() if not on.any()), None)
+        return None if bare is None else self._read(bare)
+
+    @property
+    def _runs(self) -> dict[str, Complex]:
+        """The runs of its log, in order, and what was on the rotor in each."""
+        masses: dict[str, Complex] = {}
+        for j, run in enumerate(self.group.lines.of(self.i)):
+            masses[run] = self.solved.fit.masses[self.i, j]
+        return masses
+
+    def _read(self, run: str) -> Complex:
+        """The mean readings of a run of its log, run-out off."""
+        fit = self.solved.fit.machine(self.i)
+        rows = [j for j, name in enumerate(self.group.lines.of(self.i)) if name == run]
+        there = fit.present[rows]
+        sums = np.where(there, fit.readings[rows], 0).sum(axis=0)
+        mean = np.full_like(sums, np.nan)
+        np.divide(sums, there.sum(axis=0), out=mean, where=there.any(axis=0))
+        return np.asarray(mean - self.b.runout(self.group))
+
+    # -- its tolerance -------------------------------------------------------------------------------------
+
+    def verdicts(self, *, measured: bool = False) -> list[Verdict]:
+        """Return each plane's tolerance, as predicted or as its last run shows it; none where none was requested."""
+        solved, i, tolerance = self.solved, self.i, self.b.request.tolerance
+        if tolerance is None or solved.unbalance is None:
+            return []
+        own = solved.unbalance[i]
+        if measured and self.last is not None:
+            read, weights = np.isfinite(self.last.vibration), self.group.own_weights(i)
+            left = initial_unbalance(
+                solved.alpha[i][read],
+                self.last.vibration[read],
+                None if weights is None else weights[read],
+                singular=SINGULAR,
+            )
+        else:
+            left = own + solved.total[i]
+            left = np.where(np.abs(left) <= 1e-12 * np.abs(own), 0, left)
+        sizes: list[Real] = [tolerance.shares(len(self.planes)), self.b.in_kg_m(own), self.b.in_kg_m(left)]
+        return [
+            Verdict(plane, *size)
+            for plane, size in zip(self.planes, np.transpose(sizes).tolist(), strict=True)
+        ]
+
+
+def each(b: FieldBalancing, most: int | None = None) -> Iterator[Rotor]:
+    """Yield the rotors in the order of the table."""
+    for k, i in b.place[:most]:
+        yield Rotor(b, b.solved[k], i)

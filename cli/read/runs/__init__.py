@@ -1,0 +1,1 @@
+"""Tables and logs of measured runs, as people keep them."""

@@ -1,0 +1,265 @@
+"""What was on the rotor in each row of a table of runs: which rows state it, and the masses, several joined by ';'."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cli.read.rounding import vector_error
+from dalembert.angles import phasor
+from dalembert.errors import DataError, quote
+from dalembert.quantities import parse_number
+from dalembert.tables.table import Cells, Table, numbered
+from dalembert.units import LARGEST, SMALLEST, UNITS, to_si
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Rows = NDArray[np.intp]
+Flags = NDArray[np.bool_]
+YES = ("yes", "y", "true", "1", "kept", "on", "ja", "j", "bleibt")
+NO = ("no", "n", "false", "0", "", "removed", "off", "nein")
+
+
+class Masses(NamedTuple):
+    """What the rows of a table put on, an entry for each mass."""
+
+    planes: list[str]
+    row: Rows
+    """Ascending, (k,)."""
+    plane: Rows
+    value: Complex
+    """SI."""
+    stated: NDArray[np.bool_]
+    """Whether a row says anything of masses, (n,)."""
+
+    @classmethod
+    def of(cls, rows: Sequence[dict[str, complex] | None]) -> Masses:
+        """Take the masses of each row, plane -> mass; None where it says nothing of them."""
+        planes: dict[str, int] = {}
+        entries = [
+            (i, planes.setdefault(plane, len(planes)), mass)
+            for i, masses in enumerate(rows)
+            for plane, mass in (masses or {}).items()
+        ]
+        row, plane, value = zip(*entries, strict=True) if entries else ((), (), ())
+        stated = np.array([masses is not None for masses in rows])
+        at, of = (np.array(part, dtype=np.intp) for part in (row, plane))
+        return cls(list(planes), at, of, np.array(value, dtype=complex), stated)
+
+    def by_row(self) -> list[dict[str, complex] | None]:
+        """Return them as `of` takes them."""
+        out: list[dict[str, complex] | None] = [{} if stated else None for stated in self.stated.tolist()]
+        for i, plane, mass in zip(self.row.tolist(), self.plane.tolist(), self.value.tolist(), strict=True):
+            mine = out[i]
+            assert mine is not None
+            mine[self.planes[plane]] = mass
+        return out
+
+
+@dataclass(eq=False, repr=False)
+class MassColumns:
+    """The columns that say what was on the rotor."""
+
+    table: Table
+    size: Cells
+    """Masses or unbalances."""
+    per: str
+    """`mass` or `unbalance`."""
+    fitted: bool
+    """Whether all runs are fitted together: then each row states what was on, in an initial run with trial runs one of each."""
+    rotor: Rows
+    """Of each row."""
+
+    def rows(self, run_names: list[str], run: Rows, stored: bool) -> tuple[Flags, Flags]:
+        """Find the rows that name a plane, or a mass where there is but one; and those whose masses are read.
+
+        With `stored` coefficients the runs need no names.
+        """
+        table, size = self.table, self.size
+        loaded = np.array([bool(cell) for cell in size.values])
+        planes, plane = table.numbered("trial_plane")
+        if self.fitted:
+            return loaded, loaded | np.array([bool(name) for name in planes])[plane]
+        if "run" not in table.texts and not stored:
+            raise DataError(f"{table.file}: no column run {table.told}")
+        named = np.array([bool(name) for name in planes])[plane] if "trial_plane" in table.texts else loaded
+        of_run = numbered(self.rotor * len(run_names) + run)[0]
+        self._kept(named, of_run, run_names, run)
+        tried = np.isin(of_run, of_run[named])
+        if (loose := loaded & ~tried).any():
+            raise self._wrong(int(np.argmax(loose)), "trial_plane", "", "the plane of the trial mass")
+        if size.unit not in UNITS[self.per]:
+            # what stored coefficients of masses are for is no unbalance
+            return named, np.zeros(table.rows, dtype=bool)
+        first = _first_of_run(of_run, named)
+        for i in np.flatnonzero(named & (plane != plane[first]))[:1].tolist():
+            one = planes[plane[first[i]]]
+            raise self._wrong(
+                i,
+                "trial_plane",
+                planes[plane[i]],
+                f"{quote(one)} as elsewhere in run {run_names[run[i]]}; several masses in one run are "
+                f"joined by ';' ({one};{planes[plane[i]]})",
+            )
+        # the row that states the mass: the others may leave it out
+        stated = _first_of_run(of_run, named & loaded)
+        bare = named & (stated < 0)
+        if bare.any():
+            raise self._wrong(int(np.argmax(bare)), size.header, "", "a trial mass, positive")
+        for cells in (size, table.cells.get("trial_angle")):
+            if cells is None:
+                continue
+            code = _codes(cells.values)
+            for i in np.flatnonzero(named & (code > 0) & (code != code[stated]))[:1].tolist():
+                expected = f"{quote(cells.values[stated[i]])} as elsewhere in run {run_names[run[i]]}"
+                raise self._wrong(i, cells.header, cells.values[i], expected)
+        return named, named & (stated == np.arange(table.rows))
+
+    def _kept(self, named: Flags, of_run: Rows, run_names: list[str], run: Rows) -> None:
+        """Refuse a mark that a mass is kept where none was put on."""
+        words, code = self.table.numbered("trial_kept")
+        kept = np.array([word.lower() in YES for word in words])[code]
+        for i in np.flatnonzero(kept & ~np.isin(of_run, of_run[named]))[:1].tolist():
+            expected = f"the trial mass that is kept after run {run_names[run[i]]}"
+            raise self._wrong(i, "trial_plane", "", expected)
+
+    def _wrong(self, row: int, column: str, value: str, expected: str) -> DataError:
+        return self.table.error(row, column, value, expected)
+
+    def masses(self, loaded: Flags) -> tuple[Masses, float]:
+        """Read the masses of each row, several joined by ';', and by what share of it one may be off as it is rounded."""
+        table, size, per = self.table, self.size, self.per
+        angle = table.cells.get("trial_angle")
+        if angle is None and not self.fitted and loaded.any():
+            raise DataError(f"{table.file}: no column trial_angle_deg {table.told}")
+        if not loaded.any():
+            return Masses.of([None] * table.rows), 0.0
+        names, code = table.numbered("trial_plane")
+        planes: dict[str, int] = {}
+        for name in names:
+            for part in (name or "1").split(";"):
+                planes.setdefault(part.strip(), len(planes))
+        plane = np.array([planes.get(name or "1", -1) for name in names])[code]
+        # one mass in a row, its numbers in order: all these rows together, and the others one by one
+        plain = loaded & np.array([bool(cell) for cell in size.values])
+        plain &= np.array([";" not in name for name in names])[code]
+        sizes, angles = size.parsed, None if angle is None else angle.parsed
+        if sizes is None or angles is None:
+            plain[:] = False
+            sizes = angles = np.zeros(table.rows)
+        plain &= (
+            (sizes >= (0 if self.fitted else SMALLEST)) & (sizes <= LARGEST) & (np.abs(angles) <= LARGEST)
+        )
+        others = [
+            (i, planes[name], mass, turn)
+            for i in np.flatnonzero(loaded & ~plain).tolist()
+            for name, mass, turn in self._of_row(i, names[code[i]], angle)
+        ]
+        row, where, more, turns = (
+            np.array(part) for part in (zip(*others, strict=True) if others else ((), (), (), ()))
+        )
+        row = np.concatenate([np.flatnonzero(plain), row.astype(np.intp)])
+        where = np.concatenate([plane[plain], where.astype(np.intp)])
+        around = np.concatenate([angles[plain], turns])
+        unit = angle.unit if angle is not None else "deg"
+        on = phasor(np.asarray(to_si(np.concatenate([sizes[plain], more]), per, size.unit)), around, unit)
+        # several in one plane of a run are one
+        _, first, entry = np.unique(row * max(len(planes), 1) + where, return_index=True, return_inverse=True)
+        value = np.zeros(len(first), dtype=complex)
+        np.add.at(value, entry, on)
+        share = float(vector_error(np.ones(len(around)), around, unit).max(initial=0.0))
+        says = np.array([bool(cell) for cell in size.values]) if self.fitted else loaded
+        return Masses(list(planes), row[first], where[first], value, says), share
+
+    def _of_row(self, i: int, name: str, angle: Cells | None) -> Iterator[tuple[str, float, float]]:
+        """Yield plane, size and angle of each mass of a row, as the file has them."""
+        size = self.size
+        what = "mass" if self.fitted else "trial mass"
+        cell, turn = size.values[i], "" if angle is None else angle.values[i]
+        if not cell:
+            raise self._wrong(i, size.header, cell, f"the mass in plane {name}")
+        names = [part.strip() for part in name.split(";")] if name else ["1"]
+        if "" in names:
+            raise self._wrong(i, "trial_plane", name, "a plane's name before and after each ';'")
+        parts, around = cell.split(";"), turn.split(";") if turn else [""] * len(names)
+        for cells, target in ((size, parts), (angle or size, around)):
+            if len(target) != len(names):
+                joined = f"{len(names)} joined by ';' as in trial_plane"
+                raise self._wrong(i, cells.header, cells.values[i], f"masses and angles, {joined}")
+        for one, part, at in zip(names, parts, around, strict=True):
+            mass = self._number(size, i, part, f"a {what}" if self.fitted else f"a {what}, positive")
+            if not self.fitted and not mass >= SMALLEST:
+                raise self._wrong(i, size.header, cell, f"a positive {what}")
+            if mass < 0:
+                raise self._wrong(i, size.header, cell, f"a {what} that is not negative")
+            if not at.strip() and mass:
+                header = angle.header if angle is not None else "trial_angle_deg"
+                raise self._wrong(i, header, turn, f"the angle of the {what}")
+            angled = at.strip() and angle is not None
+            yield (
+                one,
+                mass,
+                self._number(angle, i, at, f"the angle of the {what}") if angled and angle else 0.0,
+            )
+
+    def _number(self, cells: Cells, row: int, text: str, expected: str) -> float:
+        try:
+            return cells.number(text)
+        except ValueError:
+            more = ", with a decimal comma as elsewhere in the file" if cells.decimal_comma else ""
+            raise self._wrong(row, cells.header, cells.values[row], expected + more) from None
+
+
+def _codes(values: Sequence[str]) -> Rows:
+    """Number texts, 0 for a blank."""
+    first = {"": 0}
+    return np.array([first.setdefault(text, len(first)) for text in values])
+
+
+def _first_of_run(of_run: Rows, rows: Flags) -> Rows:
+    """Return for each row the first of its run among some rows, -1 where there is none."""
+    first = np.full(int(of_run.max(initial=0)) + 1, -1)
+    at = np.flatnonzero(rows)[::-1]
+    first[of_run[at]] = at
+    return first[of_run]
+
+
+def on_top(
+    table: Table, rotor: Rows, masses: list[dict[str, complex] | None]
+) -> list[dict[str, complex] | None]:
+    """Add what is below each mass: `ref` numbers the run, within its state, on top of which it stands; -1 for none.
+
+    Its angle counts from the angle written in that run's row.
+    """
+    angle = table.cells.get("trial_angle")
+    state = table.named("state", "")
+    sensor = table.named("sensor")
+    seen: dict[tuple[int, str, str], list[int]] = {}
+    out: list[dict[str, complex] | None] = []
+    for i, text in enumerate(table.texts["ref"]):
+        before = seen.setdefault((int(rotor[i]), state[i], sensor[i]), [])
+        try:
+            number = parse_number(text.replace(",", ".")) if text else -1
+            below = int(number) if number == int(number) else 0
+        except ValueError:
+            below = 0
+        own = len(before) + 1
+        if below != -1 and not 1 <= below < own and not below == own == 1:
+            raise table.error(i, "ref", text, "-1, or the number of an earlier run in this state")
+        mine = dict(masses[i] or {})
+        if 1 <= below < own:
+            base = before[below - 1]
+            written = angle.values[base] if angle is not None else ""
+            turn = 1 + 0j
+            if written and angle is not None:
+                turn = complex(phasor(np.ones(1), np.array([angle.number(written)]), angle.unit)[0])
+            mine = {plane: mass * turn for plane, mass in mine.items()}
+            for plane, mass in (out[base] or {}).items():
+                mine[plane] = mine.get(plane, 0) + mass
+        before.append(i)
+        out.append(mine)
+    return out

@@ -1,0 +1,273 @@
+"""Measured runs as people keep them: a table or a log to rows, with the masses that were on and what each row reads."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from datetime import datetime
+from typing import NamedTuple
+
+import numpy as np
+
+from cli.read import options
+from cli.read.rounding import EPS, vector_error
+from cli.read.runs.channels import OfInitialRun, near_speeds
+from cli.read.runs.layouts import Layout, alpha_of, is_log, log_table, runs_table
+from cli.read.runs.masses import MassColumns, Masses, on_top
+from cli.read.runs.rows import NoInitialRun, Sorted
+from cli.read.runs.runs import Complex, LogRows, Real, Rows, Runs
+from cli.read.runs.stored import Sisters, Stored, read_stored, stored_alpha
+from dalembert.angles import phasor
+from dalembert.errors import DataError, quote
+from dalembert.tables.table import Cells, Table
+from dalembert.units import UNITS
+
+OF_LOGS = ("date", "ref", "use")  # columns that count where all runs are fitted
+
+
+class Measured(NamedTuple):
+    """The rows of a table or a log, and the coefficients that were stored before."""
+
+    rows: Sorted
+    stored: Stored | None
+    """Those that stand for trial runs."""
+    sisters: Sisters | None
+    """Those that take part in a fit."""
+    warnings: list[str]
+    """Those of the files of coefficients."""
+
+
+def read_measured(
+    path: str,
+    influence: Sequence[str] = (),
+    *,
+    fit: bool = False,
+    exclude: Collection[str] = (),
+    four_run: bool = False,
+    against: bool = False,
+) -> Measured:
+    """Read the runs.
+
+    Parameters
+    ----------
+    path, influence
+        The runs, and the files of stored coefficients.
+    fit
+        Whether an option needs a fit of all runs.
+    exclude
+        Runs that take no part in it.
+    four_run
+        Whether amplitudes alone are read.
+    against
+        Whether phases are counted against the sense of the mass angles.
+    """
+    files = [read_stored(file) for file in influence]
+    log = not four_run and is_log(path)
+    fitted = log or fit or len(files) > 1 or any(one.along is not None for one in files)
+    fitted = fitted and not four_run
+    if fitted and not files and (own := alpha_of(path)) is not None and not own.trials:
+        files = [stored_alpha(own)]
+    layout = log_table(path) if fitted else Layout(runs_table(path))
+    fitted = fitted or (not (files or four_run) and more_than_unknowns(layout.table))
+    try:
+        return _Reading(layout, files, fitted, exclude, four_run, against).measured()
+    except NoInitialRun:
+        if files or four_run:
+            raise
+        # none of the runs is the initial one: its vibration is an unknown of the fit
+        return _Reading(layout, files, True, exclude, four_run, against).measured()
+
+
+def more_than_unknowns(table: Table) -> bool:
+    """Whether a rotor has more runs than unknowns: the initial vibration and a coefficient of each plane."""
+    sizes = [table.cells[name] for name in ("trial_mass", "trial_unbalance") if name in table.cells]
+    if "run" not in table.texts or len(sizes) != 1:
+        return False
+    _, rotor = table.numbered("rotor", "1")
+    _, run = table.numbered("run")
+    names, plane = table.numbered("trial_plane")
+    if "trial_plane" not in table.texts:
+        names, plane = ["", "1"], np.array([bool(cell) for cell in sizes[0].values]).astype(np.intp)
+    planes: dict[str, int] = {}
+    each = [
+        [planes.setdefault(part.strip(), len(planes)) for part in name.split(";") if part.strip()]
+        for name in names
+    ]
+
+    def count(codes: Rows, of: Rows) -> Rows:
+        """Count what differs, rotor by rotor."""
+        many = int(codes.max(initial=0)) + 1
+        # with indices: without them numpy loads its masked arrays, which takes longer than a small table
+        each, _ = np.unique(of * many + codes, return_index=True)
+        return np.bincount(each // many, minlength=int(rotor.max()) + 1)
+
+    most = max(map(len, each))
+    several = np.array([one + one[-1:] * (most - len(one)) if one else [-1] * most for one in each])[plane]
+    loaded = several[:, 0] >= 0 if most else np.zeros(table.rows, dtype=bool)
+    if not loaded.any():
+        return False
+    unknowns = count(several[loaded].ravel(), np.repeat(rotor[loaded], most))
+    return bool(((count(run, rotor) > 1 + unknowns) & (unknowns > 0)).any())
+
+
+class _Reading:
+    """The rows of a table of runs: of a log that is fitted, or of an initial run and trial runs."""
+
+    def __init__(
+        self,
+        layout: Layout,
+        files: Sequence[Stored],
+        fitted: bool,
+        exclude: Collection[str],
+        four_run: bool,
+        against: bool,
+    ) -> None:
+        self.table, self.fitted, self.exclude = layout.table, fitted, exclude
+        self.four_run, self.against = four_run, against
+        self.warnings = [warning for one in files for warning in one.table.warnings]
+        table = self.table
+        self.amplitude = table.require("amplitude", "amplitude")
+        self.stored = files[0] if files and not fitted else None
+        self.sisters = Sisters(files) if files and fitted else None
+        sizes = [table.cells[name] for name in ("trial_mass", "trial_unbalance") if name in table.cells]
+        if len(sizes) > 1:
+            raise DataError(
+                f"{table.file}: mixed columns {' and '.join(size.header for size in sizes)}: expected one"
+            )
+        if not sizes and not files:
+            raise DataError(
+                f"{table.file}: no column trial_mass_kg (or trial_mass_g, trial_unbalance_g_mm …): expected trial masses, "
+                f"or stored coefficients by --influence {table.told}"
+            )
+        known = self.stored.unit if self.stored else self.sisters.unit if self.sisters else "kg"
+        size = sizes[0] if sizes else Cells("", known, [""] * table.rows)
+        names, rotor = table.numbered("rotor", "1")
+        unit = known if self.stored else size.unit
+        self.runs = Runs(table, names, unit, fitted, max_mass=layout.max_mass, runout=layout.runout)
+        self.masses = MassColumns(table, size, self.runs.per, fitted, rotor)
+        if self.sisters is not None and self.sisters.unit not in UNITS[self.runs.per]:
+            raise DataError(
+                f"{table.file}: the runs have a {self.runs.per}, the stored coefficients are per {self.sisters.unit}"
+            )
+
+    def measured(self) -> Measured:
+        """Read the rows, sorted by rotor."""
+        table, runs, rotor = self.table, self.runs, self.masses.rotor
+        vibration, share = self._vibration()
+        when = None
+        if self.fitted:
+            when = years(table)
+            if "use" in table.texts:
+                table.warnings.append(
+                    f"{table.file}: the column use is the keeper's own mark: every row takes part in the fit"
+                )
+        else:
+            table.warnings += [
+                f"{table.file}: ignored the column {name}" for name in OF_LOGS if name in table.texts
+            ]
+        run_names, run = table.numbered("run", "initial")
+        named, loaded = self.masses.rows(run_names, run, self.stored is not None)
+        masses, mass_share = self.masses.masses(loaded)
+        if self.fitted:
+            if "ref" in table.texts:
+                masses = Masses.of(on_top(table, rotor, masses.by_row()))
+            channels, channel = near_speeds(table, rotor)
+            if "run" not in table.texts:
+                run_names, run = _run_names(rotor, channel, when, masses)
+            for name in self.exclude:
+                if name not in run_names:
+                    raise options.bad("--exclude", f"no run {quote(name)} in {table.file}")
+        rows = LogRows(runs, rotor, vibration, masses, named, run, run_names, when, share, mass_share)
+        ordered = Sorted(rows, self.exclude)
+        if not self.fitted:
+            ordered.find_initial(self.stored is not None)
+            channels, channel = OfInitialRun(table, rotor, runs, ordered.is_initial).channels()
+        rows.channels, rows.channel = channels, channel
+        return Measured(ordered, self.stored, self.sisters, self.warnings)
+
+    def _vibration(self) -> tuple[Complex, float]:
+        """Return what each row reads, NaN where it is blank, and by what share of it that may be off from its decimals."""
+        table, amplitude = self.table, self.amplitude
+        table.reject(amplitude.values < 0, "amplitude", "an amplitude that is not negative")
+        unread = np.isnan(amplitude.values)
+        if "weight" in table.numbers:
+            table.reject(table.numbers["weight"].values < 0, "weight", "a weight that is not negative")
+        if self.four_run:
+            table.reject(unread, "amplitude", "a number")
+            return amplitude.values.astype(complex), EPS
+        phase = table.require("phase", "angle")
+        expected = "a number"
+        if self.fitted:
+            # a state that a run lacks may be a row with blank cells
+            unread, expected = unread & np.isnan(phase.values), "a number, or amplitude and phase both blank"
+        else:
+            unread = np.zeros(table.rows, dtype=bool)
+        for numbers, name in ((amplitude, "amplitude"), (phase, "phase")):
+            table.reject(np.isnan(numbers.values) & ~unread, name, expected)
+        turn = np.where(unread, 0.0, -phase.values if self.against else phase.values)
+        vibration = np.where(unread, complex(np.nan), phasor(amplitude.values, turn, phase.unit))
+        return vibration, float(vector_error(np.ones(table.rows), turn, phase.unit).max())
+
+
+def _run_names(rotor: Rows, channel: Rows, when: Real | None, masses: Masses) -> tuple[list[str], Rows]:
+    """Number runs that no column names: a new one begins where masses or day change, or a channel comes again."""
+    out: list[int] = []
+    count: dict[int, int] = {}
+    before: tuple[int, float, dict[str, complex]] | None = None
+    seen: set[int] = set()
+    days = [np.nan] * len(rotor) if when is None else np.floor(when * YEAR + 1e-6).tolist()
+    for r, of, day, put in zip(rotor.tolist(), channel.tolist(), days, masses.by_row(), strict=True):
+        # of an unknown day: that of the row before
+        on_day = day if day == day or before is None else before[1]
+        on = (r, on_day, {plane: mass for plane, mass in (put or {}).items() if mass})
+        if on != before or of in seen:
+            count[r] = count.get(r, 0) + 1
+            before, seen = on, set()
+        seen.add(of)
+        out.append(count[r] - 1)
+    return [str(k + 1) for k in range(max(out) + 1)], np.array(out)
+
+
+_ISO = re.compile(
+    r"(\d{4})[-/](\d{1,2})(?:[-/](\d{1,2}))?(?:[T ]+(\d{1,2}):(\d{2})(?::(\d{2})(?:\.\d+)?)?Z?)?"
+)
+_POINTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?:,?\s+(\d{1,2}):(\d{2})(?::(\d{2}))?)?")
+DATE = "a date such as 2019-03-14, 2019-03-14 08:30 or 14.03.2019"
+YEAR = 365.25
+
+
+def years(table: Table) -> Real | None:
+    """Return the date of each row in years, from any origin; NaN where there is none, None without a column of dates."""
+    written = table.texts.get("date")
+    if written is None or not any(written):
+        return None
+    return np.array([_year(table, i, text) if text else np.nan for i, text in enumerate(written)])
+
+
+def _year(table: Table, row: int, text: str) -> float:
+    iso, points = _ISO.fullmatch(text), _POINTS.fullmatch(text)
+    match = iso or points
+    if match is None:
+        raise table.error(row, "date", text, DATE)
+    first, month, last, *clock = match.groups()
+    year, day = (first, last or "1") if iso else (last, first)
+    try:
+        hour, minute, second = (int(part or 0) for part in clock)
+        at = datetime(int(year), int(month), int(day), hour, minute, second)
+    except ValueError:
+        raise table.error(row, "date", text, DATE) from None
+    # in days first, so that no digit is lost
+    return (at - datetime(2000, 1, 1)).total_seconds() / 86400 / YEAR
+
+
+def latest(table: Table) -> str | None:
+    """Return the last date of a table, as 2019-03-14; None where none can be read."""
+    matches = [
+        _ISO.fullmatch(text) or _POINTS.fullmatch(text) for text in table.texts.get("date", ()) if text
+    ]
+    days = []
+    for match in filter(None, matches):
+        first, month, last = match.groups()[:3]
+        year, day = (first, last or "01") if match.re is _ISO else (last, first)
+        days.append(f"{year}-{int(month):02}-{int(day):02}")
+    return max(days, default=None)

@@ -1,0 +1,335 @@
+"""The rows of a table of runs side by side: rotors of like shape become arrays together."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cli.read.runs.masses import NO, YES
+from cli.read.runs.runs import SHOWN, Complex, Group, Lines, LogRows, Real, Rows, Trial
+from dalembert.errors import DataError, quote
+from dalembert.tables.table import numbered
+
+
+class _Listed:
+    """What of a kind each rotor has, in the order in which it first stands: rows are sorted by rotor."""
+
+    def __init__(self, rotor: Rows, code: Rows, rotors: int) -> None:
+        self.number, self.first = numbered(rotor * (int(code.max(initial=0)) + 1) + code)
+        self.code = code[self.first]
+        self.count = np.bincount(rotor[self.first], minlength=rotors)
+        self.start = np.cumsum(self.count) - self.count
+        self.place = self.number - self.start[rotor]
+        """Of each row the place within its rotor."""
+
+    def of(self, rotors: Rows) -> Rows:
+        """Return the numbers that these rotors have, (g, …): each of them as many."""
+        return np.asarray(self.start[rotors, None] + np.arange(self.count[rotors[0]]))
+
+    def labelled(self, label: Rows, codes: Rows | None = None) -> Rows:
+        """Give rotors whose lists differ, or these codes of them, labels that differ; `label`: those of other differences."""
+        of_list = self.code if codes is None else codes
+        most = int(of_list.max(initial=0)) + 2
+        for j in range(int(self.count.max(initial=0))):
+            has = self.count > j
+            code = np.where(has, of_list[np.where(has, self.start + j, 0)], most - 1)
+            label = np.unique(label * most + code, return_inverse=True)[1]
+        return label
+
+
+class NoInitialRun(DataError):
+    """No run is without a mass: all have to be fitted together."""
+
+
+class Sorted:
+    """The rows of all rotors, sorted by rotor; what was on in each run, and which runs take part."""
+
+    def __init__(self, rows: LogRows, excluded: Collection[str]) -> None:
+        self.rows = rows
+        self.order = np.argsort(rows.rotor, kind="stable")
+        self.rotor = rows.rotor[self.order]
+        self.warnings: list[str] = []
+        self.runs = _Listed(self.rotor, rows.run[self.order], len(rows.of.rotors))
+        self.run = self.runs.number
+        """Of each row its rotor's run."""
+        out = np.array([name in excluded for name in rows.runs])
+        self.takes_part = ~out[self.runs.code]
+        self._on()
+
+    def _on(self) -> None:
+        """Find what was on in each run, and the last run of each rotor."""
+        rows, masses = self.rows, self.rows.masses
+        place = np.empty(len(self.order), dtype=np.intp)
+        place[self.order] = np.arange(len(self.order))
+        at = place[masses.row]
+        by_rotor = np.argsort(at, kind="stable")
+        at, plane, value = at[by_rotor], masses.plane[by_rotor], masses.value[by_rotor]
+        loaded = np.flatnonzero(masses.stated[self.order])
+        first = np.full(len(self.runs.first), -1)
+        first[self.run[loaded[::-1]]] = loaded[::-1]
+        counts = at == first[self.run[at]]
+        self._agree(loaded, first, at, plane, value, counts)
+        at, plane, value = at[counts], plane[counts], value[counts]
+        # planes in the order of the runs
+        by_run = np.argsort(self.run[at], kind="stable")
+        at, plane, value = at[by_run], plane[by_run], value[by_run]
+        rotors = len(rows.of.rotors)
+        self.planes = _Listed(self.rotor[at], plane, rotors)
+        width = int(self.planes.count.max(initial=0))
+        on = np.zeros((len(first), width), dtype=complex)
+        on[self.run[at], self.planes.place] = value
+        sizes = np.abs(on)
+        self.has = np.zeros(on.shape, dtype=bool)
+        self.has[self.run[at], self.planes.place] = True
+        self.on, self.sizes = on, sizes
+        self.stays = stays = self._stays()
+        self.after_kept = np.zeros(len(first), dtype=bool)
+        """Whether an earlier run of the rotor has left a mass on."""
+        if stays.any():
+            standing, size = np.zeros((rotors, width), dtype=complex), np.zeros((rotors, width))
+            kept = np.zeros(rotors, dtype=bool)
+            for j in range(int(self.runs.count.max())):
+                mine = np.flatnonzero(self.runs.count > j)
+                run = self.runs.start[mine] + j
+                self.after_kept[run] = kept[mine]
+                on[run] += standing[mine]
+                sizes[run] += size[mine]
+                stay, here = mine[stays[run]], run[stays[run]]
+                standing[stay], size[stay], kept[stay] = on[here], sizes[here], True
+            self.has |= on != 0
+        read = np.zeros(len(first), dtype=bool)
+        read[self.run[np.isfinite(rows.vibration[self.order])]] = True
+        numbers = np.where(read, np.arange(len(first)), np.repeat(self.runs.start, self.runs.count))
+        self.last = np.maximum.reduceat(numbers, self.runs.start)
+        """The last run of each rotor in which anything was read."""
+
+    def find_initial(self, stored: bool) -> None:
+        """Find the initial run of each rotor, and refuse runs that are none with trial runs."""
+        rows, file = self.rows, self.rows.of.table.file
+        self.tried = np.zeros(len(self.runs.first), dtype=bool)
+        self.tried[self.run[rows.named[self.order]]] = True
+        bare = ~self.tried & ~self.after_kept
+        rotors = len(rows.of.rotors)
+        rotor_of = np.repeat(np.arange(rotors), self.runs.count)
+        many = np.bincount(rotor_of[bare], minlength=rotors)
+        if (many > 1).any():
+            rotor = int(np.argmax(many > 1))
+            run, again = np.flatnonzero(bare & (rotor_of == rotor))[:2].tolist()
+            one, two = (quote(rows.runs[self.runs.code[k]]) for k in (run, again))
+            if stored:
+                raise DataError(
+                    f"{file}: {rows.of.of(rotor)}runs {one} and {two} both have no trial mass: expected one run, for --influence "
+                    "gives the coefficients"
+                )
+            one, two = (rows.runs[self.runs.code[k]] for k in (run, again))
+            expected = f"a trial mass in run {two}, for run {one} is the initial one already"
+            raise rows.of.table.error(int(self.order[self.runs.first[again]]), "trial_plane", "", expected)
+        if not many.all():
+            raise NoInitialRun(
+                f"{file}: {rows.of.of(int(np.argmin(many)))}every run has a trial mass: expected an initial run with trial_plane, "
+                "trial_mass and trial_angle empty"
+            )
+        if not stored and (self.runs.count < 2).any():
+            raise DataError(
+                f"{file}: {rows.of.of(int(np.argmin(self.runs.count)))}no trial run: expected a run with a trial mass for every "
+                "plane, or stored coefficients by --influence"
+            )
+        self.initial = np.flatnonzero(bare)
+        """The initial run of each rotor."""
+        self.is_initial = np.zeros(len(self.order), dtype=bool)
+        self.is_initial[self.order] = bare[self.run]
+        """Which rows are of it."""
+
+    def _agree(
+        self, loaded: Rows, first: Rows, at: Rows, plane: Rows, value: Complex, counts: NDArray[np.bool_]
+    ) -> None:
+        """Refuse rows that put on other masses than the first one of their run that tells them."""
+        rows = self.rows
+        in_order = np.lexsort((plane, at))
+        at, plane = at[in_order], plane[in_order]
+        value, counts = value[in_order], counts[in_order]
+        entries = np.bincount(at, minlength=len(self.order))
+        start = np.cumsum(entries) - entries
+        # each mass of a row beside that of the row that counts
+        twin = start[first[self.run[at]]] + np.arange(len(at)) - start[at]
+        many = entries[loaded] != entries[first[self.run[loaded]]]
+        bad = loaded[many]
+        if not len(bad):
+            own, twin = np.flatnonzero(~counts), twin[~counts]
+            bad = at[own[(plane[twin] != plane[own]) | (value[twin] != value[own])]]
+        if len(bad):
+            row = bad.min()
+            size, i = next(iter(rows.of.table.cells.values())), int(self.order[row])
+            name = rows.runs[rows.run[i]]
+            raise rows.of.table.error(
+                i, size.header, size.values[i], f"the masses as elsewhere in run {name}"
+            )
+
+    def _stays(self) -> NDArray[np.bool_]:
+        """Whether what a run has put on stays on."""
+        stays = np.zeros(len(self.runs.first), dtype=bool)
+        if "trial_kept" in self.rows.of.table.texts:
+            words, code = self.rows.of.table.numbered("trial_kept")
+            for k, word in enumerate(words):
+                if word.lower() not in (*YES, *NO):
+                    raise self.rows.of.table.error(int(np.argmax(code == k)), "trial_kept", word, "yes or no")
+            kept = np.array([word.lower() in YES for word in words])
+            stays[self.run[kept[code[self.order]]]] = True
+        return stays
+
+    def _planes(self) -> tuple[_Listed, Rows]:
+        """List the planes of each rotor in which a run that takes part has a mass, and their columns in `on`."""
+        active = np.logical_or.reduceat(self.has & self.takes_part[:, None], self.runs.start, axis=0)
+        alone = (self.on[self.last] != 0) & ~active
+        for rotor, place in np.argwhere(alone)[:SHOWN].tolist():
+            plane = self.rows.masses.planes[self.planes.code[self.planes.start[rotor] + place]]
+            self.warnings.append(
+                f"{self.rows.of.of(rotor)}the last run is excluded, and the mass that stands in plane {plane} with it: the trim "
+                "leaves it out, for no other run has a mass there"
+            )
+        rotor, place = np.nonzero(active)
+        return _Listed(rotor, self.planes.code[self.planes.start[rotor] + place], len(active)), place
+
+    def parts(self, named: Sequence[str | None] | None, stored: bool = False) -> Iterator[Group]:
+        """Yield rotors of like channels, planes and number of readings, and of like names where these count.
+
+        Of an initial run and trial runs the names of the runs count too; with stored coefficients the initial run is all.
+        """
+        rows, rotors = self.rows, len(self.rows.of.rotors)
+        takes_part = self.takes_part[self.run] & np.isfinite(rows.vibration[self.order])
+        if stored:
+            takes_part &= self.is_initial[self.order]
+        mine = np.flatnonzero(takes_part)
+        if not rows.of.fitted:
+            # the initial run first
+            mine = mine[np.lexsort((~self.is_initial[self.order[mine]], self.rotor[mine]))]
+        rotor, run, channel = self.rotor[mine], self.run[mine], rows.channel[self.order[mine]]
+        lacking = np.flatnonzero(np.bincount(rotor, minlength=rotors) == 0)
+        if len(lacking):
+            of = self.rows.of.of(int(lacking[0]))
+            left = (
+                "of the runs that are not excluded none was read"
+                if self.takes_part.any()
+                else "every run is excluded"
+            )
+            raise DataError(f"{rows.of.table.file}: {of}{left}: expected runs to fit")
+        again = _again(run * len(rows.channels) + channel)
+        repeats = int(again.max()) + 1
+        lines = _Listed(rotor, run * repeats + again, rotors)
+        channels = _Listed(rotor, channel, rotors)
+        planes, places = self._planes()
+        if named is None and rows.of.fitted:
+            self._require_masses()
+        label = planes.labelled(channels.labelled(lines.count))
+        if not rows.of.fitted:
+            of_line = run[lines.first]
+            codes = (self.runs.code[of_line] * 2 + self.stays[of_line]) * repeats + again[lines.first]
+            label = lines.labelled(label, numbered(codes)[0])
+        if named is not None:
+            numbers: dict[str | None, int] = {}
+            of_name = np.array([numbers.setdefault(name, len(numbers)) for name in named])
+            label = np.unique(label, return_inverse=True)[1] * len(numbers) + of_name
+        label, begin = numbered(label)
+        members, rows_of = (np.argsort(of, kind="stable") for of in (label, label[rotor]))
+        many, many_rows = (np.bincount(of, minlength=len(begin)) for of in (label, label[rotor]))
+        rank = np.empty(rotors, dtype=np.intp)
+        rank[members] = np.arange(rotors) - np.repeat(np.cumsum(many) - many, many)
+        years = self._years(mine, run, lines)
+        for group, at in zip(
+            np.split(members, np.cumsum(many)[:-1]), np.split(rows_of, np.cumsum(many_rows)[:-1]), strict=True
+        ):
+            here, heads, columns = lines.of(group), channels.of(group), planes.of(group)
+            readings = np.full((*here.shape, heads.shape[1]), complex(np.nan))
+            readings[rank[rotor[at]], lines.place[at], channels.place[at]] = rows.vibration[
+                self.order[mine[at]]
+            ]
+            first = lines.first[here]
+            when = None if years is None else years[here]
+            if when is not None:
+                self._lacking(group, when, self.runs.code[run[first]])
+            yield Group(
+                group,
+                Lines(rows.runs, self.runs.code[run[first]], when),
+                [rows.channels[c] for c in channels.code[heads[0]].tolist()],
+                [rows.masses.planes[k] for k in planes.code[columns[0]].tolist()],
+                readings,
+                np.take_along_axis(self.on[run[first]], places[columns][:, None, :], axis=2),
+                np.take_along_axis(self.sizes[run[first]], places[columns][:, None, :], axis=2),
+                np.take_along_axis(self.on[self.last[group]], places[columns], axis=1),
+                [rows.runs[k] for k in self.runs.code[self.last[group]].tolist()],
+                self._weights(group, self.order[mine[channels.first[heads]]]),
+                [] if rows.of.fitted else self._trials(run[first[0]]),
+                (rows.reading_share, rows.mass_share),
+            )
+
+    def _trials(self, run: Rows) -> list[Trial]:
+        """Return the runs of rotors that were measured alike, in order; `run` is that of each row of readings."""
+        names, code = self.rows.runs, self.runs.code
+        return [
+            Trial(names[code[k]], np.flatnonzero(run == k).tolist(), bool(self.tried[k]), bool(self.stays[k]))
+            for k in dict.fromkeys(run.tolist())
+        ]
+
+    def _require_masses(self) -> None:
+        """Refuse a rotor on which no mass ever was."""
+        some = np.logical_or.reduceat(
+            ((self.on != 0) & self.takes_part[:, None]).any(axis=1), self.runs.start
+        )
+        if not some.all():
+            of = self.rows.of.of(int(np.argmin(some)))
+            raise DataError(
+                f"{self.rows.of.table.file}: {of}no mass ever changed: what a mass does to the vibration is not known; expected a "
+                "run with a mass on the rotor"
+            )
+
+    def _weights(self, group: Rows, at: Rows) -> Real | None:
+        """Return the weights of the channels (g, s), written in these rows."""
+        weight = self.rows.of.table.numbers.get("weight")
+        if weight is None:
+            return None
+        weights = np.where(np.isnan(weight.values[at]), 1.0, weight.values[at])
+        wrong = ~(weights > 0).any(axis=1) | (weights < 0).any(axis=1)
+        if wrong.any():
+            of = self.rows.of.of(int(group[np.argmax(wrong)]))
+            raise DataError(
+                f"{self.rows.of.table.file}: {of}the weights are zero or negative: expected one that is positive"
+            )
+        return weights
+
+    def _years(self, mine: Rows, run: Rows, lines: _Listed) -> Real | None:
+        """Return when each row of readings was read: each says it itself, or its run does once."""
+        if self.rows.years is None:
+            return None
+        years = self.rows.years[self.order[mine]]
+        dated = np.flatnonzero(np.isfinite(years))[::-1]
+        of_run, of_line = np.full(len(self.runs.first), np.nan), np.full(len(lines.first), np.nan)
+        of_run[run[dated]] = years[dated]
+        of_line[lines.number[dated]] = years[dated]
+        return np.where(np.isnan(of_line), of_run[run[lines.first]], of_line)
+
+    def _lacking(self, group: Rows, years: Real, run: Rows) -> None:
+        """Say of which runs the date is not known."""
+        for i in np.flatnonzero(np.isnan(years).any(axis=1)).tolist():
+            names = dict.fromkeys(self.rows.runs[k] for k in run[i, np.isnan(years[i])].tolist())
+            if len(self.warnings) == SHOWN:
+                self.warnings.append("… and the same of further rotors: no date")
+            elif len(self.warnings) < SHOWN:
+                self.warnings.append(
+                    f"{self.rows.of.of(int(group[i]))}no date in run{'s' * (len(names) > 1)} {', '.join(names)}: drift over time is not tested"
+                )
+
+
+def _again(codes: Rows) -> Rows:
+    """Tell how often each code stood before.
+
+    >>> _again(np.array([4, 2, 4, 4]))
+    array([0, 0, 1, 2])
+    """
+    order = np.argsort(codes, kind="stable")
+    inside = codes[order]
+    begin = np.concatenate([[True], inside[1:] != inside[:-1]])
+    out = np.empty_like(order)
+    out[order] = np.arange(len(order)) - np.maximum.accumulate(np.where(begin, np.arange(len(order)), 0))
+    return out

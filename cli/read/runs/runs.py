@@ -1,0 +1,271 @@
+"""Runs as arrays: rotors that were measured in the same way, side by side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+import balancing
+from balancing.run_means import RunMeans
+from cli.read.runs.masses import Masses
+from dalembert.errors import DataError
+from dalembert.tables.table import Table
+from dalembert.units import UNITS, Scaled, amplitude_kind, from_si, to_si
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Rows = NDArray[np.intp]
+NEAR_SPEED = 0.05  # speeds are one within this share
+
+SHOWN = 5  # a remark names so many rotors, readings …; of the others it gives the number
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A sensor at a speed (rad/s; None where the table names none)."""
+
+    sensor: str
+    speed: float | None
+    speed_written: float | None = None
+    state: str | None = None
+    """The operating state, where the table names one."""
+
+    def __str__(self) -> str:
+        named = self.sensor if self.state is None else f"{self.sensor} ({self.state})"
+        return named if self.speed_written is None else f"{named} at {self.speed_written:g}"
+
+    @property
+    def key(self) -> dict[str, str | float | None]:
+        """How the JSON names it: states stand where speeds do."""
+        key: dict[str, str | float | None] = {"sensor": self.sensor}
+        if self.state is not None:
+            key["state"] = self.state
+        return key if self.state is not None and self.speed is None else {**key, "speed_rad_s": self.speed}
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A run of an initial run with trial runs."""
+
+    run: str
+    lines: list[int]
+    """Which rows of readings are of it."""
+    tried: bool
+    """Whether a mass was put on for it."""
+    kept: bool
+
+
+class Lines:
+    """Of which run each row of readings is, for many rotors; the names are formed on request."""
+
+    def __init__(self, names: list[str], run: Rows, years: Real | None) -> None:
+        self.names, self.run, self.years = names, run, years
+        self.senses: list[str | None] = [None] * len(run)
+        """For each rotor "lead" or "lag", as the runs show it; None where they cannot tell."""
+
+    def of(self, i: int) -> list[str]:
+        """Return the runs of a rotor's rows."""
+        return [self.names[r] for r in self.run[i].tolist()]
+
+    def runs(self, i: int) -> list[str]:
+        """Return the runs of a rotor, each once."""
+        return list(dict.fromkeys(self.of(i)))
+
+    def only(self, rotors: Rows, lines: Rows) -> Lines:
+        """Return some lines of some of the rotors."""
+        mine = np.ix_(rotors, lines)
+        return Lines(self.names, self.run[mine], None if self.years is None else self.years[mine])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Before:
+    """Coefficients of a machine, or of machines like it, that are stored from earlier runs."""
+
+    prior: balancing.Prior
+    machines: int
+    """How many machines they are of."""
+    scatter: float | None
+    """Between machines, as a share of the coefficients; None of one machine."""
+    reading: tuple[float, float] | None
+    """Standard deviation of their readings as vectors, in the runs' unit, and its complex degrees of freedom."""
+
+
+@dataclass(eq=False, repr=False)
+class Group:
+    """Rotors that were measured in the same way, g of them: r rows of readings of s channels, masses in p planes."""
+
+    rotors: Rows
+    """Their numbers, (g,)."""
+    lines: Lines
+    """Of which run each row of readings is."""
+    channels: list[Channel]
+    planes: list[str]
+    readings: Complex
+    """(g, r, s), in the table's amplitude unit; NaN where a row lacks a channel."""
+    masses: Complex
+    """What was on the rotor, (g, r, p), SI."""
+    sizes: Real
+    """The sizes of all masses of which these are the sum, (g, r, p)."""
+    standing: Complex
+    """What is on the rotor in its last run, whether it is meant to stay or not, (g, p), SI."""
+    last: list[str]
+    """What that run is called, (g,)."""
+    weights: Real | None
+    """Those of the channels, (g, s)."""
+    trials: list[Trial]
+    """The runs, the initial one first; none of a log whose runs are all fitted together."""
+    shares: tuple[float, float] = (0.0, 0.0)
+    """By what share of it a reading and a mass may be off from the decimals of the table."""
+    fit: balancing.JointFit | None = None
+    """Where the readings tell the coefficients: not with stored ones, nor without phase."""
+    before: Before | None = None
+    """Where stored coefficients take part in the fit."""
+
+    def only(self, rotors: Rows, lines: Rows, channels: Rows) -> Group:
+        """Return some lines and channels of some of the rotors."""
+        mine = np.ix_(rotors, lines)
+        return replace(
+            self,
+            rotors=self.rotors[rotors],
+            lines=self.lines.only(rotors, lines),
+            channels=[self.channels[s] for s in channels],
+            readings=self.readings[np.ix_(rotors, lines, channels)],
+            masses=self.masses[mine],
+            sizes=self.sizes[mine],
+            standing=self.standing[rotors],
+            last=[self.last[k] for k in rotors],
+            weights=None if self.weights is None else self.weights[np.ix_(rotors, channels)],
+        )
+
+    def own_weights(self, i: int) -> Real | None:
+        """The weights of one rotor's channels, (s,)."""
+        return None if self.weights is None else self.weights[i]
+
+    def errors(self) -> tuple[Real, Real]:
+        """Return bounds of the errors of `readings` and `masses` against the decimals of the table."""
+        of_reading, of_mass = self.shares
+        return of_reading * np.nan_to_num(np.abs(self.readings)), of_mass * self.sizes
+
+    @property
+    def fitted(self) -> balancing.JointFit:
+        """The fit of a group that has one."""
+        assert self.fit is not None
+        return self.fit
+
+    @cached_property
+    def chance(self) -> Real:
+        """How often by chance a residual of the fit is as large as each of them, (g, r, s)."""
+        return balancing.outlier_probability(self.fitted)
+
+    @cached_property
+    def repeats(self) -> RunMeans:
+        """The mean readings of an initial run and trial runs, and how far repeats scatter; of a fitted log none."""
+        return RunMeans(self.readings, [of.lines for of in self.trials])
+
+    @property
+    def means(self) -> Complex:
+        """What was read in each run, (g, 1 + r, s): the mean of repeats."""
+        return self.repeats.values
+
+    @property
+    def initial(self) -> Complex:
+        """The vibration without masses, (g, s): the mean of the initial run, or as fitted."""
+        return self.means[:, 0] if self.trials or self.fit is None else self.fit.initial
+
+    @property
+    def on(self) -> Complex:
+        """What was on the rotor in each run, (g, 1 + r, p)."""
+        return self.masses[:, [of.lines[0] for of in self.trials]]
+
+
+@dataclass(eq=False, repr=False)
+class Runs:
+    """A table of runs."""
+
+    table: Table
+    rotors: list[str]
+    mass_unit: str
+    """Of the trials: a mass's or an unbalance's."""
+    fitted: bool = False
+    """Whether all runs are fitted together, or are an initial one and trial runs."""
+    groups: list[Group] = field(default_factory=list)
+    max_mass: dict[str, float] = field(default_factory=dict)
+    """The limits that the file states, plane -> SI."""
+    lags: bool = False
+    """Whether the runs themselves told that the phase lags, and it was turned round."""
+    runout: dict[str, complex] = field(default_factory=dict)
+    """What the file itself states of it, sensor -> vector as read."""
+    warnings: list[str] = field(default_factory=list)
+    """Shown once each, however often they stand here."""
+
+    @property
+    def amplitude_unit(self) -> str:
+        """The unit of the readings."""
+        return self.table.numbers["amplitude"].unit
+
+    @property
+    def per(self) -> str:
+        """`mass` or `unbalance`: what the trials are."""
+        return "mass" if self.mass_unit in UNITS["mass"] else "unbalance"
+
+    @property
+    def per_si(self) -> str:
+        """The SI unit of the trials, as keys and headers have it."""
+        return "kg" if self.per == "mass" else "kg_m"
+
+    @property
+    def speed_unit(self) -> str:
+        """The unit of the speeds that stand in the table."""
+        return self.table.numbers["speed"].unit if "speed" in self.table.numbers else "rpm"
+
+    @property
+    def several(self) -> bool:
+        """Whether there are several rotors, which sentences and tables then name."""
+        return len(self.rotors) > 1
+
+    def in_unit(self, value: Scaled, unit: str, what: str) -> Scaled:
+        """Convert amplitudes to the unit of the readings; DataError where they are another quantity, or read another way."""
+        wanted = self.amplitude_unit
+        if amplitude_kind(unit) != amplitude_kind(wanted):
+            raise DataError(
+                f"{what} is in {unit}, the runs in {wanted}: displacement, velocity, acceleration, voltage, counts, peak "
+                "(_pk), peak to peak (_pp) and r.m.s. (_rms) do not mix"
+            )
+        return value if unit == wanted else from_si(to_si(value, "amplitude", unit), "amplitude", wanted)
+
+    def of(self, rotor: int) -> str:
+        """Return what a sentence about a rotor begins with, where there are several."""
+        return f"rotor {self.rotors[rotor]}: " if self.several else ""
+
+
+def apart(one: float | None, other: float) -> float:
+    """How far two speeds are apart, relatively; 0 where either is not known."""
+    if one is None or other != other or one == other:
+        return 0.0
+    return abs(one - other) / max(abs(one), abs(other))
+
+
+@dataclass
+class LogRows:
+    """The rows of a table of runs, as arrays."""
+
+    of: Runs
+    """What the rows are of."""
+    rotor: Rows
+    vibration: Complex
+    masses: Masses
+    named: NDArray[np.bool_]
+    """Whether a row names a plane, or a mass where there is but one plane."""
+    run: Rows
+    runs: list[str]
+    years: Real | None = None
+    """When it was read; NaN where the row does not say."""
+    reading_share: float = 0.0
+    """By what share of it a reading may be off from its decimals."""
+    mass_share: float = 0.0
+    channels: list[Channel] = field(default_factory=list)
+    channel: Rows = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    """The sensor, state and speed of each row."""
