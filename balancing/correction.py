@@ -17,7 +17,6 @@ which for two planes is the line above. Only differences of given positions stan
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -30,6 +29,7 @@ from dalembert.arithmetic.exact import exact_sum, two_product, two_sum
 from dalembert.arithmetic.parts import in_parts
 from dalembert.arithmetic.records import numbers, record, table
 from dalembert.arithmetic.shapes import as_numbers, common_shape, spread_to
+from dalembert.dataclass import dataclass
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

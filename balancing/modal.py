@@ -18,7 +18,6 @@ or (N + 2) planes?, J. Eng. Ind. 94 (1972) 548-560).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from balancing.dependence import adjoint, threshold
 from dalembert.arithmetic.records import record
+from dalembert.dataclass import dataclass
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline

@@ -75,7 +75,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("pictured",),
         ("computing",),
         ("family",),
-        ("animation", "dragged", "evaluator", "parts_of_motion", "still"),
+        ("animation", "dragged", "evaluator", "parts_of_motion", "pieces", "still"),
         ("forces", "quantities", "table"),
         ("picture",),
         ("study",),
@@ -94,8 +94,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("animation", "picture"),
         ("rounding_in_time", "solids", "traced"),
         ("inertia",),
-        ("rounding",),
-        ("attitude", "elliptic", "shapes", "top_roots"),
+        ("attitude", "eigenvectors", "elliptic", "shapes", "top_roots"),
     ),
     "cli": (
         ("__main__",),
@@ -136,7 +135,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("arithmetic",),
         ("angles", "figures", "quantities"),
         ("units",),
-        ("errors", "hints", "memory"),
+        ("dataclass", "errors", "hints", "memory"),
     ),
     "benchmarks": (
         ("__main__", "commands_page", "library_page", "same_outputs", "trace_passes"),
@@ -158,7 +157,7 @@ PACKAGES = (
     ("dalembert.arithmetic",),
     ("dalembert.angles", "dalembert.figures", "dalembert.quantities"),
     ("dalembert.units",),
-    ("dalembert.errors", "dalembert.hints", "dalembert.memory"),
+    ("dalembert.dataclass", "dalembert.errors", "dalembert.hints", "dalembert.memory"),
 )
 
 # What is not yet so, by file. An entry goes when its offence goes; none is added.

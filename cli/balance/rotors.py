@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -14,6 +13,7 @@ from balancing import CoincidentPlanes, Correction, UnreachedMode, by_size, corr
 from cli.read.planes import Planes
 from cli.read.tolerance import Tolerance, Verdict
 from dalembert.angles import degrees, phasor
+from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError, quote
 from dalembert.tables.table import Table, read
 from dalembert.units import Scaled, from_si, to_si

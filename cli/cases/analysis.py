@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,6 +12,7 @@ from cli.cases import quantities
 from cli.cases.inputs import InputGrid, Inputs
 from cli.cases.quantities import Component
 from cli.read import options
+from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError
 from dalembert.hints import nearest
 from dalembert.memory import memory

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,6 +16,7 @@ import numpy as np
 from cli.cases.values import Driven, Varied, dimension_named, driven, quantity
 from cli.read import options
 from cli.read.options import Steps
+from dalembert.dataclass import dataclass
 from dalembert.errors import DataError
 from dalembert.units import UNITS
 

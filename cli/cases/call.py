@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,6 +17,7 @@ from cli.read.about import about
 from cli.read.options import bad
 from cli.read.seeking import pair
 from cli.show.result import Result, with_found
+from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
 from dalembert.results.text import csv_text
 from dalembert.tables.files import note, read_bytes, remember, split_sheet

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 from uuid import uuid4
@@ -15,6 +14,7 @@ from cli.cases.inputs import of_one
 from cli.cases.rows import joined
 from cli.cases.values import Driven, Varied, with_numbers
 from cli.show.result import Result
+from dalembert.dataclass import dataclass, field
 from dalembert.results.columns import Table
 from dalembert.results.columns import document as result_document
 from virtualwork import MechanismError

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from cli.cases.axes import Grid, Values
 from cli.cases.values import Driven
+from dalembert.dataclass import dataclass, field
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing, suppress
-from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,6 +20,7 @@ from cli.cases.values import Driven
 from cli.read.options import processes
 from cli.show.result import Written
 from cli.show.terminal import progress
+from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table
 from virtualwork import MechanismError

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from dalembert.dataclass import dataclass, field, replace
 from dalembert.results.columns import Column, Table
 
 if TYPE_CHECKING:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
@@ -16,6 +15,7 @@ from cli.cases.case import Case, Study
 from cli.cases.rows import like
 from cli.show.result import Result, Section, Sheet
 from cli.show.terminal import progress
+from dalembert.dataclass import dataclass, field, replace
 from dalembert.results.columns import Table
 from dalembert.results.columns import document as result_document
 from dalembert.results.text import heading

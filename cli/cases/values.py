@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from cli.read import options
 from dalembert.angles import read_degrees
+from dalembert.dataclass import dataclass, replace
 from dalembert.hints import nearest
 from dalembert.quantities import is_number, parse_number, parse_quantity
 from dalembert.units import UNITS, to_si

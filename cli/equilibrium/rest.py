@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -14,6 +13,7 @@ from cli.cases.case import TableCase, TableStudy
 from cli.cases.inputs import Inputs
 from cli.cases.ledger import Entry, entries_of, ledger
 from cli.cases.poses import column
+from dalembert.dataclass import dataclass, field, replace
 from dalembert.results.columns import Column, Table, names, number
 from dalembert.results.way import Topic, figures
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +18,7 @@ from cli.read import options
 from cli.show.picture import blank
 from cli.show.result import Result
 from dalembert.angles import read_degrees
+from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError
 from dalembert.results.columns import ABSENT, Column, Table, names, number
 from dalembert.tables.files import read_bytes

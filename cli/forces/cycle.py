@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +13,7 @@ from cli.cases.case import Case
 from cli.cases.study import Further, PoseCase, PoseStudy
 from cli.read.options import bad
 from cli.show.result import Result
+from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table, names, number
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from cli.cases import quantities
 from cli.cases.analysis import Analysis
 from cli.cases.case import TableCase, TableStudy
 from cli.cases.poses import listed
 from cli.cases.study import METHOD
+from dalembert.dataclass import dataclass, field, replace
 from dalembert.results.columns import Table, finite, names
 from dalembert.results.way import Topic, figures
 from virtualwork.formulas.forces import Effort, JointForce
@@ -223,12 +224,19 @@ def order(analysis: Analysis) -> Table:
 
 
 def operations(analysis: Analysis) -> Table:
-    """Operations that all points and links of a pose cost, with rates where the input has any, and all its forces."""
+    """Operations that a pose costs: all its points and links, with rates where the input has any, and all its forces.
+
+    Before them those of the quantities that --only names.
+    """
     motion = analysis.motions[0]
     m = motion.mechanism
     moves = any(not isinstance(rate, float) or rate for rates in motion.poses.rates for rate in rates)
     keys: list[Quantity] = []
     counts: dict[str, int] = {}
+    if analysis.request.only is not None:
+        named = quantities.keys_of([*analysis.places, *analysis.forces])
+        if motion.poses.takes(named):
+            counts[", ".join(analysis.request.only)] = motion.poses.operations(named)
     for order, what in enumerate(("positions", "with velocities", "with accelerations")[: 3 if moves else 1]):
         keys += [Point(body, 0j, p, order) for body in m.links for p in m.bodies[body]]
         keys += [Angle(body, order) for body in m.links]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cli.cases.study import Further, PoseStudy
+from dalembert.dataclass import dataclass
 from dalembert.results.columns import Column, Table, names, number
 
 if TYPE_CHECKING:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
 from dalembert.errors import DataError
-from dalembert.quantities import is_number, parse_number, parse_quantity
-from dalembert.units import SMALLEST, UNITS, to_si
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -46,6 +44,17 @@ def refuse(message: str, **values: object) -> None:
         raise bad(flag, message)
 
 
+def only(text: str | None, names: Sequence[str]) -> Sequence[str]:
+    """Read --only: the names between commas, all of them where there is none."""
+    if text is None:
+        return names
+    words = [word.strip() for word in text.split(",") if word.strip()]
+    for word in words or [text]:
+        if word not in names:
+            raise bad("--only", f"'{word}': expected {', '.join(names)}")
+    return words
+
+
 def column_names(pairs: list[str] | None) -> dict[str, str]:
     """Read the values of --column, `mass_kg=Masse`: name here -> header in the file."""
     names = {}
@@ -58,6 +67,10 @@ def column_names(pairs: list[str] | None) -> dict[str, str]:
 
 
 def _read(flag: str, text: str, dimension: str, positive: bool) -> tuple[float, str]:
+    # a help reads no quantities
+    from dalembert.quantities import parse_quantity
+    from dalembert.units import SMALLEST
+
     try:
         value, unit = parse_quantity(text, dimension)
     except ValueError as error:
@@ -65,6 +78,13 @@ def _read(flag: str, text: str, dimension: str, positive: bool) -> tuple[float, 
     if positive and not value >= SMALLEST:
         raise bad(flag, f"'{text}': expected a positive value")
     return value, unit
+
+
+def _in_si(value: float, dimension: str, unit: str) -> float:
+    from dalembert.units import UNITS, to_si
+
+    # without a unit it is in SI
+    return float(to_si(value, dimension, unit or next(iter(UNITS[dimension]))))
 
 
 def with_unit(
@@ -77,7 +97,7 @@ def with_unit(
 def needed(flag: str, text: str, dimension: str, *, positive: bool = False) -> float:
     """Read a value that is given, in SI."""
     value, unit = _read(flag, text, dimension, positive)
-    return float(to_si(value, dimension, unit))
+    return _in_si(value, dimension, unit)
 
 
 def quantity(flag: str, text: str | None, dimension: str, *, positive: bool = False) -> float | None:
@@ -95,6 +115,8 @@ def mass_at(
     flag: str, text: str, vector: str, dimension: str, expected: str
 ) -> tuple[float, str, float, str]:
     """Read the `MASS@ANGLE` of an option's text, each with its unit; a bare angle is in degrees."""
+    from dalembert.quantities import is_number
+
     mass, mark, angle = vector.partition("@")
     if not mark:
         raise bad(flag, expected)
@@ -144,6 +166,8 @@ def places(
 
 def plane_vector(flag: str, text: str) -> complex:
     """Read `X,Y` in SI as x + iy."""
+    from dalembert.quantities import parse_number
+
     parts = text.split(",")
     try:
         if len(parts) != 2:
@@ -164,12 +188,13 @@ def vector(flag: str, text: str | None, dimension: str) -> tuple[float, float, f
         numbers = [_number_and_unit(part, dimension) for part in parts]
     except ValueError as error:
         raise bad(flag, f"'{text}': expected three numbers x,y,z: {error}") from None
-    shared = numbers[2][1] or next(iter(UNITS[dimension]))
-    x, y, z = (float(to_si(value, dimension, unit or shared)) for value, unit in numbers)
+    x, y, z = (_in_si(value, dimension, unit or numbers[2][1]) for value, unit in numbers)
     return x, y, z
 
 
 def _number_and_unit(text: str, dimension: str) -> tuple[float, str]:
+    from dalembert.quantities import parse_number, parse_quantity
+
     try:
         return parse_number(text), ""
     except ValueError:
@@ -182,7 +207,7 @@ def number_or_quantity(flag: str, text: str, dimension: str) -> float:
         value, unit = _number_and_unit(text.strip(), dimension)
     except ValueError as error:
         raise bad(flag, error) from None
-    return float(to_si(value, dimension, unit or next(iter(UNITS[dimension]))))
+    return _in_si(value, dimension, unit)
 
 
 def time_range(flag: str, text: str) -> list[float]:

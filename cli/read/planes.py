@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cli.read.options import bad
+from dalembert.dataclass import dataclass
 from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_quantity
 from dalembert.tables.table import read

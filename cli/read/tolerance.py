@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from cli.read import options
+from dalembert.dataclass import dataclass
 from dalembert.results.columns import Table, names, number
 
 if TYPE_CHECKING:

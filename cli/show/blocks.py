@@ -7,12 +7,12 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.show.in_units import finished
 from cli.show.result import Written
+from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
 from dalembert.results.columns import Table
 

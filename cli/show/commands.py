@@ -6,7 +6,6 @@ import re
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
 from functools import wraps
 from inspect import Parameter, signature
 from pathlib import Path
@@ -18,6 +17,7 @@ from typer.core import TyperCommand
 
 from cli.read.about import HEAD
 from cli.show.taking import take
+from dalembert.dataclass import dataclass
 
 if TYPE_CHECKING:
     from cli.show.result import Result
@@ -275,11 +275,12 @@ class Command(TyperCommand):
         except Exception as error:
             # of a NoSuchOption the option
             option = getattr(error, "option_name", None)
+            # one of its own lacks its value
+            if option is None or any(option in param.opts for param in self.get_params(ctx)):
+                raise
             from cli.renamed import renamed
 
-            # one of its own lacks its value
-            own = any(option in param.opts for param in self.get_params(ctx))
-            line = None if option is None or own else renamed(ctx.info_name or "", option)
+            line = renamed(ctx.info_name or "", option)
             if line is None:
                 raise
             typer.echo(line, err=True)

@@ -13,10 +13,8 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cli.show.commands import FORMS, ShowOptions, with_options
-from cli.show.files import refuse_inputs
 from cli.show.terminal import coloured
 from dalembert.errors import one_line
-from dalembert.results.columns import document as result_document
 
 if TYPE_CHECKING:
     from cli.show.expect import Comparison
@@ -99,7 +97,7 @@ def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
 
 def _write(result: Result, options: ShowOptions, pages: Mapping[Path, Made]) -> None:
     """Write the files; where one of them is an input, none."""
-    from cli.show.files import check_folders, write_all
+    from cli.show.files import check_folders, refuse_inputs, write_all
 
     output = options.output
     files: dict[Path, Made] = {}
@@ -122,6 +120,8 @@ def _write(result: Result, options: ShowOptions, pages: Mapping[Path, Made]) -> 
 
 def _with_check(result: Result, checked: Comparison) -> Result:
     """Return the result with the check as its first table, and in its document."""
+    from dalembert.results.columns import document as result_document
+
     document = result.documented
     check = result_document([checked.table])
     return replace(
@@ -215,7 +215,7 @@ def reported(options: str) -> Callable[[Callable[..., Result]], Callable[..., No
 
 
 def _hand_on(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
-    from cli.show.files import write_all
+    from cli.show.files import refuse_inputs, write_all
 
     files = [*result.beside.items(), *_report(result, options, call).items()]
     refuse_inputs(path for path, _ in files)
@@ -259,7 +259,7 @@ def _in_chosen_units(result: Result, units: str | None) -> Result:
 def _stream(result: Result, options: ShowOptions) -> None:
     """Write a table that comes in parts."""
     from cli.show.blocks import stream
-    from cli.show.files import write_all
+    from cli.show.files import refuse_inputs, write_all
 
     if options.units is not None:
         from cli.show.in_units import chosen_units

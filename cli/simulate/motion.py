@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -22,6 +21,7 @@ from cli.show.picture import shown as on_page
 from cli.show.terminal import progress_in_time
 from dalembert.angles import read_degrees
 from dalembert.arithmetic.engines import anew
+from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table, document, names, number
 from dalembert.results.way import Topic, figures

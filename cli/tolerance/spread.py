@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from cli.cases.case import TableCase, TableStudy
 from cli.cases.quantities import Component, cells, keys_of
 from cli.cases.study import METHOD
 from cli.read.options import processes
+from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table, names
 from virtualwork.describe.dimensions import Dimension

@@ -8,11 +8,11 @@ for many steps.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder
 from dalembert.arithmetic.tape import Tape, performed
+from dalembert.dataclass import dataclass
 
 
 class Calls:

@@ -9,11 +9,12 @@ kind of number: floats, arrays, recorded numbers, many digits.
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property, reduce
 from operator import or_
 from types import MappingProxyType
 from typing import Any, Protocol
+
+from dalembert.dataclass import dataclass
 
 Operation = tuple[str, *tuple[Any, ...]]
 """(kind, arguments …): `("const", value)`, `("input", name)`, or a kind of `SIGNS` and the numbers of its arguments."""

@@ -6,11 +6,11 @@ Tables are made of columns; the JSON document is made of tables (`document`). No
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+from dalembert.dataclass import dataclass, field
 from dalembert.units import LISTED, RESULTS, UNITS, from_si, to_si
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ Terminal, report and JSON walk the same topics; a command forms them with --step
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from dalembert.dataclass import dataclass, field
 from dalembert.results.columns import Table, document
 
 if TYPE_CHECKING:

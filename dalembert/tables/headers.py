@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
 
+from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
 from dalembert.tables.files import load
 from dalembert.units import AMPLITUDES, TAGS, UNITS, dimensions, find_unit, nearest_unit, parted, unit_name

@@ -6,10 +6,10 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import islice, zip_longest
 from typing import TYPE_CHECKING
 
+from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError, cell_error, quote
 from dalembert.quantities import is_number
 from dalembert.tables.files import is_workbook, read_bytes, remember, split_sheet

@@ -11,12 +11,12 @@ import io
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError, quote
 from dalembert.quantities import number_expected, parse_number
 from dalembert.tables.headers import Heading, find_columns, offers, spellings

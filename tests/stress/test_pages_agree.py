@@ -25,7 +25,7 @@ from virtualwork.quantities import Component, forces, places
 pytestmark = needs_node
 EXAMPLES = (
     "andrews/andrews", "belt-drive/belt-drive", "block-on-bar/bar", "cam-valve/cam-valve",
-    "rack-lift/rack-lift", "boom/boom", "crank-press/press", "desk-lamp/lamp", "door-closer/door", "engine-start/engine-start", "engine/engine", "five-bar/five-bar",
+    "doubling-rack/doubling-rack", "rack-lift/rack-lift", "boom/boom", "crank-press/press", "desk-lamp/lamp", "door-closer/door", "engine-start/engine-start", "engine/engine", "falling-four-bar/falling", "grindstone/stone", "sledge/sledge", "five-bar/five-bar",
     "inclined-slider-crank/piston", "jansen/jansen", "klann/klann", "moving-ramp/ramp", "parallelogram/parallelogram",
     "peaucellier/peaucellier", "planetary-gear/planetary", "quick-return/quick-return", "robot-arm/arm",
     "scissors-lift/lift", "scotch-yoke/yoke", "stephenson-six-bar/stephenson", "toggle-clamp/clamp",
@@ -43,10 +43,13 @@ class Tried(NamedTuple):
     kinds: list[tuple[Any, ...]]
     true: list[list[float]]
     conditions: list[float]
+    rate: float
 
 
-def tried(name: str, m: Mechanism, rng: np.random.Generator, times: int, width: float) -> Tried | None:
-    """Some changes of a mechanism; None where its page replays, or it cannot be put together."""
+def tried(
+    name: str, m: Mechanism, rng: np.random.Generator, times: int, width: float, turns: float = 0.0
+) -> Tried | None:
+    """Some changes of a mechanism, its input up to so many turns away; None where its page replays, or it cannot be put together."""
     try:
         first = Motion(m.assembly, None, 3.0, 1.5)
     except MechanismError:
@@ -79,7 +82,10 @@ def tried(name: str, m: Mechanism, rng: np.random.Generator, times: int, width: 
             step = own or (0.1 * m.size if numbers[i].kind == "length" else 0.1)
             change[numbers[i].path] = own + width * step * rng.uniform(0 if own == 0 else -1, 1)
         at = [
-            float(q + width * rng.uniform(-1, 1) * (m.size if e.is_slide else 20.0))
+            float(
+                q
+                + rng.uniform(-1, 1) * (width * m.size if e.is_slide else 20.0 * width + 2 * math.pi * turns)
+            )
             for q, e in zip(m.at, m.inputs, strict=True)
         ]
         changes.append(change | dict(zip([e.name for e in m.inputs], at, strict=True)))
@@ -97,7 +103,8 @@ def tried(name: str, m: Mechanism, rng: np.random.Generator, times: int, width: 
     alike = dict.fromkeys(("force", "effort", "newton-euler", "shaking", "moment", "shaking moment"), "load")
     alike |= {"point": "place", "slide": "place"}
     kinds = [(alike.get(each.key.kind, each.key.kind), each.order) for each in named.values()]
-    return Tried(name, page, changes, list(named), kinds, true, conditions)
+    rate = max(3.0 / (m.size if e.is_slide else 1.0) for e in m.inputs)
+    return Tried(name, page, changes, list(named), kinds, true, conditions, rate)
 
 
 def regular(m: Mechanism) -> bool:
@@ -132,6 +139,9 @@ def faults(every: list[Tried], folder: Path, allowed: float) -> list[str]:
         inertia = max(
             (abs(v) for of in t.changes for path, v in of.items() if path.endswith(".inertia")), default=0.0
         )
+        # of a link that only rounding turns, what cancels is of the size of the input's own rates
+        for kind in (kind for kind in largest if kind[0] == "angle" and kind[1]):
+            largest[kind] = max(largest[kind], t.rate ** kind[1])
         for kind in (kind for kind in largest if kind[0] == "load"):
             largest[kind] = max(largest[kind], 90 * inertia)
         for change, row, true, condition in zip(t.changes, rows, t.true, t.conditions, strict=True):

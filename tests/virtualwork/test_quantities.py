@@ -6,13 +6,14 @@ import pickle
 
 import pytest
 
-from virtualwork.digits.exact import Gap, Rub
+from virtualwork.digits.exact import Gap
 from virtualwork.family.part import Assembled
 from virtualwork.formulas.balanced import Over
 from virtualwork.formulas.forces import Effort, JointForce, NewtonEuler, Reaction, Shaking
 from virtualwork.formulas.kinematics import Angle, AnglePartial, Point, PointPartial, Slide, Turn
 from virtualwork.formulas.loops import Closed, Margin, Size
 from virtualwork.formulas.quantity import NOTHING, Quantity
+from virtualwork.formulas.rubbing import Rub
 
 
 def kinds(of: type[Quantity] = Quantity) -> set[type[Quantity]]:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property, partial
 
 import numpy as np
 
 from dalembert.arithmetic.guard import Lock, guarded, own_lock
 from dalembert.arithmetic.records import Record, record
+from dalembert.dataclass import dataclass, field
 from virtualwork.describe.description import Description
 from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.positions import State, principal, run
 from virtualwork.plan.order import plan
-from virtualwork.plan.steps import Group, Plan, Step, turns
+from virtualwork.plan.steps import Group, Plan, Step, geared
 
 
 @guarded
@@ -79,15 +79,8 @@ class Choice(Record):
 
     @cached_property
     def geared(self) -> set[str]:
-        """Bodies of which a gear of fractional ratio, or a rack, needs the angle itself, at first or second hand.
-
-        The angle with its whole turns.
-        """
-        result: set[str] = set()
-        for turn in reversed(list(turns(self.plan.steps))):
-            needs = turn.slides or turn.body in result
-            result |= {b for b, r in turn.angle.turning if needs or not float(r).is_integer()}
-        return result
+        """Bodies of which the angle is needed with its whole turns."""
+        return geared(self.plan.steps)
 
     @cached_property
     def plain(self) -> dict[str, Callable[[State], None]]:

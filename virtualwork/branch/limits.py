@@ -6,7 +6,6 @@ And why a pose cannot be assembled: the group that does not close, by how much, 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, partial
 from math import isfinite, lcm
@@ -14,6 +13,7 @@ from math import isfinite, lcm
 import numpy as np
 
 from dalembert.arithmetic.guard import guarded
+from dalembert.dataclass import dataclass, replace
 from virtualwork.branch.noted import SAME
 from virtualwork.branch.track import Track
 from virtualwork.formulas.closed_forms import Gap

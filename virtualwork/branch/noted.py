@@ -6,11 +6,11 @@ What a group has in one round of all that it depends on it has in every other: i
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dalembert.dataclass import dataclass, replace
 from virtualwork.branch.pace import Pace
 from virtualwork.formulas.numbers import Reals
 from virtualwork.plan.steps import Group

@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from dalembert.arithmetic.varied import direction, heading, root
+from dalembert.dataclass import dataclass, field
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.curves import LiftTable
 from virtualwork.describe.forms import Body, Choice, FollowerPoint, Nested, PointName, Quantity

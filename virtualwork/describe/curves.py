@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, TypeVar
 
+from dalembert.dataclass import dataclass
 from dalembert.errors import DataError
 from dalembert.tables.sources import table_rows
 from dalembert.units import LARGEST

@@ -7,12 +7,12 @@ of solution, the formulas and the studies work on this.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
 from dalembert.arithmetic.records import Record, record
+from dalembert.dataclass import dataclass, field
 from virtualwork.describe import DescriptionError, require
 from virtualwork.describe.cams import CamDrive, drive_of
 from virtualwork.describe.forms import Form, Free, Pair

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from dalembert.dataclass import dataclass, field
 from dalembert.hints import nearest
 from virtualwork.describe import DescriptionError, require
 from virtualwork.describe.units import Units, wrong

@@ -6,10 +6,10 @@ Names are checked when the whole mechanism is there: the same check serves a fil
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from numbers import Real
 from typing import Any, Protocol
 
+from dalembert.dataclass import dataclass
 from virtualwork.describe import DescriptionError, require
 from virtualwork.describe.file import GROUND, Entry
 from virtualwork.describe.units import SI, Units, wrong

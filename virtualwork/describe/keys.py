@@ -6,9 +6,10 @@ The reader, the JSON Schema, the paths of dimensions, the checks and the TOML te
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, field, fields, replace
+from dataclasses import MISSING, field, fields, replace
 from typing import Any, ClassVar
 
+from dalembert.dataclass import dataclass
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.file import Entry, missing, require_keys
 from virtualwork.describe.forms import Form, Free, Names, Nested

@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+from dalembert.dataclass import dataclass
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.forms import Choice, Quantity
 from virtualwork.describe.keys import declared

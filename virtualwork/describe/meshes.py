@@ -6,9 +6,9 @@ Each is one linear relation Σ c·x = const between angles of bodies and slides 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
+from dalembert.dataclass import dataclass
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.file import GROUND
 from virtualwork.describe.forms import Body, Flag, Lengths, Quantity, RackPoint, TwoBodies

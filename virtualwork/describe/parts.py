@@ -9,11 +9,11 @@ Points and vectors of the plane are complex numbers x + iy: R e^{iθ} is then wr
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import ClassVar, Literal
 
 from dalembert.arithmetic.records import Record, record
+from dalembert.dataclass import dataclass, field
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.cams import Cam as Cam
 from virtualwork.describe.curves import ForceTable, Law, TorqueOrTable

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from numbers import Real
 from types import MappingProxyType
 from typing import Any
 
+from dalembert.dataclass import dataclass
 from dalembert.hints import nearest
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.forms import Form, Quantity

@@ -29,15 +29,13 @@ from dalembert.arithmetic.recorded import Number, Recorder, bare, lifted
 from dalembert.arithmetic.varied import Precise, Varied
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, dimensions, value
-from virtualwork.formulas.block import Block
 from virtualwork.formulas.lanes import Turning
-from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.newton import gaps, unknowns
-from virtualwork.formulas.numbers import Written, dot, plus
+from virtualwork.formulas.numbers import Written
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.quantity import Quantity
-from virtualwork.formulas.reactions import JointForces
 from virtualwork.formulas.recording import Recording
+from virtualwork.formulas.rubbing import Rubbing
 from virtualwork.formulas.statics import equations
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, turns
@@ -138,7 +136,7 @@ class Numbers:
 
 
 @guarded
-class Exact(Recording):
+class Exact(Rubbing):
     """The formulas of an assembly, with its numbers as inputs.
 
     Parameters
@@ -193,27 +191,6 @@ class Exact(Recording):
     def step(self, group: Group, st: State) -> list[Number] | None:
         return None if group.name in self.folded else super().step(group, st)
 
-    # --- friction -------------------------------------------------------------------------------------------------
-    @property
-    def forces(self) -> tuple[LoadPaths, JointForces, Block]:
-        """The loads over the recorded pose; the friction of each joint enters."""
-        known = self._forces
-        paths, of, block = super().forces
-        if known is None and paths.case.contacts:
-            self.solve(*paths.case.targets(paths.case.places))
-            for n, (joint, *_) in enumerate(paths.case.contacts):
-                rub = self.recorder.input(f"friction {n}")
-                block.friction[n] = rub if joint.guide is None else rub * of.rail(block, joint.guide)
-        return paths, of, block
-
-    def joint_moment(self, joint: str, body: str) -> Number:
-        value = super().joint_moment(joint, body)
-        paths, _, block = self.forces
-        for load in paths.case.friction:
-            if load.path is None and load.joint == joint and load.body == body:
-                value = plus(value, load.form(block))
-        return value
-
     # --- redundant statics ----------------------------------------------------------------------------------------
     @cached_property
     def balances(self) -> dict[int, Number]:
@@ -247,23 +224,6 @@ class Gap(Quantity, kind="gap"):
 
     def write(self, recording: Exact) -> Number:
         return gaps(recording.solved(self.group), recording.st)[self.loop]
-
-
-class Rub(Quantity, kind="rub"):
-    """The friction of a contact by the force that it bears."""
-
-    contact: int
-
-    def write(self, recording: Exact) -> Number:
-        paths, of, block = recording.placed_forces()
-        joint, body, _, coefficient, radius = paths.case.contacts[self.contact]
-        force = plus(of.on_side(block, (joint.key, body)), of.borne(block, joint, body))
-        if force is None:
-            return None
-        slip = recording.recorder.input(f"slip {self.contact}") * bare(coefficient)
-        if joint.guide is None:
-            return -(slip * bare(radius)) * abs(force)
-        return -slip * abs(dot(force, 1j * of.rail(block, joint.guide)))
 
 
 class Balance(Quantity, kind="balance"):

@@ -20,13 +20,14 @@ from dalembert.arithmetic.engines.doubled import TURN, Answer, compared, run
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.guard import guarded
 from virtualwork.describe.dimensions import dimensions
-from virtualwork.digits.exact import Exact, Gap, Rub, Unknown
+from virtualwork.digits.exact import Exact, Gap, Unknown
 from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.lanes import Lanes, taped
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Reals, dot
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import NAMES
+from virtualwork.formulas.rubbing import Rub
 from virtualwork.plan.steps import Group
 
 if TYPE_CHECKING:

@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from dalembert.arithmetic.bounds import CONSTANT
 from dalembert.arithmetic.engines import run
 from dalembert.arithmetic.guard import guarded
-from dalembert.arithmetic.rounding import UNIT_ROUNDOFF, bounds_of_few
+from dalembert.arithmetic.rounding import CONSTANT, UNIT_ROUNDOFF, bounds_of_few
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError

@@ -15,6 +15,7 @@ from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import Recording
+from virtualwork.formulas.rubbing import Rubbing
 from virtualwork.formulas.statics import Column, equations, unknowns
 
 
@@ -35,7 +36,7 @@ class Over(Quantity, kind="over"):
         return recording.value(Angle(load.body, int(load.axis == "speed")))
 
 
-class Balanced(Recording):
+class Balanced(Rubbing):
     """The formulas of an assembly; where its statics is redundant, the unknown forces enter."""
 
     @property
@@ -44,9 +45,13 @@ class Balanced(Recording):
         return bool(self.forces[0].order.redundant)
 
     def takes(self, quantities: Iterable[Quantity]) -> bool:
-        """Whether quantities can be written down: not with friction, nor with racks or cams where statics is redundant."""
-        toothed = bool(self.mechanism.racks or self.mechanism.cams)
-        return super().takes(quantities) or not (self.mechanism.friction or toothed)
+        """Whether quantities can be written down: not where statics is redundant with friction, racks or cams."""
+        m = self.mechanism
+        toothed = bool(m.racks or m.cams)
+        concerned = any(
+            (m.friction and each.is_force) or (toothed and each.is_joint_force) for each in quantities
+        )
+        return not (concerned and self.redundant)
 
     @cached_property
     def unknown_forces(self) -> list[Column]:

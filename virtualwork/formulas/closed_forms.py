@@ -11,12 +11,12 @@ the Jacobian (up to a constant factor), so that it costs nothing.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from dalembert.arithmetic.recorded import RECORDED
 from dalembert.arithmetic.varied import rotation
+from dalembert.dataclass import dataclass
 from virtualwork.formulas.numbers import ONE, Folded, Kind, Number, cross
 from virtualwork.formulas.positions import State, tied
 from virtualwork.plan.steps import Angle, Group, Term

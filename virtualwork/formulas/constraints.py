@@ -11,10 +11,10 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
+from dalembert.dataclass import dataclass
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.lifts import lift_at

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
+from dalembert.dataclass import dataclass
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.numbers import Number, cross
 from virtualwork.formulas.quantities import Combination, Quantity

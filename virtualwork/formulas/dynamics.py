@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property, partial
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,8 @@ from virtualwork.formulas.resultants import applied_loads, reduced, resultant, s
 from virtualwork.formulas.scene import Scene
 from virtualwork.formulas.statics import Statics
 from virtualwork.plan.steps import Joint, joints_at
+
+V = TypeVar("V", Reals, Complexes)
 
 
 @guarded
@@ -80,6 +82,13 @@ class Dynamics:
         """(n,): poses in which friction locks the mechanism: no reaction balances its own friction."""
         return ~self._settled[1]
 
+    def _moving(self, values: V) -> V:
+        """Values that depend on friction, without those of poses in which it locks the mechanism."""
+        if self.scene.friction:
+            values = values.copy()
+            leave_out(values, self.locked)
+        return values
+
     @cached_property
     def without_length(self) -> dict[int, NDArray[np.bool_]]:
         """Of the springs whose pull needs a direction, by number: the poses in which their ends meet, (n,)."""
@@ -100,16 +109,15 @@ class Dynamics:
             self._effort = None if found is None else np.stack(found, axis=1)
         if self._effort is None:
             # friction settles first: the loads depend on it
-            _, settled = self._settled
-            self._effort = effort(self.scene)
-            self._effort[~settled] = np.nan
+            _ = self._settled
+            self._effort = self._moving(effort(self.scene))
         return self._effort
 
     @property
     def generalized(self) -> Reals:
         """What balances the loads at each input, (n, k): the effort, but for motors that sit on another body than `on`."""
         _ = self._settled
-        return generalized(self.scene)
+        return self._moving(generalized(self.scene))
 
     @cached_property
     def reactions(self) -> Reactions:
@@ -144,7 +152,7 @@ class Dynamics:
                 ]
             else:
                 found = r.over(*(partial(r.effort, j=j) for j in range(len(inputs))))
-            self._euler = np.stack(found, axis=1)
+            self._euler = self._moving(np.stack(found, axis=1))
         return self._euler
 
     def joint_force(self, joint: Joint, body: str) -> Complexes:
@@ -159,8 +167,7 @@ class Dynamics:
             else:
                 form = partial(self.reactions.joint_force, joint=joint, body=body)
                 (self._forces[key],) = self.reactions.over(form, kind=complex)
-            if self.scene.friction:
-                leave_out(self._forces[key], self.locked)
+            self._forces[key] = self._moving(self._forces[key])
         return self._forces[key]
 
     def joint_moment(self, joint: Joint, body: str) -> Reals:
@@ -180,13 +187,13 @@ class Dynamics:
         for load in self.scene.friction:
             if load.path is None and load.joint == joint.key and load.body == body:
                 result = result + r.over(load.form)[0]
-        return result
+        return self._moving(result)
 
     def contact(self, cam: int) -> Reals:
         """How hard a cam (from 0) presses on its follower along the normal, (n,); below zero it would have to pull."""
         statics, r = self.statics, self.reactions
         if statics is None:
-            return np.asarray(r.over(lambda block: r.contact(block, cam))[0])
+            return self._moving(r.over(lambda block: r.contact(block, cam))[0])
         drive = self.poses.mechanism.cam_drives[cam]
         unit = 1.0 if drive.guide is not None else self.poses.mechanism.size
         push = statics.get(("contact", str(cam), "")) * unit
@@ -195,7 +202,7 @@ class Dynamics:
             here = push[block.rows]
             return r.contact(block, cam, here if block.st.many else float(here[0]))
 
-        return np.asarray(r.over(form)[0])
+        return self._moving(r.over(form)[0])
 
     def reaction(self, joint: str, on: str) -> Reals:
         """The force of all others on a link at a joint, (n, 2)."""
@@ -249,7 +256,7 @@ class Dynamics:
             f, m = reduced(loads, block, self.scene.rigid[link].center)
             force[block.rows] += 0.0 if f is None else f
             moment[block.rows] += 0.0 if m is None else m
-        return force, moment
+        return self._moving(force), self._moving(moment)
 
 
 class Moving(Protocol):

@@ -7,10 +7,10 @@ earlier ones have left: they enter it as `kept 0`, `kept 1`, …
 from __future__ import annotations
 
 from collections.abc import Container, Iterator, Sequence
-from dataclasses import dataclass
 
 from dalembert.arithmetic.recorded import Complex, Number, Real
 from dalembert.arithmetic.tape import Operation, Tape, reached, shortened
+from dalembert.dataclass import dataclass
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import Recording
 

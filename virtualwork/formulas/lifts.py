@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any
 
 from dalembert.arithmetic.recorded import bare
 from dalembert.arithmetic.varied import direction
+from dalembert.dataclass import dataclass, field
 from virtualwork.describe.laws import TURN, Lift, Piece
 from virtualwork.formulas.numbers import EPS, Kind, Number, plus, times
 

@@ -20,12 +20,12 @@ inertia about the point it hangs on, times α, and its mass times that point's a
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from dalembert.dataclass import dataclass
 from virtualwork.describe.meshes import Coordinate
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block

@@ -8,12 +8,12 @@ a pair one side carries the work of both.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.dataclass import dataclass, field
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.parts import GROUND, Spring, TorsionSpring
 from virtualwork.formulas.block import Block

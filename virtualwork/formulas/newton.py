@@ -12,12 +12,12 @@ J. Math. Anal. Appl. 96 (1983) 463).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.arithmetic.records import record
+from dalembert.dataclass import dataclass
 from virtualwork.formulas.numbers import (
     EPS,
     SINGULAR,

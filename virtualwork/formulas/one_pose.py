@@ -6,11 +6,11 @@ after the same first request comes with it from then on, by one function for all
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from dalembert.dataclass import dataclass, field
 from virtualwork.formulas.lanes import OFTEN, Ready, Turning, ready
 from virtualwork.formulas.quantity import Quantity
 

@@ -10,9 +10,9 @@ combination when its value is asked for, and never twice.
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable
-from dataclasses import dataclass
 from typing import Any
 
+from dalembert.dataclass import dataclass
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block, Formed
 from virtualwork.formulas.numbers import Number

@@ -16,8 +16,7 @@ face from the axis (R. L. Norton, Design of Machinery, 5th ed., §8.6, eqs. 8.31
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from dalembert.dataclass import dataclass
 from virtualwork.describe.cams import Cam, CamDrive
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND

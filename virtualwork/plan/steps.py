@@ -17,10 +17,10 @@ perhaps times a slide. That is all that derivatives, virtual displacements and r
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, TypeVar
 
+from dalembert.dataclass import dataclass, field
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
 from virtualwork.describe.laws import Lift
@@ -209,6 +209,15 @@ def turns(steps: Iterable[Step]) -> Iterator[Turn]:
             yield step
         elif isinstance(step, Group):
             yield from step.ties
+
+
+def geared(steps: Iterable[Step]) -> set[str]:
+    """Bodies of which a gear of fractional ratio, or a rack, needs the angle with its whole turns, directly or indirectly."""
+    result: set[str] = set()
+    for turn in reversed(list(turns(steps))):
+        needs = turn.slides or turn.body in result
+        result |= {body for body, ratio in turn.angle.turning if needs or not ratio.is_integer()}
+    return result
 
 
 @dataclass(frozen=True)

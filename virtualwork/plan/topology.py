@@ -10,12 +10,12 @@ The equations of the joints and the coordinates they hold form a bipartite graph
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
 from dalembert.arithmetic.recorded import Constant
 from dalembert.arithmetic.varied import direction
+from dalembert.dataclass import dataclass, field, replace
 from virtualwork.describe import MobilityError
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dalembert.arithmetic.guard import Lock, guarded
+from dalembert.dataclass import dataclass
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import AssemblyError
 from virtualwork.describe.description import Description

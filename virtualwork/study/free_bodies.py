@@ -66,7 +66,8 @@ class Part(NamedTuple):
 
 
 def parts(m: Description, case: LoadCase, joints: Sequence[Joint]) -> dict[str, list[Part]]:
-    """Return what acts on every link, as `free_bodies` has it over poses, for tapes: friction apart."""
+    """Return what acts on every link, as `free_bodies` has it over poses, for tapes."""
+    rubbing = {joint.key for joint, *_ in case.contacts if joint.guide is None}
     result: dict[str, list[Part]] = {body: [] for body in m.links}
     for i, load in enumerate(case.loads):
         if load.body != GROUND:
@@ -82,7 +83,7 @@ def parts(m: Description, case: LoadCase, joints: Sequence[Joint]) -> dict[str, 
             at: Quantity | None = Point(body, 0j, joint.name, 0) if guide is None else _block_key(m, guide)
             name = f"{joint.name}: {_other(joint, body)}"
             result[body].append(Part(name, "joint force", JointForce(joint.key, body), at, 1.0))
-            if guide is not None and m.guides[guide].is_slider:
+            if joint.key in rubbing or (guide is not None and m.guides[guide].is_slider):
                 result[body].append(Part(name, "joint moment", JointMoment(joint.key, body), None, 1.0))
     for j, entry in enumerate(m.inputs):
         guide = m.guide_of(entry) if entry.is_slide else None

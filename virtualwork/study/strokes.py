@@ -9,12 +9,12 @@ at its dead centre.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.dataclass import dataclass
 from virtualwork.branch.assembly import Assembly
 from virtualwork.formulas.kinematics import Angle, Point, Slide
 from virtualwork.formulas.lanes import Lanes
