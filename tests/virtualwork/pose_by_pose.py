@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from virtualwork.formulas.asked import Key
 from virtualwork.formulas.lanes import Lanes
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.motion import Motion
 
 
 def pose_by_pose(
-    motion: Motion, keys: Sequence[Key], rows: Sequence[int] | NDArray[Any] | None = None
+    motion: Motion, keys: Sequence[Quantity], rows: Sequence[int] | NDArray[Any] | None = None
 ) -> list[Any]:
     """The quantities of some poses, (rows,) each."""
     of = motion.poses

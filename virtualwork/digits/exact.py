@@ -30,6 +30,7 @@ from virtualwork.describe.dimensions import Dimension, changed, dimensions, valu
 from virtualwork.formulas.newton import gaps, unknowns
 from virtualwork.formulas.numbers import Written
 from virtualwork.formulas.positions import State
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import Recording
 from virtualwork.formulas.tapes import Turning
 from virtualwork.plan.order import plan
@@ -134,13 +135,6 @@ class Numbers:
 class Exact(Recording):
     """The formulas of an assembly, with its numbers as inputs.
 
-    Further keys of `value`
-    -----------------------
-    ("rub", n)                  the friction of the n-th contact by the force that it bears
-    ("unknown", group, i)       an unknown of a group without a closed form
-    ("gap", group, loop)        complex: what the unknowns of a group leave open of a loop
-    ("balance", row)            what the forces that enter leave of an equation of redundant statics
-
     Parameters
     ----------
     branch : Turning
@@ -193,24 +187,9 @@ class Exact(Recording):
     def step(self, group: Group, st: State) -> list[Number] | None:
         return None if group.name in self.folded else super().step(group, st)
 
-    def _unknown(self, group: str, i: int) -> Number:
-        return unknowns(self.solved(group), self.st)[i]
-
-    def _gap(self, group: str, loop: int) -> Number:
-        return gaps(self.solved(group), self.st)[loop]
-
-    # --- forces ---------------------------------------------------------------------------------------------------
-    def _rub(self, n: int) -> Number:
-        joint, *_, coefficient, radius = self.forces.case.contacts[n]
-        slip = self.recorder.input(f"slip {n}") * bare(coefficient)
-        arm = slip * bare(radius) if joint.guide is None else slip
-        return -(arm * abs(self.value(("bearing", n))))
-
-    def _balance(self, row: int) -> Number:
-        return self._balances.get(row, 0.0)
-
+    # --- redundant statics ----------------------------------------------------------------------------------------
     @cached_property
-    def _balances(self) -> dict[int, Number]:
+    def balances(self) -> dict[int, Number]:
         """What the unknown forces that enter leave of every equation."""
         left: dict[int, Number] = {}
         for (row, column), part in self.forces.system.items():
@@ -218,3 +197,33 @@ class Exact(Recording):
                 part = part * self.recorder.input(f"f {column}")
             left[row] = left.get(row, 0.0) + part
         return left
+
+
+class Unknown(Quantity, kind="unknown"):
+    """An unknown of a group without a closed form."""
+
+    group: str
+    number: int
+
+    def write(self, recording: Exact) -> Number:
+        return unknowns(recording.solved(self.group), recording.st)[self.number]
+
+
+class Gap(Quantity, kind="gap"):
+    """What the unknowns of a group leave open of a loop."""
+
+    is_vector = True
+    group: str
+    loop: int
+
+    def write(self, recording: Exact) -> Number:
+        return gaps(recording.solved(self.group), recording.st)[self.loop]
+
+
+class Balance(Quantity, kind="balance"):
+    """What the forces that enter leave of an equation of redundant statics."""
+
+    row: int
+
+    def write(self, recording: Exact) -> Number:
+        return recording.balances.get(self.row, 0.0)

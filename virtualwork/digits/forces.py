@@ -6,7 +6,7 @@ digits until neither changes; where statics is redundant, the unknown forces are
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, cast
 
@@ -14,10 +14,23 @@ import numpy as np
 
 from dalembert.arithmetic.guard import guarded
 from virtualwork.digits.estimates import Estimates
-from virtualwork.formulas.asked import Key
 from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.forces import (
+    Applied,
+    AppliedMoment,
+    Contact,
+    Effort,
+    Generalized,
+    JointForce,
+    JointMoment,
+    NewtonEuler,
+    Reaction,
+    Shaking,
+    ShakingMoment,
+)
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.plan.steps import Joint
 
 
@@ -32,21 +45,26 @@ class ForceErrors:
         self._poses = cast(Lanes, dynamics.poses)
         self.estimates = Estimates(self._poses, self._values)
 
-    def _values(self, keys: Sequence[Key]) -> list[Any]:
+    @property
+    def by_key(self) -> Mapping[str, Joint]:
+        """The joints by their keys."""
+        return self.dynamics.by_key
+
+    def _values(self, keys: Sequence[Quantity]) -> list[Any]:
         """The forces as they were handed out."""
         return self._poses.values(keys, lambda: self.dynamics)
 
-    def together(self, reactions: Iterable[Key] | None = None) -> None:
+    def together(self, reactions: Iterable[Quantity] | None = None) -> None:
         """Form the estimates of some joints' forces, or of all: they have most of the second run in common."""
         if reactions is not None:
             self.estimates.together(reactions)
             return
         inputs, joints = range(len(self.mechanism.inputs)), self.dynamics.reactions.joints
-        keys: list[Key] = [("shaking",), ("shaking moment",), *(("effort", j) for j in inputs)]
-        keys += [("newton-euler", j) for j in inputs]
+        keys: list[Quantity] = [Shaking(), ShakingMoment(), *(Effort(j) for j in inputs)]
+        keys += [NewtonEuler(j) for j in inputs]
         sides = [(joint, body) for joint in joints for body in joint.bodies]
-        keys += [("force", joint.key, body) for joint, body in sides]
-        keys += [("moment", joint.key, body) for joint, body in sides if self._holds(joint)]
+        keys += [JointForce(joint.key, body) for joint, body in sides]
+        keys += [JointMoment(joint.key, body) for joint, body in sides if self._holds(joint)]
         self.estimates.together(keys)
 
     def _holds(self, joint: Joint) -> bool:
@@ -55,50 +73,52 @@ class ForceErrors:
             return True
         return joint.guide is not None and self.mechanism.guides[joint.guide].is_slider
 
-    def _each(self, kind: str) -> Reals:
+    def _each(self, kind: type[Effort | Generalized | NewtonEuler]) -> Reals:
         """Of a quantity of every input, (n, k)."""
-        keys: list[Key] = [(kind, j) for j in range(len(self.mechanism.inputs))]
+        keys = [kind(j) for j in range(len(self.mechanism.inputs))]
         self.estimates.together(keys)
         return np.stack([self.estimates.of(key) for key in keys], axis=1)
 
     @cached_property
     def effort(self) -> Reals:
         """Of `Dynamics.effort`, (n, k)."""
-        return self._each("effort")
+        return self._each(Effort)
 
     @cached_property
     def generalized(self) -> Reals:
         """Of the generalized forces Σ F·K_j, (n, k): the effort, but for motors that sit on another body than `on`."""
-        return self._each("generalized")
+        return self._each(Generalized)
 
     @cached_property
     def newton_euler(self) -> Reals:
         """Of `Dynamics.newton_euler`, (n, k)."""
-        return self._each("newton-euler")
+        return self._each(NewtonEuler)
 
     def joint_force(self, joint: Joint, body: str) -> Reals:
         """Of `Dynamics.joint_force`, (n,): the length of the error."""
-        return self.estimates.of(("force", joint.key, body))
+        return self.estimates.of(JointForce(joint.key, body))
 
     def contact(self, cam: int) -> Reals:
         """Of `Dynamics.contact`, (n,)."""
-        return self.estimates.of(("contact", cam))
+        return self.estimates.of(Contact(cam))
 
     def joint_moment(self, joint: Joint, body: str) -> Reals:
         """Of `Dynamics.joint_moment`, (n,)."""
-        return self.estimates.of(("moment", joint.key, body)) if self._holds(joint) else np.zeros(self.n)
+        return self.estimates.of(JointMoment(joint.key, body)) if self._holds(joint) else np.zeros(self.n)
 
     def reaction(self, joint: str, on: str) -> Reals:
         """Of `Dynamics.reaction`, (n,): the length of the error."""
-        return self.estimates.of(("reaction", joint, on))
+        return self.estimates.of(Reaction(joint, on))
+
+    at_joint = reaction
 
     @cached_property
     def shaking(self) -> tuple[Reals, Reals]:
         """Of `Dynamics.shaking`: the length of the force's error (n,), and the moment's (n,)."""
-        self.estimates.together([("shaking",), ("shaking moment",)])
-        return self.estimates.of(("shaking",)), self.estimates.of(("shaking moment",))
+        self.estimates.together([Shaking(), ShakingMoment()])
+        return self.estimates.of(Shaking()), self.estimates.of(ShakingMoment())
 
     def applied(self, link: str) -> tuple[Reals, Reals]:
         """Of `Dynamics.applied`: the length of the force's error (n,), and the moment's (n,)."""
-        self.estimates.together([("applied", link), ("applied moment", link)])
-        return self.estimates.of(("applied", link)), self.estimates.of(("applied moment", link))
+        self.estimates.together([Applied(link), AppliedMoment(link)])
+        return self.estimates.of(Applied(link)), self.estimates.of(AppliedMoment(link))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -10,7 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.arithmetic.guard import guarded
-from virtualwork.formulas.asked import COMPLEX, JOINTS, Key
+from virtualwork.formulas.forces import (
+    Applied,
+    AppliedMoment,
+    Contact,
+    Effort,
+    Force,
+    Generalized,
+    JointForce,
+    JointMoment,
+    NewtonEuler,
+    Reaction,
+    Shaking,
+    ShakingMoment,
+)
 from virtualwork.formulas.numbers import TOGETHER, Complexes, Reals, leave_out, xy
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.reactions import JointForces
@@ -39,10 +52,10 @@ class Dynamics:
     def __init__(self, poses: Poses) -> None:
         self.poses, self.lock = poses, poses.lock
         self.scene = Scene(poses)
-        self._known: dict[Key, Any] = {}
+        self._known: dict[Force, Any] = {}
 
-    def values(self, keys: Sequence[Key]) -> list[Any]:
-        """Forces by their keys (`Recording.value`), (n,) each: of many poses from the tape, of one by the formulas on floats."""
+    def values(self, keys: Sequence[Force]) -> list[Any]:
+        """Forces (n,) each: of many poses from the tape, of one by the formulas on floats."""
         new = [key for key in keys if key not in self._known]
         taped = [key for key in new if self._on_tape(key)]
         self._known |= zip(taped, self.poses.taped(taped), strict=True)
@@ -51,23 +64,23 @@ class Dynamics:
                 self._known[key] = self._alone(key)
         return [self._known[key] for key in keys]
 
-    def value(self, key: Key) -> Any:
+    def value(self, key: Force) -> Any:
         """A force by its key, (n,)."""
         return self.values([key])[0]
 
-    def _on_tape(self, key: Key) -> bool:
-        return self.scene.on_tape or (key[0] in JOINTS and self.reactions.redundant)
+    def _on_tape(self, key: Force) -> bool:
+        return self.scene.on_tape or (key.is_joint_force and self.reactions.redundant)
 
-    def _alone(self, key: Key) -> Any:
+    def _alone(self, key: Force) -> Any:
         """A force of one pose."""
         try:
             value = self.scene.forces.value(key)
-            if key[0] in ("effort", "generalized") and self._too_fast(key[1]):
+            if isinstance(key, Effort | Generalized) and self._too_fast(key.input):
                 value = np.nan
         except (ZeroDivisionError, OverflowError):
             return self.poses.taped([key])[0]
         # no −0
-        result = np.array([value], complex if key[0] in COMPLEX else float) + 0.0
+        result = np.array([value], complex if key.is_vector else float) + 0.0
         if not self.poses.assembled.all():
             leave_out(result, ~self.poses.assembled)
         return result
@@ -78,9 +91,9 @@ class Dynamics:
         rates = (by.angle.get(body) for group in self.poses.plan.groups for body in group.angles)
         return any(rate and rate[0] is not None and not abs(rate[0]) * reach < FAST for rate in rates)
 
-    def _each(self, kind: str) -> Reals:
+    def _each(self, kind: type[Effort | Generalized | NewtonEuler]) -> Reals:
         """A quantity of every input, (n, k)."""
-        return np.stack(self.values([(kind, j) for j in range(len(self.poses.mechanism.inputs))]), axis=1)
+        return np.stack(self.values([kind(j) for j in range(len(self.poses.mechanism.inputs))]), axis=1)
 
     @property
     def friction_iterations(self) -> int:
@@ -107,17 +120,22 @@ class Dynamics:
     @cached_property
     def effort(self) -> Reals:
         """The effort at each input by virtual work, (n, k)."""
-        return self._each("effort")
+        return self._each(Effort)
 
     @property
     def generalized(self) -> Reals:
         """What balances the loads at each input, (n, k): the effort, but for motors that sit on another body than `on`."""
-        return self._each("generalized")
+        return self._each(Generalized)
 
     @cached_property
     def reactions(self) -> JointForces:
         """The joints, and how their forces follow from each other."""
         return JointForces(self.scene.paths)
+
+    @property
+    def by_key(self) -> Mapping[str, Joint]:
+        """The joints by their keys."""
+        return self.reactions.by_key
 
     @property
     def statics(self) -> Statics | None:
@@ -128,23 +146,27 @@ class Dynamics:
     @cached_property
     def newton_euler(self) -> Reals:
         """The effort at each input by Newton and Euler, (n, k): ΣM = 0 of the driven link with its joint forces."""
-        return self._each("newton-euler")
+        return self._each(NewtonEuler)
 
     def joint_force(self, joint: Joint, body: str) -> Complexes:
         """The force of a joint on one of its bodies, (n,) complex; NaN where statics does not determine it."""
-        return np.asarray(self.value(("force", joint.key, body)))
+        return np.asarray(self.value(JointForce(joint.key, body)))
 
     def joint_moment(self, joint: Joint, body: str) -> Reals:
         """The moment of a joint on one of its bodies about the joint's point, (n,): a guide's, or a pin's friction."""
-        return np.asarray(self.value(("moment", joint.key, body)))
+        return np.asarray(self.value(JointMoment(joint.key, body)))
 
     def contact(self, cam: int) -> Reals:
         """How hard a cam (from 0) presses on its follower along the normal, (n,); below zero it would have to pull."""
-        return np.asarray(self.value(("contact", cam)))
+        return np.asarray(self.value(Contact(cam)))
 
     def reaction(self, joint: str, on: str) -> Reals:
         """The force of all others on a link at a joint, (n, 2): of a pin and of a guide, where both are of that name."""
-        return xy(self.value(("reaction", joint, on)))
+        return xy(self.at_joint(joint, on))
+
+    def at_joint(self, joint: str, on: str) -> Complexes:
+        """The same, (n,) complex."""
+        return np.asarray(self.value(Reaction(joint, on)))
 
     @cached_property
     def shaking(self) -> tuple[Reals, Reals]:
@@ -153,12 +175,12 @@ class Dynamics:
         All that the moving links do to the ground through joints, springs and the drive's own reaction: by
         d'Alembert the sum of their weights, applied loads and inertia loads. No reaction is formed for it.
         """
-        force, moment = self.values([("shaking",), ("shaking moment",)])
+        force, moment = self.values([Shaking(), ShakingMoment()])
         return xy(force), moment
 
     def applied(self, link: str) -> tuple[Complexes, Reals]:
         """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""
-        force, moment = self.values([("applied", link), ("applied moment", link)])
+        force, moment = self.values([Applied(link), AppliedMoment(link)])
         return force, moment
 
 

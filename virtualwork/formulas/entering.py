@@ -2,7 +2,7 @@
 
 So do groups without a closed form where their Jacobian is singular, groups that are singular in every pose, and groups close
 to a change point, where two branches meet and a series gives what the Jacobian cannot. Whoever runs the tape solves for each
-derivative in turn: the columns of a group's Jacobian and what its loops have without it (`right side`) are on the tape.
+derivative in turn: the columns of a group's Jacobian and what its loops have without it (`RightSide`) are on the tape.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from collections.abc import Iterable
 from typing import Any
 
 from dalembert.arithmetic.recorded import Number
-from virtualwork.formulas.numbers import cross
 from virtualwork.formulas.positions import columns
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.recording import Recording
 from virtualwork.plan.steps import Group
@@ -23,11 +23,6 @@ class Entering(Recording):
 
     Further inputs of the tape: `x GROUP 0` of these groups too, and `rate GROUP 0 1 0`, of the first unknown the first
     derivative over input 0 (in time: over the count of the inputs).
-
-    Further keys of `value`
-    -----------------------
-    ("group column", group, loop, unknown)   of the group's Jacobian, complex
-    ("right side", group, order, way, loop)  a derivative of a loop without the unknowns' own of that order, complex
     """
 
     def __init__(self, entering: Iterable[str], *of: Any, **more: Any) -> None:
@@ -42,23 +37,31 @@ class Entering(Recording):
     def enters(self, group: Group) -> bool:
         return group.name in self.entering
 
-    def _margin(self, group: str) -> Number:
-        return 0.0 if self.enters(self.solved(group)) else super()._margin(group)
 
-    def _transmission(self, group: str) -> Number:
-        of = self.solved(group)
-        if not self.enters(of):
-            return super()._transmission(group)
-        (c1, c2), *_ = columns(of, self.st)
-        across = cross(c1, c2)
-        return across * across / ((c1.conjugate() * c1).real * (c2.conjugate() * c2).real)
+class GroupColumn(Quantity, kind="group column"):
+    """An entry of the Jacobian of a group: of a loop, by an unknown."""
 
-    def _group_column(self, group: str, loop: int, unknown: int) -> Number:
-        return columns(self.solved(group), self.st)[loop][unknown]
+    is_vector = True
+    group: str
+    loop: int
+    unknown: int
 
-    def _right_side(self, group: str, order: int, way: int, loop: int) -> Number:
-        self.solve(self.plan.writes(self.solved(group)), order)
-        return self.right[group, order, way][loop]
+    def write(self, recording: Entering) -> Number:
+        return columns(recording.solved(self.group), recording.st)[self.loop][self.unknown]
+
+
+class RightSide(Quantity, kind="right side"):
+    """A derivative of a loop without the unknowns' own of that order: over an input, or in time (`way`)."""
+
+    is_vector = True
+    group: str
+    loop: int
+    way: int
+    order: int
+
+    def write(self, recording: Entering) -> Number:
+        recording.solve(recording.plan.writes(recording.solved(self.group)), self.order)
+        return recording.right[self.group, self.order, self.way][self.loop]
 
 
 class _Entering(Rates):

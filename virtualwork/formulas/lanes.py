@@ -6,7 +6,7 @@ poses. What a tape does not solve enters it (`solving`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,12 +15,12 @@ from numpy.typing import ArrayLike
 from dalembert.arithmetic.choice import wanted
 from dalembert.arithmetic.engines import as_part, run
 from dalembert.arithmetic.guard import guarded
-from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.asked import COMPLEX, FORCES, UNRUBBED, Key, names, quantity
+from virtualwork.formulas.forces import Effort, Force, Generalized
 from virtualwork.formulas.numbers import leave_out
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.solving import Solving
 from virtualwork.formulas.tapes import Turning, cut, ready, taped
-from virtualwork.plan.steps import Step, joints
+from virtualwork.plan.steps import Step
 
 if TYPE_CHECKING:
     from virtualwork.formulas.dynamics import Dynamics
@@ -48,32 +48,32 @@ class Lanes(Solving):
         block_of: int | None = None,
     ) -> None:
         super().__init__(branch, angle, speed, acceleration, jerk, block_of)
-        self.known: dict[Key, Any] = {}
+        self.known: dict[Quantity, Any] = {}
         # which quantities of one pose come from the tape
-        self._taped: dict[Key, bool] = {}
+        self._taped: dict[Quantity, bool] = {}
         # values of operations for later requests, by their numbers
         self._kept: dict[int, Any] = {}
         # kinds and orders that were requested
-        self._requested: set[tuple[str, int]] = set()
+        self._requested: set[tuple[type[Quantity], int]] = set()
         self._repeated = False
 
     @property
     def solved(self) -> list[tuple[Step, int]]:
         """What has been worked out so far, (step, order); order 0 is position."""
         result = {(id(step), k): (step, k) for step, k in self._solved}
-        for steps, order in map(self.recording.steps, self.known):
+        for steps, order in (key.steps(self.recording) for key in self.known):
             result |= {(id(step), k): (step, k) for k in range(order + 1) for step in steps}
         return list(result.values())
 
-    def takes(self, keys: Iterable[Key]) -> bool:
+    def takes(self, keys: Iterable[Quantity]) -> bool:
         """Whether the tape alone has these quantities, and nothing is solved for it outside but groups without a closed form."""
         return not self.enters and self.recording.takes(keys)
 
-    def operations(self, keys: Iterable[Key]) -> int:
+    def operations(self, keys: Iterable[Quantity]) -> int:
         """What quantities of a pose cost, in operations on real numbers, with all that they depend on."""
         return taped(self.branch, self.recording, tuple(keys)).cost
 
-    def values(self, keys: Sequence[Key], forces: Callable[[], Dynamics] | None = None) -> list[Any]:
+    def values(self, keys: Sequence[Quantity], forces: Callable[[], Dynamics] | None = None) -> list[Any]:
         """The quantities, each (n,), real or complex: of many poses from the tape, of one by the formulas on floats.
 
         One pose that is asked for often comes from the tape too, as a function of floats; its forces from what `forces` gives.
@@ -91,59 +91,45 @@ class Lanes(Solving):
         alone = self._alone([key for key in keys if not self._taped[key]], forces)
         return [self.known[key].copy() if self._taped[key] else alone[key] for key in keys]
 
-    def _foreseen(self, keys: tuple[Key, ...]) -> tuple[Key, ...]:
+    def _foreseen(self, keys: tuple[Quantity, ...]) -> tuple[Quantity, ...]:
         """What a request is answered with: the second of a kind and order over very many poses brings all of them.
 
         One tape for all is cheaper than one for each; what nobody asks for twice is not computed.
         """
-        kinds = {_kind(key) for key in keys}
+        kinds = {key.family for key in keys}
         self._repeated = self._repeated or not kinds.isdisjoint(self._requested)
         self._requested |= kinds
         if len(kinds) > 1 or not self._repeated or self.n < MANY_POSES:
             return keys
-        more = [key for key in self._every(*next(iter(kinds))) if key not in self.known]
-        spent = self.operations([*keys, *(key for key in self.known if _kind(key) in kinds)])
+        ((kind, order),) = kinds
+        more = [key for key in kind.every(self.mechanism, order) if key not in self.known]
+        spent = self.operations([*keys, *(key for key in self.known if key.family in kinds)])
         if self.operations([*keys, *more]) > WASTE * spent:
             return keys
         return tuple(dict.fromkeys((*keys, *more)))
 
-    def _every(self, kind: str, order: int) -> Iterator[Key]:
-        """All quantities of a kind: of points, links, slides that are not driven; of forces efforts and one side of each joint."""
-        m = self.mechanism
-        driven = {entry.link for entry in m.inputs}
-        if kind == "point":
-            moving = ((body, name) for name, (body, _) in m.points.items() if body != GROUND)
-            yield from (("point", body, 0j, name, order) for body, name in moving)
-        elif kind == "angle":
-            yield from (("angle", link, order) for link in m.links if link not in driven)
-        elif kind == "slide":
-            yield from (("slide", guide, order) for guide in range(len(m.guides)))
-        elif kind == "forces":
-            yield from (("effort", j) for j in range(len(m.inputs)))
-            yield from (("reaction", joint.name, joint.bodies[-1]) for joint in joints(m))
-
-    def taped(self, keys: Sequence[Key]) -> list[Any]:
+    def taped(self, keys: Sequence[Quantity]) -> list[Any]:
         """Quantities from the tape, of one pose too."""
         self._fill(tuple(key for key in keys if key not in self.known))
         return [self.known[key].copy() for key in keys]
 
-    def _often(self, keys: tuple[Key, ...]) -> bool:
+    def _often(self, keys: tuple[Quantity, ...]) -> bool:
         """Whether one pose has been asked for so often that to write the tape pays: some milliseconds."""
         counts = self.branch.recordings.setdefault("asked", {})
         counts[keys] = counts.get(keys, 0) + 1
         return bool(counts[keys] > OFTEN)
 
-    def _fill(self, keys: tuple[Key, ...]) -> None:
+    def _fill(self, keys: tuple[Quantity, ...]) -> None:
         # a part of a sweep has the digits of the whole
         if self.block_of:
             as_part(self.block_of, self._run, list(keys))
         else:
             self._run(list(keys))
 
-    def _alone(self, keys: Sequence[Key], forces: Callable[[], Dynamics] | None) -> dict[Key, Any]:
+    def _alone(self, keys: Sequence[Quantity], forces: Callable[[], Dynamics] | None) -> dict[Quantity, Any]:
         """Quantities of one pose by the formulas on floats."""
-        loaded = [key for key in keys if key[0] in FORCES]
-        moving = [key for key in keys if key[0] not in FORCES]
+        loaded = [key for key in keys if isinstance(key, Force)]
+        moving = [key for key in keys if not isinstance(key, Force)]
         try:
             result = dict(zip(moving, self.by_floats(moving), strict=True))
         except (ZeroDivisionError, OverflowError):
@@ -154,7 +140,7 @@ class Lanes(Solving):
             result |= {key: of.value(key) for key in loaded}
         return result
 
-    def one(self, keys: tuple[Key, ...]) -> bool:
+    def one(self, keys: tuple[Quantity, ...]) -> bool:
         """Work out one pose that depends on nothing but its input, by a function of floats; False where it depends on more."""
         given = [self.inputs, *(rates[0] for rates in self.rates)]
         values = [x if isinstance(x, float) else float(np.ravel(x)[0]) for x in given]
@@ -170,7 +156,7 @@ class Lanes(Solving):
             self.known[key] = np.array([complex(next(found), next(found)) if vector else next(found) + 0.0])
         return True
 
-    def _run(self, keys: list[Key]) -> None:
+    def _run(self, keys: list[Quantity]) -> None:
         doubts = [key for key in dict.fromkeys(self._doubts(keys)) if key not in self._bad]
         # what is asked for first may be all: from the second time on, something is kept for those to come
         kept = dict(self._kept) if self.known and self.n > 1 else None
@@ -179,22 +165,22 @@ class Lanes(Solving):
         given = self.entering(name for name in later.tape.inputs if name not in later.takes)
         if kept:
             given |= {name: kept[number] for name, number in later.takes.items()}
-        out = run(later.tape, given, pairs=[names(key)[0] for key in keys if key[0] in COMPLEX])
+        out = run(later.tape, given, pairs=[key.names[0] for key in keys if key.is_vector])
         self._kept.update((number, out[name]) for name, number in later.leaves.items())
         for key in doubts:
-            self._bad[key] = self._where_bad(key, out[names(key)[0]])
+            self._bad[key] = self._where_bad(key, out[key.names[0]])
         # what a table is over has been handed out
         keys = [key for key in keys if key not in self.known]
         for key in keys:
-            value = quantity(out, key, self.n)
+            value = key.of_rows(out, self.n)
             for nowhere in (self._nowhere, *map(self._bad.get, self._closed(key))):
                 if nowhere is not None:
                     leave_out(value, nowhere)
             self.known[key] = value
-            if key[0] in FORCES and key[0] not in UNRUBBED and self.mechanism.friction:
+            if isinstance(key, Force) and key.is_rubbed and self.mechanism.friction:
                 leave_out(self.known[key], self.locked)
-            if self.enters and key[0] in ("effort", "generalized"):
-                leave_out(self.known[key], self._too_fast(key[1]))
+            if self.enters and isinstance(key, Effort | Generalized):
+                leave_out(self.known[key], self._too_fast(key.input))
         apart = self._apart_of(keys)
         if apart is not None:
             rows, again = apart
@@ -208,10 +194,3 @@ def _dynamics_of(poses: Lanes) -> Dynamics:
     from virtualwork.formulas.dynamics import Dynamics
 
     return Dynamics(poses)
-
-
-def _kind(key: Key) -> tuple[str, int]:
-    """The kind and order of a quantity."""
-    if key[0] in FORCES:
-        return "forces", 0
-    return key[0], key[-1] if key[0] in ("point", "angle", "slide") else 0

@@ -14,18 +14,20 @@ from typing import Any
 
 from dalembert.arithmetic.recorded import bare
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.asked import Key
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import generalized_force
+from virtualwork.formulas.forces import JointForce
 from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.numbers import Number, dot, minus, plus
-from virtualwork.formulas.reactions import JointForces, joints_at
+from virtualwork.formulas.quantity import Quantity
+from virtualwork.formulas.reactions import JointForces
+from virtualwork.formulas.resultants import applied_loads, reduced, resultant, shaking_loads
 from virtualwork.formulas.statics import Column, equations, mesh_column, unknowns
-from virtualwork.formulas.sums import applied_loads, reduced, resultant, shaking_loads
+from virtualwork.plan.steps import joints_at
 
 
 class PoseForces:
-    """The forces of a pose; each method but the first few is a kind of key (`recording.Recording.value`).
+    """The forces of a pose; each method but the first few is a kind of `forces.Force`.
 
     Attributes
     ----------
@@ -55,7 +57,7 @@ class PoseForces:
         self.paths, self.case, self.mechanism = paths, paths.case, paths.mechanism
         self.block, self.solve, self.system_of, self.enter = block, solve, system, enter
         self.joints = JointForces(paths)
-        self._known: dict[Key, Number] = {}
+        self._known: dict[Quantity, Number] = {}
         block.drive = self.effort
         solve(*self.case.targets())
         if self.case.contacts:
@@ -69,7 +71,7 @@ class PoseForces:
         """Whether statics cannot give every joint force, so that unknown ones enter."""
         return bool(self.joints.redundant)
 
-    def value(self, key: Key) -> Number:
+    def value(self, key: Quantity) -> Number:
         """A force by its key, formed once; 0 where it is zero throughout."""
         if key not in self._known:
             kind, *of = key
@@ -160,7 +162,7 @@ class PoseForces:
 
     def reaction(self, joint: str, body: str) -> Number:
         each = joints_at(self.joints.joints, joint, body)
-        return sum((self.value(("force", j.key, body)) for j in each), 0.0)
+        return sum((self.value(JointForce(j.key, body)) for j in each), 0.0)
 
     def moment(self, joint: str, body: str) -> Number:
         self.solve_places()

@@ -5,9 +5,8 @@ How they follow from each other is worked out once for a mechanism (`load_paths`
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
-from virtualwork.describe import DescriptionError
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.load_paths import LoadPaths
@@ -170,21 +169,3 @@ class JointForces:
         for mesh in self.order.racks.get(guide, ()):
             value = minus(value, self.tooth(block, mesh))
         return value
-
-
-def joints_at(joints: Iterable[Joint], name: str, on: str) -> list[Joint]:
-    """The joints of a link at a point: a pin, a guide, or both.
-
-    Raises
-    ------
-    DescriptionError
-        Where there is none.
-    """
-    named = [joint for joint in joints if joint.name == name]
-    if not named:
-        known = ", ".join(dict.fromkeys(joint.name for joint in joints))
-        raise DescriptionError(f"no joint at '{name}': expected one of {known}")
-    result = [joint for joint in named if on in joint.bodies]
-    if not result:
-        raise DescriptionError(f"link '{on}' has no joint at '{name}'")
-    return result

@@ -16,7 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 from dalembert.arithmetic.engines import Outputs, run
 from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.recorded import bare
-from virtualwork.formulas.asked import COMPLEX, FORCES, Key, names, quantity
+from virtualwork.formulas.entering import GroupColumn, RightSide
+from virtualwork.formulas.forces import Bearing, Effort, Entry, RubbingRate
+from virtualwork.formulas.kinematics import AnglePartial
+from virtualwork.formulas.loops import Closed, Margin, Regularity
 from virtualwork.formulas.newton import unknowns
 from virtualwork.formulas.numbers import (
     SINGULAR,
@@ -28,6 +31,7 @@ from virtualwork.formulas.numbers import (
     solve_determined,
 )
 from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.rates import crossed, passed
 from virtualwork.formulas.recording import NAMES, NEAR, Recording
 from virtualwork.formulas.tapes import Turning, entered, recorded, taped
@@ -56,7 +60,7 @@ class Solving(Poses):
     ) -> None:
         super().__init__(branch, angle, speed, acceleration, jerk, block_of)
         # where doubts are right
-        self._bad: dict[Key, NDArray[np.bool_] | None] = {}
+        self._bad: dict[Quantity, NDArray[np.bool_] | None] = {}
         # whether the derivatives of groups enter; and those, with the unknowns
         self._enter = False
         self._entered: dict[tuple[Any, ...], Any] = {}
@@ -100,7 +104,7 @@ class Solving(Poses):
             to.real = rows.get(f"{i} x", 0.0)
             if kind is complex:
                 to.imag = rows.get(f"{i} y", 0.0)
-        apart = self._apart_of([("effort", 0)])
+        apart = self._apart_of([Effort(0)])
         if apart is not None:
             for to, value in zip(result, apart[1].formed(forms, kind, wanted), strict=True):
                 to[apart[0]] = value
@@ -109,12 +113,12 @@ class Solving(Poses):
                 leave_out(to, ~self.assembled)
         return result
 
-    def _apart_of(self, keys: Sequence[Key]) -> tuple[NDArray[np.bool_], Self] | None:
+    def _apart_of(self, keys: Sequence[Quantity]) -> tuple[NDArray[np.bool_], Self] | None:
         """The poses whose derivatives enter: which, and these alone; None where there are none."""
         if self.enters:
             return None
         rows = self._careful
-        doubts = [key for key in dict.fromkeys(self._doubts(keys)) if key[0] != "closed"]
+        doubts = [key for key in dict.fromkeys(self._doubts(keys)) if not isinstance(key, Closed)]
         new = [key for key in doubts if key not in self._bad]
         self._bad |= {
             key: self._where_bad(key, value) for key, value in zip(new, self._raw(new), strict=True)
@@ -129,7 +133,7 @@ class Solving(Poses):
             self._apart[name]._enter = True
         return rows, self._apart[name]
 
-    def _raw(self, keys: Sequence[Key], friction: Reals | None = None) -> list[Any]:
+    def _raw(self, keys: Sequence[Quantity], friction: Reals | None = None) -> list[Any]:
         """Quantities as the tape has them, with another friction; not kept."""
         if not keys:
             return []
@@ -137,16 +141,16 @@ class Solving(Poses):
         out: Outputs = run(
             tape,
             self.entering(tape.inputs, friction),
-            pairs=[names(key)[0] for key in keys if key[0] in COMPLEX],
+            pairs=[key.names[0] for key in keys if key.is_vector],
         )
-        return [quantity(out, key, self.n) for key in keys]
+        return [key.of_rows(out, self.n) for key in keys]
 
     def _too_fast(self, j: int) -> NDArray[np.bool_]:
         """Where a link turns more than 10¹³ times as fast as the input: at a dead point to rounding, no number is left."""
         reach = self.mechanism.size if self.mechanism.inputs[j].is_slide else 1.0
         needed = self.plan.needed(self.recording.forces.case.targets()[0])
         bodies = (body for g in needed if isinstance(g, Group) for body in g.angles)
-        keys: list[Key] = [("dangle", body, j, 1) for body in bodies]
+        keys = [AnglePartial(body, j, 1) for body in bodies]
         result = np.zeros(self.n, dtype=bool)
         for rate in self._raw(keys):
             result |= ~(np.abs(rate) * reach < 1e13)
@@ -159,14 +163,14 @@ class Solving(Poses):
         from virtualwork.formulas.friction import settled
 
         contacts = self.recording.forces.case.contacts
-        rates = self._raw([("rubbing", n) for n in range(len(contacts))])
+        rates = self._raw([RubbingRate(n) for n in range(len(contacts))])
         arms = np.zeros((len(contacts), self.n))
         for arm, rate, (joint, _, _, coefficient, radius) in zip(arms, rates, contacts, strict=True):
             arm[:] = coefficient * (radius if joint.guide is None else 1.0) * np.sign(rate)
-        apart = self._apart_of([("effort", 0)]) if contacts else None
+        apart = self._apart_of([Effort(0)]) if contacts else None
         if apart is not None:
             arms[:, apart[0]] = np.nan
-        keys: list[Key] = [("bearing", n) for n in range(len(contacts))]
+        keys = [Bearing(n) for n in range(len(contacts))]
         friction, count = settled(lambda phi: np.reshape(self._raw(keys, phi), (len(keys), self.n)), arms)
         if apart is not None:
             friction[:, apart[0]], more = apart[1]._settled
@@ -197,7 +201,7 @@ class Solving(Poses):
         from virtualwork.formulas.statics import Statics
 
         forces = self.recording.forces
-        keys: list[Key] = [("entry", *place) for place in forces.system]
+        keys = [Entry(*place) for place in forces.system]
         entries = dict(zip(forces.system, self._raw(keys, friction), strict=True))
         apart = self._apart_of(keys) if friction is None else None
         if apart is not None:
@@ -205,7 +209,7 @@ class Solving(Poses):
                 value[apart[0]] = again
         return Statics(forces.joints, entries, self.n, self.lock)
 
-    def _doubts(self, keys: Iterable[Key]) -> Iterator[Key]:
+    def _doubts(self, keys: Iterable[Quantity]) -> Iterator[Quantity]:
         """What tells where quantities cannot be had, or not from the tape."""
         # what opens is known once the inputs are looked over
         forces, enters = False, self.enters
@@ -213,24 +217,22 @@ class Solving(Poses):
             yield from self._closed(key)
             if enters:
                 continue
-            forces = forces or key[0] in FORCES
-            if key[0] in FORCES or (key[0] != "turn" and key[-1] != 0):
-                yield from (("regularity", g.name) for g in self.branch.plan.groups if g.kind == "Newton")
+            forces = forces or key.is_force
+            if key.is_force or key.order:
+                yield from (Regularity(g.name) for g in self.branch.plan.groups if g.kind == "Newton")
         if forces:
-            yield from (
-                ("margin", g.name) for g in self.branch.plan.groups if g.kind not in ("Newton", "PRP")
-            )
+            yield from (Margin(g.name) for g in self.branch.plan.groups if g.kind not in ("Newton", "PRP"))
 
-    def _closed(self, key: Key) -> list[Key]:
+    def _closed(self, key: Quantity) -> list[Quantity]:
         """What tells where the groups that a quantity depends on are not assembled."""
-        return [("closed", group) for group in self.recording.hangs_on(key)] if self.branch.may_open else []
+        return [Closed((group,)) for group in key.groups(self.recording)] if self.branch.may_open else []
 
-    def _where_bad(self, key: Key, found: Any) -> NDArray[np.bool_] | None:
+    def _where_bad(self, key: Quantity, found: Any) -> NDArray[np.bool_] | None:
         """The poses that a doubt is right about; None where it is right about none."""
-        if key[0] == "closed":
+        if isinstance(key, Closed):
             bad = ~np.isfinite(found)
         else:
-            bad = np.abs(found) < (NEAR if key[0] == "margin" else SINGULAR)
+            bad = np.abs(found) < (NEAR if isinstance(key, Margin) else SINGULAR)
         return np.broadcast_to(bad, self.n) if np.any(bad) else None
 
     @cached_property
@@ -299,8 +301,8 @@ class Solving(Poses):
         if name not in self._entered:
             of = next(g for g in self.branch.plan.groups if g.name == group)
             loops, each = range(len(of.closures)), range(len(of.angles) + len(of.slides))
-            keys: list[Key] = [("group column", group, loop, i) for loop in loops for i in each]
-            keys += [("right side", group, order, way, loop) for loop in loops]
+            keys: list[Quantity] = [GroupColumn(group, loop, i) for loop in loops for i in each]
+            keys += [RightSide(group, loop, way, order) for loop in loops]
             values = self._raw(keys)
             cols = [values[loop * len(each) : (loop + 1) * len(each)] for loop in loops]
             right = values[len(loops) * len(each) :]

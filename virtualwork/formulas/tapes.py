@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from dalembert.arithmetic.engines import floats
 from dalembert.arithmetic.tape import Tape
-from virtualwork.formulas.asked import Key, names
 from virtualwork.formulas.entering import Entering
 from virtualwork.formulas.kept import Later, later
 from virtualwork.formulas.numbers import Number, Reals
 from virtualwork.formulas.poses import Branch
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import NAMES, Recording
 
 # tapes of later requests that an assembly keeps
@@ -96,7 +96,7 @@ def entered(branch: Turning, moves: tuple[bool, ...]) -> Entering:
     return result
 
 
-def taped(branch: Turning, recording: Recording, keys: tuple[Key, ...]) -> Tape:
+def taped(branch: Turning, recording: Recording, keys: tuple[Quantity, ...]) -> Tape:
     """The tape of quantities, pruned once."""
     key = recording, keys
     with branch.lock:
@@ -106,7 +106,9 @@ def taped(branch: Turning, recording: Recording, keys: tuple[Key, ...]) -> Tape:
     return result
 
 
-def cut(branch: Turning, recording: Recording, keys: tuple[Key, ...], known: frozenset[int] | None) -> Later:
+def cut(
+    branch: Turning, recording: Recording, keys: tuple[Quantity, ...], known: frozenset[int] | None
+) -> Later:
     """The tape of quantities, from what is known on; None where nothing is, nor to be left."""
     if known is None:
         return Later(taped(branch, recording, keys), {}, {})
@@ -121,7 +123,7 @@ def cut(branch: Turning, recording: Recording, keys: tuple[Key, ...], known: fro
         return result
 
 
-def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Ready | None:
+def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Quantity, ...]) -> Ready | None:
     """Quantities of one pose as a function of floats; None where they depend on more than the input and its rates.
 
     Such a mechanism has one input that turns, no change point, no limit, and a closed form for every group.
@@ -135,7 +137,7 @@ def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Re
     return result
 
 
-def _made(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Ready | None:
+def _made(branch: Turning, moves: tuple[bool, ...], keys: tuple[Quantity, ...]) -> Ready | None:
     if len(branch.mechanism.inputs) > 1 or not branch.settled or branch.folded or branch.may_open:
         return None
     recording = recorded(branch, moves)
@@ -146,4 +148,4 @@ def _made(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Re
     if not floats.takes(tape) or not set(tape.inputs) <= set(arguments):
         return None
     places = tuple(arguments.index(name) for name in tape.inputs)
-    return floats.compiled(tape), places, tuple(len(names(key)) == 2 for key in keys)
+    return floats.compiled(tape), places, tuple(key.is_vector for key in keys)

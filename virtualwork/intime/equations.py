@@ -25,6 +25,8 @@ from dalembert.arithmetic.engines import floats, run
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
+from virtualwork.formulas.forces import Effort
+from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled
@@ -168,7 +170,7 @@ class Equations:
             unit = np.vstack([np.zeros(k), np.eye(k)])
             poses = Lanes(self.assembly, np.tile(q, (k + 1, 1)), np.tile(v, (k + 1, 1)), unit)
             poses.time = np.full(k + 1, t)
-            result = np.stack(poses.taped([("effort", j) for j in range(k)]), axis=1)
+            result = np.stack(poses.taped([Effort(j) for j in range(k)]), axis=1)
         return (result[1:] - result[0]).T, result[0]
 
     def watches(self) -> list[Watch]:
@@ -298,7 +300,7 @@ class Equations:
     def _followed(self, load: Tabled) -> Value:
         """The angle or speed of a link that depends on more than the inputs, by a tape of its own."""
         order = 1 if load.axis == "speed" else 0
-        function = self.function(self.recording(True, False, False).tape([("angle", load.body, order)]))
+        function = self.function(self.recording(True, False, False).tape([Angle(load.body, order)]))
         first = load.table[0][0]
 
         def at(t: float, q: Floats, v: Floats) -> float:

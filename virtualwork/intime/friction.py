@@ -28,6 +28,7 @@ from dalembert.arithmetic.recorded import Number
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe import MechanismError
 from virtualwork.formulas.block import Block
+from virtualwork.formulas.forces import Bearing, RubbingRate
 from virtualwork.formulas.numbers import Reals, minus
 from virtualwork.intime.equations import Equations, Lost
 from virtualwork.intime.powers import motion_of
@@ -117,7 +118,7 @@ class Rubbing(Equations):
         rubs = [f"friction {n}" for n in range(len(self.arms))]
         result: dict[str, Number] = {}
         for n, (joint, body, other, *_) in enumerate(contacts):
-            force, rate = recording.value(("bearing", n)), recording.value(("rubbing", n))
+            force, rate = recording.value(Bearing(n)), recording.value(RubbingRate(n))
             if joint.guide is None:
                 slip = minus(block.alpha(body), block.alpha(other))
             else:

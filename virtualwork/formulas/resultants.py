@@ -1,4 +1,4 @@
-"""Sums of loads over a pose: what acts on one link, and what acts on all moving links from outside."""
+"""Sums of loads and their moments: on one link, and on the ground that shakes."""
 
 from __future__ import annotations
 
