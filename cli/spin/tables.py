@@ -33,13 +33,12 @@ def states(r: Rotation) -> Table:
     s = r.states
 
     def error(of: str) -> Callable[[], Array]:
-        # a turn by an angle moves a quaternion by half of it
-        return lambda: r.bounds[of] / 2 if of == "attitude" else r.bounds[of]
+        return lambda: r.errors[of]
 
     columns = [
         number("t", "time", r.time + 0.0),
         *vector("omega", "speed", s.omega + 0.0, "xyz", error("omega")),
-        *vector("attitude", "number", s.attitude + 0.0, "wxyz", error("attitude")),
+        *vector("attitude", "number", s.attitude + 0.0, "wxyz", error("quaternion")),
         *vector("momentum", "angular momentum", s.momentum + 0.0, "xyz", error("momentum")),
         number("energy", "energy", s.energy + 0.0, error=error("energy")),
     ]
