@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.guard import guarded
+from dalembert.arithmetic.guard import guarded, unlocked
 from dalembert.arithmetic.records import alike
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError
@@ -67,7 +67,7 @@ class Motion(Pictured):
     ) -> None:
         self.assembly, self.lock = assembly, assembly.lock
         self._units: dict[int, Motion] = {}
-        self._one = one_pose(assembly, (angle, speed, acceleration, jerk))
+        self._one = one_pose(assembly, angle, speed, acceleration, jerk)
         if self._one is None:
             self.poses = Lanes(assembly, angle, speed, acceleration, jerk, block_of)
 
@@ -99,6 +99,7 @@ class Motion(Pictured):
 
     # --- over what ------------------------------------------------------------------------------------------------
     @property
+    @unlocked
     def mechanism(self) -> Description:
         """What moves."""
         return self.assembly.mechanism
@@ -138,6 +139,7 @@ class Motion(Pictured):
         return self.poses.condition
 
     # --- what moves -----------------------------------------------------------------------------------------------
+    @unlocked
     def point(self, name: str) -> PointMotion:
         """Motion of a named point.
 
@@ -146,16 +148,19 @@ class Motion(Pictured):
         DescriptionError
             Where no body has a point of that name.
         """
-        if name not in self.mechanism.points:
+        place = self.mechanism.points.get(name)
+        if place is None:
             raise DescriptionError(f"no point is named '{name}'")
-        return PointMotion(self, *self.mechanism.points[name], name)
+        return PointMotion(self, *place, name)
 
+    @unlocked
     def at(self, link: str, point: Point | str) -> PointMotion:
         """Motion of any point of a link: a name, or coordinates in the link's own axes."""
         if isinstance(point, str):
             return PointMotion(self, link, self.mechanism.bodies[link][point], point)
         return PointMotion(self, link, point if isinstance(point, complex) else as_point(point))
 
+    @unlocked
     def link(self, name: str) -> LinkMotion:
         """Motion of a link.
 
@@ -168,6 +173,7 @@ class Motion(Pictured):
             raise DescriptionError(f"no link is named '{name}'")
         return LinkMotion(self, name)
 
+    @unlocked
     def slide(self, name: str) -> SlideMotion:
         """Motion along the guide in which the named point runs."""
         for i, guide in enumerate(self.mechanism.guides):
@@ -175,13 +181,16 @@ class Motion(Pictured):
                 return SlideMotion(self, i)
         raise DescriptionError(f"no slot or slider runs at a point named '{name}'")
 
+    @unlocked
     def values(self, keys: Sequence[Key]) -> list[Any]:
         """Quantities by their keys (`Recording.value`), (n,) each."""
         return self._values(tuple(keys))
 
+    @unlocked
     def value(self, key: Key) -> Any:
         """A quantity by its key, (n,)."""
-        return self._values((key,))[0]
+        result = None if self._one is None else self._one.value(key)
+        return self._values((key,))[0] if result is None else result
 
     def _values(self, keys: tuple[Key, ...]) -> list[Any]:
         if self._one is not None:
@@ -244,14 +253,18 @@ class Motion(Pictured):
         return Forces(self.poses)
 
     @property
+    @unlocked
     def effort(self) -> Reals:
         """The effort at the input by virtual work, (n,) N·m (N at a slide); (n, k) for k inputs.
 
         Static where speed and acceleration are zero (Riul, unit II, eq. 3), else with inertia loads (eq. 5).
         """
-        result = self._values(tuple(("effort", j) for j in range(len(self.mechanism.inputs))))
-        return result[0] if len(result) == 1 else np.stack(result, axis=1)
+        inputs = len(self.mechanism.inputs)
+        if inputs == 1:
+            return self.value(("effort", 0))  # type: ignore[no-any-return]
+        return np.stack(self._values(tuple(("effort", j) for j in range(inputs))), axis=1)
 
+    @unlocked
     def reaction(self, joint: str, on: str) -> Reals:
         """The force of all others on a link at a joint, (n, 2) N (Ibrahim §2.2).
 
@@ -262,7 +275,7 @@ class Motion(Pictured):
         on : str
             A link that the joint holds.
         """
-        return xy(self._values((("reaction", joint, on),))[0])
+        return xy(self.value(("reaction", joint, on)))
 
     def applied(self, link: str) -> tuple[Complexes, Reals]:
         """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""
