@@ -75,7 +75,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("pictured",),
         ("computing",),
         ("family",),
-        ("animation", "dragged", "evaluator", "parts_of_motion", "still"),
+        ("animation", "dragged", "evaluator", "parts_of_motion", "pieces", "still"),
         ("forces", "quantities", "table"),
         ("picture",),
         ("study",),

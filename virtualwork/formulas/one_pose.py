@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 
 from dalembert.dataclass import dataclass, field
-from virtualwork.formulas.asked import Key
 from virtualwork.formulas.lanes import OFTEN, Ready, Turning, ready
+from virtualwork.formulas.quantity import Quantity
 
 
 @dataclass
 class Together:
     """What a first request brings, a function and its quantities, and how often others were requested after it."""
 
-    brought: tuple[Ready, tuple[Key, ...]]
-    later: dict[tuple[Key, ...], int] = field(default_factory=dict)
+    brought: tuple[Ready, tuple[Quantity, ...]]
+    later: dict[tuple[Quantity, ...], int] = field(default_factory=dict)
 
 
 class OnePose:
@@ -39,17 +39,17 @@ class OnePose:
 
     def __init__(self, branch: Turning, numbers: tuple[float, float, float, float]) -> None:
         self.branch, self.numbers = branch, numbers
-        self.known: dict[Key, float | complex] = {}
+        self.known: dict[Quantity, float | complex] = {}
         self._first: Together | None = None
 
-    def value(self, key: Key) -> Any:
+    def value(self, key: Quantity) -> Any:
         """A quantity, (1,); None where a function of floats has not been made of it, or fails."""
         known = self.known
         if key not in known and not self._work_out((key,)):
             return None
         return np.array([known[key]])
 
-    def values(self, keys: tuple[Key, ...]) -> list[Any] | None:
+    def values(self, keys: tuple[Quantity, ...]) -> list[Any] | None:
         """Quantities, (1,) each; None where a function of floats has not been made of them, or fails."""
         known = self.known
         new = tuple([key for key in keys if key not in known])
@@ -57,7 +57,7 @@ class OnePose:
             return None
         return [np.array([known[key]]) for key in keys]
 
-    def _work_out(self, keys: tuple[Key, ...]) -> bool:
+    def _work_out(self, keys: tuple[Quantity, ...]) -> bool:
         recordings, (_, speed, acceleration, jerk) = self.branch.recordings, self.numbers
         moves = speed != 0.0, acceleration != 0.0, jerk != 0.0
         first = self._first
@@ -74,15 +74,15 @@ class OnePose:
             every = recordings.setdefault("together", {})
             self._first = every.setdefault((moves, keys), Together((made, keys)))
             return self._run(made, keys)
-        first.later[keys] = first.later.get(keys, 0) + 1
-        if first.later[keys] == OFTEN:
+        count = first.later[keys] = first.later.get(keys, 0) + 1
+        if count == OFTEN:
             wanted = tuple(dict.fromkeys((*first.brought[1], *keys)))
             together = ready(self.branch, moves, wanted)
             if together is not None:
                 first.brought = together, wanted
         return self._run(made, keys)
 
-    def _run(self, made: Ready, keys: tuple[Key, ...]) -> bool:
+    def _run(self, made: Ready, keys: tuple[Quantity, ...]) -> bool:
         function, places, vectors = made
         numbers, keep = self.numbers, self.known.setdefault
         try:
