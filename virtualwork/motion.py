@@ -67,7 +67,6 @@ class Motion(Pictured):
         block_of: int | None = None,
     ) -> None:
         self.assembly, self.lock = assembly, assembly.lock
-        self._units: dict[int, Motion] = {}
         self._one = one_pose(assembly, angle, speed, acceleration, jerk)
         if self._one is None:
             self.poses = Lanes(assembly, angle, speed, acceleration, jerk, block_of)
@@ -90,6 +89,10 @@ class Motion(Pictured):
         poses = self.poses
         own = self.inputs, poses.input_error, poses.input_rest
         return _again, (self.assembly, own, poses.rates, poses.block_of, poses.time)
+
+    @cached_property
+    def _units(self) -> dict[int, Motion]:
+        return {}
 
     @cached_property
     def poses(self) -> Lanes:
