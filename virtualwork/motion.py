@@ -177,7 +177,7 @@ class Motion(Pictured):
         raise DescriptionError(f"no slot or slider runs at a point named '{name}'")
 
     def values(self, keys: Sequence[Quantity]) -> list[Any]:
-        """Quantities by their keys (`Recording.value`), (n,) each."""
+        """Quantities, (n,) each."""
         return self._values(tuple(keys))
 
     def value(self, key: Quantity) -> Any:
@@ -302,7 +302,7 @@ class Motion(Pictured):
         return Sensitivities(self.assembly, self.poses)
 
     def derivative(self, key: Quantity, path: str) -> Any:
-        """The derivative (n,) of a quantity, by its key (`Recording.value`), to the number at a path."""
+        """The derivative (n,) of a quantity, to the number at a path."""
         sensitivities = self.sensitivities
         return sensitivities.of([key], [sensitivities.dimension(path)])[0][0]
 
