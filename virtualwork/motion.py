@@ -187,7 +187,7 @@ class Motion(Pictured):
 
     @unlocked
     def values(self, keys: Sequence[Quantity]) -> list[Any]:
-        """Quantities by their keys (`Recording.value`), (n,) each."""
+        """Quantities, (n,) each."""
         return self._values(tuple(keys))
 
     @unlocked
@@ -318,7 +318,7 @@ class Motion(Pictured):
         return Sensitivities(self.assembly, self.poses)
 
     def derivative(self, key: Quantity, path: str) -> Any:
-        """The derivative (n,) of a quantity, by its key (`Recording.value`), to the number at a path."""
+        """The derivative (n,) of a quantity, to the number at a path."""
         sensitivities = self.sensitivities
         return sensitivities.of([key], [sensitivities.dimension(path)])[0][0]
 

@@ -90,7 +90,7 @@ class Turning(Branch, Protocol):
 
 @guarded
 class Lanes(Poses):
-    """Poses of an assembly whose quantities come from the tape, by their keys (`Recording.value`).
+    """Poses of an assembly whose quantities come from the tape.
 
     Parameters are those of `Poses`.
     """
