@@ -75,7 +75,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("pictured",),
         ("computing",),
         ("family",),
-        ("animation", "dragged", "evaluator", "parts_of_motion", "still"),
+        ("animation", "dragged", "evaluator", "parts_of_motion", "pieces", "still"),
         ("forces", "quantities", "table"),
         ("picture",),
         ("study",),
@@ -139,7 +139,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("dataclass", "errors", "hints", "memory"),
     ),
     "benchmarks": (
-        ("__main__", "commands_page", "library_page", "same_outputs", "trace_passes"),
+        ("__main__", "commands_page", "library_page", "page_pictures", "same_outputs", "trace_passes"),
         ("fuzz", "page", "peers"),
         ("speed", "stress"),
         ("scenes",),
@@ -384,8 +384,8 @@ def test_nothing_imports_the_tests_or_an_undeclared_package() -> None:
         allowed = set(sys.stdlib_module_names) | set(INSTALLED) | declared
         if module.startswith("benchmarks.peers."):
             continue
-        if module.startswith("benchmarks."):  # the extra `test` brings mpmath
-            allowed |= {"benchmarks", "mpmath"}
+        if module.startswith("benchmarks."):  # the extra `test` brings mpmath and selenium
+            allowed |= {"benchmarks", "mpmath", "selenium"}
         assert tops(tree) <= allowed, f"{module}: {tops(tree) - allowed}"
 
 

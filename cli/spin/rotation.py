@@ -309,32 +309,33 @@ class Rotation:
         """The period of nutation of a top; None of any other body."""
         return finite(float(self.states.top.nutation_period)) if isinstance(self.states, TopState) else None
 
-    @cached_property
-    def errors(self) -> dict[str, Array]:
-        """The errors of the states by computing twice, of an integration of its method too."""
-        s, body, of = self.states, self.body.exact(), ("omega", "quaternion", "momentum", "energy")
+    def errors(self, of: str) -> Array:
+        """The errors of a quantity of the states by computing twice, of an integration of its method too."""
+        s, exact = self.states, self._exact
         if isinstance(s, Trajectory):
-            exact: Any = body.inertia
-            tensor = exact if exact.ndim == 2 else exact[:, None] * np.eye(3)
-            return {name: s.error_estimate(name, tensor) for name in of}
+            return s.error_estimate(of, exact)
+        errors = s.error_estimate(of, exact[0])
+        if len(exact) > 1:
+            # two moments that differ by rounding were taken as one
+            errors = 3 * errors + 2 * s.error_estimate(of, exact[1])
+        return np.asarray(errors)
+
+    @cached_property
+    def _exact(self) -> Any:
+        """The states in doubled numbers; of an integration the tensor alone."""
+        body = self.body.exact()
+        I: Any = body.inertia
+        if isinstance(self.states, Trajectory):
+            return I if I.ndim == 2 else I[:, None] * np.eye(3)
         from cli.read.exact import array
 
         time: Any = array(self.time)
-        if isinstance(s, FreeState):
-            state = FreeBody(body.inertia, body.omega, body.attitude).at(time)
-            return {name: s.error_estimate(name, state) for name in of}
-        I: Any = body.inertia if body.inertia.ndim == 1 else np.diagonal(body.inertia)
+        if isinstance(self.states, FreeState):
+            return [FreeBody(I, body.omega, body.attitude).at(time)]
         mgl: Any = body.mgl
-        tops = [
-            Top(inertia, mgl, body.omega, body.attitude).at(time) for inertia in (_round(I), I[[0, 0, 2]])
-        ]
-        errors = {name: s.error_estimate(name, tops[0]) for name in of}
-        if (I[0] != I[1]).any():
-            # two moments that differ by rounding were taken as one
-            for name in errors:
-                other = s.error_estimate(name, tops[1])
-                errors[name] = errors[name] + 2 * (errors[name] + other)
-        return errors
+        moments = I if I.ndim == 1 else np.diagonal(I)
+        each = [_round(moments), *([moments[[0, 0, 2]]] if (moments[0] != moments[1]).any() else [])]
+        return [Top(about, mgl, body.omega, body.attitude).at(time) for about in each]
 
 
 def _round(I: Array) -> Array:

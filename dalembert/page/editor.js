@@ -56,7 +56,8 @@ function update() {
   cancelAnimationFrame(due);
   due = 0;
   copied("");
-  if (wrong.size) $("limits").textContent = "";
+  // those of the earlier numbers
+  $("limits").textContent = "";
   recompute(whole);
   for (const { series, parts } of figures) {
     for (const [k, shape] of series.shapes.entries()) if (shape.s !== undefined) parts[k].setAttribute("r", Math.max(shape.s * scale, LEAST[shape.r] ?? 0).toFixed(2));

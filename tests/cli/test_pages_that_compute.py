@@ -16,6 +16,7 @@ import pytest
 
 from tests.cli.pages import FOUR_BAR, Opened
 from tests.conftest import Dalembert
+from tests.test_pages_of_redundant_statics import THREE_CRANKS
 from virtualwork import Mechanism
 from virtualwork.describe.dimensions import changed
 
@@ -233,14 +234,12 @@ def test_limits_are_those_of_inspect(dalembert: Dalembert, tmp_path: Path, brows
 def test_what_it_cannot_compute_it_replays_and_says_so(
     dalembert: Dalembert, tmp_path: Path, browser: Any
 ) -> None:
-    done = dalembert(
-        "forces",
-        EXAMPLES / "falling-four-bar" / "falling.toml",
-        "--over",
-        "60deg:90deg:5deg",
-        "--page",
-        "m.html",
+    """Three parallel cranks, and friction in one of them: a redundant statics of what rubs."""
+    (tmp_path / "m.toml").write_text(
+        THREE_CRANKS + "[[friction]]\njoint = 'A'\ncoefficient = 0.1\nradius = 0.01\n"
     )
+    sweep = ("--over", "60deg:90deg:5deg", "--set", "input.speed=2", "--set", "input.acceleration=0")
+    done = dalembert("forces", "m.toml", *sweep, "--page", "m.html")
     assert done.returncode == 0, done.stderr
     page = Opened(browser, tmp_path / "m.html")
     assert "friction" in page.text("note")
