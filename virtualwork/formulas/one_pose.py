@@ -83,14 +83,13 @@ class OnePose:
         return self._run(made, keys)
 
     def _run(self, made: Ready, keys: tuple[Quantity, ...]) -> bool:
-        function, places, vectors = made
-        numbers, keep = self.numbers, self.known.setdefault
         try:
-            found = iter(function(*[numbers[i] for i in places]))
+            result = made(*self.numbers)
         except (ZeroDivisionError, ValueError, OverflowError):
             return False
-        for key, vector in zip(keys, vectors, strict=True):
-            keep(key, complex(next(found), next(found)) if vector else next(found) + 0.0)
+        keep = self.known.setdefault
+        for key, value in zip(keys, result, strict=True):
+            keep(key, value)
         return True
 
 
