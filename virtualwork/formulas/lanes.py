@@ -33,7 +33,7 @@ OFTEN = 50
 
 @guarded
 class Lanes(Solving):
-    """Poses of an assembly whose quantities come from the tape, by their keys (`Recording.value`).
+    """Poses of an assembly whose quantities come from the tape.
 
     Parameters are those of `Poses`.
     """
@@ -144,16 +144,14 @@ class Lanes(Solving):
         """Work out one pose that depends on nothing but its input, by a function of floats; False where it depends on more."""
         given = [self.inputs, *(rates[0] for rates in self.rates)]
         values = [x if isinstance(x, float) else float(np.ravel(x)[0]) for x in given]
-        made = ready(self.branch, tuple(x != 0.0 for x in values[1:]), keys)
-        if made is None:
+        function = ready(self.branch, tuple(x != 0.0 for x in values[1:]), keys)
+        if function is None:
             return False
-        function, places, vectors = made
         try:
-            found = iter(function(*[values[i] for i in places]))
+            result = function(*values)
         except (ZeroDivisionError, ValueError, OverflowError):
             return False
-        for key, vector in zip(keys, vectors, strict=True):
-            self.known[key] = np.array([complex(next(found), next(found)) if vector else next(found) + 0.0])
+        self.known.update((key, np.array([value])) for key, value in zip(keys, result, strict=True))
         return True
 
     def _run(self, keys: list[Quantity]) -> None:

@@ -20,8 +20,8 @@ from virtualwork.formulas.recording import NAMES, Recording
 # tapes of later requests that an assembly keeps
 MANY = 256
 
-# a function of floats, the places of its arguments among the input and its rates, and whether each result is a vector
-Ready = tuple[Callable[..., tuple[float, ...]], tuple[int, ...], tuple[bool, ...]]
+# quantities of one pose, real or complex, as a function of the input, its speed, acceleration and jerk
+Ready = Callable[[float, float, float, float], tuple[complex, ...]]
 
 
 class Turning(Branch, Protocol):
@@ -144,8 +144,7 @@ def _made(branch: Turning, moves: tuple[bool, ...], keys: tuple[Quantity, ...]) 
     if not recording.takes(keys):
         return None
     tape = taped(branch, recording, keys)
-    arguments = [f"{name}0" for name in NAMES]
+    arguments = tuple(f"{name}0" for name in NAMES)
     if not floats.takes(tape) or not set(tape.inputs) <= set(arguments):
         return None
-    places = tuple(arguments.index(name) for name in tape.inputs)
-    return floats.compiled(tape), places, tuple(key.is_vector for key in keys)
+    return floats.compiled(tape, among=arguments, vectors=tuple(key.is_vector for key in keys))
