@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cli.cases import quantities
 from cli.cases.inputs import InputGrid, Inputs
-from cli.cases.quantities import Component
+from cli.cases.quantities import chosen, unknown
 from cli.read import options
 from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError
 from dalembert.hints import nearest
 from dalembert.memory import memory
 from dalembert.results.way import figures
+from virtualwork import quantities
 from virtualwork.formulas.kinematics import Angle, Point
+from virtualwork.quantities import Component
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -152,14 +153,14 @@ class Analysis:
     def places(self) -> list[Component]:
         """The places and rates that are requested."""
         every = quantities.places(self.mechanism, 3, self.request.only or ())
-        return quantities.chosen(every, self.request.only, self.order)
+        return chosen(every, self.request.only, self.order)
 
     @cached_property
     def forces(self) -> list[Component]:
         """The forces that are requested."""
         if not self.request.forces:
             return []
-        return quantities.chosen(quantities.forces(self.mechanism, self.pairs), self.request.only, 0)
+        return chosen(quantities.forces(self.mechanism, self.pairs), self.request.only, 0)
 
     @cached_property
     def pairs(self) -> list[tuple[Joint, str, str]]:
@@ -203,10 +204,10 @@ class Analysis:
         moving = quantities.places(self.mechanism, 3, only)
         forces = quantities.forces(self.mechanism, self.pairs)
         here = [*moving, *forces] if self.request.forces else moving
-        word = quantities.unknown(here, only)
+        word = unknown(here, only)
         if word is None:
             return
-        if quantities.unknown(forces, [word]) is None:
+        if unknown(forces, [word]) is None:
             raise DataError(f"{self.file}: --only {word}: this is a force: dalembert forces shows it")
         names = {name for each in here for name in (*each.names, *each.owners)}
         owner = word.rpartition(".")[0]

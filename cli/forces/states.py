@@ -16,22 +16,11 @@ import numpy as np
 
 from cli.cases.analysis import Analysis
 from cli.cases.poses import column, pose_keys
-from cli.cases.quantities import (
-    FORCE,
-    LINK,
-    POINT,
-    bound,
-    bounds_of,
-    cells,
-    cells_of,
-    keys_of,
-    links,
-    solved,
-    vector,
-)
+from cli.cases.quantities import bound, bounds_of, cells, cells_of, keys_of, solved
 from dalembert.results.columns import Table
 from virtualwork.formulas.forces import Applied, AppliedMoment
 from virtualwork.formulas.kinematics import Angle, Point, Slide, Turn
+from virtualwork.quantities import FORCE, LINK, POINT, links, vector
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
