@@ -30,19 +30,21 @@ from virtualwork.dragged import cams, drawn_numbers, handles, profiles
 from virtualwork.drawing import Drawing, draw
 from virtualwork.family.written import Written
 from virtualwork.forces import Forces
-from virtualwork.formulas.asked import FORCES, JOINTS, Key, names
-from virtualwork.formulas.balanced import Balanced
+from virtualwork.formulas.balanced import Balanced, Over
+from virtualwork.formulas.forces import Effort
+from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.loads import Tabled
+from virtualwork.formulas.loops import Closed, Margin, Twist
 from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.quantity import Quantity
+from virtualwork.formulas.rubbing import Rub, Slip
 from virtualwork.picture.paper import travel_of
 from virtualwork.pieces import toml_pieces
 from virtualwork.plan.steps import Group
-from virtualwork.quantities import Quantity, places
+from virtualwork.quantities import Component, places
 from virtualwork.quantities import forces as quantities_of_forces
 from virtualwork.study.free_bodies import parts
 
-LOCKED = (*JOINTS, "effort")
-"""What depends on the friction of joints; nothing of it has a value where they lock."""
 ORDERS = 2
 """How often places are differentiated in time."""
 # input, speed, acceleration, jerk, as an input of a description calls them
@@ -81,14 +83,14 @@ class Computed(Series):
         ]
         return {"loose": loose}
 
-    def _hidden(self, key: Key) -> list[int]:
+    def _hidden(self, key: Quantity) -> list[int]:
         """Columns of a quantity that the page does not list."""
         return [self._add(f"{key} {i}", column) for i, column in enumerate(self._unit_rates(key))]
 
-    def _unit_rates(self, key: Key) -> list[Any]:
+    def _unit_rates(self, key: Quantity) -> list[Any]:
         assert self.of is not None
         row, rest = self.of.row(key), self.of.locking(key)
-        return [{"row": row + i, **rest} for i in range(len(names(key)))]
+        return [{"row": row + i, **rest} for i in range(len(key.names))]
 
     def _add(self, name: str, values: Any, header: str = "", owner: str = "", exact: bool = True) -> int:
         if not isinstance(values, dict):
@@ -119,7 +121,7 @@ class Formulas:
         self.assembly, self.poses, self.order = assembly, poses, order
         self.mechanism: Description = assembly.mechanism
         self.dimensions = dimensions(self.mechanism)
-        self.keys: dict[Key, int] = {}
+        self.keys: dict[Quantity, int] = {}
         self._rows = 0
 
     @cached_property
@@ -129,10 +131,10 @@ class Formulas:
         moves = (True, True, self.order > ORDERS)
         return Written(self.assembly, fixed, moves, True, settled=False, recording=Balanced)
 
-    def refused(self, keys: Sequence[Key]) -> str:
+    def refused(self, keys: Sequence[Quantity]) -> str:
         """Say why a page cannot compute these quantities; empty where it can."""
         m, own = self.mechanism, self.assembly
-        forces = any(key[0] in FORCES for key in keys)
+        forces = any(key.is_force for key in keys)
         _ = own.track
         if not m.inputs:
             return "nothing drives it"
@@ -149,29 +151,30 @@ class Formulas:
                 return "a torsion spring counts its turns along several inputs"
         return ""
 
-    def row(self, key: Key) -> int:
+    def row(self, key: Quantity) -> int:
         """The first row of a quantity on the tape of the poses, which gets it."""
         if key not in self.keys:
             self.keys[key] = self._rows
-            self._rows += len(names(key))
+            self._rows += len(key.names)
         return self.keys[key]
 
-    def column(self, each: Quantity, si: float = 1.0) -> dict[str, Any]:
+    def column(self, each: Component, si: float = 1.0) -> dict[str, Any]:
         """What a column or a name asks the tape of the poses for."""
         if not each.key:
             return {"zero": 1}
         found: dict[str, Any] = {"row": self.row(each.key) + each.imaginary, **self.locking(each.key)}
         if each.less:
             found["less"] = self.row(each.less)
-        if each.turns:
+        if each.link:
             found["turns"] = 1
         if each.order:
             found["order"] = each.order
         return found
 
-    def locking(self, key: Key) -> dict[str, Any]:
-        """That a quantity has no value where friction locks the joints."""
-        return {"locks": 1} if self.mechanism.friction and key[0] in LOCKED else {}
+    def locking(self, key: Quantity) -> dict[str, Any]:
+        """That a quantity depends on the friction of joints, and has no value where they lock."""
+        locks = self.mechanism.friction and (key.is_joint_force or isinstance(key, Effort))
+        return {"locks": 1} if locks else {}
 
     # --- tapes ----------------------------------------------------------------------------------------------------
     def tapes(self, drawn: Mapping[str, Number]) -> dict[str, Tape]:
@@ -179,11 +182,11 @@ class Formulas:
         written = self.written
         groups = written.plan.groups
         closed = [g.name for g in written.closed]
-        every = ("closed", *(g.name for g in groups))
+        every = Closed(tuple(g.name for g in groups))
         found = {
             "pose": written.tape((*self.keys, every)),
             "choice": written.choice,
-            "margins": written.tape([("margin", name) for name in closed]),
+            "margins": written.tape([Margin(name) for name in closed]),
             "short": written.short,
             "drawn": written.recording.recorder.tape(dict(drawn)),
         }
@@ -192,20 +195,20 @@ class Formulas:
             found["statics"] = self._bears.statics
         if self._rubs:
             names = [f"friction {n}" for n in range(self._rubs)]
-            rubs = [("rub", n) for n in range(self._rubs)]
-            found["slips"] = written.tape([("slip", n) for n in range(self._rubs)])
+            rubs = [Rub(n) for n in range(self._rubs)]
+            found["slips"] = written.tape([Slip(n) for n in range(self._rubs)])
             found["rubs"] = written.tape(rubs)
             found["slopes"] = written.evaluation(rubs, tuple(names), False)
         if self._loaded and self.written.recording.tables:
-            found["over"] = written.tape([("over", i) for i in range(len(self.written.recording.tables))])
+            found["over"] = written.tape([Over(i) for i in range(len(self.written.recording.tables))])
         if any(g.kind == "Newton" for g in groups):
             found |= {"steps": written.steps, "guessed": written.guessed}
         winding = [body for g in written.closed for body in self._closed(g)["winds"]]
         if winding:
-            found["winds"] = written.tape([("angle", body, 0) for body in winding])
+            found["winds"] = written.tape([Angle(body, 0) for body in winding])
         if self.mechanism.torsion_springs:
             springs = range(len(self.mechanism.torsion_springs))
-            found["twists"] = written.tape([("twist", i) for i in springs])
+            found["twists"] = written.tape([Twist(i) for i in springs])
         return found
 
     def document(self) -> dict[str, Any]:
@@ -242,7 +245,7 @@ class Formulas:
     @property
     def _loaded(self) -> bool:
         """Whether forces are among the quantities."""
-        return any(key[0] in FORCES for key in self.keys)
+        return any(key.is_force for key in self.keys)
 
     @property
     def _rubs(self) -> int:
@@ -262,7 +265,7 @@ class Formulas:
         """The formulas, where joint forces are among the quantities and statics alone is redundant."""
         recording = self.written.recording
         assert isinstance(recording, Balanced)
-        return recording if any(key[0] in JOINTS for key in self.keys) and recording.redundant else None
+        return recording if any(key.is_joint_force for key in self.keys) and recording.redundant else None
 
     @staticmethod
     def _statics(of: Balanced) -> dict[str, Any]:
@@ -336,8 +339,8 @@ class Formulas:
 
 def computing_page(
     poses: Poses,
-    columns: Mapping[str, tuple[Quantity | int, Shown]],
-    named: Sequence[Quantity],
+    columns: Mapping[str, tuple[Component | int, Shown]],
+    named: Sequence[Component],
     forces: Sequence[JointForce] = (),
     bare_units: Mapping[str, str] | None = None,
     others: Sequence[Series] = (),
@@ -353,7 +356,7 @@ def computing_page(
         Over the sweep.
     columns : mapping
         What is listed: of each column its quantity, or the number of an input, and its header with its unit.
-    named : sequence of Quantity
+    named : sequence of Component
         What can be asked for by name.
     bare_units : mapping of kind to unit
         The units of lengths and angles that are typed and shown: those of the file.
@@ -425,7 +428,7 @@ def page_of(poses: Poses, drawing: Drawing, forces: Forces | None = None, over: 
         arrows = [JointForce.of(*pair) for pair in pairs]
     degree = float(np.pi / 180)
     several = len(m.inputs) > 1
-    columns: dict[str, tuple[Quantity | int, Shown]] = {}
+    columns: dict[str, tuple[Component | int, Shown]] = {}
     for j, entry in enumerate(m.inputs):
         header = f"{entry.name}_input_m" if entry.is_slide else f"{entry.name}_input_deg"
         header = header if several else header.removeprefix(f"{entry.name}_")

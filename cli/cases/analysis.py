@@ -8,22 +8,24 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cli.cases import quantities
 from cli.cases.inputs import InputGrid, Inputs
-from cli.cases.quantities import Quantity
+from cli.cases.quantities import chosen, unknown
 from cli.read import options
 from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError
 from dalembert.hints import nearest
 from dalembert.memory import memory
 from dalembert.results.way import figures
+from virtualwork import quantities
+from virtualwork.formulas.kinematics import Angle, Point
+from virtualwork.quantities import Component
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from virtualwork import Mechanism
     from virtualwork.branch.assembly import Assembly
-    from virtualwork.formulas.asked import Key
+    from virtualwork.formulas.quantity import Quantity
     from virtualwork.motion import Motion
     from virtualwork.plan.steps import Joint
 
@@ -148,17 +150,17 @@ class Analysis:
 
     # --- quantities -----------------------------------------------------------------------------------------------
     @cached_property
-    def places(self) -> list[Quantity]:
+    def places(self) -> list[Component]:
         """The places and rates that are requested."""
         every = quantities.places(self.mechanism, 3, self.request.only or ())
-        return quantities.chosen(every, self.request.only, self.order)
+        return chosen(every, self.request.only, self.order)
 
     @cached_property
-    def forces(self) -> list[Quantity]:
+    def forces(self) -> list[Component]:
         """The forces that are requested."""
         if not self.request.forces:
             return []
-        return quantities.chosen(quantities.forces(self.mechanism, self.pairs), self.request.only, 0)
+        return chosen(quantities.forces(self.mechanism, self.pairs), self.request.only, 0)
 
     @cached_property
     def pairs(self) -> list[tuple[Joint, str, str]]:
@@ -176,7 +178,7 @@ class Analysis:
         return [(j, on, of) for j, on, of in self.pairs if shown & {(j.name, on, of), (j.name, of, on)}]
 
     @cached_property
-    def tabled(self) -> list[Quantity]:
+    def tabled(self) -> list[Component]:
         """What a table has: the forces alone where they are requested without names."""
         return self.forces if self.request.forces and self.request.only is None else self.places + self.forces
 
@@ -202,10 +204,10 @@ class Analysis:
         moving = quantities.places(self.mechanism, 3, only)
         forces = quantities.forces(self.mechanism, self.pairs)
         here = [*moving, *forces] if self.request.forces else moving
-        word = quantities.unknown(here, only)
+        word = unknown(here, only)
         if word is None:
             return
-        if quantities.unknown(forces, [word]) is None:
+        if unknown(forces, [word]) is None:
             raise DataError(f"{self.file}: --only {word}: this is a force: dalembert forces shows it")
         names = {name for each in here for name in (*each.names, *each.owners)}
         owner = word.rpartition(".")[0]
@@ -284,10 +286,10 @@ class Analysis:
         return self.request.only is None or not self.named
 
     @cached_property
-    def named(self) -> list[Key]:
+    def named(self) -> list[Quantity]:
         """Places of the points, links and slides that are requested, as a motion computes them."""
         homes = self.mechanism.points
-        result: list[Key] = [("point", homes[name][0], 0j, name, 0) for name in self.points]
-        result += [("angle", name, 0) for name in self.links]
+        result: list[Quantity] = [Point(homes[name][0], 0j, name, 0) for name in self.points]
+        result += [Angle(name, 0) for name in self.links]
         slides = [each.key for each in self.places if each.path[0] == "slides"]
-        return [*result, *dict.fromkeys((*key[:2], 0) for key in slides)]
+        return [*result, *dict.fromkeys(key.of_order(0) for key in slides)]

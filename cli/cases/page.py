@@ -7,19 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from cli.cases import poses, quantities
+from cli.cases import poses
 from cli.cases.analysis import Analysis
 from cli.cases.case import Case
 from cli.cases.poses import column
-from cli.cases.quantities import Quantity
 from cli.cases.study import PoseCase
 from cli.show.picture import shown
 from dalembert.page import Shown
 from dalembert.results.columns import Table
-from virtualwork import MechanismError
+from virtualwork import MechanismError, quantities
 from virtualwork.animation import JointForce, Series, moving_page
 from virtualwork.computing import ORDERS, computing_page
 from virtualwork.motion import Motion
+from virtualwork.quantities import Component
 
 SWEEP = 361
 """Poses of a turn, where one pose was requested."""
@@ -79,7 +79,7 @@ def _computing(
         forces = quantities.forces(m, pairs)
         named += forces
         listed += [each for each in forces if each.key and not each.reverse]
-    wanted: list[tuple[Quantity | int, str]] = list(enumerate(first.input_columns))
+    wanted: list[tuple[Component | int, str]] = list(enumerate(first.input_columns))
     wanted += [(each, each.header) for each in listed]
     table = shown(Table([column(header, []) for _, header in wanted]), units)
     arrows = [JointForce.of(*row) for row in pairs]

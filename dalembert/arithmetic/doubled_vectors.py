@@ -141,6 +141,11 @@ class Vectors:
         """The sum along an axis."""
         return Vectors(total(self.x, axis), total(self.y, axis))
 
+    def swapped(self) -> Vectors:
+        """The same with its last two axes exchanged."""
+        parts = ((x.high, x.low + 0.0 * x.high) for x in (self.x, self.y))
+        return Vectors(*(Doubled(*(np.swapaxes(each, -1, -2) for each in pair)) for pair in parts))
+
     def apart(self, value: ArrayLike) -> Real:
         """Return by how much complex floats differ from these."""
         off = self - Vectors.of(value)
@@ -194,7 +199,7 @@ def doubled_array(exact: Iterable[Fraction], shape: tuple[int, ...]) -> Doubled:
 
 def off(value: ArrayLike, exact: Doubled, modulo: float = 0.0) -> Real:
     """Return by how much floats differ from doubled numbers; modulo a whole turn."""
-    difference = np.abs((exact - np.asarray(value, dtype=float)).value)
+    difference = exact - np.asarray(value, dtype=float)
     if modulo:
-        difference = np.minimum(difference, np.abs(modulo - difference))
-    return np.asarray(OWN * difference)
+        difference = difference - Doubled(np.rint(difference.high / modulo)) * modulo
+    return np.asarray(OWN * np.abs(difference.value))

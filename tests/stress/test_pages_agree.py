@@ -18,10 +18,9 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.computing import ORDERS
 from virtualwork.describe import MechanismError
 from virtualwork.describe.dimensions import changed, dimensions, value
-from virtualwork.formulas.asked import FORCES
 from virtualwork.formulas.lanes import over_blocks
 from virtualwork.motion import Motion
-from virtualwork.quantities import Quantity, forces, places
+from virtualwork.quantities import Component, forces, places
 
 pytestmark = needs_node
 EXAMPLES = (
@@ -69,7 +68,7 @@ def tried(
     every = places(m, ORDERS)
     if of:
         every += forces(m, first.dynamics.reactions.order.pairs)
-    named: dict[str, Quantity] = {}
+    named: dict[str, Component] = {}
     for each in every:
         if each.key and not each.less:
             for word in each.names:
@@ -103,7 +102,7 @@ def tried(
     # a moment is a sum of forces at arms of about a metre: rounding is of their size
     alike = dict.fromkeys(("force", "effort", "newton-euler", "shaking", "moment", "shaking moment"), "load")
     alike |= {"point": "place", "slide": "place"}
-    kinds = [(alike.get(each.key[0], each.key[0]), each.order) for each in named.values()]
+    kinds = [(alike.get(each.key.kind, each.key.kind), each.order) for each in named.values()]
     rate = max(3.0 / (m.size if e.is_slide else 1.0) for e in m.inputs)
     return Tried(name, page, changes, list(named), kinds, true, conditions, rate)
 
@@ -116,14 +115,14 @@ def regular(m: Mechanism) -> bool:
         return False
 
 
-def number(motion: Motion, each: Quantity) -> float:
+def number(motion: Motion, each: Component) -> float:
     """One quantity of one pose, SI and radians."""
-    if each.key[0] in FORCES:
+    if each.key.is_force:
         z = np.ravel(over_blocks(motion.poses, each.key, motion.dynamics))[0]
     else:
         z = np.ravel(motion.value(each.key))[0]
     x = float(z.imag if each.imaginary else z.real)
-    return x % (2 * math.pi) if each.turns else x
+    return x % (2 * math.pi) if each.link else x
 
 
 def faults(every: list[Tried], folder: Path, allowed: float) -> list[str]:

@@ -20,11 +20,12 @@ from virtualwork.describe.description import Description, joints_apart, known_by
 from virtualwork.describe.dimensions import Dimension, changed, value
 from virtualwork.describe.keys import keys_of
 from virtualwork.describe.parts import Link
-from virtualwork.formulas.asked import FORCES, Key, names
 from virtualwork.formulas.closed_forms import Case, missing
+from virtualwork.formulas.loops import Closed, Margin
 from virtualwork.formulas.newton import gaps, put_unknowns, unknowns
 from virtualwork.formulas.numbers import PARTS, WRITTEN, Number
 from virtualwork.formulas.positions import State, columns, principal_of, run
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import NEAR, Recording
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, geared, turns
@@ -105,9 +106,9 @@ class Written:
         return [g for g in self.plan.groups if g.kind not in ("Newton", "PRP")]
 
     @cached_property
-    def margins(self) -> list[Key]:
+    def margins(self) -> list[Quantity]:
         """The keys of their radicands."""
-        return [("margin", group.name) for group in self.closed]
+        return [Margin(group.name) for group in self.closed]
 
     def _once(self, write: Callable[..., Tape], *arguments: Any) -> Tape:
         """A tape, written on the first request."""
@@ -116,21 +117,21 @@ class Written:
             self._tapes[key] = write(*arguments)
         return self._tapes[key]
 
-    def tape(self, keys: Iterable[Key]) -> Tape:
+    def tape(self, keys: Iterable[Quantity]) -> Tape:
         """The tape of quantities."""
         return self._once(self.recording.tape, tuple(keys))
 
-    def tested(self, keys: Sequence[Key], also: Sequence[Key] = ()) -> Tape:
+    def tested(self, keys: Sequence[Quantity], also: Sequence[Quantity] = ()) -> Tape:
         """The tape of quantities, and `sound`: positive where all is assembled that they, and others, depend on.
 
         And where forces among them have digits.
         """
         return self._once(self._tested, tuple(keys), tuple(also))
 
-    def _tested(self, keys: tuple[Key, ...], also: tuple[Key, ...]) -> Tape:
-        closed = [("closed", *self.recording.hangs_on(key)) for key in (*keys, *also)]
+    def _tested(self, keys: tuple[Quantity, ...], also: tuple[Quantity, ...]) -> Tape:
+        closed = [Closed(key.groups(self.recording)) for key in (*keys, *also)]
         sound = [sys.float_info.max - abs(self.recording.value(key)) for key in dict.fromkeys(closed)]
-        if any(key[0] in FORCES for key in keys):
+        if any(key.is_force for key in keys):
             sound += [abs(self.recording.value(key)) - NEAR for key in self.margins]
         return self.recording.tape(keys, {"sound": every(sound)})
 
@@ -207,7 +208,7 @@ class Written:
             plain.append(RECORDED.select(TOLD * plus - minus, 1.0, TOLD * minus - plus))
         return plain
 
-    def evaluation(self, keys: Sequence[Key], enters: tuple[str, ...] | None, own_signs: bool) -> Tape:
+    def evaluation(self, keys: Sequence[Quantity], enters: tuple[str, ...] | None, own_signs: bool) -> Tape:
         """The tape of quantities, or of the derivatives of each to all that enters, one after the other.
 
         `own_signs`: the signs are those of the guess, at the input `at`, and last comes `fine`: positive where these are
@@ -215,7 +216,9 @@ class Written:
         """
         return self._once(self._evaluation, tuple(keys), enters, own_signs)
 
-    def _evaluation(self, keys: tuple[Key, ...], enters: tuple[str, ...] | None, own_signs: bool) -> Tape:
+    def _evaluation(
+        self, keys: tuple[Quantity, ...], enters: tuple[str, ...] | None, own_signs: bool
+    ) -> Tape:
         recorder = Recorder()
         signs: dict[str, Number] = {}
         fine: list[Number] = []
@@ -226,32 +229,32 @@ class Written:
         if enters is None:
             margins = self.margins if own_signs else []
             outputs = _again(self.tape((*keys, *margins)), recorder, signs)
-            fine += [outputs.pop(name) - DIP for key in margins for name in names(key)]
+            fine += [outputs.pop(name) - DIP for key in margins for name in key.names]
         else:
             numbers = _again(self.slopes(keys, enters), recorder, signs)
-            parts = [part for key in keys for part in names(key)]
+            parts = [part for key in keys for part in key.names]
             every_one = [f"d({part})/d({name})" for part in parts for name in enters]
             outputs = {name: numbers.get(name, 0.0) for name in every_one}
         if own_signs:
             outputs["fine"] = every(fine)
         return recorder.tape(outputs)
 
-    def slopes(self, keys: tuple[Key, ...], enters: tuple[str, ...]) -> Tape:
+    def slopes(self, keys: tuple[Quantity, ...], enters: tuple[str, ...]) -> Tape:
         """The tape of quantities' derivatives to what enters, as far as they depend on that."""
         return self._once(self._slopes, keys, enters)
 
-    def _slopes(self, keys: tuple[Key, ...], enters: tuple[str, ...]) -> Tape:
+    def _slopes(self, keys: tuple[Quantity, ...], enters: tuple[str, ...]) -> Tape:
         tape = self.tape(keys)
         return derivatives(tape, [name for name in enters if name in tape.inputs])
 
-    def along(self, keys: tuple[Key, ...], steps: tuple[tuple[str, float], ...]) -> Tape:
+    def along(self, keys: tuple[Quantity, ...], steps: tuple[tuple[str, float], ...]) -> Tape:
         """The tape of quantities' derivatives along one direction: `steps` of what enters, taken together."""
         return self._once(self._along, keys, steps)
 
-    def _along(self, keys: tuple[Key, ...], steps: tuple[tuple[str, float], ...]) -> Tape:
+    def _along(self, keys: tuple[Quantity, ...], steps: tuple[tuple[str, float], ...]) -> Tape:
         recorder = Recorder()
         result = _again(self.slopes(keys, tuple(name for name, _ in steps)), recorder, {})
-        parts = [part for key in keys for part in names(key)]
+        parts = [part for key in keys for part in key.names]
         return recorder.tape(
             {
                 part: sum(step * result.get(f"d({part})/d({name})", 0.0) for name, step in steps)

@@ -11,18 +11,13 @@ from dalembert.arithmetic.recorded import RECORDED, Number, bare
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.numbers import dot, minus, plus
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.reactions import JointForces
 from virtualwork.formulas.recording import Recording
 
 
 class Rubbing(Recording):
-    """The formulas of an assembly; the friction of each contact enters.
-
-    Further keys of `value`
-    -----------------------
-    ("rub", n)    the friction of contact n by the force that it bears
-    ("slip", n)   which way it slips: ±1, or 0
-    """
+    """The formulas of an assembly; the friction of each contact enters."""
 
     @property
     def forces(self) -> tuple[LoadPaths, JointForces, Block]:
@@ -41,20 +36,40 @@ class Rubbing(Recording):
         """How many there are."""
         return len(self.forces[0].case.contacts) if self.mechanism.friction else 0
 
-    def _rub(self, n: int) -> Number:
-        paths, of, block = self._places()
-        joint, body, _, coefficient, radius = paths.case.contacts[n]
+    def joint_moment(self, joint: str, body: str) -> Number:
+        value = super().joint_moment(joint, body)
+        paths, _, block = self.forces
+        for load in paths.case.friction:
+            if load.path is None and load.joint == joint and load.body == body:
+                value = plus(value, load.form(block))
+        return value
+
+
+class Rub(Quantity, kind="rub"):
+    """The friction of a contact by the force that it bears."""
+
+    contact: int
+
+    def write(self, recording: Recording) -> Number:
+        paths, of, block = recording.placed_forces()
+        joint, body, _, coefficient, radius = paths.case.contacts[self.contact]
         force = plus(of.on_side(block, (joint.key, body)), of.borne(block, joint, body))
         if force is None:
             return None
-        slip = self.recorder.input(f"slip {n}") * bare(coefficient)
+        slip = recording.recorder.input(f"slip {self.contact}") * bare(coefficient)
         if joint.guide is None:
             return -(slip * bare(radius)) * abs(force)
         return -slip * abs(dot(force, 1j * of.rail(block, joint.guide)))
 
-    def _slip(self, n: int) -> Number:
-        paths, _, block = self._places()
-        joint, body, other, *_ = paths.case.contacts[n]
+
+class Slip(Quantity, kind="slip"):
+    """Which way a contact slips: ±1, or 0."""
+
+    contact: int
+
+    def write(self, recording: Recording) -> Number:
+        paths, _, block = recording.placed_forces()
+        joint, body, other, *_ = paths.case.contacts[self.contact]
         if joint.guide is None:
             rate = minus(block.omega(body), block.omega(other))
         else:
@@ -63,11 +78,3 @@ class Rubbing(Recording):
             return None
         rate = bare(rate)
         return RECORDED.select(rate, 1.0, RECORDED.select(-rate, -1.0, 0.0))
-
-    def _moment(self, joint: str, body: str) -> Number:
-        value = super()._moment(joint, body)
-        paths, _, block = self.forces
-        for load in paths.case.friction:
-            if load.path is None and load.joint == joint and load.body == body:
-                value = plus(value, load.form(block))
-        return value
