@@ -83,8 +83,8 @@ def _entry(
 def _of_body(b: MovingBody) -> Iterator[Entry]:
     yield _entry(b, "mass", "mass", lambda b: b.body.mass)
     yield _entry(b, "center", "length", lambda b: b.body.center)
-    for i, axis in enumerate("xyz"):
-        yield _entry(b, f"inertia_{axis}", "inertia", partial(_tensor_row, i), f"inertia.{i}", "inertia")
+    for i, letter in enumerate("xyz"):
+        yield _entry(b, f"inertia_{letter}", "inertia", partial(_tensor_row, i), f"inertia.{i}", "inertia")
     yield Entry("principal", "inertia", lambda: b.body.principal.moments, lambda: b.principal_errors[0])
     for i in range(3):
         name, place = f"principal_axis_{i + 1}", f"principal_axes.{i}"
