@@ -97,7 +97,7 @@ def events(
     ----------
     rates : Tape
         The accelerations.
-    given : mapping of name to array (lanes,)
+    entering : mapping of name to array (lanes,)
         What further enters them.
     nodes : Nodes (rounds, lanes)
     levels : mapping of an input's number to its level

@@ -196,7 +196,7 @@ def march(k: int, rates: Tape, numbers: Lanes, state: Lanes, capacity: int = ROU
     Parameters
     ----------
     rates : Tape
-    given, state : mapping of name to float or array (n,)
+    numbers, state : mapping of name to float or array (n,)
         See `body`; what further enters the rates is given.
     """
     last, kept = rounds.run(loop(k, rates), numbers, state, capacity)
