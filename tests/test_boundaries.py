@@ -92,9 +92,10 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("freebody", "gyroscope", "integration", "momentum", "percussion", "shaft", "top"),
         ("body", "free_rotation", "states"),
         ("animation", "picture"),
-        ("rounding_in_time", "solids", "traced"),
+        ("solids", "traced"),
         ("inertia",),
         ("attitude", "eigenvectors", "elliptic", "shapes", "top_roots"),
+        ("carlson",),
     ),
     "cli": (
         ("__main__",),

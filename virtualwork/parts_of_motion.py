@@ -61,8 +61,7 @@ class PointRates(PartOfMotion):
     """A point of a link, and its rates."""
 
     def __init__(self, motion: Asked, body: str, place: complex, node: str | None = None) -> None:
-        super().__init__(motion)
-        self.body, self.place, self.node = body, place, node
+        self.motion, self.body, self.place, self.node = motion, body, place, node
         # a named point stands wherever the description, or a variant, has it
         self._where = 0j if node is not None else place
 

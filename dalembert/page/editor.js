@@ -255,8 +255,10 @@ const handleParts = model.handles.map((handle) => {
     grip = [px(x) - event.clientX, py(y) - event.clientY];
     moved = false;
     event.preventDefault();
-    group.focus();
+    group.focus({ preventScroll: true });
   });
+  // a finger on a handle never scrolls the page, though the drawing around it does
+  group.addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
   group.addEventListener("pointermove", (event) => {
     if (!grip) return;
     // a touch alone changes nothing
