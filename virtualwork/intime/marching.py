@@ -197,7 +197,7 @@ def march(k: int, rates: Tape, numbers: Lanes, state: Lanes, capacity: int = ROU
     ----------
     rates : Tape
     numbers, state : mapping of name to float or array (n,)
-        See `body`; what further enters the rates is given.
+        See `body`; `numbers`: what further enters the rates.
     """
     last, kept = rounds.run(loop(k, rates), numbers, state, capacity)
     return March(_nodes(k, np.stack(list(kept.values()), axis=1)), last)
