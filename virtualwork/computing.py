@@ -389,6 +389,8 @@ def computing_page(
         places, numbers = drawn_numbers(
             drawing, draw(formulas.written.mechanism, travel, cam_steps=1), formulas.written.mechanism
         )
+        # first: what is written for them says what the document has
+        tapes = literal(formulas.tapes(numbers))
         model = formulas.document() | {
             "quantities": quantities,
             "drawn": places,
@@ -398,7 +400,7 @@ def computing_page(
             "bare": dict(bare_units or {}),
             "first": list(map(float, poses.inputs[0] if first is None else first)),
         }
-        return f"{engine()}\nconst tapes = {literal(formulas.tapes(numbers))};\n", {"model": model}
+        return f"{engine()}\nconst tapes = {tapes};\n", {"model": model}
 
     return moving_page(m.name, [series, *others], computed=computed)
 
