@@ -110,7 +110,7 @@ def _examples(_: typer.Context) -> list[str]:
 
 def _quantities(ctx: typer.Context) -> list[str]:
     """The names that --only takes: of all of a point, link or joint, and of each of its quantities."""
-    from cli.cases import quantities
+    from virtualwork import quantities
     from virtualwork.plan.joint_forces import pairs
     from virtualwork.plan.steps import joints
 

@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cli.cases import quantities
 from cli.cases.inputs import InputGrid, Inputs
-from cli.cases.quantities import Quantity
+from cli.cases.quantities import chosen, unknown
 from cli.read import options
 from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError
 from dalembert.hints import nearest
 from dalembert.memory import memory
 from dalembert.results.way import figures
+from virtualwork import quantities
+from virtualwork.quantities import Quantity
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -90,13 +91,11 @@ class Analysis:
     @cached_property
     def own_order(self) -> int:
         """How high the rates go that the inputs have."""
-        highest = 0
-        for k, name in enumerate(("speed", "acceleration", "jerk"), 1):
-            if any(getattr(e, name) is not None for e in self.mechanism.inputs) or (
-                getattr(self.inputs, name, None) is not None
-            ):
-                highest = k
-        return highest
+        orders = self.inputs.orders
+        for k, name in enumerate(("jerk", "acceleration", "speed")):
+            if 3 - k in orders or any(getattr(e, name) is not None for e in self.mechanism.inputs):
+                return 3 - k
+        return 0
 
     @property
     def order(self) -> int:
@@ -139,7 +138,7 @@ class Analysis:
         """The motion of each assembly."""
         from virtualwork.motion import Motion
 
-        q = self.inputs
+        q = self.inputs.whole
         result = tuple(Motion(a, q.values, q.speed, q.acceleration) for a in self.assemblies)
         for motion in result:
             motion.poses.input_rest = q.rest
@@ -151,14 +150,14 @@ class Analysis:
     def places(self) -> list[Quantity]:
         """The places and rates that are requested."""
         every = quantities.places(self.mechanism, 3, self.request.only or ())
-        return quantities.chosen(every, self.request.only, self.order)
+        return chosen(every, self.request.only, self.order)
 
     @cached_property
     def forces(self) -> list[Quantity]:
         """The forces that are requested."""
         if not self.request.forces:
             return []
-        return quantities.chosen(quantities.forces(self.mechanism, self.pairs), self.request.only, 0)
+        return chosen(quantities.forces(self.mechanism, self.pairs), self.request.only, 0)
 
     @cached_property
     def pairs(self) -> list[tuple[Joint, str, str]]:
@@ -202,10 +201,10 @@ class Analysis:
         moving = quantities.places(self.mechanism, 3, only)
         forces = quantities.forces(self.mechanism, self.pairs)
         here = [*moving, *forces] if self.request.forces else moving
-        word = quantities.unknown(here, only)
+        word = unknown(here, only)
         if word is None:
             return
-        if quantities.unknown(forces, [word]) is None:
+        if unknown(forces, [word]) is None:
             raise DataError(f"{self.file}: --only {word}: this is a force: dalembert forces shows it")
         names = {name for each in here for name in (*each.names, *each.owners)}
         owner = word.rpartition(".")[0]
@@ -224,7 +223,7 @@ class Analysis:
         """Return the inputs of a pose as a sentence has them: 60°, 0.35 m; several with their names."""
         values = [
             f"{figures(float(value))}{'°' if key.endswith('_deg') else ' m'}"
-            for value, key in zip(self.inputs.shown[i], self.input_names.values(), strict=True)
+            for value, key in zip(self.inputs.whole.shown[i], self.input_names.values(), strict=True)
         ]
         if len(values) == 1:
             return values[0]
@@ -249,7 +248,7 @@ class Analysis:
     @cached_property
     def set_angles(self) -> dict[str, NDArray[np.float64]]:
         """The angles of the links that are driven against the ground, as they were requested, degrees."""
-        shown, inputs = self.inputs.shown, self.mechanism.inputs
+        shown, inputs = self.inputs.whole.shown, self.mechanism.inputs
         return {e.link: shown[:, j] for j, e in enumerate(inputs) if e.link and e.on == "ground"}
 
     # --- sizes ----------------------------------------------------------------------------------------------------

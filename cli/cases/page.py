@@ -7,19 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from cli.cases import poses, quantities
+from cli.cases import poses
 from cli.cases.analysis import Analysis
 from cli.cases.case import Case
 from cli.cases.poses import column
-from cli.cases.quantities import Quantity
 from cli.cases.study import PoseCase
 from cli.show.picture import shown
 from dalembert.page import Shown
 from dalembert.results.columns import Table
-from virtualwork import MechanismError
+from virtualwork import MechanismError, quantities
 from virtualwork.animation import JointForce, Series, moving_page
 from virtualwork.computing import ORDERS, computing_page
 from virtualwork.motion import Motion
+from virtualwork.quantities import Quantity
 
 SWEEP = 361
 """Poses of a turn, where one pose was requested."""
@@ -68,8 +68,8 @@ def _computing(
         motion = Motion(
             assembly,
             start[0] + np.linspace(0.0, 2 * np.pi, SWEEP),
-            first.inputs.speed,
-            first.inputs.acceleration,
+            first.inputs.whole.speed,
+            first.inputs.whole.acceleration,
         )
     pairs = first.pairs if first.request.forces else []
     order = max(ORDERS, first.order)

@@ -12,7 +12,6 @@ import numpy as np
 from cli.cases.analysis import Analysis
 from cli.cases.quantities import (
     TURNED,
-    Quantity,
     bound,
     bounds_of,
     cells,
@@ -24,6 +23,7 @@ from cli.cases.quantities import (
     solved,
 )
 from dalembert.results.columns import Column, Table
+from virtualwork.quantities import Quantity
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -55,7 +55,7 @@ def table(analysis: Analysis, computed: Sequence[Mapping[Key, Any]] = ()) -> Tab
     `computed`: what the poses of each assembly have computed already; there are no bounds of it.
     """
     wanted = analysis.tabled
-    n, shown, driven = analysis.inputs.n, analysis.inputs.shown, analysis.set_angles
+    n, shown, driven = analysis.inputs.n, analysis.inputs.whole.shown, analysis.set_angles
     every = computed or [solved(motion, keys_of(wanted)) for motion in analysis.motions]
     times = len(every)
     parts = [cells_of(wanted, each, n, driven) for each in every]
@@ -77,7 +77,7 @@ def table(analysis: Analysis, computed: Sequence[Mapping[Key, Any]] = ()) -> Tab
                 ]
         return [b for each in bounds for b in bounds_of(each)]  # type: ignore[arg-type]
 
-    columns = [Column("step", "", [*analysis.inputs.steps] * times)]
+    columns = [Column("step", "", [*analysis.inputs.whole.steps] * times)]
     if analysis.several:
         numbers = [str(assembly.number) for assembly in analysis.assemblies for _ in range(n)]
         columns.append(Column("branch", "", numbers))
@@ -119,7 +119,7 @@ def by_link(analysis: Analysis) -> Table:
     solved_here = solved(analysis.motions[0], keys_of(wanted))
     shown = cells_of(wanted, solved_here, analysis.inputs.n, analysis.set_angles)
     numbers = {each.path[1:]: values for each, values in shown.items()}
-    steps = analysis.inputs.steps
+    steps = analysis.inputs.whole.steps
     columns = [
         Column("step", "", [step for step in steps for _ in names]),
         Column("link", "", names * len(steps)),
@@ -174,7 +174,7 @@ def poses_of(
     n, driven, m = len(assembled), analysis.set_angles, analysis.mechanism
     shown = {
         e.name: {analysis.input_names[e.name]: values.tolist()}
-        for e, values in zip(m.inputs, analysis.inputs.shown.T, strict=True)
+        for e, values in zip(m.inputs, analysis.inputs.whole.shown.T, strict=True)
     }
     tree: Document = {**(next(iter(shown.values())) if len(m.inputs) == 1 else {"inputs": shown})}
     tree |= {"branch": [branch] * n, "assembled": assembled.tolist()}
@@ -188,7 +188,7 @@ def poses_of(
 
 def pose_head(analysis: Analysis, i: int) -> Document:
     """What names a pose in JSON: `input_deg`, or `inputs` of several."""
-    shown = analysis.inputs.shown[i].tolist()
+    shown = analysis.inputs.whole.shown[i].tolist()
     every = {
         e.name: {analysis.input_names[e.name]: value}
         for e, value in zip(analysis.mechanism.inputs, shown, strict=True)

@@ -16,20 +16,9 @@ import numpy as np
 
 from cli.cases.analysis import Analysis
 from cli.cases.poses import column, pose_keys
-from cli.cases.quantities import (
-    FORCE,
-    LINK,
-    POINT,
-    bound,
-    bounds_of,
-    cells,
-    cells_of,
-    keys_of,
-    links,
-    solved,
-    vector,
-)
+from cli.cases.quantities import bound, bounds_of, cells, cells_of, keys_of, solved
 from dalembert.results.columns import Table
+from virtualwork.quantities import FORCE, LINK, POINT, links, vector
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -130,7 +119,9 @@ def rows(analysis: Analysis) -> list[tuple[Place, Row]]:
             )
             for of in ways
         ]
-        for i, (step, assembled) in enumerate(zip(analysis.inputs.steps, motion.assembled, strict=True)):
+        for i, (step, assembled) in enumerate(
+            zip(analysis.inputs.whole.steps, motion.assembled, strict=True)
+        ):
             head: Row = {"step": step}
             if several:
                 head["branch"] = str(assembly.number)

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from cli.cases import quantities
 from cli.cases.analysis import Analysis
 from cli.cases.axes import input_values
 from cli.cases.case import Case, TableCase, TableStudy
 from cli.cases.poses import column
-from cli.cases.quantities import SLIDE, Quantity, bounds_of, cells, in_rows, keys_of, nested
+from cli.cases.quantities import bounds_of, cells, in_rows, keys_of, nested
 from cli.read import options
 from cli.show.picture import shown as on_page
 from cli.show.terminal import progress_in_time
@@ -25,8 +24,9 @@ from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table, document, names, number
 from dalembert.results.way import Topic, figures
-from virtualwork import MechanismError
+from virtualwork import MechanismError, quantities
 from virtualwork.describe.parts import GROUND
+from virtualwork.quantities import SLIDE, Quantity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -29,18 +29,19 @@ def run(own: Options, show: ShowOptions) -> Result:
 
     The first order is from exact derivatives; --draws solves drawn mechanisms. The table has a row for each pose.
     """
-    from cli.cases import quantities
     from cli.cases.analysis import ORDERS, Request, names
     from cli.cases.call import Call
+    from cli.cases.quantities import unknown
     from cli.read.options import bad
     from cli.tolerance.spread import Spreads
+    from virtualwork import quantities
 
     if own.draws is not None and own.draws < 2:
         raise bad("--draws", f"{own.draws}: expected two or more drawn mechanisms")
     order = None if own.order is None else ORDERS.index(own.order)
     call = Call.of(own, show, Request(own.file, names(own.only), order))
     only = call.request.only
-    if only is not None and quantities.unknown(quantities.places(call.mechanism, 3, only), only) is not None:
+    if only is not None and unknown(quantities.places(call.mechanism, 3, only), only) is not None:
         call.request = call.request._replace(forces=True)
     call.check_names()
     workers = 1 if call.varied is not None else call.workers

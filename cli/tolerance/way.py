@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from cli.cases.analysis import Analysis
-    from cli.cases.quantities import Quantity
     from virtualwork.describe.dimensions import Dimension
     from virtualwork.formulas.asked import Key
+    from virtualwork.quantities import Quantity
 
 
 def way(
