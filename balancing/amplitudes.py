@@ -16,6 +16,9 @@ from dalembert.arithmetic.records import record, table
 if TYPE_CHECKING:
     import pandas as pd
 
+    from dalembert.arithmetic.doubled import Doubled
+    from dalembert.arithmetic.doubled_vectors import Vectors
+
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
@@ -66,31 +69,55 @@ class AmplitudeFit:
         size = np.abs(self.influence) * np.abs(self.trial_masses).max() / self.initial
         return np.asarray(gain * (self.trials / self.initial).max(axis=0) / np.where(size > 0, size, np.nan))
 
-    def error_estimate(self, quantity: str = "influence", *, data_error: float = 0.0) -> Real:
-        """Return a bound of the rounding error of `influence` or of `misfit`, (s,).
+    def error_estimate(self, quantity: str = "influence") -> Real:
+        """Return the rounding error of `influence` or of `misfit`, (s,): by what the same fit in 32 digits differs.
 
-        `data_error` is a bound of the relative errors of readings and trial masses, which are carried on; 0: exact.
-
-        With f_r = |O + α t_r| - R_r and J its derivatives the fit is where Jᵀf = 0: its value there as computed, with
-        what rounding hides of it, times the inverse of the exact second derivatives H. inf where H is singular: two
-        circles that touch, trials on a line through them.
+        Amplitudes and trial masses are taken as exact. inf where the second derivatives are singular: two circles that touch,
+        trials on a line through them.
         """
-        at, c = self._at, 4 * EPS + data_error
-        f, length = np.abs(at.f), at.length
-        reach = 1 + np.abs(at.z)[:, None] * np.abs(at.t)
-        of_f = c * (reach + at.read)
-        of_rows = c * np.abs(at.t) * (1 + reach / np.where(length > 0, length, 1.0))
-        value = np.abs(at.gain(np.einsum("srk,sr->sk", at.rows, at.f)[:, None])[..., 0])
-        bound = value + np.einsum("skr,sr->sk", np.abs(at.gain(at.rows)), of_f)
-        bound = bound + np.einsum("skl,sr,sr->sk", np.abs(at.inverse), of_rows, f)
-        z = np.hypot(bound[:, 0], bound[:, 1])
-        unit = self.initial / np.abs(self.trial_masses).max()
-        if quantity == "influence":
-            return np.asarray(z * unit + c * np.abs(self.influence))
-        if quantity == "misfit":
-            each = of_f + np.abs(at.t) * z[:, None]
-            return np.asarray(np.sqrt(np.square(each).mean(axis=-1)) * self.initial + c * self.misfit)
-        raise ValueError(f"'{quantity}': expected influence or misfit")
+        from dalembert.arithmetic.doubled import Doubled
+        from dalembert.arithmetic.doubled_vectors import Vectors, off
+
+        if quantity not in ("influence", "misfit"):
+            raise ValueError(f"'{quantity}': expected influence or misfit")
+        data = Doubled(self.initial), Doubled(self.trials), Vectors.of(self.trial_masses)
+        influence, misfit = self.second_run(*data)
+        error = influence.apart(self.influence) if quantity == "influence" else off(self.misfit, misfit)
+        return np.where(np.isfinite(influence.x.high), error, np.inf)
+
+    def second_run(self, initial: Doubled, trials: Doubled, trial_masses: Vectors) -> tuple[Vectors, Doubled]:
+        """Return the coefficients (s,) and the misfits (s,) in 32 digits, of such data: (s,), (r, s), (r,); NaN where singular.
+
+        With f_r = |O + α t_r| - R_r and J its derivatives the fit is where Jᵀf = 0. Newton's method goes on from the
+        coefficients with these values in 32 digits and the inverse of the second derivatives in 16.
+        """
+        from dalembert.arithmetic.doubled import Doubled
+        from dalembert.arithmetic.doubled_functions import DOUBLED
+        from dalembert.arithmetic.doubled_vectors import Vectors, part, total
+
+        unit, inverse = float(np.abs(self.trial_masses).max()), self._at.inverse
+        sure = np.asarray(np.isfinite(inverse).all(axis=(-2, -1)))
+        inverse = np.where(sure[:, None, None], inverse, 0.0)
+        t = (trial_masses / np.array(unit))[None]
+        read = Doubled(*(np.broadcast_to(x, trials.high.shape).T for x in (trials.high, trials.low)))
+        read = read / part(initial, (..., None))
+        z = Vectors.of(self._at.z)
+        reached, last = np.zeros(sure.shape, dtype=np.bool_), np.full(sure.shape, np.inf)
+        for _ in range(60):
+            y = z[:, None] * t + Vectors.of(np.ones((1, 1)))
+            length = y.size
+            f = length - read
+            pull = (y * t.conj * (f / length)).total().value
+            step = (inverse @ np.stack([pull.real, pull.imag], axis=-1)[..., None])[..., 0]
+            reach = np.hypot(step[:, 0], step[:, 1])
+            size = np.abs(z.value)
+            reached = reached | (reach <= 1e-29 * size) | ((reach >= last / 2) & (last <= 1e-20 * size))
+            if (reached | ~sure).all():
+                break
+            z, last = z - Vectors.of(step[:, 0] + 1j * step[:, 1]), reach
+        misfit = DOUBLED.sqrt(total(f * f) / float(len(self.trials))) * initial
+        known = np.where(sure & reached, 1.0, np.nan)
+        return z * (initial / unit) * known, misfit * known
 
 
 def influence_from_amplitudes(initial: ArrayLike, trials: ArrayLike, trial_masses: ArrayLike) -> AmplitudeFit:

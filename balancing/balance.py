@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import FigureBase
 
-    from balancing.rounding import Bounds, Solved
+    from balancing.rounding import Problem
+    from dalembert.arithmetic.doubled_vectors import Vectors
     from dalembert.page import Page
 
 Real = NDArray[np.float64]
@@ -162,11 +163,7 @@ class Balance:
         return condition_number(self.influence, self.weights)
 
     def error_estimate(
-        self,
-        quantity: str = "corrections",
-        *,
-        influence_error: ArrayLike | None = None,
-        initial_error: ArrayLike | None = None,
+        self, quantity: str = "corrections", *, exact: tuple[Vectors, Vectors] | None = None
     ) -> Real:
         """Return the rounding error of a result, in its units and shape.
 
@@ -175,16 +172,15 @@ class Balance:
         quantity
             `corrections` (..., p), `residual` (..., s), `residual_max` or `residual_rms` (...): against those of the
             exact solution.
-        influence_error, initial_error
-            Bounds of the errors of the coefficients (..., s, p) and of the vibration (..., s), which are carried on;
-            None: they are exact.
+        exact
+            Coefficients (..., s, p) and vibration (..., s) in 32 digits; None: they are the floats.
 
         Notes
         -----
-        Least squares: what the result and the same problem in 32 digits differ by (`balancing.rounding`). Limits and minimax: the optimality
-        conditions at the corrections as found (`balancing.optimality`); inf where the optimum is not unique or not
-        a smooth function of the data, with the reason in `error_reason`. Even then `residual_max` of minimax is
-        bounded, by its distance from `bound`.
+        What the result and the same problem in 32 digits differ by: of least squares `balancing.rounding`, under limits
+        and of minimax the optimality conditions at the corrections (`balancing.optimality`); inf where the optimum is not
+        unique or not a smooth function of the data, with the reason in `error_reason`. Even then `residual_max` of
+        minimax has an estimate, by its distance from `bound`.
 
         Examples
         --------
@@ -192,64 +188,55 @@ class Balance:
         >>> bool((abs(fix.corrections - [17 / 21, 31 / 21]) <= fix.error_estimate()).all())
         True
         """
-        solved = self._solved(influence_error, initial_error)
-        exact = influence_error is None and initial_error is None
-        bounds = (self._bounds if exact else self._bounds_of(solved))[0]
+        problem = self._problem(exact)
+        true = (self._again if exact is None else self._found(problem))[0]
         if quantity == "corrections":
-            return bounds.solution
+            return np.full(self.corrections.shape, np.inf) if true is None else true.apart(self.corrections)
+        if quantity not in ("residual", "residual_max", "residual_rms"):
+            raise ValueError(f"'{quantity}': expected corrections, residual, residual_max or residual_rms")
+        residual = self.residual
+        nothing = np.full(residual.shape, np.inf)
+        off = nothing if true is None else problem.residual(true).apart(residual)
         if quantity == "residual":
-            return bounds.residual
-        if quantity == "residual_max":
-            # the size of a complex number rounds once more
-            largest = bounds.residual.max(axis=-1) + EPS * self.residual_max
-            if (
-                not np.isfinite(largest).all()
-                and self.of_largest
-                and self.bound is not None
-                and self.weights is None
-            ):
-                # the true optimum lies between the dual bound, rounding taken off, and what the corrections truly leave
-                gap, own = (
-                    max(float(self.residual_max) - self.bound, 0.0),
-                    float(solved.evaluation_error.max()),
-                )
-                largest = np.asarray(max(gap, own) if exact else gap + own)
-            return np.asarray(largest)
+            return off
         if quantity == "residual_rms":
-            return np.asarray(np.sqrt(np.square(bounds.residual).mean(axis=-1)) + 8 * EPS * self.residual_rms)
-        raise ValueError(f"'{quantity}': expected corrections, residual, residual_max or residual_rms")
+            return np.asarray(np.sqrt(np.square(off).mean(axis=-1)) + 8 * EPS * self.residual_rms)
+        if true is None and self.of_largest and self.bound is not None and self.weights is None:
+            # the true optimum lies between the dual bound, rounding taken off, and what the corrections truly leave
+            gap = max(float(self.residual_max) - self.bound, 0.0)
+            return np.asarray(max(gap, float(problem.moved.max())))
+        # the size of a complex number rounds once more
+        return np.asarray(off.max(axis=-1) + EPS * self.residual_max)
 
     @property
     def error_reason(self) -> str:
-        """Why `error_estimate` has no bound of the corrections; empty where it has one."""
-        return self._bounds[1]
+        """Why `error_estimate` knows nothing of the corrections; empty where it does."""
+        return self._again[1]
+
+    def second_run(self, influence: Vectors, initial: Vectors) -> tuple[Vectors | None, str]:
+        """Return the corrections (..., p) of data in 32 digits; None with the reason where they are not determined."""
+        return self._found(self._problem((influence, initial)))
 
     @cached_property
-    def _bounds(self) -> tuple[Bounds, str]:
-        return self._bounds_of(self._solved())
+    def _again(self) -> tuple[Vectors | None, str]:
+        return self._found(self._problem(None))
 
-    def _solved(
-        self, influence_error: ArrayLike | None = None, initial_error: ArrayLike | None = None
-    ) -> Solved:
-        from balancing.rounding import Solved
+    def _problem(self, exact: tuple[Vectors, Vectors] | None) -> Problem:
+        from balancing.rounding import Problem
+        from dalembert.arithmetic.doubled_vectors import Vectors
 
-        of_influence, of_initial = (
-            None if error is None else spread_to(name, error, like.shape)
-            for name, error, like in (
-                ("influence_error", influence_error, self.influence),
-                ("initial_error", initial_error, self.initial),
-            )
-        )
-        return Solved(self.influence, self.initial, self.corrections, self.weights, of_influence, of_initial)
+        floats = self.influence, self.initial
+        data = exact or (Vectors.of(self.influence), Vectors.of(self.initial))
+        return Problem(*data, self.corrections, self.weights, floats)
 
-    def _bounds_of(self, solved: Solved) -> tuple[Bounds, str]:
+    def _found(self, problem: Problem) -> tuple[Vectors | None, str]:
         if self._free:
-            from balancing.rounding import least_squares_bounds
+            from balancing.rounding import least_squares_again
 
-            return least_squares_bounds(solved, self.residual, self.ridge), ""
-        from balancing.optimality import optimum_bounds
+            return least_squares_again(problem, self.ridge), ""
+        from balancing.optimality import optimum_again
 
-        return optimum_bounds(solved, self.of_largest, self.max_mass, self.max_residual)
+        return optimum_again(problem, self.of_largest, self.max_mass, self.max_residual)
 
     @property
     def _free(self) -> bool:

@@ -6,8 +6,7 @@ the minimax problem, of the readings, ρ_k their values and u_k = ρ_k/|ρ_k|, �
     Bᴴ(B w + b) + Σ μ_k E_kᴴ u_k = 0,    |ρ_k| = h_k + f_k t  for each row that is active,    Σ μ_k f_k = 1,
 
 the first sum for least squares, t and the last condition for minimax. From the corrections as given out Newton's method
-goes on with their values F in 32 digits and the inverse of their Jacobian K in 16, to the optimum; where errors of the data
-are known, they move it by |K⁻¹| δF. Where K is singular, or the active rows are not sure, there is no estimate: the optimum
+goes on with their values F in 32 digits and the inverse of their Jacobian K in 16, to the optimum. Where K is singular, or the active rows are not sure, there is no estimate: the optimum
 is not unique, or not a smooth function of the data. The reason is given.
 """
 
@@ -19,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing.cone_problem import real_rows
-from balancing.dependence import adjoint, columns_scaled, roundings
-from balancing.rounding import Bounds, Solved
+from balancing.dependence import adjoint, columns_scaled
+from balancing.rounding import Problem
 from dalembert.arithmetic.doubled import Doubled
 from dalembert.arithmetic.doubled_functions import DOUBLED
 from dalembert.arithmetic.doubled_vectors import Vectors, part, total
+from dalembert.arithmetic.exact import EPS
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -46,46 +46,34 @@ class _Rows:
     offset: Vectors
     h: Real
     f: Real
-    square_error: tuple[Real, Real]
-    """Bounds of errors of the data in `square` and `at`."""
-    e_error: tuple[Real, Real]
+    moved: Real
+    """By how much the values of `e` in floats may be wrong."""
 
 
-def optimum_bounds(
-    solved: Solved, minimax: bool, max_mass: Real | None, max_residual: Real | None
-) -> tuple[Bounds, str]:
-    """Bound the errors of the corrections and of the residual; inf with the reason where they are not bounded."""
-    sensors, planes = solved.influence.shape
+def optimum_again(
+    problem: Problem, minimax: bool, max_mass: Real | None, max_residual: Real | None
+) -> tuple[Vectors | None, str]:
+    """Return the corrections (p,) in 32 digits; None with the reason where they are not determined."""
     try:
-        optimum = _Optimum(solved.corrections, minimax, _rows(solved, minimax, max_mass, max_residual))
+        return _Optimum(
+            problem.corrections, minimax, _rows(problem, minimax, max_mass, max_residual)
+        ).true, ""
     except _NotBounded as reason:
-        nothing = Bounds(np.full(planes, np.inf), np.full(sensors, np.inf))
-        return nothing, str(reason)
-    alpha = Vectors.of(solved.influence)
-    residual = Vectors.of(solved.initial) + (alpha * optimum.true[None]).total()
-    of_data = optimum.carried(solved.influence) + solved.carried_error
-    return (
-        Bounds(
-            optimum.true.apart(solved.corrections) + optimum.carried(np.eye(planes, dtype=complex)),
-            residual.apart(solved.residual) + of_data,
-        ),
-        "",
-    )
+        return None, str(reason)
 
 
 class _NotBounded(Exception):
     """Why there is no bound."""
 
 
-def _rows(solved: Solved, minimax: bool, max_mass: Real | None, max_residual: Real | None) -> _Rows:
-    alpha, v, w = solved.influence, solved.initial, solved.corrections
+def _rows(problem: Problem, minimax: bool, max_mass: Real | None, max_residual: Real | None) -> _Rows:
+    (alpha, v), w = problem.floats, problem.corrections
     sensors, planes = alpha.shape
-    da, db = solved.data_errors
     limit = np.broadcast_to(np.inf if max_mass is None else max_mass, (planes,))
     limited = np.flatnonzero(np.isfinite(limit))
     ones = np.ones(len(limited))
     caps = Vectors.of(np.eye(planes)[limited]) / limit[limited, None]
-    weight = np.ones(sensors) if solved.weights is None else solved.weights
+    weight = np.ones(sensors) if problem.weights is None else problem.weights
     none = np.zeros((0, planes)), np.zeros(0)
     if minimax:
         # readings that no plane moves are no part of it
@@ -93,19 +81,18 @@ def _rows(solved: Solved, minimax: bool, max_mass: Real | None, max_residual: Re
         unit = float((weight * np.abs(v + alpha @ w))[held].max())
         by = np.full(int(held.sum()), unit)
         h, f = np.zeros(len(by)), np.ones(len(by))
-        square, of, square_error = Vectors.of(none[0]), Vectors.of(none[1]), none
+        square, of = Vectors.of(none[0]), Vectors.of(none[1])
     else:
         root = DOUBLED.sqrt(Doubled(np.asarray(weight, dtype=float)))
         unit = float((root.value * np.abs(v + alpha @ w)).max()) or 1.0
         scale = root / unit
-        square, of = Vectors.of(alpha) * part(scale, (..., None)), Vectors.of(v) * scale
-        square_error = da * scale.value[:, None], db * scale.value
+        square, of = problem.influence * part(scale, (..., None)), problem.initial * scale
         ceiling = np.broadcast_to(np.inf if max_residual is None else max_residual, (sensors,))
         held = np.isfinite(ceiling)
         weight, by = np.ones(sensors), ceiling[held]
         h, f = np.ones(len(by)), np.zeros(len(by))
     own = Doubled(weight[held]) / by
-    e, at = Vectors.of(alpha[held]) * part(own, (..., None)), Vectors.of(v[held]) * own
+    e, at = problem.influence[held] * part(own, (..., None)), problem.initial[held] * own
     return _Rows(
         square,
         of,
@@ -113,11 +100,7 @@ def _rows(solved: Solved, minimax: bool, max_mass: Real | None, max_residual: Re
         Vectors.joined([at, Vectors.of(0 * ones)]),
         np.concatenate([h, ones]),
         np.concatenate([f, 0 * ones]),
-        square_error,
-        (
-            np.concatenate([da[held] * own.value[:, None], np.zeros(caps.shape)]),
-            np.concatenate([db[held] * own.value, 0 * ones]),
-        ),
+        np.concatenate([problem.moved[held] * own.value, 4 * EPS * ones]),
     )
 
 
@@ -130,12 +113,9 @@ class _Optimum:
         start = Vectors.of(w)
         value = (exact.offset + (exact.e * start[None]).total()).value
         size = np.abs(value)
-        # of each value
-        of_data = exact.e_error[0] @ np.abs(w) + exact.e_error[1]
-        wrong = of_data + roundings(planes) * (np.abs(rows_e) @ np.abs(w) + np.abs(exact.offset.value))
         # the unit is chosen so that t = 1
         radius = exact.h + exact.f
-        active = size >= radius * (1 - ACTIVE) - 4 * wrong
+        active = size >= radius * (1 - ACTIVE) - 4 * exact.moved
         # a reading that stands twice holds the corrections once
         twice = np.ones(len(size), dtype=bool)
         twice[
@@ -153,8 +133,7 @@ class _Optimum:
         # w = undo z: coordinates without units or κ(α)
         undo: Complex = np.asarray(scale[:, None] * np.linalg.inv(upper), dtype=complex)
         e, value, f = rows_e[active], value[active], exact.f[active]
-        self.wrong = of_data[active]
-        self.e, self.size = e, size[active]
+        self.size = size[active]
         turn = value / self.size
         along_rows = turn.conj()[:, None] * (e @ undo)
         re, im = real_rows(along_rows)
@@ -195,11 +174,8 @@ class _Optimum:
         inverse = np.linalg.inv(system)
         inverse[:, :n] /= unit
         inverse[n:, :] *= unit
-        # the response of w, complex, to each condition
-        self.response = undo @ (inverse[:planes] + 1j * inverse[planes : 2 * planes])
         self.mu, self.n, self.planes = mu, n, planes
-        self.rows, self.turn, self.undo, self.left = exact, turn, undo, left
-        self.squares, self.w, self.active = squares, np.abs(w), active
+        self.rows, self.undo, self.active = exact, undo, active
         self.true = self._true(start, inverse, with_t)
         self._check(size, radius, active | twice)
 
@@ -234,30 +210,10 @@ class _Optimum:
             last = min(reach, last)
         raise _NotBounded("the problem is so badly conditioned that its optimum in 32 digits is not reached")
 
-    def carried(self, of: Complex) -> Real:
-        """Bound what errors of the data do to a linear function of the corrections, its rows (..., p)."""
-        response = of @ self.response
-        n, p = self.n, self.planes
-        # an error of an active row's value: along it, and across it, where it turns its pull
-        out = np.abs(response[:, n:]) @ self.wrong
-        out += np.abs(response[:, :n] @ self.across.T) @ (self.mu / self.size * self.wrong)
-        # of the residual of least squares
-        da, db = self.rows.square_error
-        off = da @ self.w + db
-        out += np.abs(response[:, : 2 * p] @ self.squares.T) @ np.concatenate([off, off])
-        # of the rows themselves in the sums of the pulls: in the coordinates of w
-        pulls = da.T @ np.abs(self.left) + self.rows.e_error[0][self.active].T @ self.mu
-        # zᵣ = Re Σ conj(undo) g …
-        back = self.undo.conj()
-        by_re = response[:, :p] @ back.real.T + response[:, p : 2 * p] @ back.imag.T
-        by_im = -response[:, :p] @ back.imag.T + response[:, p : 2 * p] @ back.real.T
-        out += (np.abs(by_re) + np.abs(by_im)) @ pulls
-        return np.asarray(out)
-
     def _check(self, size: Real, radius: Real, held: NDArray[np.bool_]) -> None:
         """See to it that what is inactive stays so, and that the values hardly turn: else first order is not enough."""
         value = (self.rows.offset + (self.rows.e * self.true[None]).total()).value
-        moved = np.abs(np.abs(value) - size) + self.carried(self.rows.e.value)
+        moved = np.abs(np.abs(value) - size)
         turned = moved[self.active] / self.size
         if turned.max(initial=0.0) > 1e-3 or (size + moved >= radius)[~held].any():
             raise _NotBounded(

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
     from matplotlib.projections.polar import PolarAxes
 
+    from dalembert.arithmetic.doubled_vectors import Vectors
+
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
@@ -183,18 +185,23 @@ class JointFit:
         size = np.abs(self.residuals) * root
         return np.asarray(np.where(size > 0, size / np.where(sd > 0, sd, np.nan), 0.0 * sd) / np.sqrt(free))
 
-    def error_estimate(
-        self, reading_error: ArrayLike | None = None, mass_error: ArrayLike | None = None
-    ) -> Real:
-        """Return the rounding errors of the unknowns, (..., s, 1 + p), as `balancing.rounding` has them.
-
-        Bounds of the errors of readings (..., r, s) and masses (..., r, p) are carried on; None: they are exact.
+    def error_estimate(self) -> Real:
+        """Return the rounding errors of the unknowns, (..., s, 1 + p), the readings and masses taken as exact.
 
         >>> fit = joint_fit([[5], [7], [9.5]], [[0], [1], [2]])
         >>> bool((fit.error_estimate() < 1e-14).all())
         True
         """
-        from balancing.rounding import carried
+        from dalembert.arithmetic.doubled_vectors import Vectors
+
+        readings = Vectors.of(np.where(self.present, self.readings, 0.0))
+        return self.second_run(readings, Vectors.of(self.masses)).apart(self.unknowns)
+
+    def second_run(self, readings: Vectors, masses: Vectors) -> Vectors:
+        """Return the unknowns (..., s, 1 + p) in 32 digits, of readings (..., r, s) and masses (..., r, p) in 32 digits.
+
+        Where a reading is missing any number stands. Of the runs alone: not with what was known before.
+        """
         from balancing.second_run import smallest_squares
         from dalembert.arithmetic.doubled import Doubled
         from dalembert.arithmetic.doubled_functions import DOUBLED
@@ -202,21 +209,9 @@ class JointFit:
 
         weights = np.where(self.present, 1.0 if self.weights is None else self.weights, 0.0)
         of_rows = DOUBLED.sqrt(Doubled(np.swapaxes(weights, -1, -2)))
-        rows = Vectors.of(design(self.masses)[..., None, :, :]) * part(of_rows, (..., None))
-        y = np.swapaxes(np.where(self.present, self.readings, 0.0), -1, -2)
-        error = smallest_squares(rows, Vectors.of(-y) * of_rows)[0].apart(self.unknowns)
-        if reading_error is None and mass_error is None:
-            return error
-        root, own = of_rows.value, rows.value
-        of_reading, of_masses = (
-            np.zeros(like.shape) if e is None else np.broadcast_to(np.asarray(e, dtype=float), like.shape)
-            for e, like in ((reading_error, self.readings), (mass_error, self.masses))
-        )
-        of_own = np.zeros(own.shape)
-        of_own[..., 1:] = root[..., None] * of_masses[..., None, :, :]
-        left = np.matvec(own, self.unknowns) - root * y
-        of_y = root * np.swapaxes(of_reading, -1, -2)
-        return np.asarray(error + carried(own, self.unknowns, left, of_own, of_y).solution)
+        ones = Vectors.of(np.ones((*masses.shape[:-1], 1)))
+        rows = Vectors.joined([ones, masses], axis=-1)[..., None, :, :] * part(of_rows, (..., None))
+        return smallest_squares(rows, -readings.swapped() * of_rows)[0]
 
     def scatter(self) -> Errors:
         """Return the errors of readings as the residuals show them: s/√2 in each component."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing.tapes import measured, split
+from balancing.unbalance import initial_unbalance
 from dalembert.angles import degrees
 from dalembert.arithmetic.engines.javascript import engine, written
 from dalembert.page import Page
@@ -41,10 +42,11 @@ def machine_sheet(
     mass: tuple[str, str] = ("mass", "kg"),
     channels: Sequence[tuple[str, float | None]] | None = None,
     speed_unit: str = "rpm",
-    places: Sequence[float] | None = None,
+    places: Sequence[tuple[str, float]] | None = None,
     spread: tuple[Real, Real] | None = None,
     limits: Sequence[float | None] = (),
     ceiling: float | None = None,
+    permissible: Sequence[float] | None = None,
     facts: Sequence[tuple[str, str]] = (),
 ) -> Page:
     """Return the sheet of one machine.
@@ -65,18 +67,27 @@ def machine_sheet(
         "mass" or "unbalance", and the unit it is shown in.
     channels : sequence of (sensor, speed)
         How the rows call the sensors; default: as `sensors`, without a speed.
-    places : sequence of float
-        Angles where masses go, rad.
+    places : sequence of (name, angle)
+        Where masses go, rad.
     spread : (along, across), arrays (s, p), optional
         Standard deviations of the coefficients along themselves and across.
     limits : sequence of float
         The largest mass of each plane, kg or kg·m; None where it has no limit. The sheet names a plane that is beyond.
     ceiling : float, optional
         The largest vibration with which no trim is needed, in the amplitude unit.
+    permissible : sequence of float, optional
+        The largest unbalance of each plane with which no trim is needed, in kg or kg·m as `mass` is.
     facts : sequence of (name, text)
         What is to be known of the machine.
     """
-    tape = measured(influence, weights, ridge, RUNS, errors, runout, covariance)
+    unbalance, shares = None, None
+    if permissible is not None:
+        each = np.stack([initial_unbalance(influence, one, weights) for one in np.eye(len(influence))])
+        unbalance = np.nan_to_num(each, nan=0.0)
+        # readings that do not determine a plane's unbalance say nothing of its tolerance
+        hidden = [bool(column.any()) for column in np.isnan(each).T]
+        shares = [None if unseen else share for unseen, share in zip(hidden, permissible, strict=True)]
+    tape = measured(influence, weights, ridge, RUNS, errors, runout, covariance, unbalance)
     values: dict[str, float] = {}
     for sensor, v in zip(sensors, initial, strict=True):
         # fifteen digits: a reading stands there as it was typed
@@ -119,8 +130,11 @@ def machine_sheet(
         "coefficients": coefficients,
         "limits": list(limits) or [None] * len(planes),
         "ceiling": ceiling,
+        "permissible": shares,
         "facts": [list(fact) for fact in facts],
-        "places": None if places is None else sorted(places),
+        "places": None
+        if places is None
+        else [list(place) for place in sorted(places, key=lambda place: place[1])],
         "units": {**units([kind, "angle"]), "amplitude": {amplitude: [1.0, 1.0]}},
     }
     whole["id"] = sha256(repr(sorted(whole.items(), key=lambda item: item[0])).encode()).hexdigest()[:16]

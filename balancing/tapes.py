@@ -44,11 +44,12 @@ def measured(
     errors: tuple[float, float] | None = None,
     runout: Complex | None = None,
     covariance: Complex | None = None,
+    unbalance: Complex | None = None,
 ) -> Tape:
     """The tape of a machine's sheet: stored coefficients, readings of an initial run and of runs with masses.
 
-    Inputs are `run K amplitude S`, `run K phase S` and `run K there S` (1 where it was read, else 0), `run K mass P` and
-    `run K angle P` (what stands on the rotor in that run, nothing in the first). The initial vibration is the mean of what
+    Inputs are `run K amplitude S`, `run K phase S` and `run K there S` (1 where it tells of the initial vibration, else 0), `run K mass P`
+    and `run K angle P` (what stands on the rotor in that run, nothing in the first), with `unbalance` also `run K read S` (1 where it was read, else 0). The initial vibration is the mean of what
     every run says of it that is there. Outputs: corrections, the vibration they leave, the trim after each run (the corrections
     less what stands; `fresh`: what its own reading alone asks for), what each run's reading is off, the vibration of each run as read
     (without the run-out) and as the coefficients expect it, and with stated errors of readings the standard deviations of the corrections and the trims.
@@ -64,6 +65,9 @@ def measured(
         What the sensors read of a rotor that runs true.
     covariance : complex array (s, p, p), optional
         E δδᴴ of the coefficients' errors, which count as independent of the readings.
+    unbalance : complex array (s, p), optional
+        The unbalance that explains a vibration of 1 at each sensor (`initial_unbalance`). Then `left K P` is what remains of it in each
+        run, of the vibration as read, or as expected where a sensor was not read.
     """
     s, p = influence.shape
     off = np.zeros(s, dtype=complex) if runout is None else runout
@@ -113,6 +117,15 @@ def measured(
             expected = v + sum((a * w for a, w in zip(alpha[i], standing[k], strict=True)), 0j)
             outputs[f"off {k} {i}"] = abs(read[i][k] - expected)
             outputs |= {f"read {k} {i}": abs(read[i][k]), f"expected {k} {i}": abs(expected)}
+    if unbalance is not None:
+        for k in range(runs):
+            left = [0j] * p
+            for i, v in enumerate(initial):
+                flag = recorder.input(f"run {k} read {i}")
+                expected = v + sum((a * w for a, w in zip(alpha[i], standing[k], strict=True)), 0j)
+                seen = read[i][k] * flag + expected * (1.0 - flag)
+                left = [u + complex(one) * seen for u, one in zip(left, unbalance[i].tolist(), strict=True)]
+            outputs |= {f"left {k} {j}": abs(u) for j, u in enumerate(left)}
     if errors is not None:
         # of the corrections, and of the trims, which differ from them by masses that are exact
         targets = {f"{j}": (j, w) for j, w in enumerate(corrections)} | {
@@ -142,7 +155,11 @@ def measured(
 
 
 def split() -> Tape:
-    """The tape of a correction on two places: `size`, `angle`, and the places' angles `first`, `second`."""
+    """The tape of a correction on two places: `size`, `angle`, and the places' angles `first`, `second`.
+
+    `first` and `second` are the shares of the two, `near first` and `near second` the mass on one of them that comes nearest where
+    they do not stand on either side of the correction within half a turn, and `off first`, `off second` what is missed then.
+    """
     recorder = Recorder()
     size, angle, first, second = (recorder.input(name) for name in ("size", "angle", "first", "second"))
     w, a, b = size * RECORDED.turn(angle), RECORDED.turn(first), RECORDED.turn(second)
@@ -151,4 +168,8 @@ def split() -> Tape:
         return z.real * other.imag - z.imag * other.real
 
     inverse = 1.0 / across(a, b)
-    return recorder.tape({"first": across(w, b) * inverse, "second": across(a, w) * inverse})
+    outputs: Outputs = {"first": across(w, b) * inverse, "second": across(a, w) * inverse}
+    for name, arm in (("first", a), ("second", b)):
+        mass = w.real * arm.real + w.imag * arm.imag
+        outputs |= {f"near {name}": mass, f"off {name}": abs(across(w, arm))}
+    return recorder.tape(outputs)

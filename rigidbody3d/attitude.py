@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.shapes import as_array
+
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
@@ -31,7 +33,7 @@ def compose(a: ArrayLike, b: ArrayLike) -> Array:
     >>> compose([0, 1, 0, 0], [0, 0, 1, 0])  # i j = k
     array([0., 0., 0., 1.])
     """
-    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    a, b = as_array(a), as_array(b)
     w, x, y, z = np.moveaxis(a, -1, 0)
     W, X, Y, Z = np.moveaxis(b, -1, 0)
     return np.stack(
@@ -53,7 +55,7 @@ def inverse(q: ArrayLike) -> Array:
     >>> inverse([0.5, 0.5, 0.5, 0.5])
     array([ 0.5, -0.5, -0.5, -0.5])
     """
-    return np.asarray(q, dtype=float) * [1.0, -1.0, -1.0, -1.0]
+    return as_array(q) * [1.0, -1.0, -1.0, -1.0]
 
 
 def normalize(q: ArrayLike) -> Array:
@@ -69,7 +71,7 @@ def normalize(q: ArrayLike) -> Array:
     >>> normalize([2, 0, 0, 0])
     array([1., 0., 0., 0.])
     """
-    q = np.asarray(q, dtype=float)
+    q = as_array(q)
     if q.shape[-1:] != (4,):
         raise ValueError(f"a quaternion has four components [w, x, y, z], found {q.shape[-1:]}")
     largest = np.abs(q).max(axis=-1, keepdims=True)
@@ -88,10 +90,10 @@ def rotate(q: ArrayLike, vector: ArrayLike) -> Array:
     >>> rotate([0.5, 0.5, 0.5, 0.5], [1, 0, 0])  # x -> y -> z -> x
     array([0., 1., 0.])
     """
-    q, v = np.asarray(q, dtype=float), np.asarray(vector, dtype=float)
+    q, v = as_array(q), as_array(vector)
     w, u = q[..., :1], q[..., 1:]
     t = 2 * np.cross(u, v)
-    return np.asarray(v + w * t + np.cross(u, t))
+    return v + w * t + np.cross(u, t)
 
 
 def to_matrix(q: ArrayLike) -> Array:
@@ -108,7 +110,7 @@ def to_matrix(q: ArrayLike) -> Array:
            [1., 0., 0.],
            [0., 1., 0.]])
     """
-    w, x, y, z = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
+    w, x, y, z = np.moveaxis(as_array(q), -1, 0)
     rows = [
         [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
@@ -129,7 +131,7 @@ def from_matrix(matrix: ArrayLike) -> Array:
     >>> from_matrix([[0, 0, 1], [1, 0, 0], [0, 1, 0]])
     array([0.5, 0.5, 0.5, 0.5])
     """
-    R = np.asarray(matrix, dtype=float)
+    R = as_array(matrix)
     r = [[R[..., i, j] for j in range(3)] for i in range(3)]
     # 4 q qᵀ: every row is a multiple of q; take the one with the largest diagonal
     a, b, c = r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]
@@ -143,9 +145,9 @@ def from_matrix(matrix: ArrayLike) -> Array:
         ],
         axis=-2,
     )
-    best = np.argmax(np.diagonal(table, axis1=-2, axis2=-1), axis=-1)
+    best = np.diagonal(table, axis1=-2, axis2=-1).argmax(axis=-1)
     row = np.take_along_axis(table, best[..., None, None], axis=-2)[..., 0, :]
-    return np.asarray(row / length(row))
+    return row / length(row)
 
 
 def from_vector(turn: ArrayLike) -> Array:
@@ -156,7 +158,7 @@ def from_vector(turn: ArrayLike) -> Array:
     >>> from_vector([0, 0, np.pi]).round(12)
     array([0., 0., 0., 1.])
     """
-    v = np.asarray(turn, dtype=float)
+    v = as_array(turn)
     half = length(v) / 2
     safe = np.where(half > 0, half, 1.0)
     return np.concatenate([np.cos(half), v / 2 * np.where(half > 0, np.sin(half) / safe, 1.0)], axis=-1)
@@ -198,12 +200,12 @@ def angle_between(a: ArrayLike, b: ArrayLike) -> Array:
     """
     turn = compose(a, inverse(b))
     sine = length(turn[..., 1:])[..., 0]
-    return np.asarray(2 * np.arctan2(sine, np.abs(turn[..., 0])))
+    return 2 * np.arctan2(sine, np.abs(turn[..., 0]))
 
 
 def length(vectors: Array) -> Array:
     """Return |v| of vectors (..., k), as (..., 1)."""
-    return np.asarray(np.sqrt(np.square(vectors).sum(axis=-1, keepdims=True)))
+    return np.sqrt(np.square(vectors).sum(axis=-1, keepdims=True))  # type: ignore[no-any-return]
 
 
 def left_matrix(q: Array) -> Array:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.exact import UNIT
 from dalembert.arithmetic.records import record
-
-if TYPE_CHECKING:
-    from dalembert.arithmetic.bounds import Given
+from dalembert.arithmetic.shapes import as_array, in_32_digits
 
 Array = NDArray[np.float64]
 
@@ -39,18 +36,19 @@ class _Rates(NamedTuple):
 class Steady(_Rates):
     """The two rates of steady precession, `.slow` and `.fast`, rad/s; NaN where the spin is too slow for any."""
 
-    given: dict[str, Given]
-    """I1, I3, m g l, the tilt's cosine, the spin, and the sign of its momentum."""
+    inputs: tuple[Array, ...]
+    """What `steady_precession` computed them from."""
 
     def error_estimate(self) -> tuple[Array, Array]:
-        """Return bounds of the rounding errors of both rates, (...), rad/s.
+        """Return estimates of the errors of both rates, (...), rad/s: computed twice, with 16 and with 32 digits.
 
         Where the two nearly coincide, at the least spin that allows them, the square root leaves half the digits.
         """
-        from dalembert.arithmetic.bounds import bounds
-
-        slow, fast = bounds(_rates, self.given)
-        return np.where(self.slow == 0, 0.0, slow), np.where(np.isinf(self.fast), np.inf, fast)
+        second: Any = steady_precession(*map(in_32_digits, self.inputs))
+        slow, fast = (there.off(here) for there, here in zip(second, self, strict=True))
+        # the spin is just fast enough for 16 digits, and just too slow for 32
+        slow, fast = (np.where(np.isnan(off) & ~np.isnan(self.slow), np.inf, off) for off in (slow, fast))
+        return slow, fast
 
 
 def steady_precession(
@@ -80,25 +78,19 @@ def steady_precession(
     >>> [float(x) for x in steady_precession(0.002, 0.0008, 0.1962, 0.4, 60.0)]
     [5.07653596218304..., 20.980370319014...]
     """
-    I1, I3, a, theta, w = (np.asarray(x, dtype=float) for x in (transverse, axial, mgl, tilt, spin))
+    inputs = tuple(map(as_array, (transverse, axial, mgl, tilt, spin)))
+    I1, I3, a, theta, w = inputs
     c = np.cos(theta)
     # a right angle given in radians is one to rounding
     c = np.where(np.abs(c) < 1e-16, 0.0, c)
     side = np.where(I3 * w < 0, -1.0, 1.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        slow, fast = _rates(I1, I3, a, c, w, side)
-    rates = Steady(np.where((a == 0) & (w == 0), 0.0, slow), np.asarray(fast))
-    exact = {"I1": I1, "I3": I3, "mgl": a, "spin": w, "side": side}
-    # a cosine errs by one unit in its last place
-    rates.given = {"c": (c, 0, 2 * UNIT * np.abs(c)), **{name: (x, 0, 0.0) for name, x in exact.items()}}
+        B = I3 * w
+        large = B + side * np.sqrt(B * B - 4 * I1 * a * c)
+        slow, fast = 2 * a / large, large / (2 * I1 * c)
+    rates = Steady(np.where((a == 0) & (w == 0), 0.0, slow), fast)
+    rates.inputs = inputs
     return rates
-
-
-def _rates(I1: Array, I3: Array, mgl: Array, c: Array, spin: Array, side: Array) -> tuple[Array, Array]:
-    """On arrays of any kind of number, recorded ones for bounds too."""
-    B = I3 * spin
-    large = B + side * np.sqrt(B * B - 4 * I1 * mgl * c)
-    return 2 * mgl / large, large / (2 * I1 * c)
 
 
 def sleeping_threshold(transverse: ArrayLike, axial: ArrayLike, mgl: ArrayLike) -> Array:
@@ -115,8 +107,15 @@ def sleeping_threshold(transverse: ArrayLike, axial: ArrayLike, mgl: ArrayLike) 
     return np.asarray(2 * np.sqrt(np.maximum(a, 0.0) * I1) / I3)
 
 
+class _Cones(NamedTuple):
+    space: Array
+    body: Array
+    precession: Array
+    spin: Array
+
+
 @record
-class Cones(NamedTuple):
+class Cones(_Cones):
     """The cones of a free symmetric body: half angles, rad, and rates, rad/s.
 
     `.space` is the angle between ω and H, the cone fixed in space; `.body` that between ω and the axis of the body,
@@ -124,15 +123,13 @@ class Cones(NamedTuple):
     about its axis relative to the precessing plane, ω3 (I1 - I3)/I1.
     """
 
-    space: Array
-    body: Array
-    precession: Array
-    spin: Array
+    inputs: tuple[Array, Array, Array]
+    """What `cones` computed them from."""
 
     def error_estimate(self) -> tuple[Array, ...]:
-        """Return bounds of the rounding errors of the four, (...): small beside each, since nothing here cancels."""
-        roundings = (16, 6, 8, 4)
-        return tuple(n * UNIT * np.abs(x) for n, x in zip(roundings, self, strict=True))
+        """Return estimates of the errors of the four, (...): computed twice, with 16 and with 32 digits."""
+        second: Any = cones(*map(in_32_digits, self.inputs))
+        return tuple(there.off(here) for there, here in zip(second, self, strict=True))
 
 
 def cones(transverse: ArrayLike, axial: ArrayLike, omega: ArrayLike) -> Cones:
@@ -156,13 +153,13 @@ def cones(transverse: ArrayLike, axial: ArrayLike, omega: ArrayLike) -> Cones:
     >>> [round(float(np.degrees(x)), 4) for x in c[:2]]
     [18.4349, 45.0]
     """
-    I1, I3 = np.asarray(transverse, dtype=float), np.asarray(axial, dtype=float)
-    w = np.asarray(omega, dtype=float)
+    I1, I3, w = as_array(transverse), as_array(axial), as_array(omega)
     across, along = np.hypot(w[..., 0], w[..., 1]), w[..., 2]
-    space = np.arctan2(np.abs(I1 - I3) * across * np.abs(along), I1 * across**2 + I3 * along**2)
-    return Cones(
-        space,
+    result = Cones(
+        np.arctan2(np.abs(I1 - I3) * across * np.abs(along), I1 * across**2 + I3 * along**2),
         np.arctan2(across, np.abs(along)),
         np.hypot(across, I3 * along / I1),
-        np.asarray(along * (I1 - I3) / I1),
+        along * (I1 - I3) / I1,
     )
+    result.inputs = (I1, I3, w)
+    return result

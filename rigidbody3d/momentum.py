@@ -11,21 +11,22 @@ axis of the difference ω - Ω; here Ḣ is always the true rate, I α + ω × (
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.records import components, numbers, record, table
-from dalembert.arithmetic.shapes import as_numbers, common_shape
-from rigidbody3d.rounding import BodyError, of_body
+from dalembert.arithmetic.shapes import as_array, as_numbers, common_shape, in_32_digits, is_doubled
 from rigidbody3d.rounding_in_time import require
 from rigidbody3d.states import BLOCK
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from rigidbody3d.body import Body
 
 Array = NDArray[np.float64]
 
@@ -38,106 +39,9 @@ class Wrench(NamedTuple):
     moment: Array
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class _Formulas:
-    """The formulas of a body in motion, on arrays of any kind of number, recorded ones for bounds too."""
-
-    inertia: Array
-    omega: Array
-    alpha: Array
-    frame_omega: Array | None
-    mass: Array
-    center: Array
-    velocity: Array
-    acceleration: Array
-    pivot: Array | None
-    """The point fixed in space that velocity and acceleration were worked out from; None: they are given."""
-
-    @cached_property
-    def momentum(self) -> Array:
-        """H_G = I ω about the centre of mass, (..., 3), kg·m²/s."""
-        return _times(self.inertia, self.omega)
-
-    @cached_property
-    def true_alpha(self) -> Array:
-        """The angular acceleration in fixed space, (ω̇)_rel + Ω × ω, (..., 3), rad/s²."""
-        if self.frame_omega is None:
-            return self.alpha
-        return np.asarray(self.alpha + np.cross(self.frame_omega, self.omega))
-
-    @cached_property
-    def rate(self) -> Array:
-        """Ḣ_G in fixed space, (..., 3), N·m: the moment about the centre of mass that the motion asks for."""
-        I, w, alpha = self.inertia, self.omega, self.true_alpha
-        if I.ndim > 2 or w.ndim == 1 or w.shape != alpha.shape:
-            return np.asarray(_times(I, alpha) + np.cross(w, self.momentum))
-        # both in one pass, while a block of ω is in the cache; H is not worked out twice
-        momentum, rate = _momentum_and_rate(I, w, alpha, self.__dict__.get("momentum"))
-        self.__dict__["momentum"] = momentum
-        return rate
-
-    @cached_property
-    def transport(self) -> Array:
-        """Ω × H_G, the part of the rate that the turning of the axes gives, (..., 3), N·m."""
-        frame = self.omega if self.frame_omega is None else self.frame_omega
-        return np.asarray(np.cross(frame, self.momentum))
-
-    @cached_property
-    def relative(self) -> Array:
-        """(Ḣ_G)_rel, the rate of the components of H_G in the turning axes, (..., 3), N·m."""
-        if self.frame_omega is None:
-            return _times(self.inertia, self.alpha)
-        return np.asarray(_times(self.inertia, self.alpha) + self.tensor_rate)
-
-    @cached_property
-    def tensor_rate(self) -> Array:
-        """İ_rel ω: what the change of the tensor in the turning axes adds, (..., 3), N·m; zero in body axes.
-
-        With ν = ω - Ω the turning of the body in those axes, İ_rel ω = ν × (I ω) - I (ν × ω).
-        """
-        if self.frame_omega is None:
-            return np.zeros_like(self.momentum)
-        slip = np.asarray(self.omega - self.frame_omega)
-        return np.asarray(np.cross(slip, self.momentum) - _times(self.inertia, np.cross(slip, self.omega)))
-
-    @cached_property
-    def linear_momentum(self) -> Array:
-        """m v_G, (..., 3), kg·m/s."""
-        return _scaled(self.mass, self.velocity)
-
-    @cached_property
-    def force(self) -> Array:
-        """m a_G, the external force that the motion asks for, (..., 3), N."""
-        return _scaled(self.mass, self.acceleration)
-
-    @cached_property
-    def inertia_force(self) -> Array:
-        """d'Alembert's inertia force, -m a_G, (..., 3), N."""
-        return _scaled(self.mass, self.acceleration, -1.0)
-
-    @cached_property
-    def inertia_wrench(self) -> Wrench:
-        """d'Alembert's wrench at the centre of mass: -m a_G and -Ḣ_G."""
-        return Wrench(self.inertia_force, -self.rate)
-
-    @cached_property
-    def energy(self) -> Array:
-        """Kinetic energy, ½ m v² + ½ ω·H, (...), J."""
-        v2 = (self.velocity * self.velocity).sum(axis=-1)
-        return np.asarray(self.mass * v2 / 2 + (self.omega * self.momentum).sum(axis=-1) / 2)
-
-    def momentum_about(self, point: ArrayLike) -> Array:
-        """Return H about a point, H_G + (G - P) × m v_G, (..., 3), kg·m²/s."""
-        return np.asarray(self.momentum + np.cross(self.center - np.asarray(point), self.linear_momentum))
-
-    def rate_about(self, point: ArrayLike) -> Array:
-        """Return Ḣ about a point fixed in space, Ḣ_G + (G - P) × m a_G, (..., 3), N·m: the moment needed there."""
-        return np.asarray(self.rate + np.cross(self.center - np.asarray(point), self.force))
-
-
 @record
 @dataclass(frozen=True, init=False, eq=False, repr=False)
-class Motion(_Formulas):
+class Motion:
     """A rigid body in motion, one state or many: what its momentum is and what forces the motion asks for.
 
     Each quantity is computed on the first request. All components are along one set of axes, in which the
@@ -172,6 +76,17 @@ class Motion(_Formulas):
     >>> disk.rate.round(6)
     array([3.4848, 0.    , 0.    ])
     """
+
+    inertia: Array
+    omega: Array
+    alpha: Array
+    frame_omega: Array | None
+    mass: Array
+    center: Array
+    velocity: Array
+    acceleration: Array
+    pivot: Array | None
+    """The point fixed in space that velocity and acceleration were worked out from; None: they are given."""
 
     def __init__(
         self,
@@ -214,6 +129,88 @@ class Motion(_Formulas):
             return f"<Motion: {np.prod(states)} states, omega {numbers(self.omega)} rad/s>"
         return f"<Motion: omega {numbers(self.omega)} rad/s, momentum {numbers(self.momentum)} kg·m²/s>"
 
+    @cached_property
+    def momentum(self) -> Array:
+        """H_G = I ω about the centre of mass, (..., 3), kg·m²/s."""
+        return _times(self.inertia, self.omega)
+
+    @cached_property
+    def true_alpha(self) -> Array:
+        """The angular acceleration in fixed space, (ω̇)_rel + Ω × ω, (..., 3), rad/s²."""
+        if self.frame_omega is None:
+            return self.alpha
+        return self.alpha + np.cross(self.frame_omega, self.omega)
+
+    @cached_property
+    def rate(self) -> Array:
+        """Ḣ_G in fixed space, (..., 3), N·m: the moment about the centre of mass that the motion asks for."""
+        I, w, alpha = self.inertia, self.omega, self.true_alpha
+        if I.ndim > 2 or w.ndim == 1 or w.shape != alpha.shape or is_doubled(w):
+            return _times(I, alpha) + np.cross(w, self.momentum)
+        # both in one pass, while a block of ω is in the cache; H is not worked out twice
+        momentum, rate = _momentum_and_rate(I, w, alpha, self.__dict__.get("momentum"))
+        self.__dict__["momentum"] = momentum
+        return rate
+
+    @cached_property
+    def transport(self) -> Array:
+        """Ω × H_G, the part of the rate that the turning of the axes gives, (..., 3), N·m."""
+        frame = self.omega if self.frame_omega is None else self.frame_omega
+        return np.cross(frame, self.momentum)
+
+    @cached_property
+    def relative(self) -> Array:
+        """(Ḣ_G)_rel, the rate of the components of H_G in the turning axes, (..., 3), N·m."""
+        if self.frame_omega is None:
+            return _times(self.inertia, self.alpha)
+        return _times(self.inertia, self.alpha) + self.tensor_rate
+
+    @cached_property
+    def tensor_rate(self) -> Array:
+        """İ_rel ω: what the change of the tensor in the turning axes adds, (..., 3), N·m; zero in body axes.
+
+        With ν = ω - Ω the turning of the body in those axes, İ_rel ω = ν × (I ω) - I (ν × ω).
+        """
+        if self.frame_omega is None:
+            return np.zeros_like(self.momentum)
+        slip = self.omega - self.frame_omega
+        return np.cross(slip, self.momentum) - _times(self.inertia, np.cross(slip, self.omega))
+
+    @cached_property
+    def linear_momentum(self) -> Array:
+        """m v_G, (..., 3), kg·m/s."""
+        return _scaled(self.mass, self.velocity)
+
+    @cached_property
+    def force(self) -> Array:
+        """m a_G, the external force that the motion asks for, (..., 3), N."""
+        return _scaled(self.mass, self.acceleration)
+
+    @cached_property
+    def inertia_force(self) -> Array:
+        """d'Alembert's inertia force, -m a_G, (..., 3), N."""
+        return _scaled(self.mass, self.acceleration, -1.0)
+
+    @cached_property
+    def inertia_wrench(self) -> Wrench:
+        """d'Alembert's wrench at the centre of mass: -m a_G and -Ḣ_G."""
+        return Wrench(self.inertia_force, -self.rate)
+
+    @cached_property
+    def energy(self) -> Array:
+        """Kinetic energy, ½ m v² + ½ ω·H, (...), J."""
+        v2: Array = (self.velocity * self.velocity).sum(axis=-1)
+        turning: Array = (self.omega * self.momentum).sum(axis=-1)
+        return self.mass * v2 / 2 + turning / 2
+
+    def momentum_about(self, point: ArrayLike) -> Array:
+        """Return H about a point, H_G + (G - P) × m v_G, (..., 3), kg·m²/s."""
+        return self.momentum + np.cross(self.center - as_array(point), self.linear_momentum)
+
+    def rate_about(self, point: ArrayLike) -> Array:
+        """Return Ḣ about a point fixed in space, Ḣ_G + (G - P) × m a_G, (..., 3), N·m: the moment needed there."""
+        return self.rate + np.cross(self.center - as_array(point), self.force)
+
     def to_frame(self) -> pd.DataFrame:
         """Return a table with a row per state: ω, H and its rate, d'Alembert's inertia force, kinetic energy."""
         columns = components("omega_*_rad_s", self.omega)
@@ -222,14 +219,23 @@ class Motion(_Formulas):
         columns |= components("inertia_force_*_N", self.inertia_force)
         return table(columns | {"energy_J": self.energy}, ("state",))
 
-    def error_estimate(
-        self,
-        of: str,
-        point: ArrayLike | None = None,
-        body: BodyError | None = None,
-        given: float = 0.0,
-    ) -> Array:
-        """Return a bound of the rounding error of a quantity, in its shape and unit.
+    @cached_property
+    def in_32_digits(self) -> Motion:
+        """The same motion in doubled numbers."""
+        return self.of_body(*map(in_32_digits, (self.mass, self.center, self.inertia)))
+
+    def of_body(self, mass: Array, center: Array, inertia: Array) -> Motion:
+        """Return the same motion, in doubled numbers, of a body that has these."""
+        omega, alpha = in_32_digits(self.omega), in_32_digits(self.alpha)
+        frame = None if self.frame_omega is None else in_32_digits(self.frame_omega)
+        if self.pivot is not None:
+            at = {"mass": mass, "center": center, "point": in_32_digits(self.pivot)}
+            return Motion.about_fixed_point(inertia, omega, alpha, frame_omega=frame, **at)
+        velocity, acceleration = in_32_digits(self.velocity), in_32_digits(self.acceleration)
+        return Motion(inertia, omega, alpha, frame, mass, center, velocity, acceleration)
+
+    def error_estimate(self, of: str, point: ArrayLike | None = None, body: Body | None = None) -> Array:
+        """Return an estimate of the error of a quantity, in its shape and unit: computed twice, with 16 and with 32 digits.
 
         Parameters
         ----------
@@ -239,27 +245,24 @@ class Motion(_Formulas):
         point
             What momentum_about and rate_about are about, (..., 3), m.
         body
-            Bounds of the errors of mass, centre and tensor, where they were worked out (`Body.error_estimate`).
-        given
-            By how much of themselves the velocities, accelerations and points may be off, as numbers that were
-            read in other units are.
+            The body to 32 digits, where it was worked out (`Body.in_32_digits`).
 
         Examples
         --------
-        >>> disk = Motion(np.diag([1.0, 1.0, 2.0]), [0, 4, 12.0], frame_omega=[0, 4.0, 0])
-        >>> bool((disk.error_estimate("rate") < 1e-12).all())
+        >>> disk = Motion(np.diag([1.0, 1.0, 2.0]), [0, 4, 12.1], frame_omega=[0, 4.3, 0])
+        >>> bool((disk.error_estimate("rate") < 1e-14).all())
         True
         """
-        from dalembert.arithmetic.bounds import bounds, read
-
         require(of, *ESTIMATED)
         if point is None and of.endswith("_about"):
             raise ValueError(f"{of}: expected the point that it is about")
-        names = ("omega", "alpha", "frame_omega", "velocity", "acceleration", "pivot")
-        vectors = {"point": point} | {name: getattr(self, name) for name in names}
-        entering = of_body(self.mass, self.center, self.inertia, body)
-        entering |= {name: read(v, 1, given) for name, v in vectors.items() if v is not None}
-        return bounds(_quantity, entering, of)[0]
+        second = self.in_32_digits if body is None else self.of_body(body.mass, body.center, body.inertia)
+
+        def quantity(motion: Motion) -> Any:
+            value = getattr(motion, "rate" if of == "inertia_moment" else of)
+            return value(point) if of.endswith("_about") else value
+
+        return quantity(second).off(quantity(self))  # type: ignore[no-any-return]
 
     @classmethod
     def about_fixed_point(
@@ -302,24 +305,7 @@ ESTIMATED = [
 """What a motion has estimates of."""
 
 
-def _quantity(
-    of: str,
-    *,
-    frame_omega: Array | None = None,
-    pivot: Array | None = None,
-    point: Array | None = None,
-    **given: Array,
-) -> list[Array]:
-    """A quantity of a motion, from the numbers it is worked out of."""
-    motion = _Formulas(frame_omega=frame_omega, pivot=pivot, **given)
-    if pivot is not None:
-        velocity, acceleration = _about_pivot(motion, pivot)
-        motion = replace(motion, velocity=velocity, acceleration=acceleration)
-    value = getattr(motion, "rate" if of == "inertia_moment" else of)
-    return [value(point) if of.endswith("_about") else value]
-
-
-def _about_pivot(motion: _Formulas, pivot: Array) -> tuple[Array, Array]:
+def _about_pivot(motion: Motion, pivot: Array) -> tuple[Array, Array]:
     """Velocity and acceleration of the centre of mass of a body that turns about a point fixed in space."""
     arm = motion.center - pivot
     velocity = np.cross(motion.omega, arm)
@@ -331,8 +317,9 @@ def _times(I: Array, w: Array) -> Array:
     if I.ndim == 2:
         if w.ndim > 1 and w.dtype == I.dtype == float:
             return _in_blocks(w, I)
-        return np.asarray(w @ I.T)
-    return np.asarray((I * w[..., None, :]).sum(axis=-1))
+        return w @ I.T
+    product: Array = (I * w[..., None, :]).sum(axis=-1)
+    return product
 
 
 def _in_blocks(w: Array, I: Array) -> Array:
@@ -386,8 +373,8 @@ def _gyroscopic(I: Array) -> Array:
 
 def _scaled(factor: Array, vectors: Array, sign: float = 1.0) -> Array:
     """A factor (...) times vectors (..., 3); many in blocks, since numpy goes through each column by itself."""
-    if vectors.ndim != 2 or factor.shape != vectors.shape[:1] or len(vectors) <= BLOCK:
-        return np.asarray((sign * factor)[..., None] * vectors)
+    if is_doubled(vectors) or vectors.ndim != 2 or factor.shape != vectors.shape[:1] or len(vectors) <= BLOCK:
+        return (sign * factor)[..., None] * vectors
     out = np.empty_like(vectors)
     for s in range(0, len(vectors), BLOCK):
         part = slice(s, s + BLOCK)

@@ -1,6 +1,6 @@
 """A shaft with attached bodies, turning about z on two bearings: reactions, driving torque, unbalance.
 
-In the plane across the shaft a vector is a complex number x + iy. With U = ∫ (x + iy) dm the static unbalance and
+In the plane across the shaft a vector is a complex number x + iy, here the pair (x, y). With U = ∫ (x + iy) dm the static unbalance and
 V(z1) = ∫ (x + iy)(z - z1) dm, the inertia of a body turning at ω, ω̇ asks the bearings for
 
     R2 = (-ω² + i ω̇) V(z1)/(z2 - z1),   R1 = (-ω² + i ω̇) V(z2)/(z1 - z2),
@@ -14,14 +14,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.records import components, numbers, record, table
+from dalembert.arithmetic.shapes import as_array, in_32_digits
+from rigidbody3d.attitude import length
 from rigidbody3d.body import Body
-from rigidbody3d.rounding import MassProperties
 from rigidbody3d.rounding_in_time import require
 
 if TYPE_CHECKING:
@@ -50,91 +51,22 @@ def shaft_axes(axis: ArrayLike) -> Array:
            [0., 0., 1.],
            [1., 0., 0.]])
     """
-    n = np.asarray(axis, dtype=float)
+    n = as_array(axis)
     largest = np.abs(n).max(axis=-1, keepdims=True)
     if n.shape[-1:] != (3,) or not (np.isfinite(n).all() and (largest > 0).all()):
         raise ValueError(f"the axis of a shaft is a vector of three numbers, not all 0, found {axis!r}")
     n = n / largest
-    n = n / np.linalg.norm(n, axis=-1, keepdims=True)
+    n = n / length(n)
     following = (np.abs(n).argmax(axis=-1) + 1) % 3
     first = np.eye(3)[following]
-    first = first - n * (n * first).sum(axis=-1, keepdims=True)
-    first = first / np.linalg.norm(first, axis=-1, keepdims=True)
+    first = first - n * (n * first).sum(axis=-1)[..., None]
+    first = first / length(first)
     return np.stack([first, np.cross(n, first), n], axis=-2) + 0.0
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class _Formulas:
-    """The formulas of a shaft, on arrays of any kind of number, recorded ones for bounds too."""
-
-    body: Body | MassProperties
-    bearings: Array
-    speed: Array
-    speed_rate: Array
-    gravity: Array
-
-    @property
-    def _turning(self) -> Complex:
-        """-ω² + i ω̇: what the acceleration of a point is to its place across the shaft."""
-        return np.asarray(-np.square(self.speed) + 1j * self.speed_rate)
-
-    @property
-    def _weight(self) -> Array:
-        return np.asarray(self.body.mass[..., None] * self.gravity)
-
-    @property
-    def static_unbalance(self) -> Complex:
-        """U = ∫ (x + iy) dm, (...), kg·m."""
-        return np.asarray(self.body.mass * _across(self.body.center))
-
-    def moment_unbalance(self, z: ArrayLike) -> Complex:
-        """Return V(z) = ∫ (x + iy)(z' - z) dm about a plane, (...), kg·m²: the products I_xz + i I_yz about it."""
-        I, c = self.body.inertia, self.body.center
-        central = -I[..., 0, 2] - 1j * I[..., 1, 2]
-        return np.asarray(central + self.static_unbalance * (c[..., 2] - np.asarray(z)))
-
-    @cached_property
-    def unbalance(self) -> Complex:
-        """The dynamic unbalance as two unbalances in the planes of the bearings, (..., 2), kg·m."""
-        z1, z2 = self.bearings[..., 0], self.bearings[..., 1]
-        return np.stack(
-            np.broadcast_arrays(
-                self.moment_unbalance(z2) * (1 / (z1 - z2)), self.moment_unbalance(z1) * (1 / (z2 - z1))
-            ),
-            axis=-1,
-        )
-
-    @cached_property
-    def dynamic(self) -> Array:
-        """Forces of the bearings on the shaft that the turning asks for, (..., 2, 2): bearing, then x and y, N."""
-        return _parts(self._turning[..., None] * self.unbalance)
-
-    @cached_property
-    def static(self) -> Array:
-        """Forces of the bearings on the shaft that carry the weight, (..., 2, 2): bearing, then x and y, N."""
-        weight, c, z = self._weight, self.body.center, self.bearings
-        across = _across(weight)
-        # the moment of the weight about each bearing, its part along the shaft included
-        lever = across[..., None] * (c[..., 2:] - z[..., ::-1]) - (_across(c) * weight[..., 2])[..., None]
-        span = np.stack([z[..., 0] - z[..., 1], z[..., 1] - z[..., 0]], axis=-1)
-        return _parts(-lever * (1 / span))
-
-    @property
-    def axial(self) -> Array:
-        """Force along z of the bearings on the shaft, (...), N."""
-        return np.asarray(0.0 - self._weight[..., 2])
-
-    @property
-    def drive_torque(self) -> Array:
-        """Torque about z that drives the shaft: I_zz ω̇ less the moment of the weight, (...), N·m."""
-        c, weight = self.body.center, self._weight
-        about = self.body.inertia[..., 2, 2] + self.body.mass * (c[..., 0] ** 2 + c[..., 1] ** 2)
-        return np.asarray(about * self.speed_rate - (c[..., 0] * weight[..., 1] - c[..., 1] * weight[..., 0]))
 
 
 @record
 @dataclass(frozen=True, init=False, eq=False, repr=False)
-class Shaft(_Formulas):
+class Shaft:
     """A body turning about the z-axis on two bearings, in the position drawn.
 
     Parameters
@@ -169,6 +101,10 @@ class Shaft(_Formulas):
     """
 
     body: Body
+    bearings: Array
+    speed: Array
+    speed_rate: Array
+    gravity: Array
 
     def __init__(
         self,
@@ -178,20 +114,95 @@ class Shaft(_Formulas):
         speed_rate: ArrayLike = 0.0,
         gravity: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
-        z = np.asarray(bearings, dtype=float)
+        z = as_array(bearings)
         if z.shape[-1:] != (2,) or not np.isfinite(z).all():
             raise ValueError(f"two bearings have two finite positions z1, z2, found {bearings!r}")
         if (z[..., 0] == z[..., 1]).any():
             raise ValueError("the two bearings lie at the same place: they cannot hold a moment")
         object.__setattr__(self, "body", body)
         object.__setattr__(self, "bearings", z)
-        object.__setattr__(self, "speed", np.asarray(speed, dtype=float))
-        object.__setattr__(self, "speed_rate", np.asarray(speed_rate, dtype=float))
-        object.__setattr__(self, "gravity", np.asarray(gravity, dtype=float))
+        object.__setattr__(self, "speed", as_array(speed))
+        object.__setattr__(self, "speed_rate", as_array(speed_rate))
+        object.__setattr__(self, "gravity", as_array(gravity))
 
     def __repr__(self) -> str:
         speed, unbalance = numbers(self.speed), numbers(self.unbalance)
         return f"<Shaft: bearings at {numbers(self.bearings)} m, {speed} rad/s, unbalance {unbalance} kg·m>"
+
+    # --- vectors across the shaft as pairs (..., 2) of x and y ---
+
+    @property
+    def _weight(self) -> Array:
+        return self.body.mass[..., None] * self.gravity
+
+    @property
+    def static_unbalance_xy(self) -> Array:
+        """U as x and y, (..., 2), kg·m."""
+        return self.body.mass[..., None] * self.body.center[..., :2]
+
+    def moment_unbalance_xy(self, z: ArrayLike) -> Array:
+        """Return V(z) as x and y, (..., 2), kg·m²."""
+        arm = self.body.center[..., 2] - as_array(z)
+        return -self.body.inertia[..., :2, 2] + self.static_unbalance_xy * arm[..., None]
+
+    @cached_property
+    def unbalance_xy(self) -> Array:
+        """The dynamic unbalance in the planes of the bearings as x and y, (..., 2, 2), kg·m."""
+        z1, z2 = self.bearings[..., 0], self.bearings[..., 1]
+        planes = [
+            self.moment_unbalance_xy(there) * (1 / (here - there))[..., None]
+            for here, there in ((z1, z2), (z2, z1))
+        ]
+        return np.stack(np.broadcast_arrays(*planes), axis=-2)
+
+    def _turning(self, unbalance: Array) -> Array:
+        """The forces that unbalances (..., 2, 2) ask for: times -ω² + i ω̇."""
+        pull, push = -np.square(self.speed)[..., None], self.speed_rate[..., None]
+        x, y = unbalance[..., 0], unbalance[..., 1]
+        return np.stack([pull * x - push * y, pull * y + push * x], axis=-1) + 0.0
+
+    # --- what is asked for ---
+
+    @property
+    def static_unbalance(self) -> Complex:
+        """U = ∫ (x + iy) dm, (...), kg·m."""
+        return _complex(self.static_unbalance_xy)
+
+    def moment_unbalance(self, z: ArrayLike) -> Complex:
+        """Return V(z) = ∫ (x + iy)(z' - z) dm about a plane, (...), kg·m²: the products I_xz + i I_yz about it."""
+        return _complex(self.moment_unbalance_xy(z))
+
+    @property
+    def unbalance(self) -> Complex:
+        """The dynamic unbalance as two unbalances in the planes of the bearings, (..., 2), kg·m."""
+        return _complex(self.unbalance_xy)
+
+    @cached_property
+    def dynamic(self) -> Array:
+        """Forces of the bearings on the shaft that the turning asks for, (..., 2, 2): bearing, then x and y, N."""
+        return self._turning(self.unbalance_xy)
+
+    @cached_property
+    def static(self) -> Array:
+        """Forces of the bearings on the shaft that carry the weight, (..., 2, 2): bearing, then x and y, N."""
+        weight, c, z = self._weight, self.body.center, self.bearings
+        # the moment of the weight about each bearing, its part along the shaft included
+        arms = (c[..., 2:] - z[..., ::-1])[..., None]
+        lever = weight[..., None, :2] * arms - (c[..., :2] * weight[..., 2:])[..., None, :]
+        span = np.stack([z[..., 0] - z[..., 1], z[..., 1] - z[..., 0]], axis=-1)
+        return -lever * (1 / span)[..., None] + 0.0
+
+    @property
+    def axial(self) -> Array:
+        """Force along z of the bearings on the shaft, (...), N."""
+        return 0.0 - self._weight[..., 2]
+
+    @property
+    def drive_torque(self) -> Array:
+        """Torque about z that drives the shaft: I_zz ω̇ less the moment of the weight, (...), N·m."""
+        c, weight = self.body.center, self._weight
+        about = self.body.inertia[..., 2, 2] + self.body.mass * (c[..., 0] ** 2 + c[..., 1] ** 2)
+        return about * self.speed_rate - (c[..., 0] * weight[..., 1] - c[..., 1] * weight[..., 0])
 
     def to_frame(self) -> pd.DataFrame:
         """Return a table with a row per bearing: z_m, what it carries at rest and because of the turning, the unbalance."""
@@ -214,19 +225,23 @@ class Shaft(_Formulas):
         forces = ({"static": self.static} if self.gravity.any() else {}) | {"dynamic": self.dynamic}
         return views.shaft(self.body.solids(), names, self.body.whole(), self.bearings, forces, figure=figure)
 
-    def error_estimate(self, of: str, given: float = 0.0) -> Array:
-        """Return a bound of the rounding error of a quantity, in its shape and unit; of a complex one: of its size.
+    @cached_property
+    def in_32_digits(self) -> Shaft:
+        """The same shaft in doubled numbers."""
+        entering = (self.bearings, self.speed, self.speed_rate, self.gravity)
+        return Shaft(self.body.in_32_digits, *map(in_32_digits, entering))
+
+    def error_estimate(self, of: str) -> Array:
+        """Return an estimate of the error of a quantity, in its shape and unit; of a complex one: of its size.
 
         Parameters
         ----------
         of
             Its name: dynamic, static, axial, drive_torque, unbalance, static_unbalance.
-        given
-            By how much of themselves speed, gravity and the places of the bearings may be off.
 
         Notes
         -----
-        With what the body itself has from how it was made (`Body.error_estimate`).
+        Computed twice, with 16 and with 32 digits, from what the body was made of (`Body.in_32_digits`).
 
         Examples
         --------
@@ -235,47 +250,33 @@ class Shaft(_Formulas):
         >>> bool((Shaft(rotor, (0.0, 2.0), 100.0).error_estimate("dynamic") < 1e-13).all())
         True
         """
-        from dalembert.arithmetic.bounds import bounds, read
-
         require(of, *ESTIMATED)
-        entering = self.body.given()
-        for name, axes in (("bearings", 1), ("speed", 0), ("speed_rate", 0), ("gravity", 1)):
-            entering[name] = read(getattr(self, name), axes, given)
-        return bounds(_quantity, entering, of)[0]
+        name = f"{of}_xy" if of.endswith("unbalance") else of
+        second: Any = getattr(self.in_32_digits, name)
+        off: Array = second.off(getattr(self, name))
+        return np.hypot(off[..., 0], off[..., 1]) if name != of else off
 
     def with_masses(self, unbalance: ArrayLike, z: ArrayLike) -> Array:
         """Return the dynamic forces with further unbalances (..., k) at z (k,) on the shaft, (..., 2, 2), N.
 
         For masses small beside the shaft's: their own weight and inertia about z are left out.
         """
-        U, at = np.asarray(unbalance, dtype=complex), np.asarray(z, dtype=float)
+        U = np.asarray(unbalance, dtype=complex)
+        return self.with_masses_xy(np.stack([U.real, U.imag], axis=-1), np.asarray(z, dtype=float))
+
+    def with_masses_xy(self, unbalance: Array, z: Array) -> Array:
+        """Return the same for unbalances (..., k, 2) as x and y."""
         z1, z2 = self.bearings[..., 0], self.bearings[..., 1]
-        share = np.stack(
-            [
-                (U * (at - z2[..., None]) / (z1 - z2)[..., None]).sum(axis=-1),
-                (U * (at - z1[..., None]) / (z2 - z1)[..., None]).sum(axis=-1),
-            ],
-            axis=-1,
-        )
-        return _parts(self._turning[..., None] * (self.unbalance + share))
+        shares = [
+            (unbalance * ((z - there[..., None]) / (here - there)[..., None])[..., None]).sum(axis=-2)
+            for here, there in ((z1, z2), (z2, z1))
+        ]
+        return self._turning(self.unbalance_xy + np.stack(shares, axis=-2))
 
 
 ESTIMATED = ("static_unbalance", "unbalance", "dynamic", "static", "axial", "drive_torque")
 """What a shaft has estimates of."""
 
 
-def _quantity(of: str, *, mass: Array, center: Array, inertia: Array, **given: Array) -> list[Array]:
-    """A quantity of a shaft, from the numbers it is worked out of."""
-    return [getattr(_Formulas(MassProperties(mass, center, inertia), **given), of)]
-
-
-def _across(vector: Array) -> Complex:
-    return np.asarray(vector[..., 0] + 1j * vector[..., 1])
-
-
-def _parts(z: Complex) -> Array:
-    x, y = _recorded_parts(z) if z.dtype == object else (z.real, z.imag)
-    return np.stack([x, y], axis=-1) + 0.0
-
-
-_recorded_parts = np.frompyfunc(lambda z: (z.real, z.imag), 1, 2)
+def _complex(pairs: Array) -> Complex:
+    return np.asarray(pairs[..., 0] + 1j * pairs[..., 1])

@@ -8,12 +8,14 @@ down to walls without thickness.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.shapes import as_array
 from dalembert.hints import nearest
 
 Array = NDArray[np.float64]
@@ -106,7 +108,7 @@ SHAPES: dict[str, Shape] = {
         ("radius",),
         lambda radius, inner_radius: 3 * (_hollow(radius, inner_radius),),
         lambda radius, inner_radius: (
-            4 / 3 * np.pi * (radius - inner_radius) * (radius**2 + radius * inner_radius + inner_radius**2)
+            np.pi * (radius - inner_radius) * (radius**2 + radius * inner_radius + inner_radius**2) * 4 / 3
         ),
         optional=("inner_radius",),
     ),
@@ -150,8 +152,7 @@ def _dimensions(shape: str, dimensions: dict[str, ArrayLike]) -> dict[str, Array
             )
         )
     values = {
-        name: np.asarray(dimensions.get(name, 0.0), dtype=float)
-        for name in definition.dimensions + definition.optional
+        name: as_array(dimensions.get(name, 0.0)) for name in definition.dimensions + definition.optional
     }
     for name, value in values.items():
         if (
@@ -187,23 +188,11 @@ def inertia_of(shape: str, mass: ArrayLike, **dimensions: ArrayLike) -> Array:
     >>> inertia_of("disk", 2.0, radius=0.3).diagonal()
     array([0.045, 0.045, 0.09 ])
     """
-    return shape_tensor(shape, np.asarray(mass, dtype=float), _dimensions(shape, dimensions))
-
-
-def shape_tensor(shape: str, mass: Array, dimensions: Mapping[str, Array]) -> Array:
-    """The same of arrays of any kind of number, which are not checked."""
-    definition = SHAPES[shape]
-    full = dict.fromkeys(definition.optional, 0.0) | dict(dimensions)
-    moments = [mass * np.asarray(x) for x in definition.moments(**full)]
-    diagonal = np.stack(np.broadcast_arrays(*moments), axis=-1)
-    return np.asarray(diagonal[..., None, :] * np.eye(3))
-
-
-def weighed(shape: str, dense: bool, amount: Array, **dimensions: Array) -> list[Array]:
-    """Return mass and tensor of a shape from its mass or, where it is `dense`, its density: arrays of any kind of number."""
-    measure = SHAPES[shape].measure
-    mass = amount * np.asarray(measure(**dimensions)) if dense and measure is not None else amount
-    return [mass, shape_tensor(shape, mass, dimensions)]
+    definition, values = SHAPES.get(shape), _dimensions(shape, dimensions)
+    assert definition is not None
+    m: Any = as_array(mass)
+    moments = np.broadcast_arrays(*(m * x for x in definition.moments(**values)))
+    return np.stack(moments, axis=-1)[..., None, :] * np.eye(3)
 
 
 def measure_of(shape: str, **dimensions: ArrayLike) -> tuple[Array, int]:
@@ -218,7 +207,7 @@ def measure_of(shape: str, **dimensions: ArrayLike) -> tuple[Array, int]:
     values = _dimensions(shape, dimensions)
     if definition.measure is None:
         raise ValueError(f"a {shape} has no volume: give its mass")
-    return np.asarray(definition.measure(**values), dtype=float), definition.thin
+    return as_array(definition.measure(**values)), definition.thin
 
 
 def mesh(vertices: ArrayLike, faces: ArrayLike, density: float = 1.0) -> tuple[Array, Array, Array]:
@@ -250,25 +239,30 @@ def mesh(vertices: ArrayLike, faces: ArrayLike, density: float = 1.0) -> tuple[A
     >>> round(float(m), 12), c, round(float(I[0, 0]), 12)
     (1.0, array([0.25, 0.25, 0.25]), 0.075)
     """
-    points, triangles = np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.int64)
+    points, triangles = as_array(vertices), np.asarray(faces, dtype=np.int64)
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     ahead = edges[:, 0] * len(points) + edges[:, 1]
     back = edges[:, 1] * len(points) + edges[:, 0]
     if not np.array_equal(np.sort(ahead), np.sort(back)):
         raise ValueError("the mesh is not closed: some edge has no neighbour that runs it the other way")
-    middle = points[np.unique(triangles)].mean(axis=0)
+    corners = points[np.unique(triangles)]
+    middle = corners.sum(axis=0) / len(corners)
     p = (points - middle)[triangles]
-    volume = np.linalg.det(p) / 6
+    volume = (p[:, 0] * np.cross(p[:, 1], p[:, 2])).sum(axis=-1) / 6
     total = volume.sum()
     if not total > 0:
         raise ValueError("the mesh encloses no volume, or its faces are turned inside out")
     s = p.sum(axis=1)
-    first = np.einsum("f,fi->i", volume, s) / 4
-    second = (np.einsum("f,fki,fkj->ij", volume, p, p) + np.einsum("f,fi,fj->ij", volume, s, s)) / 20
+    first = (volume[:, None] * s).sum(axis=0) / 4
+    parts = np.stack([p[:, 0], p[:, 1], p[:, 2], s], axis=1)
+    second = (
+        (volume[:, None] * np.swapaxes(parts, 0, 1))[..., None] * np.swapaxes(parts, 0, 1)[..., None, :]
+    ).sum(axis=1)
+    whole = second.sum(axis=0) / 20
     center = first / total
-    second -= total * np.outer(center, center)
-    inertia = density * (np.trace(second) * np.eye(3) - second)
-    return np.asarray(density * total), center + middle, (inertia + inertia.T) / 2
+    whole = whole - total * (center[:, None] * center)
+    inertia = density * ((whole[0, 0] + whole[1, 1] + whole[2, 2]) * np.eye(3) - whole)
+    return density * total, center + middle, (inertia + inertia.T) / 2
 
 
 def load_mesh(path: str) -> tuple[Array, NDArray[np.int64]]:

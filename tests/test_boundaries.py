@@ -75,7 +75,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("pictured",),
         ("computing",),
         ("family",),
-        ("animation", "dragged", "evaluator", "parts_of_motion", "still"),
+        ("animation", "dragged", "evaluator", "parts_of_motion", "pieces", "still"),
         ("forces", "quantities", "table"),
         ("picture",),
         ("study",),
@@ -94,8 +94,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("animation", "picture"),
         ("rounding_in_time", "solids", "traced"),
         ("inertia",),
-        ("rounding",),
-        ("attitude", "elliptic", "shapes", "top_roots"),
+        ("attitude", "eigenvectors", "elliptic", "shapes", "top_roots"),
     ),
     "cli": (
         ("__main__",),

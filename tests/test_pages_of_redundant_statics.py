@@ -15,14 +15,14 @@ from virtualwork import Mechanism
 from virtualwork.describe.dimensions import changed, dimensions, value
 from virtualwork.formulas.lanes import over_blocks
 from virtualwork.motion import Motion
-from virtualwork.quantities import Quantity, forces
+from virtualwork.quantities import Component, forces
 
 pytestmark = needs_node
 
 
-def everything(motion: Motion) -> tuple[dict[str, Quantity], str]:
+def everything(motion: Motion) -> tuple[dict[str, Component], str]:
     """The forces of a motion by their names, and its page."""
-    every: dict[str, Quantity] = {}
+    every: dict[str, Component] = {}
     for each in forces(motion.mechanism, motion.dynamics.reactions.order.pairs):
         if each.key and not each.less:
             every.setdefault(each.names[0], each)
@@ -31,7 +31,7 @@ def everything(motion: Motion) -> tuple[dict[str, Quantity], str]:
     return every, page
 
 
-def compare(rows: Any, motion: Motion, every: dict[str, Quantity]) -> None:
+def compare(rows: Any, motion: Motion, every: dict[str, Component]) -> None:
     """Hold the curves of a page against the program's."""
     right = []
     for each in every.values():

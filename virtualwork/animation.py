@@ -21,9 +21,10 @@ from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.drawing import Circle, Coil, Drawing, Line, Row, Shape, tracers
 from virtualwork.forces import Forces
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.kinematics import AnglePartial, PointPartial
 from virtualwork.formulas.numbers import xy
 from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.table import columns
 
 if TYPE_CHECKING:
@@ -165,7 +166,7 @@ class Series:
             if all(column in self._index for column in columns):
                 entry[key] = [self._index[column] for column in columns]
         if unit and body != GROUND:
-            rates = self._unit_rates(("dpoint", body, place, name, 0, 1))
+            rates = self._unit_rates(PointPartial(body, place, name, 0, 1))
             entry["v"] = [
                 self._add(f"{name} {axis}", v, exact=False) for axis, v in zip("xy", rates, strict=True)
             ]
@@ -188,11 +189,11 @@ class Series:
             entry["omega"] = self._index.get(f"{name}_omega_rad_s")
             entry["alpha"] = self._index.get(f"{name}_alpha_rad_s2")
             if unit:
-                (rate,) = self._unit_rates(("dangle", name, 0, 1))
+                (rate,) = self._unit_rates(AnglePartial(name, 0, 1))
                 entry["omega"] = self._add(f"{name} omega", rate, exact=False)
         return entry
 
-    def _unit_rates(self, key: Key) -> list[Any]:
+    def _unit_rates(self, key: Quantity) -> list[Any]:
         """Return the columns of a derivative to the one input, that of x and of y."""
         z = self.poses.values([key])[0]
         return list(xy(z).T) if np.iscomplexobj(z) else [z]

@@ -7,7 +7,6 @@ What a tape has not is left to a page that replays: `refused` says what.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,21 +22,26 @@ from dalembert.page.typed import units
 from virtualwork.animation import JointForce, Series, moving_page
 from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.guess import informed
-from virtualwork.describe import DescriptionError
+from virtualwork.branch.sampling import FINE
+from virtualwork.branch.track import SAMPLES
 from virtualwork.describe.description import Description, known_by_guess
-from virtualwork.describe.dimensions import Dimension, changed, dimensions, value
-from virtualwork.describe.text import toml_text
+from virtualwork.describe.dimensions import Dimension, dimensions, value
 from virtualwork.dragged import cams, drawn_numbers, handles, profiles
 from virtualwork.drawing import Drawing, draw
 from virtualwork.family.written import Written
 from virtualwork.forces import Forces
-from virtualwork.formulas.asked import FORCES, JOINTS, Key, names
-from virtualwork.formulas.balanced import Balanced
+from virtualwork.formulas.balanced import Balanced, Over
+from virtualwork.formulas.forces import Effort
+from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.loads import Tabled
+from virtualwork.formulas.loops import Closed, Margin, Twist
 from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.quantity import Quantity
+from virtualwork.formulas.rubbing import Rub, Slip
 from virtualwork.picture.paper import travel_of
+from virtualwork.pieces import toml_pieces
 from virtualwork.plan.steps import Group
-from virtualwork.quantities import Quantity, places
+from virtualwork.quantities import Component, places
 from virtualwork.quantities import forces as quantities_of_forces
 from virtualwork.study.free_bodies import parts
 
@@ -79,14 +83,14 @@ class Computed(Series):
         ]
         return {"loose": loose}
 
-    def _hidden(self, key: Key) -> list[int]:
+    def _hidden(self, key: Quantity) -> list[int]:
         """Columns of a quantity that the page does not list."""
         return [self._add(f"{key} {i}", column) for i, column in enumerate(self._unit_rates(key))]
 
-    def _unit_rates(self, key: Key) -> list[Any]:
+    def _unit_rates(self, key: Quantity) -> list[Any]:
         assert self.of is not None
-        row = self.of.row(key)
-        return [{"row": row + i} for i in range(len(names(key)))]
+        row, rest = self.of.row(key), self.of.locking(key)
+        return [{"row": row + i, **rest} for i in range(len(key.names))]
 
     def _add(self, name: str, values: Any, header: str = "", owner: str = "", exact: bool = True) -> int:
         if not isinstance(values, dict):
@@ -117,7 +121,7 @@ class Formulas:
         self.assembly, self.poses, self.order = assembly, poses, order
         self.mechanism: Description = assembly.mechanism
         self.dimensions = dimensions(self.mechanism)
-        self.keys: dict[Key, int] = {}
+        self.keys: dict[Quantity, int] = {}
         self._rows = 0
 
     @cached_property
@@ -127,25 +131,19 @@ class Formulas:
         moves = (True, True, self.order > ORDERS)
         return Written(self.assembly, fixed, moves, True, settled=False, recording=Balanced)
 
-    def refused(self, keys: Sequence[Key]) -> str:
+    def refused(self, keys: Sequence[Quantity]) -> str:
         """Say why a page cannot compute these quantities; empty where it can."""
         m, own = self.mechanism, self.assembly
-        forces = any(key[0] in FORCES for key in keys)
+        forces = any(key.is_force for key in keys)
         _ = own.track
         if not m.inputs:
             return "nothing drives it"
-        if own.geared:
-            return "a gear needs angles with their whole turns"
         if own.folded:
             return "loops are singular in every pose"
-        if forces and m.friction:
-            return "friction is found by iteration"
         if {g.name: g.kind for g in self.written.plan.groups} != {g.name: g.kind for g in own.plan.groups}:
             return "its loops have a closed form for these numbers alone"
-        if self.written.open_gears:
-            return "a gear's phase depends on links that the guess places"
         if not self.written.recording.takes(keys):
-            return "the joint forces are statically redundant, and there are racks or cams"
+            return "the joint forces are statically redundant, and there are racks, cams or friction"
         if forces:
             if any(load.axis == "time" for load in self.written.recording.tables) and self.poses.time is None:
                 return "a torque is given over the time, which the poses have not"
@@ -153,25 +151,30 @@ class Formulas:
                 return "a torsion spring counts its turns along several inputs"
         return ""
 
-    def row(self, key: Key) -> int:
+    def row(self, key: Quantity) -> int:
         """The first row of a quantity on the tape of the poses, which gets it."""
         if key not in self.keys:
             self.keys[key] = self._rows
-            self._rows += len(names(key))
+            self._rows += len(key.names)
         return self.keys[key]
 
-    def column(self, each: Quantity, si: float = 1.0) -> dict[str, Any]:
+    def column(self, each: Component, si: float = 1.0) -> dict[str, Any]:
         """What a column or a name asks the tape of the poses for."""
         if not each.key:
             return {"zero": 1}
-        found: dict[str, Any] = {"row": self.row(each.key) + each.imaginary}
+        found: dict[str, Any] = {"row": self.row(each.key) + each.imaginary, **self.locking(each.key)}
         if each.less:
             found["less"] = self.row(each.less)
-        if each.turns:
+        if each.link:
             found["turns"] = 1
         if each.order:
             found["order"] = each.order
         return found
+
+    def locking(self, key: Quantity) -> dict[str, Any]:
+        """That a quantity depends on the friction of joints, and has no value where they lock."""
+        locks = self.mechanism.friction and (key.is_joint_force or isinstance(key, Effort))
+        return {"locks": 1} if locks else {}
 
     # --- tapes ----------------------------------------------------------------------------------------------------
     def tapes(self, drawn: Mapping[str, Number]) -> dict[str, Tape]:
@@ -179,24 +182,33 @@ class Formulas:
         written = self.written
         groups = written.plan.groups
         closed = [g.name for g in written.closed]
-        every = ("closed", *(g.name for g in groups))
+        every = Closed(tuple(g.name for g in groups))
         found = {
             "pose": written.tape((*self.keys, every)),
             "choice": written.choice,
-            "margins": written.tape([("margin", name) for name in closed]),
+            "margins": written.tape([Margin(name) for name in closed]),
             "short": written.short,
             "drawn": written.recording.recorder.tape(dict(drawn)),
         }
         found |= profiles(written.mechanism, written.recording.recorder)
         if self._bears:
             found["statics"] = self._bears.statics
+        if self._rubs:
+            names = [f"friction {n}" for n in range(self._rubs)]
+            rubs = [Rub(n) for n in range(self._rubs)]
+            found["slips"] = written.tape([Slip(n) for n in range(self._rubs)])
+            found["rubs"] = written.tape(rubs)
+            found["slopes"] = written.evaluation(rubs, tuple(names), False)
         if self._loaded and self.written.recording.tables:
-            found["over"] = written.tape([("over", i) for i in range(len(self.written.recording.tables))])
+            found["over"] = written.tape([Over(i) for i in range(len(self.written.recording.tables))])
         if any(g.kind == "Newton" for g in groups):
             found |= {"steps": written.steps, "guessed": written.guessed}
+        winding = [body for g in written.closed for body in self._closed(g)["winds"]]
+        if winding:
+            found["winds"] = written.tape([Angle(body, 0) for body in winding])
         if self.mechanism.torsion_springs:
             springs = range(len(self.mechanism.torsion_springs))
-            found["twists"] = written.tape([("twist", i) for i in springs])
+            found["twists"] = written.tape([Twist(i) for i in springs])
         return found
 
     def document(self) -> dict[str, Any]:
@@ -207,7 +219,7 @@ class Formulas:
         groups = [
             {
                 "name": g.name,
-                **(self._iterated(g) if g.name in iterated else {"sign": self.assembly.signs[g.name]}),
+                **(self._iterated(g) if g.name in iterated else self._closed(g)),
             }
             for g in written.plan.groups
             if g.name in closed or g.name in iterated
@@ -216,6 +228,8 @@ class Formulas:
             "dimensions": [self._dimension(d) for d in self.dimensions.values()],
             "inputs": [self._input(j) for j in range(len(m.inputs))],
             "groups": groups,
+            "phases": written.phases,
+            "pace": self._pace,
             "springs": [s.turns for s in m.torsion_springs],
             "tables": [self._table(load) for load in self.written.recording.tables] if self._loaded else [],
             "files": self._files(),
@@ -225,13 +239,20 @@ class Formulas:
             "n": self.poses.n,
             "comesBack": bool(iterated and len(m.inputs) == 1 and self.assembly.track.whole),
             "rates": [bool(np.any(rate)) for rate in self.poses.rates[0]],
-            "toml": self._toml(),
+            "toml": toml_pieces(m, list(self.dimensions)),
         }
 
     @property
     def _loaded(self) -> bool:
         """Whether forces are among the quantities."""
-        return any(key[0] in FORCES for key in self.keys)
+        return any(key.is_force for key in self.keys)
+
+    @property
+    def _rubs(self) -> int:
+        """How many contacts have friction, where forces are among the quantities."""
+        recording = self.written.recording
+        assert isinstance(recording, Balanced)
+        return recording.contacts if self._loaded else 0
 
     def _files(self) -> list[str]:
         """The tables that stand beside the file."""
@@ -244,7 +265,7 @@ class Formulas:
         """The formulas, where joint forces are among the quantities and statics alone is redundant."""
         recording = self.written.recording
         assert isinstance(recording, Balanced)
-        return recording if any(key[0] in JOINTS for key in self.keys) and recording.redundant else None
+        return recording if any(key.is_joint_force for key in self.keys) and recording.redundant else None
 
     @staticmethod
     def _statics(of: Balanced) -> dict[str, Any]:
@@ -264,6 +285,22 @@ class Formulas:
             "periodic": load.periodic,
             "turns": bool(bases),
         }
+
+    def _closed(self, group: Group) -> dict[str, Any]:
+        """A group with a closed form: its sign, and which of its links' whole turns are counted."""
+        winding = self.written.recording.geared.intersection(group.members)
+        return {"sign": self.assembly.signs[group.name], "winds": sorted(winding)}
+
+    @property
+    def _pace(self) -> int:
+        """How many times finer than usual the page has to look along the input, for what gears turn fast."""
+        track = self.assembly.track
+        if not track.active:
+            return 1
+        usual = (self.mechanism.size if track.slides else 2 * np.pi) / SAMPLES
+        pace = track.pace
+        fast = [max([pace.fastest(g), *pace.driving(g).values()]) for g in self.assembly.plan.groups]
+        return max(1, *(int(np.ceil(usual * of / FINE)) for of in fast), 1)
 
     def _iterated(self, group: Group) -> dict[str, Any]:
         """A group without a closed form: its unknowns at the guess, and what the guess says of them."""
@@ -299,54 +336,11 @@ class Formulas:
             "sweep": packed(self.poses.inputs[:, j]),
         }
 
-    def _toml(self) -> list[Any] | None:
-        """The file in pieces: lines of text and paths; what was left out as it is the default stands only where it was changed."""
-        m = self.mechanism
-        try:
-            own = toml_text(m)
-            marked = {
-                d.path: 0.5 + (i + 1) * 1.000123456789e-4 for i, d in enumerate(self.dimensions.values())
-            }
-            text = toml_text(changed(m, marked))
-        except DescriptionError:
-            return None
-        known = set(_keyed(own))
-        marks = {repr(number): path for path, number in marked.items()}
-        lines: list[Any] = []
-        for (head, key), line in zip(_keyed(text), text.splitlines(), strict=True):
-            pieces: list[Any] = [""]
-            for word in _words(line):
-                if word in marks:
-                    pieces += [[marks[word]], ""]
-                else:
-                    pieces[-1] += word
-            lines.append({"of": pieces, "needed": (head, key) in known or not key})
-        found = {word for line in text.splitlines() for word in _words(line)} & set(marks)
-        return lines if len(found) == len(marks) else None
-
-
-def _words(line: str) -> list[str]:
-    """A line of TOML in numbers and what stands between them."""
-    return re.split(r"((?<![\w.\"+-])\d+\.\d+(?![\w.\"]))", line)
-
-
-def _keyed(text: str) -> list[tuple[str, str]]:
-    """Each line's table and key; tables of a list are counted."""
-    found, head, count = [], "", 0
-    for line in text.splitlines():
-        if line.startswith("["):
-            count += 1
-            head = f"{line} {count}"
-            found.append((head, ""))
-        else:
-            found.append((head, line.partition(" = ")[0] if " = " in line else ""))
-    return found
-
 
 def computing_page(
     poses: Poses,
-    columns: Mapping[str, tuple[Quantity | int, Shown]],
-    named: Sequence[Quantity],
+    columns: Mapping[str, tuple[Component | int, Shown]],
+    named: Sequence[Component],
     forces: Sequence[JointForce] = (),
     bare_units: Mapping[str, str] | None = None,
     others: Sequence[Series] = (),
@@ -362,7 +356,7 @@ def computing_page(
         Over the sweep.
     columns : mapping
         What is listed: of each column its quantity, or the number of an input, and its header with its unit.
-    named : sequence of Quantity
+    named : sequence of Component
         What can be asked for by name.
     bare_units : mapping of kind to unit
         The units of lengths and angles that are typed and shown: those of the file.
@@ -435,7 +429,7 @@ def page_of(poses: Poses, drawing: Drawing, forces: Forces | None = None, over: 
         arrows = [JointForce.of(*pair) for pair in pairs]
     degree = float(np.pi / 180)
     several = len(m.inputs) > 1
-    columns: dict[str, tuple[Quantity | int, Shown]] = {}
+    columns: dict[str, tuple[Component | int, Shown]] = {}
     for j, entry in enumerate(m.inputs):
         header = f"{entry.name}_input_m" if entry.is_slide else f"{entry.name}_input_deg"
         header = header if several else header.removeprefix(f"{entry.name}_")

@@ -15,9 +15,11 @@ from numpy.typing import ArrayLike
 from dalembert.hints import nearest
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError
-from virtualwork.formulas.asked import COMPLEX, Key
+from virtualwork.formulas.forces import Effort, Reaction, Shaking, ShakingMoment
+from virtualwork.formulas.kinematics import Angle, Point, Slide
 from virtualwork.formulas.lanes import Lanes, Ready, ready, recorded, taped
 from virtualwork.formulas.numbers import xy
+from virtualwork.formulas.quantity import Quantity
 
 POINT = ("position", "velocity", "acceleration", "jerk")
 LINK = ("angle", "omega", "alpha", "jerk")
@@ -82,7 +84,7 @@ class Evaluator:
                     }
         numbers = Lanes(self.assembly, angle, speed, acceleration, jerk).values(self.keys)
         shown = {
-            name: xy(value) if key[0] in COMPLEX else value
+            name: xy(value) if key.is_vector else value
             for name, key, value in zip(self.wanted, self.keys, numbers, strict=True)
         }
         if np.ndim(angle):
@@ -96,7 +98,7 @@ class Evaluator:
         return taped(self.assembly, recorded(self.assembly, (speed, acceleration, False)), self.keys).cost
 
 
-def key_of(assembly: Assembly, name: str) -> Key:
+def key_of(assembly: Assembly, name: str) -> Quantity:
     """The key of a quantity called as in the JSON output: `points.H.velocity`, `reactions.B.coupler`.
 
     Raises
@@ -118,23 +120,23 @@ def key_of(assembly: Assembly, name: str) -> Key:
     if kind == "points" and of:
         # on the body on which a motion takes it too: an estimate is of that motion's own digits
         body, _ = m.points[known(of[0], m.points, "point")]
-        return "point", body, 0j, of[0], order(POINT)
+        return Point(body, 0j, of[0], order(POINT))
     if kind == "links" and of:
-        return "angle", known(of[0], m.links, "link"), order(LINK)
+        return Angle(known(of[0], m.links, "link"), order(LINK))
     if kind == "slides" and of:
         guides = {guide.point: i for i, guide in enumerate(m.guides)}
-        return "slide", guides[known(of[0], guides, "slot or slider")], order(SLIDE)
+        return Slide(guides[known(of[0], guides, "slot or slider")], order(SLIDE))
     if kind == "effort":
         inputs = {entry.name: j for j, entry in enumerate(m.inputs)}
-        return "effort", inputs[known(of[0], inputs, "input")] if of else 0
+        return Effort(inputs[known(of[0], inputs, "input")] if of else 0)
     if kind == "reactions" and len(of) == 2:
         forces = recorded(assembly, (True, True, False)).forces[1]
         there = {joint.name: joint for joint in forces.joints if of[1] in joint.bodies}
-        return "reaction", known(of[0], there, f"joint of {of[1]}"), of[1]
+        return Reaction(known(of[0], there, f"joint of {of[1]}"), of[1])
     if name == "shaking.force":
-        return ("shaking",)
+        return Shaking()
     if name == "shaking.moment":
-        return ("shaking moment",)
+        return ShakingMoment()
     raise DescriptionError(
         f"'{name}': expected points.NAME.velocity, links.NAME.omega, slides.NAME.speed, effort, reactions.JOINT.LINK, "
         "shaking.force or shaking.moment"

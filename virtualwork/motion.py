@@ -24,10 +24,11 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import Point, as_point
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.forces import Effort, Reaction, Shaking, ShakingMoment
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.one_pose import one_pose
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.parts_of_motion import LinkMotion, PointMotion, SlideMotion
 from virtualwork.pictured import Pictured
 from virtualwork.plan.steps import Step
@@ -175,15 +176,15 @@ class Motion(Pictured):
                 return SlideMotion(self, i)
         raise DescriptionError(f"no slot or slider runs at a point named '{name}'")
 
-    def values(self, keys: Sequence[Key]) -> list[Any]:
+    def values(self, keys: Sequence[Quantity]) -> list[Any]:
         """Quantities by their keys (`Recording.value`), (n,) each."""
         return self._values(tuple(keys))
 
-    def value(self, key: Key) -> Any:
+    def value(self, key: Quantity) -> Any:
         """A quantity by its key, (n,)."""
         return self._values((key,))[0]
 
-    def _values(self, keys: tuple[Key, ...]) -> list[Any]:
+    def _values(self, keys: tuple[Quantity, ...]) -> list[Any]:
         if self._one is not None:
             result = self._one.values(keys)
             if result is not None:
@@ -226,13 +227,13 @@ class Motion(Pictured):
         from virtualwork.evaluator import key_of
 
         keys = {name: key_of(self.assembly, name) for name in names}
-        joints = {name: key for name, key in keys.items() if key[0] == "reaction"}
+        joints = {name: key for name, key in keys.items() if isinstance(key, Reaction)}
         self.rounding.together(key for name, key in keys.items() if name not in joints)
         estimates = {name: self.rounding.of(key) for name, key in keys.items() if name not in joints}
         if joints:
             errors = self.dynamics.error_estimate()
             errors.together(joints.values())
-            estimates |= {name: errors.reaction(*key[1:]) for name, key in joints.items()}
+            estimates |= {name: key.read(errors) for name, key in joints.items()}
         return {name: estimates[name] for name in names}
 
     # --- forces -----------------------------------------------------------------------------------------------
@@ -249,7 +250,7 @@ class Motion(Pictured):
 
         Static where speed and acceleration are zero (Riul, unit II, eq. 3), else with inertia loads (eq. 5).
         """
-        result = self._values(tuple(("effort", j) for j in range(len(self.mechanism.inputs))))
+        result = self._values(tuple(Effort(j) for j in range(len(self.mechanism.inputs))))
         return result[0] if len(result) == 1 else np.stack(result, axis=1)
 
     def reaction(self, joint: str, on: str) -> Reals:
@@ -262,7 +263,7 @@ class Motion(Pictured):
         on : str
             A link that the joint holds.
         """
-        return xy(self._values((("reaction", joint, on),))[0])
+        return xy(self._values((Reaction(joint, on),))[0])
 
     def applied(self, link: str) -> tuple[Complexes, Reals]:
         """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""
@@ -300,7 +301,7 @@ class Motion(Pictured):
 
         return Sensitivities(self.assembly, self.poses)
 
-    def derivative(self, key: Key, path: str) -> Any:
+    def derivative(self, key: Quantity, path: str) -> Any:
         """The derivative (n,) of a quantity, by its key (`Recording.value`), to the number at a path."""
         sensitivities = self.sensitivities
         return sensitivities.of([key], [sensitivities.dimension(path)])[0][0]
@@ -332,12 +333,12 @@ class Motion(Pictured):
         """
         if what == "effort":
             k = self.inputs.shape[1]
-            slopes = [self.derivative(("effort", j), path) for j in range(k)]
+            slopes = [self.derivative(Effort(j), path) for j in range(k)]
             return np.asarray(slopes[0]) if k == 1 else np.stack(slopes, axis=1)
         if what == "shaking force":
-            return xy(self.derivative(("shaking",), path))
+            return xy(self.derivative(Shaking(), path))
         if what == "shaking moment":
-            return np.asarray(self.derivative(("shaking moment",), path))
+            return np.asarray(self.derivative(ShakingMoment(), path))
         raise ValueError(f"'{what}': expected effort, shaking force or shaking moment")
 
     # --- as a table -------------------------------------------------------------------------------------------------

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Protocol
 
 from virtualwork.describe.description import Description
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.kinematics import Angle, AnglePartial, Point, PointPartial, Slide
 from virtualwork.formulas.numbers import Complexes, Reals, xy
+from virtualwork.formulas.quantity import Quantity
 
 if TYPE_CHECKING:
     from virtualwork.digits.estimates import Estimates
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 class Asked(Protocol):
     """What has quantities: the motion of one mechanism, (n,) each, or of variants, (v, n) each."""
 
-    def value(self, key: Key) -> Any:
+    def value(self, key: Quantity) -> Any:
         """A quantity by its key (`Recording.value`)."""
 
 
@@ -34,7 +35,7 @@ class Whole(Asked, Protocol):
     def rounding(self) -> Estimates:
         """Estimates of its rounding errors."""
 
-    def derivative(self, key: Key, path: str) -> Any:
+    def derivative(self, key: Quantity, path: str) -> Any:
         """The derivative of a quantity to a number of the description."""
 
 
@@ -47,7 +48,7 @@ class PartOfMotion:
     def __init__(self, motion: Asked) -> None:
         self.motion = motion
 
-    def key(self, order: int = 0) -> Key:
+    def key(self, order: int = 0) -> Quantity:
         """What the position, the angle or a rate is asked for by (`Recording.value`)."""
         raise NotImplementedError
 
@@ -89,8 +90,8 @@ class PointRates(PartOfMotion):
         """The order-th time derivative as x + iy, (n,)."""
         return self.motion.value(self.key(order))  # type: ignore[no-any-return]
 
-    def key(self, order: int = 0) -> Key:
-        return "point", self.body, self._where, self.node, order
+    def key(self, order: int = 0) -> Quantity:
+        return Point(self.body, self._where, self.node, order)
 
 
 class LinkRates(PartOfMotion):
@@ -120,8 +121,8 @@ class LinkRates(PartOfMotion):
         """(n,) rad/s³ (Ibrahim eq. 1.5.3)."""
         return self.value(3)
 
-    def key(self, order: int = 0) -> Key:
-        return "angle", self.body, order
+    def key(self, order: int = 0) -> Quantity:
+        return Angle(self.body, order)
 
 
 class SlideRates(PartOfMotion):
@@ -151,8 +152,8 @@ class SlideRates(PartOfMotion):
         """(n,) m/s³."""
         return self.value(3)
 
-    def key(self, order: int = 0) -> Key:
-        return "slide", self.guide, order
+    def key(self, order: int = 0) -> Quantity:
+        return Slide(self.guide, order)
 
 
 class OfOneMechanism(PartOfMotion):
@@ -228,7 +229,7 @@ class PointMotion(OfOneMechanism, PointRates):
 
     def coefficient(self, j: int = 0) -> Complexes:
         """The velocity coefficient dP/dq_j as x + iy, (n,): the point's virtual displacement for a unit of input j."""
-        return self.motion.value(("dpoint", self.body, self._where, self.node, j, 1))  # type: ignore[no-any-return]
+        return self.motion.value(PointPartial(self.body, self._where, self.node, j, 1))  # type: ignore[no-any-return]
 
 
 class LinkMotion(OfOneMechanism, LinkRates):
@@ -247,7 +248,7 @@ class LinkMotion(OfOneMechanism, LinkRates):
 
     def coefficient(self, j: int = 0) -> Reals:
         """The velocity coefficient dθ/dq_j, (n,): the link's virtual rotation for a unit of input j."""
-        return self.motion.value(("dangle", self.body, j, 1))  # type: ignore[no-any-return]
+        return self.motion.value(AnglePartial(self.body, j, 1))  # type: ignore[no-any-return]
 
 
 class SlideMotion(OfOneMechanism, SlideRates):

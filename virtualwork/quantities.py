@@ -11,7 +11,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from virtualwork.describe.description import Description
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.forces import (
+    Contact,
+    Effort,
+    JointForce,
+    JointMoment,
+    NewtonEuler,
+    Shaking,
+    ShakingMoment,
+)
+from virtualwork.formulas.kinematics import Angle, CurvatureRadius, Point, PressureAngle, Slide
+from virtualwork.formulas.quantity import NOTHING, Quantity
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,21 +36,21 @@ LINK = ("angle_deg", "omega_rad_s", "alpha_rad_s2", "jerk_rad_s3")
 SLIDE = ("position_m", "speed_m_s", "acceleration_m_s2", "jerk_m_s3")
 FORCE = ("fx_N", "fy_N")
 # of a cam
-TOUCH = (("pressure angle", "deg"), ("curvature radius", "m"))
-CONTACT = (("contact force", "N"),)
+TOUCH = (("pressure_angle_deg", PressureAngle), ("curvature_radius_m", CurvatureRadius))
+CONTACT = (("contact_force_N", Contact),)
 
 
-class Quantity(NamedTuple):
+class Component(NamedTuple):
     """A number that is shown of every pose."""
 
     path: tuple[Any, ...]
     """Where it stands in JSON, a reaction below (joint, on, from); empty where tables alone have it."""
     header: str
-    key: Key = ()
-    """What a motion computes for it (`Recording.value`); empty for what is zero throughout, or no motion has."""
+    key: Quantity = NOTHING
+    """What a motion computes for it ; nothing for what is zero throughout, or no motion has."""
     imaginary: bool = False
     """Whether it is the y of a vector."""
-    less: Key = ()
+    less: Quantity = NOTHING
     """What is subtracted."""
     names: tuple[str, ...] = ()
     """What `--only` calls it: `H.x`, `B.coupler.fx`, `B.coupler.guide.fx`."""
@@ -54,14 +64,14 @@ class Quantity(NamedTuple):
     """Whether it is the other side of a joint force, shown only where its full name is requested."""
 
     @property
-    def turns(self) -> bool:
-        """Whether it is an angle, shown in degrees."""
-        return self.key[:1] == ("angle",) and not self.key[2]
+    def link(self) -> str:
+        """The link whose angle it is; empty of all else."""
+        return self.key.body if isinstance(self.key, Angle) and self.key.is_angle else ""
 
     @property
     def in_degrees(self) -> bool:
         """Whether it is shown in degrees: an angle, or one that has a sign."""
-        return self.turns or self.key[:1] == ("pressure angle",)
+        return self.key.is_angle
 
     def of(self, value: Any) -> Reals:
         """The number as it is shown, from the quantity or from its slope."""
@@ -75,24 +85,24 @@ class Quantity(NamedTuple):
         return np.asarray(np.degrees(part) if self.in_degrees else part)
 
 
-def vector(path: tuple[Any, ...], lead: str, names: Sequence[str], key: Key) -> list[Quantity]:
+def vector(path: tuple[Any, ...], lead: str, names: Sequence[str], key: Quantity) -> list[Component]:
     """The two components of a vector."""
-    return [Quantity((*path, name), f"{lead}{name}", key, imaginary=bool(i)) for i, name in enumerate(names)]
+    return [Component((*path, name), f"{lead}{name}", key, imaginary=bool(i)) for i, name in enumerate(names)]
 
 
-def called(quantities: Iterable[Quantity], owner: str, order: int = 0) -> list[Quantity]:
+def called(quantities: Iterable[Component], owner: str, order: int = 0) -> list[Component]:
     """Quantities with the names that a point, link or slide has for them: `H.vx`."""
     return [
         each._replace(names=(f"{owner}.{_word(each)}",), owners=(owner,), order=order) for each in quantities
     ]
 
 
-def _word(each: Quantity) -> str:
+def _word(each: Component) -> str:
     """The name of a quantity without its unit: `vx` of `vx_m_s`."""
     return str(each.path[-1]).partition("_")[0]
 
 
-def points(m: Description, names: Iterable[str], order: int) -> list[Quantity]:
+def points(m: Description, names: Iterable[str], order: int) -> list[Component]:
     """Places of points and their rates up to an order."""
     return [
         part
@@ -100,12 +110,12 @@ def points(m: Description, names: Iterable[str], order: int) -> list[Quantity]:
         for k in range(order + 1)
         # the name says where on the body
         for part in called(
-            vector(("points", name), f"{name}_", POINT[k], ("point", m.points[name][0], 0j, name, k)), name, k
+            vector(("points", name), f"{name}_", POINT[k], Point(m.points[name][0], 0j, name, k)), name, k
         )
     ]
 
 
-def slides(m: Description, names: Iterable[str], order: int) -> list[Quantity]:
+def slides(m: Description, names: Iterable[str], order: int) -> list[Component]:
     """Travels along guides and their rates up to an order."""
     guides = {g.point: i for i, g in reversed(list(enumerate(m.guides)))}
     return [
@@ -113,24 +123,24 @@ def slides(m: Description, names: Iterable[str], order: int) -> list[Quantity]:
         for name in names
         for k in range(order + 1)
         for part in called(
-            [Quantity(("slides", name, SLIDE[k]), f"{name}_{SLIDE[k]}", ("slide", guides[name], k))], name, k
+            [Component(("slides", name, SLIDE[k]), f"{name}_{SLIDE[k]}", Slide(guides[name], k))], name, k
         )
     ]
 
 
-def links(names: Iterable[str], order: int) -> list[Quantity]:
+def links(names: Iterable[str], order: int) -> list[Component]:
     """Angles of links and their rates up to an order."""
     return [
         part
         for name in names
         for k in range(order + 1)
         for part in called(
-            [Quantity(("links", name, LINK[k]), f"{name}_{LINK[k]}", ("angle", name, k))], name, k
+            [Component(("links", name, LINK[k]), f"{name}_{LINK[k]}", Angle(name, k))], name, k
         )
     ]
 
 
-def places(m: Description, order: int, words: Iterable[str] = ()) -> list[Quantity]:
+def places(m: Description, order: int, words: Iterable[str] = ()) -> list[Component]:
     """All that moves, in the order of tables, and the vectors between two points that these words name."""
     guided = dict.fromkeys(g.point for g in m.guides)
     every = [*points(m, m.points, order), *slides(m, guided, order), *links(m.links, order)]
@@ -139,18 +149,18 @@ def places(m: Description, order: int, words: Iterable[str] = ()) -> list[Quanti
     return [*every, *touches, *(part for pair in pairs for part in between(m, *pair, order))]
 
 
-def cam(m: Description, number: int, of: Iterable[tuple[str, str]]) -> list[Quantity]:
+def cam(m: Description, number: int, of: Iterable[tuple[str, type[Quantity]]]) -> list[Component]:
     """What a cam has beside its follower's place, under the name of the follower."""
     name = str(m.cams[number].slider or m.cams[number].follower)
     return [
-        Quantity(
-            ("cams", name, f"{kind.replace(' ', '_')}_{unit}"),
-            f"{name}_{kind.replace(' ', '_')}_{unit}",
-            (kind.removesuffix(" force"), number),
-            names=(f"{name}.{kind.replace(' ', '_')}",),
+        Component(
+            ("cams", name, header),
+            f"{name}_{header}",
+            kind(number),
+            names=(f"{name}.{header.rpartition('_')[0]}",),
             owners=(name,),
         )
-        for kind, unit in of
+        for header, kind in of
     ]
 
 
@@ -163,7 +173,7 @@ def _two_points(m: Description, word: str) -> tuple[str, str] | None:
     return None
 
 
-def between(m: Description, p: str, q: str, order: int) -> list[Quantity]:
+def between(m: Description, p: str, q: str, order: int) -> list[Component]:
     """The vector R_PQ from Q to P (Ibrahim §1.2), Cartesian and polar, and its rates: `P-Q.x`, `P-Q.length`.
 
     >>> from virtualwork import Link
@@ -173,11 +183,11 @@ def between(m: Description, p: str, q: str, order: int) -> list[Quantity]:
     """
     name, parts_of = f"{p}-{q}", []
     for k in range(order + 1):
-        to, start = (("point", m.points[point][0], 0j, point, k) for point in (p, q))
+        to, start = (Point(m.points[point][0], 0j, point, k) for point in (p, q))
         parts = vector(("vectors", name), f"{name}_", POINT[k], to)
         if k == 0:
             for kind, header in (("length", "length_m"), ("angle", "angle_deg")):
-                parts.append(Quantity(("vectors", name, header), f"{name}_{header}", to, polar=kind))
+                parts.append(Component(("vectors", name, header), f"{name}_{header}", to, polar=kind))
         parts_of += [part._replace(less=start) for part in called(parts, name, k)]
     return parts_of
 
@@ -187,50 +197,52 @@ def effort_name(slide: bool) -> str:
     return "force_N" if slide else "torque_N_m"
 
 
-def forces(m: Description, pairs: Iterable[tuple[Joint, str, str]]) -> list[Quantity]:
+def forces(m: Description, pairs: Iterable[tuple[Joint, str, str]]) -> list[Component]:
     """The effort of every input both ways and their difference, and what the joints carry and the ground feels."""
     result = []
     for j, entry in enumerate(m.inputs):
         name, several = effort_name(entry.is_slide), len(m.inputs) > 1
         lead = f"{entry.name}_" if several else ""
         path = ("effort", "inputs", entry.name) if several else ("effort",)
-        euler, work = ("newton-euler", j), ("effort", j)
+        euler, work = NewtonEuler(j), Effort(j)
         word, owner = name.partition("_")[0], str(entry.name)
         every = [
-            Quantity((*path, f"input_{name}"), f"{lead}input_{name}", euler, names=(f"{owner}.{word}",)),
-            Quantity(
+            Component((*path, f"input_{name}"), f"{lead}input_{name}", euler, names=(f"{owner}.{word}",)),
+            Component(
                 (*path, f"virtual_work_{name}"),
                 f"{lead}virtual_work_{name}",
                 work,
                 names=(f"{owner}.virtual_work_{word}",),
             ),
-            Quantity((), f"{lead}difference_{name}", euler, less=work, names=(f"{owner}.difference_{word}",)),
+            Component(
+                (), f"{lead}difference_{name}", euler, less=work, names=(f"{owner}.difference_{word}",)
+            ),
         ]
         result += [each._replace(owners=(owner,)) for each in every]
     touches = [part for number in range(len(m.cams)) for part in cam(m, number, CONTACT)]
     return [*result, *reactions(m, pairs), *touches]
 
 
-def reactions(m: Description, pairs: Iterable[tuple[Joint, str, str]]) -> list[Quantity]:
+def reactions(m: Description, pairs: Iterable[tuple[Joint, str, str]]) -> list[Component]:
     """What the joints carry, on one side and on the other, and what shakes the ground."""
     rub = {each.joint for each in m.friction}
-    result: list[Quantity] = []
+    result: list[Component] = []
     for joint, on, of in pairs:
         result += _joint_force(joint, on, of, joint.guide is not None or joint.name in rub)
         if len(joint.bodies) == 2:
             other = _joint_force(joint, of, on, joint.guide is not None or joint.name in rub)
             result += [each._replace(reverse=True, owners=(f"{joint.name}.{of}",)) for each in other]
-    shaking = vector(("shaking",), "shaking_", FORCE, ("shaking",))
-    shaking.append(Quantity(("shaking", "moment_N_m"), "shaking_moment_N_m", ("shaking moment",)))
+    shaking = vector(("shaking",), "shaking_", FORCE, Shaking())
+    shaking.append(Component(("shaking", "moment_N_m"), "shaking_moment_N_m", ShakingMoment()))
     return result + called(shaking, "shaking")
 
 
-def _joint_force(joint: Joint, on: str, of: str, turns: bool) -> list[Quantity]:
+def _joint_force(joint: Joint, on: str, of: str, turns: bool) -> list[Component]:
     """The force and the moment of a joint on a body; a pin has a moment where it rubs."""
     path, lead = ("reactions", (joint.name, on, of)), f"{joint.name}_{of}_on_{on}_"
-    result = vector(path, lead, FORCE, ("force", joint.key, on))
-    key = ("moment", joint.key, on) if turns else ()
-    result.append(Quantity((*path, "moment_N_m"), f"{lead}moment_N_m", key))
+    result = vector(path, lead, FORCE, JointForce(joint.key, on))
+    key = JointMoment(joint.key, on) if turns else NOTHING
+    result.append(Component((*path, "moment_N_m"), f"{lead}moment_N_m", key))
     side, kind = f"{joint.name}.{on}", joint.key.partition(":")[0]
     return [
         each._replace(

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from virtualwork.describe.description import Description
+from virtualwork.formulas.kinematics import Angle, Point
 from virtualwork.formulas.poses import Poses
 
 POINT = (("x_m", "y_m"), ("vx_m_s", "vy_m_s"), ("ax_m_s2", "ay_m_s2"))
@@ -26,9 +27,9 @@ def columns(poses: Poses) -> dict[str, Any]:
 
 def moving_columns(m: Description, poses: Poses, orders: int) -> dict[str, Any]:
     """Return the columns of links and points that move, so many orders of them."""
-    links = {f"{name}_{LINK[k]}": ("angle", name, k) for name in m.links for k in range(orders)}
+    links = {f"{name}_{LINK[k]}": Angle(name, k) for name in m.links for k in range(orders)}
     points = [
-        (name, k, ("point", body, 0j, name, k))
+        (name, k, Point(body, 0j, name, k))
         for name, (body, _) in m.points.items()
         if name not in m.ground
         for k in range(orders)

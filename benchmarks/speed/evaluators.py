@@ -22,6 +22,7 @@ from benchmarks.speed.measure import Measurement, around, measured, worst
 from benchmarks.truth import reference
 from dalembert.arithmetic.engines import compiled_code
 from virtualwork import Mechanism
+from virtualwork.formulas.kinematics import Angle
 from virtualwork.motion import Motion
 
 Real = NDArray[np.float64]
@@ -132,7 +133,7 @@ def _sweep(
 def _one_by_one(leg: Mechanism, angles: Real, speed: float, links: tuple[str, ...]) -> Iterator[Measurement]:
     """Yield three points, angles, ω and α of a new motion, together and one by one as a notebook asks."""
     keys: list[Any] = [leg.motion(0.0).point(name).key() for name in "CGH"]
-    keys += [("angle", link, order) for order in (0, 1, 2) for link in links]
+    keys += [Angle(link, order) for order in (0, 1, 2) for link in links]
 
     def request(*parts: list[Any]) -> list[list[Real]]:
         motion = leg.motion(angles, speed=speed, acceleration=0.0)

@@ -16,6 +16,7 @@ from benchmarks.speed.measure import Measurement, around, measured, peak, worst
 from benchmarks.truth import reference
 from virtualwork import Mechanism
 from virtualwork.branch.assembly import Assembly
+from virtualwork.formulas.forces import Effort, Reaction
 from virtualwork.formulas.newton import newton
 from virtualwork.formulas.positions import State
 from virtualwork.motion import Motion
@@ -115,7 +116,7 @@ def _four_bar(poses: int) -> Iterator[Measurement]:
 
     def together() -> list[Real]:
         motion = loaded.motion(angles, speed=speed, acceleration=0.0)
-        motion.values([("effort", 0), *(("reaction", *pin) for pin in PINS)])
+        motion.values([Effort(0), *(Reaction(*pin) for pin in PINS)])
         return ask(motion)
 
     def one_by_one() -> list[Real]:

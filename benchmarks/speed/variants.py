@@ -22,7 +22,9 @@ from dalembert.arithmetic.processes import Processes
 from virtualwork import Mechanism
 from virtualwork.describe.dimensions import changed, value
 from virtualwork.family.family import Family
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.forces import Effort, JointForce, NewtonEuler
+from virtualwork.formulas.kinematics import Angle
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.plan.steps import joints
 
 Real = NDArray[np.float64]
@@ -38,7 +40,7 @@ TEN = (
     *(f"links.coupler.H.{k}" for k in "xy"),
 )
 SPEED = 10.0
-RATES: list[Key] = [("angle", name, k) for name in ("coupler", "rocker") for k in (1, 2)]
+RATES: list[Quantity] = [Angle(name, k) for name in ("coupler", "rocker") for k in (1, 2)]
 # how many are described alone, for the time of a loop and for the error
 ALONE = 200
 
@@ -89,8 +91,8 @@ def _forces(m: Mechanism, v: int) -> Iterator[Measurement]:
     """All forces of variants over a turn, over as many poses of one mechanism."""
     n = 360
     turn, long = np.linspace(0, 2 * np.pi, n), np.linspace(0, 2 * np.pi, v * n)
-    keys: list[Key] = [("effort", 0), ("newton-euler", 0)]
-    keys += [("force", joint.key, joint.bodies[-1]) for joint in joints(m)]
+    keys: list[Quantity] = [Effort(0), NewtonEuler(0)]
+    keys += [JointForce(joint.key, joint.bodies[-1]) for joint in joints(m)]
     pins = ("A.crank", "B.coupler", "C.rocker", "D.rocker")
     numbers = lengths(m, v)
     family, one = m.vary(numbers), m.evaluator("effort", *(f"reactions.{pin}" for pin in pins))
@@ -164,7 +166,7 @@ def _processes(m: Mechanism, v: int) -> Iterator[Measurement]:
     motion = family.motion(turn, SPEED)
     sent = sum(len(pickle.dumps(motion.part.some(rows))) for _, rows in motion.parts())
     times = []
-    keys: list[Key] = [("effort", 0)]
+    keys: list[Quantity] = [Effort(0)]
     for workers in (1, 2):
         with Processes(workers) as pool:
             # the processes begin, and write the formulas down
@@ -184,7 +186,7 @@ def _processes(m: Mechanism, v: int) -> Iterator[Measurement]:
         )
 
 
-def _solve(family: Family, angle: Any, keys: list[Key], executor: Executor | None = None) -> Any:
+def _solve(family: Family, angle: Any, keys: list[Quantity], executor: Executor | None = None) -> Any:
     return family.motion(angle, SPEED, executor=executor).values(keys)
 
 

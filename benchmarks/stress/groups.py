@@ -16,7 +16,7 @@ from benchmarks.stress.random_linkages import four_bar, geared_five_bar, slider_
 from benchmarks.truth.mechanism import DIGITS, Exact
 from virtualwork import Link, Mechanism, MechanismError
 from virtualwork.digits.estimates import Estimates
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.motion import Motion
 
 Generator = np.random.Generator
@@ -157,7 +157,7 @@ def _picked(sweep: Motion, i: int, alone: Motion) -> Pairs:
     if not exact.closed:
         return []
 
-    def values(keys: Sequence[Key]) -> list[Any]:
+    def values(keys: Sequence[Quantity]) -> list[Any]:
         return [value[i : i + 1] for value in sweep.values(keys)]
 
     estimates = Estimates(alone.poses, values)

@@ -140,10 +140,10 @@ def _largest(off: Real, bound: Real) -> tuple[float, float]:
     return float(off[k]), float(limit[k])
 
 
-def _axes(found: Any, tensor: Any, given: Any = 0.0) -> Pairs:
+def _axes(found: Any, tensor: Any, worked_out: Any = None) -> Pairs:
     with mp.workdps(50):
         moments, axes = _eigen(tensor)
-        error = found.error_estimate(given)
+        error = found.error_estimate(worked_out)
         signs = [1 if mp.fdot(a, map(float, b)) > 0 else -1 for a, b in zip(axes, found.axes, strict=True)]
         axes = np.array([s * row for s, row in zip(signs, axes, strict=True)])
         return [
@@ -165,7 +165,7 @@ def _flat(rng: np.random.Generator) -> Pairs:
     center = (at @ _rotation(rng)) * 10.0 ** rng.uniform(-12, 12)
     parts = Body(rng.uniform(0.1, 1, count), center, np.zeros((count, 3, 3)))
     body = compose(parts)
-    return _axes(body.principal, _whole(parts)[2], body.error_estimate().inertia)
+    return _axes(body.principal, _whole(parts)[2], body.in_32_digits.inertia)
 
 
 # --- momentum and shafts ---
@@ -196,7 +196,6 @@ def _momentum(rng: np.random.Generator) -> Pairs:
         acceleration=given[3],
     )
     point = body.center + rng.normal(size=3) * np.abs(body.center)
-    error = body.error_estimate()
     w, alpha, frame, v, a, at = map(exact, (w, alpha, frame, v, a, point))
     H = I @ w
     if turning:
@@ -221,7 +220,7 @@ def _momentum(rng: np.random.Generator) -> Pairs:
         _worst(
             found.get(name, lambda name=name: getattr(motion, name))(),
             np.array([answer, answer]) if many else answer,
-            motion.error_estimate(name, point, error),
+            motion.error_estimate(name, point, body.in_32_digits),
         )
         for name, answer in true.items()
     ]

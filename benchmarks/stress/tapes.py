@@ -15,8 +15,10 @@ from dalembert.arithmetic.tape import Tape
 from virtualwork import Mechanism
 from virtualwork.describe import MechanismError
 from virtualwork.describe.description import Description
-from virtualwork.formulas.asked import Key, names
+from virtualwork.formulas.forces import Effort, JointForce, NewtonEuler, Shaking, ShakingMoment
+from virtualwork.formulas.kinematics import Angle, Point, Slide
 from virtualwork.formulas.lanes import taped
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.motion import Motion
 
 if TYPE_CHECKING:
@@ -50,30 +52,29 @@ class Digits:
         return positive if test > 0 else otherwise
 
 
-def every_key(motion: Motion) -> list[Key]:
+def every_key(motion: Motion) -> list[Quantity]:
     """Every quantity that the command can show."""
     m = motion.mechanism
-    keys: list[Key] = [
-        ("point", body, z, p, order)
+    keys: list[Quantity] = [
+        Point(body, z, p, order)
         for body, points in m.bodies.items()
         if body != "ground"
         for p, z in points.items()
         for order in range(3)
     ]
-    keys += [("angle", body, order) for body in m.links for order in range(3)]
-    keys += [("slide", i, order) for i in range(len(m.guides)) for order in range(3)]
-    keys += [(kind, j) for kind in ("effort", "newton-euler") for j in range(len(m.inputs))]
-    keys += [("force", joint.key, b) for joint in motion.dynamics.reactions.joints for b in joint.bodies]
-    return [*keys, ("shaking",), ("shaking moment",)]
+    keys += [Angle(body, order) for body in m.links for order in range(3)]
+    keys += [Slide(i, order) for i in range(len(m.guides)) for order in range(3)]
+    keys += [kind(j) for kind in (Effort, NewtonEuler) for j in range(len(m.inputs))]
+    keys += [JointForce(joint.key, b) for joint in motion.dynamics.reactions.joints for b in joint.bodies]
+    return [*keys, Shaking(), ShakingMoment()]
 
 
-def dimension(key: Key) -> tuple[str, int]:
+def dimension(key: Quantity) -> tuple[str, int]:
     """What is zero but for rounding is measured by the largest of its dimension: length, angle, force, with its order."""
-    kind = str({"point": "length", "slide": "length", "shaking": "force"}.get(key[0], key[0]))
-    return kind, int(key[-1]) if key[0] in ("point", "angle", "slide") else 0
+    return key.dimension or {"shaking": "force"}.get(key.kind, key.kind), key.order
 
 
-def sizes(m: Description, keys: list[Key], values: list[Any]) -> dict[tuple[str, int], float]:
+def sizes(m: Description, keys: list[Quantity], values: list[Any]) -> dict[tuple[str, int], float]:
     """The largest value of every dimension; a moment's is that of a force at the mechanism's size at least."""
     largest: dict[tuple[str, int], float] = {}
     for key, value in zip(keys, values, strict=True):
@@ -102,10 +103,10 @@ def disagreement(motion: Motion, engines: tuple[str, ...]) -> tuple[float, float
     tape = taped(motion.assembly, lanes.recording, tuple(keys))
     given = lanes.entering(tape.inputs)
     found = [run(tape, given, engine) for engine in engines]
-    largest = sizes(m, keys, [np.array([found[0][name] for name in names(key)]) for key in keys])
+    largest = sizes(m, keys, [np.array([found[0][name] for name in key.names]) for key in keys])
     worst = 0.0
     for key in keys:
-        for name in names(key):
+        for name in key.names:
             rows = [np.broadcast_to(of[name], motion.n) for of in found]
             if any((np.isnan(row) != np.isnan(rows[0])).any() for row in rows):
                 return np.inf, 1.0

@@ -1,15 +1,15 @@
-"""A body put together from parts, its motion, the shaft it may be, and bounds of the rounding errors of all that."""
+"""A body put together from parts, its motion, the shaft it may be; all of it once more in numbers of 32 digits."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cli.read.parts import READ, Parts
+from cli.read.parts import Parts
 from cli.read.planes import Planes
 from dalembert.angles import degrees
 from rigidbody3d import Body, Motion, Shaft
@@ -17,7 +17,7 @@ from rigidbody3d.shaft import shaft_axes
 
 if TYPE_CHECKING:
     from balancing import Correction
-    from rigidbody3d.rounding import BodyError
+    from dalembert.arithmetic.doubled_vectors import Vectors
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -53,7 +53,7 @@ class Request:
 
 
 class CorrectionMass(NamedTuple):
-    """What goes into a correction plane of a shaft; with bounds of its errors in place of numbers, what they may be off by."""
+    """What goes into a correction plane of a shaft; or the errors of these numbers."""
 
     plane: str
     z: float
@@ -69,37 +69,71 @@ class MovingBody:
 
     parts: Parts
     request: Request
+    doubled: bool = False
+    """Whether its numbers are those of the second run, doubled ones, with the decimals as they were written."""
+
+    @cached_property
+    def second(self) -> MovingBody:
+        """The same to 32 digits."""
+        return replace(self, doubled=True)
+
+    @property
+    def body(self) -> Body:
+        """The body of all parts."""
+        return self.parts.whole.in_32_digits if self.doubled else self.parts.whole
+
+    @cached_property
+    def principal_errors(self) -> tuple[Array, Array]:
+        """The errors of the principal moments (3,) and of the axes (3, 3)."""
+        exact: Any = self.second.body.inertia
+        return self.body.principal.error_estimate(exact)
+
+    def _numbers(self, option: ArrayLike) -> Array:
+        """Numbers of an option."""
+        if not self.doubled:
+            return np.asarray(option, dtype=float)
+        from cli.read.exact import array
+
+        result: Any = array(option)
+        return result  # type: ignore[no-any-return]
+
+    def _rates(self, option: ArrayLike) -> Array:
+        """Angular velocities and accelerations of an option."""
+        if not self.doubled:
+            return np.asarray(option, dtype=float)
+        from cli.read.exact import rates
+
+        result: Any = rates(option)
+        return result  # type: ignore[no-any-return]
 
     @cached_property
     def motion(self) -> Motion:
         """The motion of the body, its components along the axes drawn."""
-        w, body = self.request, self.parts.whole
-        omega, alpha, point = w.omega or ORIGIN, w.alpha or ORIGIN, w.fixed
+        w, body, point = self.request, self.body, self.request.fixed
+        omega, alpha = self._rates(w.omega or ORIGIN), self._rates(w.alpha or ORIGIN)
         if w.shaft is not None:
-            x, y, z = self.shaft_axes[2].tolist()
             omega, alpha = (
-                tuple(n * rate for n in (x, y, z)) for rate in (w.shaft.speed, w.shaft.speed_rate)
+                self.shaft_axes[2] * self._rates(rate) for rate in (w.shaft.speed, w.shaft.speed_rate)
             )
             point = ORIGIN
+        frame = None if w.frame_omega is None else self._rates(w.frame_omega)
         if point is None:
-            velocity, acceleration = w.velocity or ORIGIN, w.acceleration or ORIGIN
-            return Motion(
-                body.inertia, omega, alpha, w.frame_omega, body.mass, body.center, velocity, acceleration
-            )
+            linear = self._numbers(w.velocity or ORIGIN), self._numbers(w.acceleration or ORIGIN)
+            return Motion(body.inertia, omega, alpha, frame, body.mass, body.center, *linear)
         return Motion.about_fixed_point(
             body.inertia,
             omega,
             alpha,
             mass=body.mass,
             center=body.center,
-            point=point,
-            frame_omega=w.frame_omega,
+            point=self._numbers(point),
+            frame_omega=frame,
         )
 
-    @property
-    def point(self) -> Vector:
-        """The point that `…_about` speaks of: as given, else the fixed point, else the origin."""
-        return self.request.about or self.request.fixed or ORIGIN
+    @cached_property
+    def point(self) -> Array:
+        """The point that `…_about` speaks of, (3,): as given, else the fixed point, else the origin."""
+        return self._numbers(self.request.about or self.request.fixed or ORIGIN)
 
     @property
     def moving(self) -> bool:
@@ -114,7 +148,7 @@ class MovingBody:
         """Two axes across the shaft and its own, as rows; those drawn for a shaft along z."""
         s = self.request.shaft
         assert s is not None
-        return np.eye(3) if s.axis is None else shaft_axes(s.axis)
+        return np.eye(3) if s.axis is None else shaft_axes(self._numbers(s.axis))
 
     @property
     def letters(self) -> str:
@@ -128,32 +162,24 @@ class MovingBody:
         """Return a body, or parts, along the axes of the shaft."""
         if self.letters == "xyz":
             return body
-        return body.turned(self.shaft_axes, ORIGIN, self._axes_error)
-
-    @cached_property
-    def _axes_error(self) -> Array:
-        """What the entries of the shaft's axes may be off by: those along coordinate axes are exact."""
-        rough = 4 * READ * np.ones((3, 3))
-        return np.where(np.isin(self.shaft_axes, (-1.0, 0.0, 1.0)).all(), 0.0, rough)
+        return body.turned(self.shaft_axes, ORIGIN)
 
     @cached_property
     def shaft(self) -> Shaft:
         """The shaft on its bearings, along its own axes."""
         s = self.request.shaft
         assert s is not None
-        gravity = self.shaft_axes @ s.gravity + 0.0
-        return Shaft(self.upright(self.parts.whole), s.bearings, s.speed, s.speed_rate, gravity)
+        gravity = self.shaft_axes @ self._numbers(s.gravity) + 0.0
+        speeds = self._rates(s.speed), self._rates(s.speed_rate)
+        return Shaft(self.upright(self.body), self._numbers(s.bearings), *speeds, gravity)
 
-    def drawn(self, across: ArrayLike, along: float = 0.0) -> Array:
+    def drawn(self, across: Array, along: ArrayLike = 0.0) -> Array:
         """Return a vector of the shaft, its part across and that along, along the axes drawn, (3,)."""
-        return np.asarray(np.append(across, along) @ self.shaft_axes + 0.0)
+        return np.stack([across[0], across[1], along]) @ self.shaft_axes + 0.0
 
-    def drawn_error(
-        self, across: ArrayLike, error: ArrayLike, along: float = 0.0, rest: float = 0.0
-    ) -> Array:
-        """Bound the errors of such a vector, from those of its part across and of that along."""
-        turned = np.append(error, rest) @ np.abs(self.shaft_axes)
-        return np.asarray(turned + np.abs(np.append(across, along)) @ self._axes_error)
+    def static_force(self, bearing: int) -> Array:
+        """The force of a bearing that carries the weight, along the axes drawn, (3,); the first holds the shaft along its axis."""
+        return self.drawn(self.shaft.static[bearing], self.shaft.axial if bearing == 0 else 0.0)
 
     @cached_property
     def correction(self) -> Correction | None:
@@ -163,8 +189,7 @@ class MovingBody:
             return None
         from balancing import correct
 
-        assert s.planes.z is not None
-        return correct(self.shaft.unbalance, self.shaft.bearings, s.planes.z)
+        return correct(self.shaft.unbalance, self.shaft.bearings, self.plane_places)
 
     @property
     def corrections(self) -> list[CorrectionMass]:
@@ -185,57 +210,53 @@ class MovingBody:
         assert self.request.shaft.planes is not None
         return self.request.shaft.planes
 
+    @property
+    def plane_places(self) -> Array:
+        """Where the planes lie on the shaft, (p,), m."""
+        places = self.planes.z
+        assert places is not None
+        return np.asarray(places)
+
     @cached_property
     def corrected(self) -> Array:
-        """The dynamic forces of the bearings once the corrections are made."""
-        assert self.correction is not None
-        return self.shaft.with_masses(self.correction.unbalance, np.asarray(self.planes.z))
+        """The dynamic forces of the bearings once the corrections are made, (2, 2)."""
+        xy: Any
+        if self.doubled:
+            from dalembert.arithmetic.doubled_arrays import DoubledArray
 
-    # -- bounds of rounding errors -------------------------------------------------------------------------
-
-    @cached_property
-    def body_error(self) -> BodyError:
-        """Of mass, centre of mass and tensor."""
-        return self.parts.whole.error_estimate()
-
-    @cached_property
-    def unbalance_error(self) -> Array:
-        """Of the corrections' unbalances, (p,): their own rounding, and what that of the shaft's becomes in them."""
-        from balancing import correct
-
-        fix, shaft = self.correction, self.shaft
-        assert fix is not None
-        z = np.asarray(self.planes.z)
-        # the planes' places are read too: as good as unbalances that are off by as much of the moment
-        bound = shaft.error_estimate("unbalance", READ) + READ * np.abs(shaft.unbalance)
-        share = correct(np.eye(2, dtype=complex), shaft.bearings, z).unbalance
-        misplaced = READ * (np.abs(z).max() + np.abs(shaft.bearings).max()) / (np.ptp(z) or 1.0)
-        several = len(z) > 1
-        own = fix.error_estimate() + bound @ np.abs(share)
-        return np.asarray(own + misplaced * np.abs(fix.unbalance).sum() * several)
+            xy = np.stack(
+                [DoubledArray.of(x) for x in (self.exact_correction.x, self.exact_correction.y)], axis=-1
+            )
+        else:
+            assert self.correction is not None
+            made = self.correction.unbalance
+            xy = np.stack([made.real, made.imag], axis=-1)
+        return self.shaft.with_masses_xy(xy, self._numbers(self.plane_places))
 
     @cached_property
-    def corrected_error(self) -> Array:
-        """Of the bearings' forces once corrected, (2,): a difference of nearly equal forces."""
-        s, fix, shaft = self.request.shaft, self.correction, self.shaft
-        assert s is not None
-        assert fix is not None
-        z, bearings = np.asarray(self.planes.z), shaft.bearings
-        arm = np.abs(z - bearings[::-1, None]) / abs(bearings[1] - bearings[0])
-        rounded = self.unbalance_error + 4 * READ * np.abs(fix.unbalance)
-        own = shaft.error_estimate("unbalance", READ) + 4 * READ * np.abs(shaft.unbalance)
-        return np.asarray(np.hypot(s.speed**2, s.speed_rate) * (own + arm @ rounded))
+    def exact_correction(self) -> Vectors:
+        """The corrections to 32 digits, (p,)."""
+        from balancing.second_run import ExactMasses
+        from cli.read.exact import writtens
+        from dalembert.arithmetic.doubled_vectors import Vectors
+
+        shaft: Any = self.second.shaft
+        x, y = (shaft.unbalance_xy[..., i].doubled for i in range(2))
+        return ExactMasses(Vectors(x, y), shaft.bearings.doubled, writtens(self.plane_places)).corrections
 
     @cached_property
     def correction_errors(self) -> list[CorrectionMass]:
-        """Of the masses of the correction planes."""
-        assert self.correction is not None
-        bound, amount = self.unbalance_error, np.abs(self.correction.unbalance)
-        mass = (bound + READ * amount) / self.planes.radius
-        angle = np.degrees(np.divide(bound, amount, out=np.zeros_like(bound), where=amount > 0))
-        return [
-            CorrectionMass(name, 0.0, 0.0, *row)
-            for name, *row in zip(
-                self.planes.name, bound.tolist(), mass.tolist(), angle.tolist(), strict=True
-            )
-        ]
+        """The errors of the masses of the correction planes."""
+        from cli.read.exact import writtens
+        from dalembert.arithmetic.doubled_vectors import off
+
+        fix, exact = self.correction, self.exact_correction
+        assert fix is not None
+        size = np.abs(fix.unbalance)
+        errors = (
+            off(size, exact.size),
+            off(size / self.planes.radius, exact.size / writtens(self.planes.radius)),
+            exact.turned(fix.unbalance),
+        )
+        rows = zip(self.planes.name, *(error.tolist() for error in errors), strict=True)
+        return [CorrectionMass(name, 0.0, 0.0, *row) for name, *row in rows]

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cli.body.moving import AXES, Array, MovingBody
-from cli.read.parts import READ, SEVERAL
+from cli.read.parts import SEVERAL
 from cli.show.picture import blank
 from dalembert.angles import degrees
 from dalembert.results.columns import Column, Table, document_unit, names, number, stacked
 from dalembert.units import G0
-from rigidbody3d.inertia import Principal
 from rigidbody3d.picture import views
 
 if TYPE_CHECKING:
@@ -63,75 +62,68 @@ class Entry(NamedTuple):
         )
 
 
+def _entry(
+    b: MovingBody, name: str, dimension: str, of: Callable[[MovingBody], Any], place: str | None = ""
+) -> Entry:
+    """A quantity: its error is what it differs by from the second run, in 32 digits."""
+    return Entry(name, dimension, of(b), lambda: of(b.second).off(of(b)), place)
+
+
 def _of_body(b: MovingBody) -> Iterator[Entry]:
-    body, moments = b.parts.whole, b.parts.whole.principal
-
-    def tensor_error(row: int) -> Array:
-        return np.asarray(b.body_error.inertia[row])
-
-    def principal_error() -> Principal:
-        return moments.error_estimate(b.body_error.inertia)
-
-    def axis_error(axis: int) -> Array:
-        return np.asarray(principal_error().axes[axis])
-
-    yield Entry("mass", "mass", body.mass, lambda: b.body_error.mass)
-    yield Entry("center", "length", body.center, lambda: b.body_error.center)
+    moments = b.body.principal
+    yield _entry(b, "mass", "mass", lambda b: b.body.mass)
+    yield _entry(b, "center", "length", lambda b: b.body.center)
     for i, axis in enumerate("xyz"):
-        yield Entry(f"inertia_{axis}", "inertia", body.inertia[i], partial(tensor_error, i), f"inertia.{i}")
-    yield Entry("principal", "inertia", moments.moments, lambda: principal_error().moments)
+        yield _entry(b, f"inertia_{axis}", "inertia", partial(_tensor_row, i), f"inertia.{i}")
+    yield Entry("principal", "inertia", moments.moments, lambda: b.principal_errors[0])
     for i in range(3):
         place = f"principal_axes.{i}"
-        yield Entry(f"principal_axis_{i + 1}", "number", moments.axes[i], partial(axis_error, i), place)
+        yield Entry(f"principal_axis_{i + 1}", "number", moments.axes[i], partial(_axis_error, b, i), place)
+
+
+def _tensor_row(i: int, b: MovingBody) -> Array:
+    row: Array = b.body.inertia[i]
+    return row
+
+
+def _axis_error(b: MovingBody, i: int) -> Array:
+    row: Array = b.principal_errors[1][i]
+    return row
 
 
 def _of_motion(b: MovingBody) -> Iterator[Entry]:
-    motion, point = b.motion, b.point
-
-    def error(of: str) -> ArrayLike:
-        return motion.error_estimate(of, point, b.body_error, READ)
-
-    def entry(name: str, dimension: str, value: ArrayLike, of: str = "", place: str = "") -> Entry:
-        return Entry(name, dimension, value, partial(error, of or name), place)
-
-    yield entry("momentum", "angular momentum", motion.momentum)
-    yield entry("momentum_about", "angular momentum", motion.momentum_about(point))
-    yield entry("momentum_rate", "torque", motion.rate, "rate")
-    yield entry("rate_relative", "torque", motion.relative, "relative", "rate_terms.relative")
-    yield entry("rate_transport", "torque", motion.transport, "transport", "rate_terms.transport")
-    yield entry("momentum_rate_about", "torque", motion.rate_about(point), "rate_about")
-    yield entry("inertia_force", "force", motion.inertia_force)
-    yield entry("inertia_moment", "torque", motion.inertia_wrench.moment)
-    yield entry("energy", "energy", motion.energy)
+    yield _entry(b, "momentum", "angular momentum", lambda b: b.motion.momentum)
+    yield _entry(b, "momentum_about", "angular momentum", lambda b: b.motion.momentum_about(b.point))
+    yield _entry(b, "momentum_rate", "torque", lambda b: b.motion.rate)
+    yield _entry(b, "rate_relative", "torque", lambda b: b.motion.relative, "rate_terms.relative")
+    yield _entry(b, "rate_transport", "torque", lambda b: b.motion.transport, "rate_terms.transport")
+    yield _entry(b, "momentum_rate_about", "torque", lambda b: b.motion.rate_about(b.point))
+    yield _entry(b, "inertia_force", "force", lambda b: b.motion.inertia_force)
+    yield _entry(b, "inertia_moment", "torque", lambda b: b.motion.inertia_wrench.moment)
+    yield _entry(b, "energy", "energy", lambda b: b.motion.energy)
 
 
 def _of_shaft(b: MovingBody) -> Iterator[Entry]:
     """Forces of the bearings across the axis; the first takes the axial force."""
-    shaft = b.shaft
-
-    def static_error(i: int) -> Array:
-        along, rest = (
-            (float(shaft.axial), float(shaft.error_estimate("axial", READ))) if i == 0 else (0.0, 0.0)
-        )
-        return b.drawn_error(shaft.static[i], shaft.error_estimate("static", READ)[i], along, rest)
-
-    def dynamic_error(i: int) -> Array:
-        return b.drawn_error(shaft.dynamic[i], shaft.error_estimate("dynamic", READ)[i])
-
-    def corrected_error(i: int) -> Array:
-        return b.drawn_error(b.corrected[i], b.corrected_error[[i, i]])
-
     for i in range(2):
         name = f"bearing{i + 1}"
-        static = b.drawn(shaft.static[i], float(shaft.axial) if i == 0 else 0.0)
-        yield Entry(f"{name}_static", "force", static, partial(static_error, i), None)
-        dynamic = b.drawn(shaft.dynamic[i])
-        yield Entry(f"{name}_dynamic", "force", dynamic, partial(dynamic_error, i), None)
+        yield _entry(b, f"{name}_static", "force", partial(_static, i), None)
+        yield _entry(b, f"{name}_dynamic", "force", partial(_dynamic, i), None)
         if b.correction is not None:
-            corrected = b.drawn(b.corrected[i])
-            yield Entry(f"{name}_corrected", "force", corrected, partial(corrected_error, i), None)
-    torque_error = partial(shaft.error_estimate, "drive_torque", READ)
-    yield Entry("drive_torque", "torque", shaft.drive_torque, torque_error, "shaft.drive_torque")
+            yield _entry(b, f"{name}_corrected", "force", partial(_corrected, i), None)
+    yield _entry(b, "drive_torque", "torque", lambda b: b.shaft.drive_torque, "shaft.drive_torque")
+
+
+def _static(i: int, b: MovingBody) -> Array:
+    return b.static_force(i)
+
+
+def _dynamic(i: int, b: MovingBody) -> Array:
+    return b.drawn(b.shaft.dynamic[i])
+
+
+def _corrected(i: int, b: MovingBody) -> Array:
+    return b.drawn(b.corrected[i])
 
 
 def _entries(b: MovingBody) -> list[Entry]:

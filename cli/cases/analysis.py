@@ -9,22 +9,21 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cli.cases.inputs import InputGrid, Inputs
-from cli.cases.quantities import chosen, unknown
+from cli.cases.quantities import Component
 from cli.read import options
 from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError
 from dalembert.hints import nearest
 from dalembert.memory import memory
 from dalembert.results.way import figures
-from virtualwork import quantities
-from virtualwork.quantities import Quantity
+from virtualwork.formulas.kinematics import Angle, Point
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from virtualwork import Mechanism
     from virtualwork.branch.assembly import Assembly
-    from virtualwork.formulas.asked import Key
+    from virtualwork.formulas.quantity import Quantity
     from virtualwork.motion import Motion
     from virtualwork.plan.steps import Joint
 
@@ -147,13 +146,13 @@ class Analysis:
 
     # --- quantities -----------------------------------------------------------------------------------------------
     @cached_property
-    def places(self) -> list[Quantity]:
+    def places(self) -> list[Component]:
         """The places and rates that are requested."""
         every = quantities.places(self.mechanism, 3, self.request.only or ())
         return chosen(every, self.request.only, self.order)
 
     @cached_property
-    def forces(self) -> list[Quantity]:
+    def forces(self) -> list[Component]:
         """The forces that are requested."""
         if not self.request.forces:
             return []
@@ -175,7 +174,7 @@ class Analysis:
         return [(j, on, of) for j, on, of in self.pairs if shown & {(j.name, on, of), (j.name, of, on)}]
 
     @cached_property
-    def tabled(self) -> list[Quantity]:
+    def tabled(self) -> list[Component]:
         """What a table has: the forces alone where they are requested without names."""
         return self.forces if self.request.forces and self.request.only is None else self.places + self.forces
 
@@ -283,10 +282,10 @@ class Analysis:
         return self.request.only is None or not self.named
 
     @cached_property
-    def named(self) -> list[Key]:
+    def named(self) -> list[Quantity]:
         """Places of the points, links and slides that are requested, as a motion computes them."""
         homes = self.mechanism.points
-        result: list[Key] = [("point", homes[name][0], 0j, name, 0) for name in self.points]
-        result += [("angle", name, 0) for name in self.links]
+        result: list[Quantity] = [Point(homes[name][0], 0j, name, 0) for name in self.points]
+        result += [Angle(name, 0) for name in self.links]
         slides = [each.key for each in self.places if each.path[0] == "slides"]
-        return [*result, *dict.fromkeys((*key[:2], 0) for key in slides)]
+        return [*result, *dict.fromkeys(key.of_order(0) for key in slides)]

@@ -11,6 +11,7 @@ from cli.cases import poses
 from cli.cases.analysis import Analysis
 from cli.cases.case import Case
 from cli.cases.poses import column
+from cli.cases.quantities import Component
 from cli.cases.study import PoseCase
 from cli.show.picture import shown
 from dalembert.page import Shown
@@ -79,7 +80,7 @@ def _computing(
         forces = quantities.forces(m, pairs)
         named += forces
         listed += [each for each in forces if each.key and not each.reverse]
-    wanted: list[tuple[Quantity | int, str]] = list(enumerate(first.input_columns))
+    wanted: list[tuple[Component | int, str]] = list(enumerate(first.input_columns))
     wanted += [(each, each.header) for each in listed]
     table = shown(Table([column(header, []) for _, header in wanted]), units)
     arrows = [JointForce.of(*row) for row in pairs]

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.cases.analysis import Analysis
-from cli.cases.quantities import cells_of, keys_of, solved
+from cli.cases.quantities import Component, cells_of, keys_of, links, points, solved
 from cli.show.picture import blank
 from cli.show.result import Section, Sheet
 from dalembert.angles import read_degrees
 from dalembert.results.columns import Column, Table
 from dalembert.units import UNITS, from_si, written
+from virtualwork.formulas.kinematics import Angle
 from virtualwork.picture.over_input import curves_of, forces
 from virtualwork.picture.paper import on_paper
 from virtualwork.picture.quantities import Quantity as Drawn
@@ -64,10 +65,10 @@ def curves(analysis: Analysis) -> Figure:
     return figure
 
 
-def _curve(analysis: Analysis, each: Quantity, value: NDArray[np.generic]) -> Drawn:
+def _curve(analysis: Analysis, each: Component, value: NDArray[np.generic]) -> Drawn:
     """A quantity as it is drawn, with how large one of its kind is."""
     m, poses = analysis.mechanism, analysis.motions[0].poses
-    numbers = unwrapped(value.real) if each.turns else each.of(value)
+    numbers = unwrapped(value.real) if each.link else each.of(value)
     name = each.names[0]
     unit = next(
         text
@@ -76,8 +77,8 @@ def _curve(analysis: Analysis, each: Quantity, value: NDArray[np.generic]) -> Dr
     )
     if each in analysis.forces:
         return Drawn(name, unit, numbers, float(np.abs(numbers[np.isfinite(numbers)]).max(initial=0.0)))
-    size = 1.0 if each.key[0] == "angle" else m.size
-    return Drawn(name, unit, numbers, 180.0 if each.turns else size * pace(poses) ** each.order)
+    size = 1.0 if isinstance(each.key, Angle) else m.size
+    return Drawn(name, unit, numbers, 180.0 if each.link else size * pace(poses) ** each.order)
 
 
 def posed(

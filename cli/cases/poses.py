@@ -12,6 +12,7 @@ import numpy as np
 from cli.cases.analysis import Analysis
 from cli.cases.quantities import (
     TURNED,
+    Component,
     bound,
     bounds_of,
     cells,
@@ -23,14 +24,14 @@ from cli.cases.quantities import (
     solved,
 )
 from dalembert.results.columns import Column, Table
-from virtualwork.quantities import Quantity
+from virtualwork.formulas.forces import JointMoment
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.cases.quantities import Numbers, Reals
     from dalembert.results.columns import Cell, Document
-    from virtualwork.formulas.asked import Key
+    from virtualwork.formulas.quantity import Quantity
     from virtualwork.motion import Motion
 
 _UNIT = re.compile(r"_(m|m_s|m_s2|m_s3|deg|rad_s|rad_s2|rad_s3|N|N_m|kg|kg_m|kg_m2|J)\Z")
@@ -49,7 +50,7 @@ def pose_keys(analysis: Analysis) -> tuple[str, ...]:
     return ("step", "branch", "link", *analysis.input_columns)
 
 
-def table(analysis: Analysis, computed: Sequence[Mapping[Key, Any]] = ()) -> Table:
+def table(analysis: Analysis, computed: Sequence[Mapping[Quantity, Any]] = ()) -> Table:
     """A row for each pose, one assembly after the other.
 
     `computed`: what the poses of each assembly have computed already; there are no bounds of it.
@@ -65,7 +66,7 @@ def table(analysis: Analysis, computed: Sequence[Mapping[Key, Any]] = ()) -> Tab
         for motion in analysis.motions:
             form_bounds(motion, wanted, driven)
 
-    def error(each: Quantity) -> list[float]:
+    def error(each: Component) -> list[float]:
         formed()
         bounds = [sum(bound(motion, key, driven) for key in keys_of([each])) for motion in analysis.motions]
         if each.polar == "angle":
@@ -94,18 +95,18 @@ def table(analysis: Analysis, computed: Sequence[Mapping[Key, Any]] = ()) -> Tab
     return Table(columns, keys=pose_keys(analysis))
 
 
-def _has_column(analysis: Analysis, each: Quantity, values: Numbers) -> bool:
+def _has_column(analysis: Analysis, each: Component, values: Numbers) -> bool:
     """Whether a table has it: the moment of a pin only where friction makes one, or where it is requested by name."""
     only = analysis.request.only
     if only is not None and not set(only).isdisjoint(each.names):
         return True
-    if each.key[:1] != ("moment",) or each.key[1].startswith("guide:"):
+    if not isinstance(each.key, JointMoment) or each.key.joint.startswith("guide:"):
         return bool(each.key)
     if not analysis.block_of:
         return any(value != 0 for value in values)
     # the blocks of a sweep all have the column that one of them may need
     return any(
-        load.path is None and (load.joint, load.body) == each.key[1:]
+        load.path is None and (load.joint, load.body) == (each.key.joint, each.key.body)
         for motion in analysis.motions
         for load in motion.dynamics.scene.friction
     )
@@ -151,12 +152,12 @@ def documents(analysis: Analysis) -> list[Document]:
     return [pose for each in zip(*listed, strict=True) for pose in each]
 
 
-def in_json(analysis: Analysis) -> list[Quantity]:
+def in_json(analysis: Analysis) -> list[Component]:
     """What the document has of every pose."""
     return _moving(analysis) + analysis.forces
 
 
-def _moving(analysis: Analysis) -> list[Quantity]:
+def _moving(analysis: Analysis) -> list[Component]:
     return sorted(
         analysis.places, key=lambda each: ("links", "points", "slides", "cams", "vectors").index(each.path[0])
     )
@@ -165,7 +166,7 @@ def _moving(analysis: Analysis) -> list[Quantity]:
 def poses_of(
     analysis: Analysis,
     branch: int,
-    computed: Mapping[Key, Any],
+    computed: Mapping[Quantity, Any],
     assembled: NDArray[np.bool_],
     condition: Reals | None,
     marks: list[list[str]],

@@ -9,8 +9,51 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dalembert.angles import degrees
-from virtualwork.formulas.asked import FORCES, Key
-from virtualwork.quantities import Quantity
+from virtualwork.formulas.forces import Force
+from virtualwork.formulas.kinematics import Angle
+from virtualwork.formulas.quantity import Quantity
+from virtualwork.quantities import (
+    FORCE as FORCE,
+)
+from virtualwork.quantities import (
+    LINK as LINK,
+)
+from virtualwork.quantities import (
+    POINT as POINT,
+)
+from virtualwork.quantities import (
+    SLIDE as SLIDE,
+)
+from virtualwork.quantities import (
+    Component as Component,
+)
+from virtualwork.quantities import (
+    called as called,
+)
+from virtualwork.quantities import (
+    effort_name as effort_name,
+)
+from virtualwork.quantities import (
+    forces as forces,
+)
+from virtualwork.quantities import (
+    links as links,
+)
+from virtualwork.quantities import (
+    places as places,
+)
+from virtualwork.quantities import (
+    points as points,
+)
+from virtualwork.quantities import (
+    reactions as reactions,
+)
+from virtualwork.quantities import (
+    slides as slides,
+)
+from virtualwork.quantities import (
+    vector as vector,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,7 +68,7 @@ TURNED = 2 * float(np.finfo(float).eps)
 
 
 # --- which are requested ----------------------------------------------------------------------------------------------
-def chosen(every: Sequence[Quantity], words: Sequence[str] | None, order: int) -> list[Quantity]:
+def chosen(every: Sequence[Component], words: Sequence[str] | None, order: int) -> list[Component]:
     """The quantities of these names, up to an order where a bare name stands; all without names.
 
     `every` has them to the highest order.
@@ -45,19 +88,19 @@ def chosen(every: Sequence[Quantity], words: Sequence[str] | None, order: int) -
     ]
 
 
-def unknown(every: Sequence[Quantity], words: Sequence[str]) -> str | None:
+def unknown(every: Sequence[Component], words: Sequence[str]) -> str | None:
     """The first of some names that none of the quantities has."""
     names = {name for each in every for name in (*each.names, *each.owners)}
     return next((word for word in words if word not in names), None)
 
 
 # --- what they are ----------------------------------------------------------------------------------------------------
-def keys_of(wanted: Iterable[Quantity]) -> list[Key]:
+def keys_of(wanted: Iterable[Component]) -> list[Quantity]:
     """What they are asked for by, each once."""
     return list(dict.fromkeys(key for each in wanted for key in (each.key, each.less) if key))
 
 
-def solved(motion: Motion, keys: Sequence[Key]) -> dict[Key, Any]:
+def solved(motion: Motion, keys: Sequence[Quantity]) -> dict[Quantity, Any]:
     """Quantities of a motion by their keys, (n,), in one pass."""
     return dict(zip(keys, motion.values(keys), strict=True))
 
@@ -72,12 +115,12 @@ def cells(values: Reals, finite: NDArray[np.bool_] | None = None) -> Numbers:
 
 
 def cells_of(
-    wanted: Iterable[Quantity],
-    computed: Mapping[Key, Any],
+    wanted: Iterable[Component],
+    computed: Mapping[Quantity, Any],
     n: int,
     driven: Mapping[str, Reals],
     where: NDArray[np.bool_] | None = None,
-) -> dict[Quantity, Numbers]:
+) -> dict[Component, Numbers]:
     """The numbers of n poses as they are shown.
 
     Parameters
@@ -89,7 +132,7 @@ def cells_of(
     where : array (n,) of bool, optional
         The poses that have any.
     """
-    shown: dict[Quantity, Numbers] = {}
+    shown: dict[Component, Numbers] = {}
     finite = np.ones(n, dtype=bool)
     for each in wanted:
         if not each.key:
@@ -99,9 +142,9 @@ def cells_of(
         value = computed[each.key] - computed[each.less] if each.less else computed[each.key]
         # a vector is known where both its components are
         finite = np.isfinite(value)
-        if each.turns:
-            name = each.key[1]
-            part = exact_degrees(driven[name]) if name in driven else degrees(np.exp(1j * value))
+        if each.link:
+            set_by_hand = each.link in driven
+            part = exact_degrees(driven[each.link]) if set_by_hand else degrees(np.exp(1j * value))
         else:
             part = each.of(value)
             finite = finite & np.isfinite(part)
@@ -115,39 +158,28 @@ def exact_degrees(angle: Reals) -> Reals:
     return np.where(reduced >= 360.0, 0.0, reduced)
 
 
-def form_bounds(motion: Motion, wanted: Iterable[Quantity], driven: Mapping[str, Reals]) -> None:
+def form_bounds(motion: Motion, wanted: Iterable[Component], driven: Mapping[str, Reals]) -> None:
     """Form the bounds of all numbers, which have most of the work in common."""
     keys = keys_of(wanted)
-    moving = [key for key in keys if key[0] not in FORCES]
+    moving = [key for key in keys if not key.is_force]
     if len(moving) < len(keys):
         motion.dynamics.error_estimate().together()
     # an angle that was given is as it was given
-    motion.rounding.together([key for key in moving if key[0] != "angle" or key[2] or key[1] not in driven])
+    motion.rounding.together(
+        [key for key in moving if not (isinstance(key, Angle) and key.is_angle and key.body in driven)]
+    )
 
 
-def bound(motion: Motion, key: Key, driven: Mapping[str, Reals]) -> Reals:
+def bound(motion: Motion, key: Quantity, driven: Mapping[str, Reals]) -> Reals:
     """Bound the error of a quantity, as it is shown."""
-    kind, *of = key
-    if kind in FORCES:
-        bounds = motion.dynamics.error_estimate()
-        if kind == "effort":
-            return bounds.effort[:, of[0]]
-        if kind == "newton-euler":
-            return bounds.newton_euler[:, of[0]]
-        if kind.startswith("shaking"):
-            return bounds.shaking[kind != "shaking"]
-        if kind.startswith("applied"):
-            return bounds.applied(of[0])[kind != "applied"]
-        if kind == "contact":
-            return bounds.contact(of[0])
-        joint = motion.dynamics.reactions.by_key[of[0]]
-        return (bounds.joint_force if kind == "force" else bounds.joint_moment)(joint, of[1])
-    if kind == "pressure angle":
-        return np.asarray(np.degrees(motion.rounding.of(key)))
-    if kind != "angle" or of[1]:
+    if isinstance(key, Force):
+        return np.asarray(key.read(motion.dynamics.error_estimate()))
+    if not key.is_angle:
         return motion.rounding.of(key)
-    if of[0] in driven:
-        return TURNED * np.abs(driven[of[0]])
+    if not isinstance(key, Angle):
+        return np.asarray(np.degrees(motion.rounding.of(key)))
+    if key.body in driven:
+        return TURNED * np.abs(driven[key.body])
     from dalembert.arithmetic.doubled import PI, Doubled
 
     # what the degrees as they are shown round besides
@@ -162,7 +194,7 @@ def bounds_of(bounds: Reals) -> list[float]:
 
 
 # --- in JSON ----------------------------------------------------------------------------------------------------------
-def nested(numbers: Mapping[Quantity, Numbers], n: int) -> dict[str, Any]:
+def nested(numbers: Mapping[Component, Numbers], n: int) -> dict[str, Any]:
     """Columns of n poses where they stand in JSON."""
     result: dict[str, Any] = {}
     for each, values in numbers.items():

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from cli.cases.analysis import Analysis, Request
 from cli.cases.inputs import of_one
 from cli.cases.poses import column
-from cli.cases.quantities import cells_of, keys_of, solved
+from cli.cases.quantities import Component, cells_of, keys_of, solved
 from cli.cases.values import Varied, dimension_named, place_or_angle, with_numbers
 from cli.read import seeking
 from cli.read.options import bad
@@ -67,7 +67,7 @@ def find(
 
     own = m.value(of.label)
     sought = seeking.Sought(of.of.header, of.unit, _shown(of, float(own.real)) if own == own else 0.0)
-    goal = seeking.Goal(word, unit, target, each.turns)
+    goal = seeking.Goal(word, unit, target, bool(each.link))
     root = seeking.search(name, sought, goal, value)
     text = f"{name} = {_text(of, root, bare)} gives {word} = {seeking.amount(target, unit)}"
     return Changed(with_numbers(m, [of.of], [root]), seeking.Found(sought.header, root, text))
@@ -85,7 +85,7 @@ def _text(of: Varied, shown: float, bare: Mapping[str, str]) -> str:
     return f"{shown:.10g}°" if of.unit == "deg" else f"{shown:.10g} {written(of.unit)}".rstrip()
 
 
-def _value(each: Quantity, text: str, bare: Mapping[str, str]) -> tuple[float, str]:
+def _value(each: Component, text: str, bare: Mapping[str, str]) -> tuple[float, str]:
     """The value in the unit that the quantity is shown in, and that unit."""
     unit = column(each.header, []).unit
     if unit == "deg":

@@ -15,8 +15,10 @@ from cli.cases.inputs import Inputs
 from cli.cases.quantities import keys_of
 from cli.cases.remarks import pinned
 from virtualwork.family.part import ASSEMBLED, Part, Solver
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.forces import Effort, NewtonEuler
+from virtualwork.formulas.loops import Column, Margin, Size
 from virtualwork.formulas.numbers import condition
+from virtualwork.formulas.quantity import Quantity
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,7 +46,7 @@ class Solved(NamedTuple):
     alone: NDArray[np.bool_]
 
 
-SIZE: Key = ("size",)
+SIZE: Quantity = Size()
 
 
 @dataclass(frozen=True)
@@ -66,23 +68,23 @@ class Together:
     json: bool
 
     @property
-    def loops(self) -> list[list[Key]]:
+    def loops(self) -> list[list[Quantity]]:
         """The entries of the Jacobian of all loops."""
         written = self.solver.written
         if written is None or written.recording.loops is None:
             return []
         loops = written.recording.loops
         unknowns = range(len(loops.angles) + len(loops.slides))
-        return [[("column", i, j) for j in unknowns] for i in range(len(loops.closures))]
+        return [[Column(i, j) for j in unknowns] for i in range(len(loops.closures))]
 
     @cached_property
-    def keys(self) -> list[Key]:
+    def keys(self) -> list[Quantity]:
         """The quantities that the table or the documents are of."""
         a = self.analysis
         wanted = keys_of(poses.in_json(a) if self.json else a.tabled)
         if self.json:
             assert self.solver.written is not None
-            wanted += [("margin", group.name) for group in self.solver.written.closed]
+            wanted += [Margin(group.name) for group in self.solver.written.closed]
             wanted += (
                 [] if a.request.only is not None else [SIZE, *(key for row in self.loops for key in row)]
             )
@@ -95,7 +97,7 @@ class Together:
         """Whether the formulas take all that is requested."""
         if self.solver.written is None:
             return False
-        if self.analysis.forces and not self.solver.takes([("effort", 0), ("newton-euler", 0)]):
+        if self.analysis.forces and not self.solver.takes([Effort(0), NewtonEuler(0)]):
             return False
         return self.solver.takes(self.keys)
 
@@ -111,7 +113,7 @@ class Together:
         if forces:
             alone |= self._without_mass(part)
         for key, lanes in zip(self.keys, values, strict=True):
-            if self.json and key[0] == "margin":
+            if self.json and isinstance(key, Margin):
                 alone |= (np.abs(lanes) < MARKED).any(axis=1)
             if forces:
                 alone |= (assembled & ~np.isfinite(lanes)).any(axis=1)
@@ -131,7 +133,7 @@ class Together:
         listed = poses.poses_of(analysis, branch, flat, whole, conditions, marks)
         return Solved(list(listed), whole.reshape(v, n), alone)
 
-    def _condition(self, lanes: Mapping[Key, Any], assembled: NDArray[np.bool_]) -> NDArray[np.float64]:
+    def _condition(self, lanes: Mapping[Quantity, Any], assembled: NDArray[np.bool_]) -> NDArray[np.float64]:
         """(v n,): see `Motion.condition`."""
         assert self.solver.written is not None
         loops = self.solver.written.recording.loops

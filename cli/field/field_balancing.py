@@ -195,18 +195,22 @@ class FieldBalancing:
             self._doubt(solved)
         return solved
 
-    def _standing(self, group: Group, planes: list[str]) -> Complex:
-        """Return what is on the rotors in their last run in these planes, (g, p)."""
+    def matches(self, group: Group, planes: list[str]) -> list[tuple[int, int]]:
+        """Return which plane of a group is which of these."""
         named = group.planes
-        if named == planes:
-            return group.standing
         if len(planes) == 1 and "trial_plane" not in self.runs.table.texts:
             named = planes[: len(named)]
+        return [(own, planes.index(plane)) for own, plane in enumerate(named) if plane in planes]
+
+    def _standing(self, group: Group, planes: list[str]) -> Complex:
+        """Return what is on the rotors in their last run in these planes, (g, p)."""
         standing = np.zeros((len(group.rotors), len(planes)), dtype=complex)
-        for p, plane in enumerate(named):
-            if plane in planes:
-                standing[:, planes.index(plane)] = group.standing[:, p]
-            elif group.standing[:, p].any():
+        matches = self.matches(group, planes)
+        for own, p in matches:
+            standing[:, p] = group.standing[:, own]
+        for own in sorted(set(range(len(group.planes))) - {own for own, _ in matches}):
+            plane = group.planes[own]
+            if group.standing[:, own].any():
                 self.warnings.append(
                     f"{self.of(group)}the last run has a mass in plane {plane}, of which no coefficient is stored: the trim "
                     "leaves it out"

@@ -107,9 +107,6 @@ class _Groups:
             )
 
     def _add(self, group: Group) -> None:
-        if "ref" in self.runs.table.texts:
-            # each mass may be a sum of all that went before
-            group.sizes = 2 * group.sizes.sum(axis=1, keepdims=True) + 0 * group.sizes
         self.runs.groups.append(group)
 
     # -- an initial run with trial runs ----------------------------------------------------------------------
@@ -225,6 +222,10 @@ class _Groups:
                 self.request.lagging,
                 lambda turned: self._fitted(turned, masses, prior),
             )
+        turned = (np.nan_to_num(fit.readings) != np.nan_to_num(readings)).any(axis=(1, 2))
+        if turned.any():
+            before = group.exact
+            group.exact = lambda: before().turned(turned)
         group.readings, group.fit, group.before = fit.readings, fit, prior
         self._add(group)
 
@@ -257,12 +258,17 @@ class _Groups:
                     f"expected {', '.join(covered)}"
                 )
         at = [covered.index(plane) for plane in planes]
-        masses, sizes, standing = (
-            np.zeros((*of.shape[:-1], len(covered)), dtype=of.dtype)
-            for of in (group.masses, group.sizes, group.standing)
+        masses, standing = (
+            np.zeros((*of.shape[:-1], len(covered)), dtype=of.dtype) for of in (group.masses, group.standing)
         )
-        masses[..., at], sizes[..., at], standing[..., at] = group.masses, group.sizes, group.standing
-        return replace(group, planes=covered, masses=masses, sizes=sizes, standing=standing)
+        masses[..., at], standing[..., at] = group.masses, group.standing
+        return replace(
+            group,
+            planes=covered,
+            masses=masses,
+            standing=standing,
+            exact=lambda: group.exact().with_planes(at, len(covered)),
+        )
 
     def _undetermined(self, group: Group, keep: Flags) -> None:
         """Warn of channels (g, s) that the runs do not determine; refuse a rotor without others."""

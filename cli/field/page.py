@@ -65,6 +65,11 @@ def sheet(b: FieldBalancing) -> Page:
         spread=deviations,
         limits=[b.max_mass.get(plane, b.max_mass.get("")) for plane in solved.planes] if b.max_mass else (),
         ceiling=b.ceiling,
+        permissible=None
+        if request.tolerance is None
+        else (request.tolerance.shares(len(solved.planes)) / b.in_kg_m(np.ones(1, dtype=complex))).tolist(),
         facts=[("Convention", sense(b)), *([("Objective", LEAST_SQUARES)] if b.limited else [])],
-        places=None if request.places is None else [float(np.radians(x)) for x in request.places],
+        places=None
+        if request.places is None
+        else [(str(k), float(np.radians(x))) for k, x in enumerate(request.places, 1)],
     )

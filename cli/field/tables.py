@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,11 +14,13 @@ from balancing.run_means import RunMeans
 from cli.field.field_balancing import FieldBalancing, Solved
 from cli.field.rotor import Rotor, Trim, each
 from cli.field.rows import READINGS, Rows, Tables, amplitude, masses, uncertainties
-from cli.read.rounding import angle_error, size_error
 from cli.read.runs.runs import Complex, Real
 from dalembert.angles import degrees
 from dalembert.results.columns import ABSENT, Column, Table, names, number
 from dalembert.units import amplitude_kind, from_si, to_si
+
+if TYPE_CHECKING:
+    from dalembert.arithmetic.doubled_vectors import Vectors
 
 METHOD = (
     "Influence coefficients from trial runs (E. L. Thearle 1934), corrections by least squares or by the smallest largest "
@@ -69,24 +72,27 @@ def corrections(b: FieldBalancing, warnings: list[str]) -> Table:
     fix, trim = (rows.numbers(lambda s: s.corrections), rows.numbers(lambda s: s.trim))
 
     @cache
-    def errors() -> list[Real]:
-        """Of corrections, of trims, and the share of uncertainties."""
-        from cli.field.rounding import errors
+    def again() -> list[Real]:
+        """The second run."""
+        from cli.field.rounding import digits
 
-        return rows.several(lambda solved: errors(b, solved, warnings))
+        return rows.several(lambda solved: digits(b, solved, warnings).parts)
+
+    def exact(k: int) -> Vectors:
+        from cli.field.rounding import vectors_of
+
+        return vectors_of(again()[4 * k :])
 
     def sized(name: str, values: Complex, k: int, place: str | None) -> list[Column]:
         size, angle = np.abs(values), degrees(values)
         return [
-            number(f"{name}{per}", per, size, unit, lambda: size_error(values, errors()[k]), place),
-            number(
-                f"{name}angle", "angle", angle, "", lambda: angle_error(values, errors()[k], angle), place
-            ),
+            number(f"{name}{per}", per, size, unit, None, place, exact=lambda: exact(k).size),
+            number(f"{name}angle", "angle", angle, "", lambda: exact(k).turned(values), place),
         ]
 
     uncertainty = uncertainties(b, *rows.several(lambda s: s.uncertainty(s.corrections)))
     for column in uncertainty:
-        column.error = lambda column=column: errors()[2] * np.nan_to_num(column.values)
+        column.error = lambda column=column: again()[8] * np.nan_to_num(column.values)
     columns = [*sized("", fix, 0, ""), *sized("trim_", trim, 1, None)]
     columns[2:2] = uncertainty if b.uncertain else []
     below = [

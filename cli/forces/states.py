@@ -18,14 +18,15 @@ from cli.cases.analysis import Analysis
 from cli.cases.poses import column, pose_keys
 from cli.cases.quantities import bound, bounds_of, cells, cells_of, keys_of, solved
 from dalembert.results.columns import Table
-from virtualwork.quantities import FORCE, LINK, POINT, links, vector
+from virtualwork.formulas.forces import Applied, AppliedMoment
+from virtualwork.formulas.kinematics import Angle, Point, Slide, Turn
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.cases.quantities import Numbers
     from dalembert.results.columns import Cell
-    from virtualwork.formulas.asked import Key
+    from virtualwork.formulas.quantity import Quantity
     from virtualwork.motion import Motion
 
     Part = dict[str, Sequence[Cell]]
@@ -71,13 +72,13 @@ def table(analysis: Analysis) -> Table:
         if name in ("fvx_m_s", "fvy_m_s"):
             assert guide is not None
             return bounds_of(_guided(along, guide, link))
-        key: Key = ("applied" if name in FORCE else "applied moment", link)
+        key: Quantity = Applied(link) if name in FORCE else AppliedMoment(link)
         if name in LINK:
-            key = ("angle", link, LINK.index(name))
+            key = Angle(link, LINK.index(name))
         for k, names in enumerate(POINT):
             if name in names:
-                key = ("point", link, center, None, k)
-        return bounds_of(bound(along if key[-1] == 1 else motion, key, analysis.set_angles))
+                key = Point(link, center, None, k)
+        return bounds_of(bound(along if key.order == 1 else motion, key, analysis.set_angles))
 
     def error(key: str) -> list[float]:
         result = []
@@ -154,7 +155,7 @@ def _part(analysis: Analysis, motion: Motion, name: str, order: int) -> Part:
     body, highest = motion.mechanism.rigid[name], min(order, 2)
     wanted = links([name], highest)
     for k in range(highest + 1):
-        wanted += vector((name,), "", POINT[k], ("point", name, body.center, None, k))
+        wanted += vector((name,), "", POINT[k], Point(name, body.center, None, k))
     shown = cells_of(wanted, solved(motion, keys_of(wanted)), motion.n, analysis.set_angles)
     part: Part = {"mass_kg": [body.mass] * motion.n, "inertia_kg_m2": [body.inertia] * motion.n}
     part |= {each.path[-1]: values for each, values in shown.items()}
@@ -238,9 +239,7 @@ def _guided(motion: Motion, guide: int, link: str) -> NDArray[np.float64]:
     g = m.guides[guide]
     if link == g.link:
         return motion.at(link, g.point).error_estimate(1)
-    slide, omega = np.abs(motion.value(("slide", guide, 0))), np.abs(motion.link(link).omega)
+    slide, omega = np.abs(motion.value(Slide(guide, 0))), np.abs(motion.link(link).omega)
     carried = motion.at(link, m.through(g)).error_estimate(1)
-    turned = slide * (r.of(("angle", link, 1)) + omega * r.of(("turn", link))) + omega * r.of(
-        ("slide", guide, 0)
-    )
+    turned = slide * (r.of(Angle(link, 1)) + omega * r.of(Turn(link))) + omega * r.of(Slide(guide, 0))
     return np.asarray(carried + turned)

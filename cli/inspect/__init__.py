@@ -12,7 +12,11 @@ if TYPE_CHECKING:
     from cli.show.result import Result
 
 EXAMPLE = "watt-six-bar"
-OPTIONS = f"{FILE}{CASES}{WORKERS}"
+OPTIONS = f"""
+{FILE}{CASES}{WORKERS}
+What:
+  only NAME,...  Also count the operations of these alone: H.x,coupler.omega,crank.torque.
+"""
 
 
 @declared_command(OPTIONS, Options)
@@ -22,11 +26,12 @@ def run(own: Options, show: ShowOptions) -> Result:
     Speaks of the whole range of the input: --over, --cases and --set change dimensions. On a terminal also the order
     in which the mechanism is solved.
     """
-    from cli.cases.analysis import Request
+    from cli.cases.analysis import Request, names
     from cli.cases.call import Call
     from cli.inspect.character import Inspection
 
-    call = Call.of(own, show, Request(own.file))
+    call = Call.of(own, show, Request(own.file, names(own.only), forces=True))
+    call.check_names()
     call.refuse_inputs(
         "inspect speaks of the whole range of the input: expected a dimension, links.crank.B.x=..."
     )

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from cli.cases import quantities
 from cli.cases.analysis import Analysis
 from cli.cases.case import TableCase, TableStudy
 from cli.cases.poses import listed
@@ -14,6 +15,8 @@ from cli.cases.study import METHOD
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.results.columns import Table, finite, names
 from dalembert.results.way import Topic, figures
+from virtualwork.formulas.forces import Effort, JointForce
+from virtualwork.formulas.kinematics import Angle, Point
 from virtualwork.plan.steps import Group, Place, Slide, Turn, joints, relations
 from virtualwork.study.check import Check
 from virtualwork.study.loops import loops
@@ -25,7 +28,7 @@ if TYPE_CHECKING:
     from dalembert.results.columns import Cell, Document, Json
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
-    from virtualwork.formulas.asked import Key
+    from virtualwork.formulas.quantity import Quantity
     from virtualwork.study.check import Check, FourBar
     from virtualwork.study.strokes import Stroke
 
@@ -221,19 +224,26 @@ def order(analysis: Analysis) -> Table:
 
 
 def operations(analysis: Analysis) -> Table:
-    """Operations that all points and links of a pose cost, with rates where the input has any, and all its forces."""
+    """Operations that a pose costs: all its points and links, with rates where the input has any, and all its forces.
+
+    Before them those of the quantities that --only names.
+    """
     motion = analysis.motions[0]
     m = motion.mechanism
     moves = any(not isinstance(rate, float) or rate for rates in motion.poses.rates for rate in rates)
-    keys: list[Key] = []
+    keys: list[Quantity] = []
     counts: dict[str, int] = {}
+    if analysis.request.only is not None:
+        named = quantities.keys_of([*analysis.places, *analysis.forces])
+        if motion.poses.takes(named):
+            counts[", ".join(analysis.request.only)] = motion.poses.operations(named)
     for order, what in enumerate(("positions", "with velocities", "with accelerations")[: 3 if moves else 1]):
-        keys += [("point", body, 0j, p, order) for body in m.links for p in m.bodies[body]]
-        keys += [("angle", body, order) for body in m.links]
+        keys += [Point(body, 0j, p, order) for body in m.links for p in m.bodies[body]]
+        keys += [Angle(body, order) for body in m.links]
         counts[what] = motion.poses.operations(keys)
     if motion.assembled.all():
-        keys = [("force", joint.key, joint.bodies[-1]) for joint in motion.dynamics.reactions.joints]
-        keys += [("effort", j) for j in range(len(m.inputs))]
+        keys = [JointForce(joint.key, joint.bodies[-1]) for joint in motion.dynamics.reactions.joints]
+        keys += [Effort(j) for j in range(len(m.inputs))]
         if motion.poses.takes(keys):
             counts["forces"] = motion.poses.operations(keys)
     return Table([names(what, [float(count)], None) for what, count in counts.items()], place="")

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from fractions import Fraction
-from math import ulp
+from math import pi, ulp
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dalembert.arithmetic.doubled import Doubled
+from dalembert.arithmetic.doubled import PI, Doubled
+from dalembert.arithmetic.doubled_arrays import DoubledArray
 from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array
 from dalembert.quantities import decimals, exactly
 from dalembert.tables.table import Numbers
@@ -53,3 +55,38 @@ def vectors(sizes: Iterable[Fraction], angle: Numbers) -> Vectors:
     """Vectors of exact sizes at the angles of a column, (n,)."""
     exact: Sequence[Fraction] = angle.exact
     return Vectors.polar(doubled_array(sizes, (len(exact),)), exact, angle.unit, (len(exact),))
+
+
+def array(numbers: ArrayLike) -> DoubledArray:
+    """Numbers of options, in SI, as they were written, as a `DoubledArray`."""
+    return DoubledArray.of(writtens(numbers))
+
+
+def rates(numbers: ArrayLike) -> DoubledArray:
+    """Angular velocities or accelerations of options, in SI, as they were written: in radians, or in degrees or turns.
+
+    >>> float((rates(3000 * pi / 30) / np.pi).off(100.0))
+    0.0
+    """
+    values = np.atleast_1d(np.asarray(numbers, dtype=float))
+    exact = array(values)
+    for i, x in enumerate(values):
+        degrees = x * (180 / pi)
+        short = Fraction(f"{degrees:.13g}")
+        if not exact.low[i] and abs(float(short) - degrees) <= 2 * ulp(degrees) and x != round(x):
+            exact[i] = DoubledArray.of(Doubled.of(short / 180) * PI)
+    return exact.reshape(np.shape(numbers))
+
+
+def column(numbers: Numbers, rows: Sequence[int]) -> DoubledArray:
+    """Rows of a column of a file, in SI, as they are written; what is blank is zero."""
+    values = np.nan_to_num(numbers.values[list(rows)])
+    exact = DoubledArray.of(doubled_array(replace(numbers, values=values).exact, values.shape))
+    return exact * pi / 180.0 if numbers.unit == "deg" else exact
+
+
+def cosine_and_sine(angle: Numbers, rows: Sequence[int]) -> tuple[DoubledArray, DoubledArray]:
+    """Cosines and sines of rows of a column of angles."""
+    values = np.nan_to_num(angle.values[list(rows)])
+    unit = vectors([Fraction(1)] * len(values), replace(angle, values=values))
+    return DoubledArray.of(unit.x), DoubledArray.of(unit.y)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -42,6 +42,17 @@ def refuse(message: str, **values: object) -> None:
     """Refuse the first of these options that is given."""
     for flag in given(**values):
         raise bad(flag, message)
+
+
+def only(text: str | None, names: Sequence[str]) -> Sequence[str]:
+    """Read --only: the names between commas, all of them where there is none."""
+    if text is None:
+        return names
+    words = [word.strip() for word in text.split(",") if word.strip()]
+    for word in words or [text]:
+        if word not in names:
+            raise bad("--only", f"'{word}': expected {', '.join(names)}")
+    return words
 
 
 def column_names(pairs: list[str] | None) -> dict[str, str]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,17 +18,14 @@ from dalembert.hints import nearest
 from dalembert.tables.files import note
 from dalembert.tables.table import Table, read
 from dalembert.units import UNITS, to_si
-from rigidbody3d import Body, check, compose, load_mesh, mesh, tensor
+from rigidbody3d import Body, check, compose, inertia_of, load_mesh, measure_of, mesh, tensor
 from rigidbody3d.shapes import SHAPES
 
 if TYPE_CHECKING:
-    from rigidbody3d.rounding import BodyError
     from rigidbody3d.solids import Solid
 
 Array = NDArray[np.float64]
 
-READ = 2 * float(np.finfo(float).eps)
-"""By how much of itself a number may be off once it is read and put into SI: three roundings, and one to spare."""
 LENGTHS = ("radius", "inner_radius", "length", "width", "height", "depth")
 MOMENTS = ("ixx", "iyy", "izz")
 PRODUCTS = ("ixy", "ixz", "iyz")
@@ -78,7 +75,8 @@ class _Mesh(NamedTuple):
     mass: float
     center: Array
     inertia: Array
-    rough: Callable[[], tuple[float, float]]
+    exact: Callable[[], tuple[Any, Any, Any]]
+    """Volume, centre and tensor of unit density to 32 digits."""
     triangles: Array
 
 
@@ -92,35 +90,55 @@ class _Unturned:
     mass: Array
     center: Array
     inertia: Array
-    reach: Array
-    """Radius times turn of points by radius and angle: their places have the errors of a cosine; else 0."""
+    table: Table
+    index: list[int]
+    """Their rows of the table."""
 
-    def error(self) -> BodyError:
-        """Bound what is off in them: numbers as read, and their shapes' formulas."""
-        from dalembert.arithmetic.bounds import bounds, read
-        from rigidbody3d.rounding import BodyError
-        from rigidbody3d.shapes import weighed
+    def exact(self) -> Body:
+        """Return the parts, turned, to 32 digits: from the decimals of the table as they are written."""
+        from cli.read.exact import column, cosine_and_sine
+        from dalembert.arithmetic.doubled_arrays import DoubledArray
 
-        masses, centers, tensors = (READ * np.abs(x) for x in (self.mass, self.center, self.inertia))
-        centers[:, :2] += READ * self.reach[:, None]
-        for i, solid in self.meshes.items():
-            rough, reach = solid.rough()
-            masses[i] += rough * np.abs(self.mass[i])
-            centers[i] += rough * reach
-            tensors[i] += rough * np.abs(self.mass[i]) * reach**2
-        alike: dict[tuple[str, str], list[int]] = {}
-        for i, (shape, row) in enumerate(zip(self.shapes, self.rows, strict=True)):
-            if shape in SHAPES:
-                amount = "mass" if "mass" in row else DENSITIES[SHAPES[shape].thin]
-                alike.setdefault((shape, amount), []).append(i)
-        for (shape, amount), places in alike.items():
-            names = SHAPES[shape].dimensions + SHAPES[shape].optional
-            entering = {
-                name: read([self.rows[i].get(key, 0.0) for i in places], 0, READ)
-                for name, key in (("amount", amount), *zip(names, names, strict=True))
-            }
-            masses[places], tensors[places] = bounds(weighed, entering, shape, amount != "mass")
-        return BodyError(masses, centers, tensors)
+        read, shape = self.table.numbers, np.array(self.shapes)
+        cells = {name: column(numbers, self.index) for name, numbers in read.items()}
+        zero = DoubledArray(np.zeros(len(self.index)))
+        center = np.stack([cells.get(axis, zero) for axis in "xyz"], axis=-1)
+        if "angle" in read:
+            turned = (shape == POINT) & np.isfinite(read["angle"].values[self.index])
+            c, s = cosine_and_sine(read["angle"], self.index)
+            polar = np.stack([cells["radius"] * c, cells["radius"] * s, center[:, 2]], axis=-1)
+            center = np.where(turned[:, None], polar, center)
+        mass = cells.get("mass", zero) + 0.0
+        own = [cells.get(name, zero) for name in (*MOMENTS, *PRODUCTS)]
+        inertia: Any = tensor(*own)
+        inertia = np.where(
+            (inertia.value.trace(axis1=1, axis2=2) * mass.high < 0)[:, None, None], -inertia, inertia
+        )
+        for kind in dict.fromkeys(self.shapes):
+            if kind in SHAPES:
+                places = np.flatnonzero(shape == kind)
+                known = SHAPES[kind]
+                sizes = {
+                    name: cells[name][places] for name in known.dimensions + known.optional if name in cells
+                }
+                if known.thin:
+                    density = cells.get(DENSITIES[known.thin], zero)[places]
+                    dense: Any = measure_of(kind, **sizes)[0] * density
+                    mass[places] = np.where(mass.high[places] == 0, dense, mass[places])
+                inertia[places] = inertia_of(kind, mass[places], **sizes)
+        for place, solid in self.meshes.items():
+            volume, middle, moments = solid.exact()
+            density = cells["density"][place] if "density" in self.rows[place] else mass[place] / volume
+            mass[place], inertia[place] = density * volume, moments * density
+            if not self.rows[place].keys() & {"x", "y", "z"}:
+                center[place] = middle
+        turns = [
+            (axis, *cosine_and_sine(read[name], self.index))
+            for axis, name in enumerate(TURNS)
+            if name in read
+        ]
+        rotation = _turned(turns, _along(np.stack([cells.get(f"axis_{a}", zero) for a in "xyz"], axis=-1)))
+        return Body(mass, center, inertia).turned(rotation)
 
     def solids(self) -> list[Solid]:
         """Return what they look like."""
@@ -163,8 +181,7 @@ def bodies_of(table: Table, path: str) -> list[Parts]:
     # row by row Python's numbers are faster; turns are no shape's
     columns = {key: column.tolist() for key, column in values.items() if key not in TURNS}
     labels = table.texts.get("part", [str(index + 1) for index in range(table.rows)])
-    centers = np.stack([np.nan_to_num(values.get(axis, np.zeros(table.rows))) for axis in "xyz"], axis=-1)
-    reach = np.zeros(table.rows)
+    centers = _vectors(values, *"xyz")
     folder = Path() if path == "-" else Path(path).parent
     names, body_of = table.numbered(SEVERAL)
     warnings: list[list[str]] = [[] for _ in names]
@@ -176,7 +193,7 @@ def bodies_of(table: Table, path: str) -> list[Parts]:
     for index, shape in enumerate(map(str.lower, table.needed("shape"))):
         row = {key: value for key, column in columns.items() if (value := column[index]) == value}
         if shape == POINT and row.keys() & set(POLAR):
-            centers[index, :2], reach[index] = _polar(table, index, row)
+            centers[index, :2] = _polar(table, index, row)
             row = {key: value for key, value in row.items() if key not in POLAR}
         if shape == MESH:
             solid = _mesh(table, index, row, folder)
@@ -201,8 +218,7 @@ def bodies_of(table: Table, path: str) -> list[Parts]:
         index = kept[place]
         warnings[body_of[index]].append(_broken(table, index, labels[index], by))
         missing[body_of[index]] += by
-    rotation = (_turns(table) @ _along(table, values))[kept]
-    turning = _turning(rotation, values, kept)
+    rotation = _rotation(table, values)[kept]
     result = []
     for number, name in enumerate(names):
         mine = np.flatnonzero(body_of[kept] == number)
@@ -214,10 +230,11 @@ def bodies_of(table: Table, path: str) -> list[Parts]:
             mass[mine],
             centers[own_rows],
             inertia[mine],
-            reach[own_rows],
+            table,
+            own_rows,
         )
-        drawn = Body(parts.mass, parts.center, parts.inertia, parts.error, parts.solids)
-        each = drawn.turned(rotation[mine], error=turning[mine])
+        drawn = Body(parts.mass, parts.center, parts.inertia, form=parts.solids).turned(rotation[mine])
+        each = replace(drawn, exact=parts.exact)
         of = f"{table.file}: body {quote(name)}" if SEVERAL in table.texts else table.file
         whole = _whole(of, each, float(missing[number]))
         shown = [labels[i] for i in own_rows]
@@ -244,8 +261,8 @@ def _whole(of: str, each: Body, missing: float) -> Body:
     return whole
 
 
-def _polar(table: Table, index: int, row: dict[str, float]) -> tuple[tuple[float, float], float]:
-    """Return x and y of a point by radius and angle, m, and its radius times its turn."""
+def _polar(table: Table, index: int, row: dict[str, float]) -> tuple[float, float]:
+    """Return x and y of a point by radius and angle, m."""
     for key, other in (POLAR, POLAR[::-1]):
         if key not in row:
             raise table.wrong(index, other, f"radius and angle together: a point has no {key}")
@@ -257,8 +274,7 @@ def _polar(table: Table, index: int, row: dict[str, float]) -> tuple[tuple[float
         raise table.wrong(index, "radius", "a radius that is not negative")
     angle = table.numbers["angle"]
     c, s = (float(x) for x in cosine_sine(angle.values[index], angle.unit))
-    plain = c in (0.0, 1.0, -1.0)
-    return (radius * c, radius * s), 0.0 if plain else radius * (1.0 + abs(row["angle"]))
+    return radius * c, radius * s
 
 
 def _part(
@@ -350,8 +366,8 @@ def _mesh(table: Table, index: int, row: dict[str, float], folder: Path) -> _Mes
     if ("mass" in row) == ("density" in row) or not row.get("density", 1.0) > 0 or row.get("mass", 1.0) == 0:
         raise table.error(index, "shape", MESH, "with it a mass, or a positive density_kg_m3")
     try:
-        vertices, faces = load_mesh(str(note(folder / cell)))
-        vertices = to_si(vertices, "length", unit)
+        read, faces = load_mesh(str(note(folder / cell)))
+        vertices = to_si(read, "length", unit)
         volume, center, inertia = mesh(vertices, faces)
     except ImportError:
         raise needs(f"{table.file}: a mesh", "trimesh", "mesh") from None
@@ -359,18 +375,20 @@ def _mesh(table: Table, index: int, row: dict[str, float], folder: Path) -> _Mes
         raise table.error(index, "file", cell, f"a closed mesh: {error}") from None
     size = float(volume)
     density = row["density"] if "density" in row else row["mass"] / size
-    rough = partial(_rough, vertices, faces, size)
-    return _Mesh(density * size, center, density * inertia, rough, vertices[faces] - center)
+    return _Mesh(
+        density * size,
+        center,
+        density * inertia,
+        partial(_exact_mesh, read, unit, faces),
+        vertices[faces] - center,
+    )
 
 
-def _rough(vertices: Array, faces: NDArray[np.int64], volume: float) -> tuple[float, float]:
-    """Return by how much, of the volume, the sum over a mesh's faces may be off, and how far its corners lie."""
-    corners = vertices[faces]
-    spread = corners - vertices[np.unique(faces)].mean(axis=0)
-    reach = float(np.sqrt(np.square(spread).sum(axis=-1)).max())
-    # a corner moves by its own rounding, and all that its faces sweep with it
-    sizes = np.abs(np.linalg.det(spread)) + reach**2 * READ * np.abs(corners).max()
-    return READ * len(faces) * float(sizes.sum()) / volume, reach
+def _exact_mesh(vertices: Array, unit: str, faces: NDArray[np.int64]) -> tuple[Any, Any, Any]:
+    from dalembert.arithmetic.doubled_arrays import DoubledArray
+
+    numerator, denominator = UNITS["length"][unit]
+    return mesh(DoubledArray(vertices) * numerator / denominator, faces)
 
 
 def _mass(table: Table, index: int, shape: str, row: dict[str, float], dimensions: dict[str, float]) -> float:
@@ -395,49 +413,54 @@ def _mass(table: Table, index: int, shape: str, row: dict[str, float], dimension
     return mass
 
 
-def _turning(rotation: Array, values: dict[str, Array], kept: list[int]) -> Array:
-    """Bound the turns' entries: a matrix of zeros and ones is exact, another has its angles' own rounding."""
-    angles = [np.abs(np.nan_to_num(values[name][kept])) for name in TURNS if name in values]
-    plain = np.isin(rotation, (-1.0, 0.0, 1.0)).all(axis=(-1, -2), keepdims=True)
-    rough = READ * (4 + sum(angles, np.zeros(len(kept)))[:, None, None])
-    return np.broadcast_to(np.where(plain, 0.0, rough), rotation.shape)
-
-
-def _turns(table: Table) -> Array:
-    """The turn about the fixed x, then y, then z, (k, 3, 3); degrees are exact at quarter turns."""
-    out = np.broadcast_to(np.eye(3), (table.rows, 3, 3))
-    for axis, name in enumerate(TURNS):
+def _rotation(table: Table, values: dict[str, Array]) -> Array:
+    """How each part is turned, (k, 3, 3): its axis first, then about the fixed x, y and z; degrees are exact at quarter turns."""
+    if any(f"axis_{axis}" in values for axis in "xyz"):
+        axis = _vectors(values, *(f"axis_{a}" for a in "xyz"))
+        blank = np.all([np.isnan(values[f"axis_{a}"]) for a in "xyz" if f"axis_{a}" in values], axis=0)
+        zero = ~axis.any(axis=-1) & ~blank
+        if zero.any():
+            header = next(table.numbers[f"axis_{a}"].header for a in "zyx" if f"axis_{a}" in table.numbers)
+            index = int(np.argmax(zero))
+            raise table.error(index, header, "0", "an axis that is not zero in every component")
+    else:
+        axis = np.zeros((table.rows, 3))
+    turns = []
+    for number, name in enumerate(TURNS):
         if name in table.numbers:
-            c, s = cosine_sine(np.nan_to_num(table.numbers[name].values), table.numbers[name].unit)
-            turn = np.zeros((table.rows, 3, 3))
-            p, q = (axis + 1) % 3, (axis + 2) % 3
-            turn[:, axis, axis] = 1.0
-            turn[:, p, p] = turn[:, q, q] = c
-            turn[:, p, q], turn[:, q, p] = -s, s
-            out = turn @ out
-    return out
+            angle = table.numbers[name]
+            turns.append((number, *cosine_sine(np.nan_to_num(angle.values), angle.unit)))
+    return _turned(turns, _along(axis))
 
 
-def _along(table: Table, values: dict[str, Array]) -> Array:
-    """The shortest turn that brings z onto each part's axis, (k, 3, 3); about x where the axis is -z."""
-    if not any(f"axis_{axis}" in values for axis in "xyz"):
-        return np.broadcast_to(np.eye(3), (table.rows, 3, 3))
-    blank = np.full(table.rows, np.nan)
-    axis = np.stack([values.get(f"axis_{a}", blank) for a in "xyz"], axis=-1)
-    axis = np.where(np.isnan(axis).all(axis=-1, keepdims=True), [0.0, 0.0, 1.0], np.nan_to_num(axis))
+def _vectors(values: dict[str, Array], *names: str) -> Array:
+    """Three columns as vectors (k, 3); what is blank is zero."""
+    rows = len(next(iter(values.values())))
+    return np.stack([np.nan_to_num(values.get(name, np.zeros(rows))) for name in names], axis=-1)
+
+
+def _turned(turns: Iterable[tuple[int, Any, Any]], turn: Array) -> Array:
+    """Turn further about fixed axes: the number of each, cosines and sines (k,)."""
+    for axis, c, s in turns:
+        zero = np.zeros_like(c)
+        rows = [[zero, zero, zero] for _ in range(3)]
+        p, q = (axis + 1) % 3, (axis + 2) % 3
+        rows[axis][axis] = zero + 1.0
+        rows[p][p] = rows[q][q] = c
+        rows[p][q], rows[q][p] = -s, s
+        turn = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2) @ turn
+    return turn
+
+
+def _along(axis: Array) -> Array:
+    """The shortest turn that brings z onto each part's axis (k, 3), (k, 3, 3); about x where the axis is -z; none where it is blank."""
+    axis = np.where((axis == 0).all(axis=-1)[:, None], [0.0, 0.0, 1.0], axis)
     size = np.sqrt(np.square(axis).sum(axis=-1))
-    if (size == 0).any():
-        index = int(np.argmin(size))
-        header = next(table.numbers[f"axis_{a}"].header for a in "zyx" if f"axis_{a}" in table.numbers)
-        raise table.error(index, header, "0", "an axis that is not zero in every component")
     x, y, z = (axis / size[:, None]).T
     across = x * x + y * y
     # 1/(1 + z), by the other quotient where z is near -1
     k = np.where(z >= 0, 1 / (1 + np.abs(z)), (1 + np.abs(z)) / np.where(across > 0, across, 1.0))
-    flat = across == 0
-    turn = np.empty((table.rows, 3, 3))
-    turn[:, 0, 0], turn[:, 0, 1], turn[:, 0, 2] = 1 - k * x * x, -k * x * y, x
-    turn[:, 1, 0], turn[:, 1, 1], turn[:, 1, 2] = -k * x * y, 1 - k * y * y, y
-    turn[:, 2, 0], turn[:, 2, 1], turn[:, 2, 2] = -x, -y, z
-    turn[flat & (z < 0)] = np.diag([1.0, -1.0, -1.0])
-    return turn
+    rows = [[1 - k * x * x, -k * x * y, x], [-k * x * y, 1 - k * y * y, y], [-x, -y, z]]
+    turn = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    reverse = (across == 0) & (z < 0)
+    return np.where(reverse[:, None, None], np.diag([1.0, -1.0, -1.0]), turn)

@@ -14,7 +14,7 @@ from cli.cases.analysis import Analysis
 from cli.cases.axes import input_values
 from cli.cases.case import Case, TableCase, TableStudy
 from cli.cases.poses import column
-from cli.cases.quantities import bounds_of, cells, in_rows, keys_of, nested
+from cli.cases.quantities import SLIDE, Component, bounds_of, cells, in_rows, keys_of, nested
 from cli.read import options
 from cli.show.picture import shown as on_page
 from cli.show.terminal import progress_in_time
@@ -26,7 +26,7 @@ from dalembert.results.columns import Column, Table, document, names, number
 from dalembert.results.way import Topic, figures
 from virtualwork import MechanismError, quantities
 from virtualwork.describe.parts import GROUND
-from virtualwork.quantities import SLIDE, Quantity
+from virtualwork.formulas.forces import Shaking
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from virtualwork.intime.travel import Moved, Travel
 
     Reals = NDArray[np.float64]
-    Values = dict[Quantity, Reals]
+    Values = dict[Component, Reals]
     from collections.abc import Sequence
 
     from virtualwork.describe.parts import Input
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 # an input's angle and its rates
 INPUT = ("angle_deg", "speed_rad_s", "acceleration_rad_s2")
-ENERGY = Quantity(("energy_J",), "energy_J")
+ENERGY = Component(("energy_J",), "energy_J")
 METHOD = (
     "Motion under forces: the effort at the inputs by virtual work with d'Alembert's forces is M·q̈ + h; of released inputs "
     "it is zero, and q̈ is integrated in the inputs. Loops are closed at every evaluation. The error is estimated from a "
@@ -105,12 +105,12 @@ class Motion(TableCase):
             raise DataError(f"{a.file}: {error}") from None
 
     @cached_property
-    def _wanted(self) -> list[Quantity]:
+    def _wanted(self) -> list[Component]:
         """What is requested in addition to the inputs and the energy."""
         return [*(self.analysis.places if self.analysis.request.only is not None else []), *self._forces]
 
     @property
-    def _forces(self) -> list[Quantity]:
+    def _forces(self) -> list[Component]:
         """The joint forces and the shaking force, where they are requested."""
         a = self.analysis
         if not a.request.forces:
@@ -119,10 +119,10 @@ class Motion(TableCase):
         joints = [each for each in a.forces if each.path[:1] == ("reactions",)]
         every = quantities.forces(a.mechanism, a.pairs)
         joints = joints or [each for each in every if each.path[:1] == ("reactions",) and not each.reverse]
-        return [*joints, *(each for each in every if each.path[:1] == ("shaking",))]
+        return [*joints, *(each for each in every if each.path[:1] == Shaking())]
 
     def values(
-        self, way: Travel, wanted: Sequence[Quantity], times: Reals | None = None, moved: Moved | None = None
+        self, way: Travel, wanted: Sequence[Component], times: Reals | None = None, moved: Moved | None = None
     ) -> Values:
         """The inputs, the energy and some quantities, of one of the two solutions; `moved`: with other states."""
         m, t = self.analysis.mechanism, self.run.t if times is None else times
@@ -137,9 +137,9 @@ class Motion(TableCase):
         keys = keys_of(wanted)
         solved = dict(zip(keys, way.motion(t, moved).values(keys), strict=True)) if keys else {}
         for each in wanted:
-            if each.turns:
+            if each.link:
                 # whole turns and all
-                name = each.key[1]
+                name = each.link
                 values[each] = driven[name] if name in driven else np.degrees(way.link_angle(name, t))
             else:
                 values[each] = each.of(solved[each.key]) if each.key else np.zeros(len(t))
@@ -174,11 +174,11 @@ class Motion(TableCase):
         """The answer as far as any digit of it can be trusted."""
         return trusted(self.fine, self.run.unknown)
 
-    def _error(self, each: Quantity) -> list[float]:
+    def _error(self, each: Component) -> list[float]:
         error = self.errors[each]
         if each.key:
             own = self.run.rounding(each.key)
-            error = error + (np.degrees(own) if each.key[0] == "angle" and not each.key[2] else own)
+            error = error + (np.degrees(own) if each.in_degrees else own)
         return bounds_of(error)
 
     def further(self) -> dict[str, Callable[[], Table]]:
@@ -374,7 +374,7 @@ def inputs_of(m: Mechanism, q: Reals, v: Reals, a: Reals, error: Reals) -> Value
         names = *(SLIDE if entry.is_slide else INPUT)[:3], f"error_estimate_{unit}"
         for name, its in zip(names, values, strict=True):
             header = f"{lead}{unit if name in (SLIDE[0], INPUT[0]) else name}"
-            result[Quantity(("inputs", entry.name, name), header)] = its
+            result[Component(("inputs", entry.name, name), header)] = its
     return result
 
 
@@ -386,7 +386,7 @@ def _degrees(q: Reals) -> Reals:
     return np.asarray(angle)
 
 
-def _is_error(each: Quantity) -> bool:
+def _is_error(each: Component) -> bool:
     return str(each.path[-1]).startswith("error")
 
 
@@ -401,7 +401,7 @@ def trusted(values: Values, unknown: NDArray[np.bool_]) -> Values:
 
 
 def columns_of(
-    t: Reals, values: Mapping[Quantity, Reals], error: Callable[[Quantity], list[float]] | None = None
+    t: Reals, values: Mapping[Component, Reals], error: Callable[[Component], list[float]] | None = None
 ) -> list[Column]:
     """The numbers at each time as columns."""
     columns = [column("t_s", t.tolist())]

@@ -42,6 +42,7 @@ What:
   at T  A time, s; may be repeated.
   find NAME  Find this number of the file: omega.z, inertia.3, top.mgl, a top's tilt.
   so_that QUANTITY=VALUE  What it is to give: slow=0.5rad_s, momentum.z=2.
+  only NAME,...  Only these: omega, attitude, momentum, energy, drift, period, nutation_period, cones, steady.
 How:
   method  Default: exact wherever a closed form exists, else integrate.
   integrator  For integration; the splitting is for a symmetric top.
@@ -57,6 +58,7 @@ def run(
     at: list[str] | None = None,
     find: str | None = None,
     so_that: str | None = None,
+    only: str | None = None,
     method: Annotated[Method | None, typer.Option(show_default=False)] = None,
     integrator: Integrator = Integrator.dop853,
     page: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None,
@@ -83,6 +85,7 @@ def run(
         times = options.time_range("--time", time)
     else:
         times = [options.number_or_quantity("--at", text, "time") for text in at or ["0"]]
+    chosen = options.only(only, tables.QUANTITIES)
     if page is not None:
         from cli.show.picture import refuse_long
 
@@ -115,7 +118,7 @@ def run(
 
     result = Result(
         way=way,
-        tables=tables.tables(rotation),
+        tables=tables.tables(rotation, chosen),
         head={"method": "exact" if rotation.exact else rotation.integrator},
         figure=figure,
         beside={} if page is None else {page: moving},

@@ -291,16 +291,19 @@ class Rotation:
         """The period of nutation of a top; None of any other body."""
         return finite(float(self.states.top.nutation_period)) if isinstance(self.states, TopState) else None
 
-    @cached_property
-    def bounds(self) -> dict[str, Array]:
+    def bounds(self, of: str) -> Array:
         """Bounds of the rounding errors of the states, of an integration of its method too."""
-        s, rounded = self.states, self.body.rounded
+        return self.states.error_estimate(of, self._tensor_errors)
+
+    @cached_property
+    def _tensor_errors(self) -> Array:
+        rounded = self.body.rounded
         tensor = np.zeros((3, 3)) if rounded is None else rounded()
-        if isinstance(s, TopState):
-            # two moments that differ by rounding were taken as one
-            between = np.abs(np.diff(np.diag(_tensor(self.body.inertia))[:2]))[0] / 2
-            tensor = np.diag(tensor) + [between, between, 0.0]
-        return {of: s.error_estimate(of, tensor) for of in ("omega", "attitude", "momentum", "energy")}
+        if not isinstance(self.states, TopState):
+            return tensor
+        # two moments that differ by rounding were taken as one
+        between = np.abs(np.diff(np.diag(_tensor(self.body.inertia))[:2]))[0] / 2
+        return np.asarray(np.diag(tensor) + [between, between, 0.0])
 
 
 def _tensor(inertia: Array) -> Array:

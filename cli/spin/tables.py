@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,32 +23,44 @@ METHOD = (
 )
 
 
-def tables(r: Rotation) -> dict[str, Callable[[], Table]]:
+STATES = ("omega", "attitude", "momentum", "energy")
+CONSTANTS = ("drift", "period", "nutation_period", "cones", "steady")
+QUANTITIES = (*STATES, *CONSTANTS)
+"""What --only can name; nothing else is computed then."""
+
+
+def tables(r: Rotation, only: Collection[str] = QUANTITIES) -> dict[str, Callable[[], Table]]:
     """The tables of a result, the CSV's first."""
-    return {"states": lambda: states(r), "constants": lambda: constants(r)}
+    made = {"states": lambda: states(r, only), "constants": lambda: constants(r, only)}
+    return {
+        name: made[name] for name, of in (("states", STATES), ("constants", CONSTANTS)) if {*of} & {*only}
+    }
 
 
-def states(r: Rotation) -> Table:
+def states(r: Rotation, only: Collection[str] = QUANTITIES) -> Table:
     """A row for each time."""
     s = r.states
 
     def error(of: str) -> Callable[[], Array]:
         # a turn by an angle moves a quaternion by half of it
-        return lambda: r.bounds[of] / 2 if of == "attitude" else r.bounds[of]
+        return lambda: r.bounds(of) / 2 if of == "attitude" else r.bounds(of)
 
-    columns = [
-        number("t", "time", r.time + 0.0),
-        *vector("omega", "speed", s.omega + 0.0, "xyz", error("omega")),
-        *vector("attitude", "number", s.attitude + 0.0, "wxyz", error("attitude")),
-        *vector("momentum", "angular momentum", s.momentum + 0.0, "xyz", error("momentum")),
-        number("energy", "energy", s.energy + 0.0, error=error("energy")),
-    ]
+    columns = [number("t", "time", r.time + 0.0)]
+    for name, dimension, axes in (
+        ("omega", "speed", "xyz"),
+        ("attitude", "number", "wxyz"),
+        ("momentum", "angular momentum", "xyz"),
+    ):
+        if name in only:
+            columns += vector(name, dimension, getattr(s, name) + 0.0, axes, error(name))
+    if "energy" in only:
+        columns.append(number("energy", "energy", s.energy + 0.0, error=error("energy")))
     how = "closed form" if r.exact else f"integrated by {r.integrator}"
     above = f"omega in body axes, momentum in space axes, attitude [w, x, y, z] from body to space; {how}"
     return Table(columns, place="states[]", above=above)
 
 
-def constants(r: Rotation) -> Table:
+def constants(r: Rotation, only: Collection[str] = QUANTITIES) -> Table:
     """One row: drift, periods, the cones of a free symmetric body, the steady precession of a top."""
     columns: list[Column] = []
     absent: list[Column] = []
@@ -57,11 +69,16 @@ def constants(r: Rotation) -> Table:
         column = number(name, dimension, [np.nan if value is None else value], place=place)
         (absent if value is None else columns).append(column)
 
-    for of, value in r.drift.items():
-        one(f"drift_of_{of}", "number", value, f"drift.{of}")
-    one("period", "time", r.period, "period")
-    one("nutation_period", "time", r.nutation_period, "nutation_period")
-    for name, rates in (("cones", r.cones()), ("steady", r.steady())):
+    if "drift" in only:
+        for of, value in r.drift.items():
+            one(f"drift_of_{of}", "number", value, f"drift.{of}")
+    for name in ("period", "nutation_period"):
+        if name in only:
+            one(name, "time", getattr(r, name), name)
+    for name in ("cones", "steady"):
+        if name not in only:
+            continue
+        rates = getattr(r, name)()
         for key, value in (rates or {}).items():
             base, dimension = (key[:-4], "angle") if key.endswith("_deg") else (key[:-6], "speed")
             one(base, dimension, value, f"{name}.{base}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ import numpy as np
 from cli.cases import poses
 from cli.cases.analysis import Analysis
 from cli.cases.case import TableCase, TableStudy
-from cli.cases.quantities import cells, keys_of
+from cli.cases.quantities import Component, cells, keys_of
 from cli.cases.study import METHOD
 from cli.read.options import processes
 from dalembert.dataclass import dataclass, field
@@ -19,8 +19,8 @@ from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table, names
 from virtualwork.describe.dimensions import Dimension
 from virtualwork.family.tolerance import Drawn, Spread, drawn, drawn_numbers, limits, spread, summary
-from virtualwork.formulas.asked import Key
-from virtualwork.quantities import Quantity
+from virtualwork.formulas.kinematics import Point
+from virtualwork.formulas.quantity import Quantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,7 +64,7 @@ class Tolerances(TableCase):
         return limits(self.analysis.mechanism, tolerances)
 
     @cached_property
-    def numbers(self) -> list[Quantity]:
+    def numbers(self) -> list[Component]:
         """What is shown and varies with the tolerances."""
         shown = [each for each in self.analysis.tabled if each.key and not each.less]
         keys = keys_of(shown)
@@ -72,12 +72,12 @@ class Tolerances(TableCase):
         return [each for each in shown if varies[each.key][each.imaginary]]
 
     @cached_property
-    def keys(self) -> list[Key]:
+    def keys(self) -> list[Quantity]:
         """The quantities that this is of."""
         return keys_of(self.numbers)
 
     @cached_property
-    def slopes(self) -> dict[Key, list[Any]]:
+    def slopes(self) -> dict[Quantity, list[Any]]:
         """Of each quantity to each dimension."""
         result = self.analysis.motions[0].sensitivities.of(self.keys, list(self.limits))
         return dict(zip(self.keys, result, strict=True))
@@ -106,7 +106,7 @@ class Tolerances(TableCase):
                 solved = dict(zip(self.keys, values, strict=True))
                 for number in self.numbers:
                     its, mean = number.of(solved[number.key]), number.of(nominal[number.key][rows])
-                    parts[number.header].append(summary(its, mean, 360.0 if number.turns else None))
+                    parts[number.header].append(summary(its, mean, 360.0 if number.link else None))
         joined = {
             header: Drawn(*(np.concatenate([getattr(p, name) for p in some], axis=-1) for name in _FIELDS))
             for header, some in parts.items()
@@ -312,8 +312,10 @@ def draw(tolerances: Tolerances) -> Figure:
     """The band of the path of each point, and the shares; without points, bands over the input."""
     from matplotlib.figure import Figure
 
-    points = [number.key for number in tolerances.numbers if number.key[0] == "point" and number.key[4] == 0]
-    points = list(dict.fromkeys(key for key in points if key[3] not in tolerances.analysis.mechanism.ground))
+    points = [each.key for each in tolerances.numbers if isinstance(each.key, Point) and not each.key.order]
+    points = list(
+        dict.fromkeys(key for key in points if key.node not in tolerances.analysis.mechanism.ground)
+    )
     figure = Figure(figsize=(11.0, 5.2), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=(1.3, 1))
     if points:
@@ -327,14 +329,14 @@ def draw(tolerances: Tolerances) -> Figure:
     return figure
 
 
-def _paths(axes: Axes, tolerances: Tolerances, points: list[Key]) -> None:
+def _paths(axes: Axes, tolerances: Tolerances, points: list[Point]) -> None:
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import to_rgb
 
     analysis = tolerances.analysis
     scale, unit = (1e3, "mm") if analysis.mechanism.size < 2 else (1.0, "m")
     sizes = np.array(list(tolerances.limits.values()))
-    paths = {key: analysis.motions[0].point(key[3]).complex(0) * scale for key in points}
+    paths = {key: analysis.motions[0].point(str(key.node)).complex(0) * scale for key in points}
     width = max((np.nanmax(abs(z - np.nanmean(z)), initial=0.0) for z in paths.values()), default=1.0) or 1.0
     bands = {}
     for key, z in paths.items():
@@ -358,7 +360,7 @@ def _paths(axes: Axes, tolerances: Tolerances, points: list[Key]) -> None:
             list(np.stack([corners.real, corners.imag], axis=-1)), facecolor=light, edgecolor=light
         )
         axes.add_collection(quads)
-        axes.plot(z.real, z.imag, color=f"C{i}", lw=1.2, label=key[3])
+        axes.plot(z.real, z.imag, color=f"C{i}", lw=1.2, label=key.node)
     much = "" if enlarged == 1 else f", drawn {enlarged:g} times as wide"
     axes.set_title(f"paths, and their worst case across{much}", fontsize=9)
     axes.set_aspect("equal", adjustable="datalim")
@@ -383,7 +385,7 @@ def _over_input(axes: Axes, tolerances: Tolerances, header: str) -> None:
     axes.grid(color="0.9", lw=0.6)
 
 
-def _shares(axes: Axes, tolerances: Tolerances, keys: list[Key], of: str) -> None:
+def _shares(axes: Axes, tolerances: Tolerances, keys: Sequence[Quantity], of: str) -> None:
     """Bars of the shares, means over the poses."""
     variances = np.zeros(len(tolerances.limits))
     for key in keys:

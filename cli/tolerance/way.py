@@ -13,15 +13,15 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from cli.cases.analysis import Analysis
+    from cli.cases.quantities import Component
     from virtualwork.describe.dimensions import Dimension
-    from virtualwork.formulas.asked import Key
-    from virtualwork.quantities import Quantity
+    from virtualwork.formulas.quantity import Quantity
 
 
 def way(
     analysis: Analysis,
-    shown: Sequence[Quantity],
-    slopes_of: Mapping[Key, Sequence[Any]],
+    shown: Sequence[Component],
+    slopes_of: Mapping[Quantity, Sequence[Any]],
     limits: Mapping[Dimension, float],
 ) -> list[Topic]:
     """The one topic: at the first pose that is assembled."""

@@ -141,6 +141,11 @@ class Vectors:
         """The sum along an axis."""
         return Vectors(total(self.x, axis), total(self.y, axis))
 
+    def swapped(self) -> Vectors:
+        """The same with its last two axes exchanged."""
+        parts = ((x.high, x.low + 0.0 * x.high) for x in (self.x, self.y))
+        return Vectors(*(Doubled(*(np.swapaxes(each, -1, -2) for each in pair)) for pair in parts))
+
     def apart(self, value: ArrayLike) -> Real:
         """Return by how much complex floats differ from these."""
         off = self - Vectors.of(value)

@@ -2,12 +2,40 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Shape = tuple[int, ...]
+
+
+def is_doubled(x: object) -> TypeGuard[Any]:
+    """Return whether these are numbers of 32 digits (`doubled_arrays`), in which a formula runs the second time."""
+    return hasattr(x, "high")
+
+
+def as_array(x: ArrayLike) -> NDArray[np.float64]:
+    """Return an array of floats; one of 32 digits stays as it is."""
+    if is_doubled(x):
+        doubled: NDArray[np.float64] = x
+        return doubled
+    return np.asarray(x, dtype=float)
+
+
+def in_32_digits(x: ArrayLike) -> Any:
+    """Return the same numbers as a `DoubledArray`."""
+    from dalembert.arithmetic.doubled_arrays import DoubledArray
+
+    return x if is_doubled(x) else DoubledArray(x)
+
+
+def sorting(x: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the order in which the numbers of the last axis ascend."""
+    if is_doubled(x):
+        order: NDArray[np.intp] = np.lexsort((x.low, x.high), axis=-1)
+        return order
+    return np.argsort(x, axis=-1, kind="stable")
 
 
 def as_numbers(name: str, value: ArrayLike, kind: type = float) -> NDArray[Any]:
@@ -27,6 +55,8 @@ def as_numbers(name: str, value: ArrayLike, kind: type = float) -> NDArray[Any]:
     ...
     ValueError: omega must be an array of numbers, found 'fast'
     """
+    if is_doubled(value):
+        return as_array(value)
     try:
         return np.asarray(value, dtype=kind)
     except (TypeError, ValueError):

@@ -131,7 +131,7 @@ def page(
     """
     own = ["player.js", f"{scene}.js"]
     own = (
-        ["way.js", "model.js", "common.js", "entry.js", *own, "loose.js", "editor.js"]
+        ["solving.js", "way.js", "model.js", "common.js", "entry.js", *own, "loose.js", "editor.js"]
         if script
         else ["common.js", *own]
     )

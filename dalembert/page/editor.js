@@ -293,7 +293,9 @@ drawHandles = (stands) => {
     const gap = Math.min(20, far);
     if (far > 1) [u, v] = [u + (gap * way[0]) / far, v + (gap * way[1]) / far];
     group.setAttribute("transform", `translate(${u.toFixed(1)} ${v.toFixed(1)})`);
-    group.style.display = gripped && Number.isFinite(u + v) ? "" : "none";
+    const seen = gripped && Number.isFinite(u + v);
+    group.style.display = seen ? "" : "none";
+    if (seen) taken.push([u, v, 6, 6]);
   }
 };
 toggle("h", TEXTS.handles, true, (on) => (gripped = on));

@@ -22,6 +22,7 @@ function enter(last) {
       const there = k <= last && has(reading(k, s, "amplitude")) && has(reading(k, s, "phase"));
       // as the program takes them: the initial run tells the initial vibration, later ones where it was not read
       given[`run ${k} there ${s}`] = there && (k === 0 || !has(reading(0, s, "amplitude"))) ? 1 : 0;
+      given[`run ${k} read ${s}`] = there ? 1 : 0;
       given[`run ${k} amplitude ${s}`] = there ? values[reading(k, s, "amplitude")] : 0;
       given[`run ${k} phase ${s}`] = there ? (sheet.against ? -1 : 1) * values[reading(k, s, "phase")] : 0;
     }
@@ -35,12 +36,14 @@ function enter(last) {
 let standing = [];
 const readIn = (k) => sheet.sensors.some((_, s) => has(reading(k, s, "amplitude")) || has(reading(k, s, "phase")));
 
+const usedIn = (k) => readIn(k) || [...wrong.keys()].some((name) => name.startsWith(`${sheet.runs[k]}/`)) || (k > 0 && sheet.planes.some((_, p) => has(onRotor(k, p, word)) || has(onRotor(k, p, "angle"))));
+
 solveSheet = () => {
   [doubts, idle, beyond, standing] = [[], [], [], []];
   // a reading is an amplitude with its phase; each sensor is read in some run
   for (let k = 0; k < sheet.runs.length; k++) {
     for (let s = 0; s < sheet.sensors.length; s++) {
-      if (has(reading(k, s, "amplitude")) !== has(reading(k, s, "phase"))) return;
+      if (has(reading(k, s, "amplitude")) !== has(reading(k, s, "phase"))) return void idle.push(TEXTS.half(sheet.runs[k], sheet.sensors[s], has(reading(k, s, "phase")) ? TEXTS.amplitude : TEXTS.phase));
     }
   }
   let out = null;
@@ -77,11 +80,14 @@ solveSheet = () => {
         answers.set(`${lead}${plane}.angle_uncertainty`, [out.get(`across ${from}`)[0] / out.get(size)[0], 0]);
       }
     }
-    // the program's reasons for leaving a plane as it is
-    const size = answer(`trim.${plane}.${word}`);
+    // the program's reasons for leaving a plane as it is: of the limits that are asked for each is met
     const stands = sheet.sensors.map((_, s) => out.get(`${has(reading(last, s, "amplitude")) ? "read" : "expected"} ${last} ${s}`)[0]);
-    if (sheet.ceiling !== null && stands.every((x) => x <= sheet.ceiling * (1 + 1e-9))) idle.push(TEXTS.withinLimit(plane));
-    else if (sheet.errors && size < answer(`trim.${plane}.${word}_uncertainty`)) idle.push(TEXTS.belowUncertainty(plane));
+    const limits = [];
+    if (sheet.ceiling !== null) limits.push([stands.every((x) => x <= sheet.ceiling * (1 + 1e-9)), TEXTS.vibrationWithin]);
+    if (sheet.permissible) limits.push([sheet.permissible[p] !== null && out.get(`left ${last} ${p}`)[0] <= sheet.permissible[p], TEXTS.unbalanceWithin]);
+    if (!Number(shownAnswer(`trim.${plane}.${word}`, sheet.mass.si))) idle.push(TEXTS.idle(plane, TEXTS.nothingLeft));
+    else if (sheet.errors && answer(`trim.${plane}.${word}`) < answer(`trim.${plane}.${word}_uncertainty`)) idle.push(TEXTS.idle(plane, TEXTS.belowUncertainty));
+    else if (limits.length && limits.every(([met]) => met)) idle.push(TEXTS.idle(plane, limits.map(([, why]) => why).join(TEXTS.and)));
     if (sheet.limits[p] !== null && answer(`${plane}.${word}`) > sheet.limits[p] * (1 + 1e-12)) beyond.push(TEXTS.beyondLimit(plane, amount(answer(`${plane}.${word}`)), amount(sheet.limits[p])));
   });
   sheet.sensors.forEach((sensor, s) => {
@@ -98,20 +104,30 @@ solveSheet = () => {
       }
     }
   }
-  if (sheet.places) {
-    sheet.planes.forEach((plane, p) => {
-      const [size, angle] = [answer(`trim.${plane}.${word}`), answer(`trim.${plane}.angle`)];
-      const k = sheet.places.findLastIndex((place) => place <= angle);
-      const low = sheet.places.at(k);
-      const high = sheet.places.at((k + 1) % sheet.places.length);
-      const [first, second] = splitTape.one({ size, angle, first: low, second: high });
-      answers.set(`split.${plane}.1.${word}`, [first, 0]);
-      answers.set(`split.${plane}.1.angle`, [low, 0]);
-      answers.set(`split.${plane}.2.${word}`, [second, 0]);
-      answers.set(`split.${plane}.2.angle`, [high, 0]);
-    });
-  }
+  if (sheet.places) sheet.planes.forEach(splitOn);
 };
+// a trim on the two places on either side of it, or where these do not reach it on the nearer one
+function splitOn(plane) {
+  const [size, angle] = [answer(`trim.${plane}.${word}`), answer(`trim.${plane}.angle`)];
+  const k = sheet.places.findLastIndex(([, place]) => place <= angle);
+  const pair = [sheet.places.at(k), sheet.places.at((k + 1) % sheet.places.length)];
+  const [low, high] = pair.map(([, place]) => place);
+  const [first, second, nearFirst, offFirst, nearSecond, offSecond] = splitTape.one({ size, angle, first: low, second: high });
+  let shares = [first, second];
+  const gap = whole(high - low) || 2 * Math.PI;
+  if (sheet.places.length < 2 || gap > Math.PI - 1e-9) {
+    const [near] = [[0, nearFirst, offFirst], [1, nearSecond, offSecond]].filter(([, mass]) => mass > 0).sort((one, other) => one[2] - other[2]);
+    shares = [0, 1].map((i) => (near?.[0] === i ? near[1] : 0));
+    const off = near ? near[2] : size;
+    if (off > 1e-9 * size) beyond.push(TEXTS.outOfReach(plane, amount(off)));
+  }
+  shares.forEach((share, i) => {
+    answers.set(`split.${plane}.${i + 1}.${word}`, [share, 0]);
+    answers.set(`split.${plane}.${i + 1}.angle`, [pair[i][1], 0]);
+  });
+  placeNames.set(plane, pair.map(([name]) => name));
+}
+const placeNames = new Map(); // plane -> the names of its two places
 
 const boxes = []; // of each run
 function build() {
@@ -150,26 +166,26 @@ const R = 78; // of a dial
 function dial(parent, plane) {
   const host = put(parent, "figure");
   put(host, "figcaption", {}, TEXTS.dial(plane));
-  const picture = put(host, "svg", { role: "img", "aria-label": TEXTS.dial(plane), viewBox: "0 0 300 260", class: "polygon" });
+  const picture = put(host, "svg", { role: "img", "aria-label": TEXTS.dial(plane), viewBox: "-30 0 360 260", class: "polygon dialled" });
   put(picture, "circle", { class: "dial", cx: 150, cy: 130, r: R });
   const at = (angle, r) => [(150 + r * Math.cos(angle)).toFixed(1), (130 - r * Math.sin(angle)).toFixed(1)];
-  for (const place of sheet.places ?? []) {
+  for (const [, place] of sheet.places ?? []) {
     const [x, y] = at(place, R);
     put(picture, "circle", { class: "place", cx: x, cy: y, r: 4 });
   }
-  const marks = (sheet.places ? [`split.${plane}.1`, `split.${plane}.2`] : [`trim.${plane}`]).map((name) => [answer(`${name}.angle`), answer(`${name}.${word}`)]).filter(([angle, size]) => Number.isFinite(angle) && size > 0);
+  const marks = (sheet.places ? [`split.${plane}.1`, `split.${plane}.2`] : [`trim.${plane}`]).map((name, i) => [answer(`${name}.angle`), answer(`${name}.${word}`), placeNames.get(plane)?.[i]]).filter(([angle, size]) => Number.isFinite(angle) && size > 0);
   // the words of two marks that are close stand farther apart
   const between = marks.length < 2 ? 0 : Math.atan2(Math.sin(marks[1][0] - marks[0][0]), Math.cos(marks[1][0] - marks[0][0]));
-  const apart = between ? (Math.sign(between) * Math.max(0, 0.6 - Math.abs(between))) / 2 : 0;
-  for (const [k, [angle, size]] of marks.entries()) {
+  const apart = between ? (Math.sign(between) * Math.max(0, 0.7 - Math.abs(between))) / 2 : 0;
+  for (const [k, [angle, size, name]] of marks.entries()) {
     const [x, y] = at(angle, R);
     put(picture, "circle", { class: "place on", cx: x, cy: y, r: 7 });
     const words = angle + (k ? apart : -apart);
     const [u, v] = at(words, R + 13);
     const side = Math.abs(Math.cos(words)) < 0.3 ? "" : Math.cos(words) > 0 ? "start" : "end";
-    const y0 = Number(v) - 8 * Math.sin(words);
-    put(picture, "text", { x: u, y: y0 - 7, class: side }, amount(size));
-    put(picture, "text", { x: u, y: y0 + 7, class: side }, `${Number(((angle * 180) / Math.PI).toFixed(1))}°`);
+    const lines = [...(name ? [TEXTS.place(name)] : []), amount(size), `${Number(((angle * 180) / Math.PI).toFixed(1))}°`];
+    const y0 = Number(v) - 7 * lines.length * Math.sin(words);
+    lines.forEach((text, i) => put(picture, "text", { x: u, y: y0 + 14 * (i - (lines.length - 1) / 2), class: side }, text));
   }
   put(picture, "text", { x: 150, y: 130 }, "0° →");
 }
@@ -177,7 +193,12 @@ drawSheet = () => {
   keep();
   const host = $("answers");
   host.replaceChildren();
-  for (const [k, box] of boxes.entries()) box.classList.toggle("unused", k > 0 && !readIn(k));
+  // one run more than was read: the answers stay near
+  const last = boxes.findLastIndex((_, k) => usedIn(k));
+  for (const [k, box] of boxes.entries()) {
+    box.classList.toggle("unused", k > 0 && !usedIn(k));
+    box.hidden = k > last + 1;
+  }
   const turn = Math.PI / 180;
   for (const text of beyond) put(host, "p", { class: "doubt", role: "status" }, text);
   for (const text of idle) put(host, "p", { role: "status" }, text);
@@ -206,6 +227,7 @@ drawSheet = () => {
     return [sensor, plane, short(size * sheet.mass.si) + error(along * sheet.mass.si), short(sheet.against ? (360 - angle) % 360 : angle) + error(across / turn)];
   }));
   const limits = sheet.planes.flatMap((plane, p) => (sheet.limits[p] === null ? [] : [[`${TEXTS.largest} ${plane}`, amount(sheet.limits[p])]]));
+  if (sheet.permissible) limits.push(...sheet.planes.map((plane, p) => [TEXTS.permissibleIn(plane), sheet.permissible[p] === null ? "–" : amount(sheet.permissible[p])]));
   const facts = [...sheet.facts, ...(sheet.ceiling === null ? [] : [[TEXTS.largestVibration, `${short(sheet.ceiling)} ${amplitudeUnit}`]]), ...limits];
   if (!facts.length) return;
   put(host, "h2", {}, TEXTS.machine);

@@ -25,18 +25,25 @@ class Machine extends Way {
     at.forEach((q, j) => (given[`q${j}`] = q));
     for (const g of this.iterated) g.start.forEach((x, i) => (given[`x ${g.name} ${i}`] = x));
     for (const g of this.closed) given[`sign ${g.name}`] = g.sign;
-    const choice = this.tapes.choice;
-    let found = choice.one(given);
+    for (const body of this.winding) given[`near ${body}`] = NaN;
+    // the constants of gears follow from what is placed so far
+    const choose = () => {
+      const found = this.tapes.choice.one(given);
+      this.model.phases.forEach((i, k) => (given[`phase ${i}`] = found[5 * this.closed.length + k]));
+      return found;
+    };
+    let found = choose();
     for (const g of this.model.groups) {
       if (g.start) {
         if (!this.#assemble(g, given)) return (given.open = g.name) && false;
-        found = choice.one(given);
+        found = choose();
         continue;
       }
       const k = 5 * this.closed.indexOf(g);
       const margin = found[k];
       // two assemblies meet there: the one it was before
       given[`sign ${g.name}`] = Math.abs(margin) < 1e-14 || !Number.isFinite(found[k + 4]) ? g.sign : found[k + 4];
+      for (const body of g.winds) given[`near ${body}`] = principal(this.tapes.winds.one(given)[this.winding.indexOf(body)]);
     }
     return !(found[found.length - 1] <= 0);
   }
@@ -89,6 +96,7 @@ class Machine extends Way {
     inputs.forEach((q, j) => (given[`q${j}`] = q));
     const [q] = inputs;
     for (const g of this.closed) given[`sign ${g.name}`] = this.one ? this.signs(state, g, q) : state.given[`sign ${g.name}`];
+    if (this.one) this.turned(state, given, q);
     if (this.iterated.length && this.one) {
       for (const g of this.iterated) {
         const keys = g.start.map((_, i) => `x ${g.name} ${i}`);
@@ -102,11 +110,22 @@ class Machine extends Way {
         const open = this.tapes.steps.run(given, q.length)[g.place];
         keys.forEach((key) => (given[key] = given[key].map((x, l) => (open[l] <= 1e-11 * this.model.size ? x : NaN))));
       }
-    } else if (this.iterated.length) this.#alongLines(state, given, inputs);
+    } else if (this.iterated.length + this.winding.length && !this.one) this.#alongLines(state, given, inputs);
     if (this.tapes.twists) this.#wind(state, given, inputs);
     if (this.tapes.over && pose === undefined) this.#load(given, this.tapes.over.run(given, inputs[0].length));
-    if (this.tapes.statics && !(this.tapes.over && pose !== undefined)) this.#bear(given, inputs[0].length);
+    if (!this.tapes.over || pose === undefined) {
+      const locked = this.#settle(given, inputs[0].length);
+      if (pose === undefined) state.locked = new Set(locked);
+    }
     return given;
+  }
+
+  // what the forces of n lanes depend on and is found from tapes; where friction locks the joints
+  #settle(given, n) {
+    if (this.tapes.statics) this.#bear(given, n);
+    if (!this.rubbing) return [];
+    this.tapes.slips.run(given, n).forEach((slip, k) => (given[`slip ${k}`] = slip));
+    return this.rubbing.fit(given, n);
   }
 
   // the equations of all links at one lane of the tape's outputs
@@ -142,27 +161,43 @@ class Machine extends Way {
   // several inputs: every pose on its own straight line from the guess
   #alongLines(state, given, inputs) {
     const n = inputs[0].length;
-    const keys = this.iterated.flatMap((g) => g.start.map((_, i) => `x ${g.name} ${i}`));
-    const found = keys.map(() => new Float64Array(n).fill(NaN));
+    const keys = this.iterated.flatMap((g) => g.keys);
+    const near = this.winding.map((body) => `near ${body}`);
+    const found = [...keys, ...near].map(() => new Float64Array(n).fill(NaN));
     for (let l = 0; l < n; l++) {
       const way = inputs.map((q, j) => q[l] - state.at[j]);
       const here = { ...state.given };
       let [gone, step] = [0, 1 / Math.max(1, Math.ceil(Math.max(...way.map(Math.abs)) / 0.1))];
-      const least = step / 2 ** 20;
+      const [first, least] = [step, step / 2 ** 20];
       while (gone < 1 && step > least) {
         const to = Math.min(1, gone + step);
         const trial = { ...here };
         way.forEach((d, j) => (trial[`q${j}`] = state.at[j] + to * d));
-        const closes = this.iterated.every((g) => this.iterate(g, trial, 8));
+        const closes = this.model.groups.every((g) => (g.start ? this.iterate(g, trial, 8) : this.#turns(g, here, trial)));
         if (closes && keys.every((key) => Math.abs(trial[key] - here[key]) < 0.3 * Math.max(1, Math.abs(here[key])))) {
           Object.assign(here, trial);
           gone = to;
-          step *= 2;
+          step = near.length ? Math.min(2 * step, first) : 2 * step;
         } else step /= 2;
       }
-      if (gone >= 1) keys.forEach((key, k) => (found[k][l] = here[key]));
+      if (gone >= 1) [...keys, ...near].forEach((key, k) => (found[k][l] = here[key]));
     }
-    keys.forEach((key, k) => (given[key] = found[k]));
+    [...keys, ...near].forEach((key, k) => (given[key] = found[k]));
+    // a pose that is not reached has no number of turns, and is not assembled
+    for (const g of this.closed) for (const body of g.winds) {
+      const sign = given[`sign ${g.name}`];
+      given[`sign ${g.name}`] = given[`near ${body}`].map((x) => (Number.isFinite(x) ? sign : NaN));
+    }
+  }
+
+  // the whole turns of a group's links a step farther on; says whether they are known there
+  #turns(g, here, trial) {
+    return g.winds.every((body) => {
+      const key = `near ${body}`;
+      const turned = this.tapes.winds.one(trial)[this.winding.indexOf(body)] - here[key];
+      trial[key] = here[key] + turned - TAU * Math.round(turned / TAU);
+      return Math.abs(trial[key] - here[key]) <= FAR;
+    });
   }
 
   // the whole turns of torsion springs, followed from the guess
@@ -277,7 +312,7 @@ class Machine extends Way {
           const over = precise(this.tapes.over, given);
           this.#load(given, over.map((row, i) => [between(row, poses[0], this.model.tables[i].turns)]));
           for (const [name, x] of Object.entries(given)) if (name.startsWith("table ")) given[name] = x[0];
-          if (this.tapes.statics) this.#bear(given, count);
+          this.#settle(given, count);
         }
         const values = precise(this.tapes.pose, given);
         if (!values.every((row) => row.every(Number.isFinite))) continue;
@@ -314,15 +349,21 @@ class Machine extends Way {
   errors(state, l) {
     if (state.interpolated?.has(l)) return null;
     const here = lane(state.entering, l);
+    if (this.model.phases.length) {
+      const chosen = this.tapes.choice.twice(state.given).slice(5 * this.closed.length);
+      this.model.phases.forEach((i, k) => (here[`phase ${i}`] = chosen[k]));
+    }
     if (this.tapes.statics) this.#unbalanced(here).forEach((x, i) => (here[`f ${i}`] = [here[`f ${i}`], x || 0]));
+    this.rubbing?.refine(here);
     const twice = this.tapes.pose.twice(here);
     return twice.slice(0, -1).map(([high, low], r) => Math.abs(high - state.rows[r][l] + low));
   }
 
   // a quantity at a pose, SI and radians
-  value(state, { row, less, turns, order, zero }, l) {
+  value(state, { row, less, turns, order, zero, locks }, l) {
     if (!state.rows || !Number.isFinite(state.closed[l])) return NaN;
     if (zero) return 0;
+    if (locks && state.locked.has(l)) return NaN;
     if (order && !this.moves(state)) return NaN;
     const x = state.rows[row][l] - (less === undefined ? 0 : state.rows[less][l]);
     return turns && x < 0 ? (x + TAU < TAU ? x + TAU : 0) : x + 0;

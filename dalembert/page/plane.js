@@ -281,7 +281,7 @@ function fit() {
 // where other names stand there, on another side, and nowhere if there is no room
 const neighbours = whole.points.map((_, k) => [...new Set(whole.bodies.slice(1).filter((b) => b.points.includes(k)).flatMap((b) => b.points))].filter((other) => other !== k));
 const LETTER = [3.4, 8]; // half a letter's width; a line's height
-let taken = []; // middles and half sides of what is written so far, and of the pins
+let taken = []; // middles and half sides of what is written so far, of the pins and of the handles
 const free = ([u, v, w, h]) => taken.every(([x, y, a, b]) => Math.abs(u - x) > w + a || Math.abs(v - y) > h + b);
 function set(text, places, kind) {
   const [w, h] = [LETTER[0] * text.length, LETTER[1]];
@@ -319,10 +319,10 @@ function labels(stands, i) {
     const ends = whole.bodies[label.b].points.map((p) => places[p]);
     const along = ends.length > 1 ? [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]] : [0, 50];
     const side = across(unit(along)).map((x) => -x);
-    const beside = [1, -1].flatMap((sign) => [0, 0.2, -0.2].map((share) => {
-      const [du, dv] = aside(label, side.map((x) => sign * x), 12);
+    const beside = [12, 22].flatMap((gap) => [1, -1].flatMap((sign) => [0, 0.2, -0.2].map((share) => {
+      const [du, dv] = aside(label, side.map((x) => sign * x), gap);
       return [u + du + share * along[0], v + dv + share * along[1]];
-    }));
+    })));
     set(label.t, ends.length > 2 ? [[u, v], ...beside] : beside, `body ${classOf(label.b)}`);
   }
 }
@@ -341,13 +341,13 @@ function drawAll(i) {
   const [stands] = figures.map((figure) => drawFigure(figure, i));
   missing.style.display = stands ? "none" : "";
   taken = [];
+  drawHandles?.(stands);
   labels(stands, i);
   for (const [kind, draw] of Object.entries(drawers)) draw(i, drawn[kind === "force" ? "forces" : kind]);
   drawCentres(i);
   words.put(...barText, "note");
   words.done();
   drawPolygon(i);
-  drawHandles?.(stands);
 }
 let drawHandles; // of a page that computes
 let barText;

@@ -4,74 +4,25 @@ const TAU = 2 * Math.PI;
 const TOUCHES = 1e-13; // a radicand so small is zero but for rounding
 const DIP = 0.05; // a radicand below this may touch zero between two samples
 const PER_TURN = 720; // samples of a turn
+const FAR = 1; // rad: what turns farther than this between two samples is looked at in between
 const SHUT = 64 * Number.EPSILON; // a loop no farther open than this share of the size is closed
 
 // what enters a tape at one of its lanes
 const lane = (given, l) => Object.fromEntries(Object.entries(given).map(([name, x]) => [name, typeof x === "number" ? x : x[l]]));
 
-// the x of least |Σ x_j·column_j + gap|, by Householder's reflections; columns are arrays
-function leastSquares(columns, gap) {
-  const [a, b] = [columns.map((column) => [...column]), gap.map((x) => -x)];
-  const count = a.length;
-  for (let j = 0; j < count; j++) {
-    const v = a[j].map((x, i) => (i < j ? 0 : x));
-    v[j] += Math.sign(v[j] || 1) * Math.hypot(...v);
-    const square = v.reduce((sum, x) => sum + x * x, 0);
-    for (const w of [...a.slice(j), b]) {
-      const share = (2 * v.reduce((sum, x, i) => sum + x * w[i], 0)) / square;
-      v.forEach((x, i) => (w[i] -= share * x));
-    }
-  }
-  const x = new Array(count);
-  for (let j = count - 1; j >= 0; j--) x[j] = (b[j] - a.slice(j + 1).reduce((sum, column, k) => sum + column[j] * x[j + 1 + k], 0)) / a[j][j];
-  return x;
-}
+// an angle in (−π, π]; what stands at half a turn but for its rounding is at +π
+const principal = (angle) => angle - TAU * Math.ceil((angle - Math.PI - 1e-9) / TAU);
 
-// A·f + b = 0 of dependent equations, by reflections with the longest column next: what is determined of f, NaN for the rest;
-// all NaN where b asks for what no f gives. Shares below `null` of the largest are none.
-function determined(a, b, count, none = 1e-9) {
-  const columns = Array.from({ length: count }, (_, j) => a.map((row) => row[j]));
-  const right = b.map((x) => -x);
-  const order = columns.map((_, j) => j);
-  const largest = Math.max(...right.map(Math.abs));
-  let rank = 0;
-  for (let first = 0; rank < Math.min(count, right.length); rank++) {
-    const size = (j) => Math.hypot(...columns[j].slice(rank));
-    let [next, most] = [rank, -1];
-    for (let j = rank; j < count; j++) if (size(j) > most) [next, most] = [j, size(j)];
-    first = rank ? first : most;
-    if (!(most > none * first)) break;
-    for (const list of [columns, order]) [list[rank], list[next]] = [list[next], list[rank]];
-    const v = columns[rank].map((x, i) => (i < rank ? 0 : x));
-    v[rank] += (v[rank] < 0 ? -1 : 1) * most;
-    const square = v.reduce((sum, x) => sum + x * x, 0);
-    for (const w of [...columns.slice(rank), right]) {
-      let share = 0;
-      for (let i = rank; i < v.length; i++) share += v[i] * w[i];
-      share *= 2 / square;
-      for (let i = rank; i < v.length; i++) w[i] -= share * v[i];
-    }
+// what is known at nodes, linear between them; before the first and after the last as there
+function interpolated(nodes, values, at) {
+  let [low, high] = [0, nodes.length - 1];
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (nodes[middle] <= at) low = middle;
+    else high = middle;
   }
-  const back = (y) => {
-    const x = new Array(rank);
-    for (let i = rank - 1; i >= 0; i--) {
-      let rest = y[i];
-      for (let k = i + 1; k < rank; k++) rest -= columns[k][i] * x[k];
-      x[i] = rest / columns[i][i];
-    }
-    return x;
-  };
-  const f = new Array(count).fill(NaN);
-  if (!right.every(Number.isFinite) || right.slice(rank).some((x) => Math.abs(x) > 1e-9 * largest)) return f;
-  back(right).forEach((x, i) => (f[order[i]] = x));
-  // a state of self-stress for each column that depends on those before it
-  for (let j = rank; j < count; j++) {
-    const stress = back(columns[j]);
-    const length = Math.hypot(1, ...stress);
-    stress.forEach((x, i) => Math.abs(x) > 1e-7 * length && (f[order[i]] = NaN));
-    f[order[j]] = NaN;
-  }
-  return f;
+  const share = low === high ? 0 : Math.min(Math.max((at - nodes[low]) / (nodes[high] - nodes[low]), 0), 1);
+  return values[low] + (values[high] - values[low]) * share;
 }
 
 class Way {
@@ -89,6 +40,8 @@ class Way {
     if (model.time) this.time = along(model.time);
     this.closed = model.groups.filter((g) => !g.start);
     this.iterated = model.groups.filter((g) => g.start);
+    if (this.tapes.rubs) this.rubbing = new Fitted(this.tapes.rubs, this.tapes.slopes, this.tapes.rubs.outputs.map((_, k) => `friction ${k}`));
+    this.winding = this.closed.flatMap((g) => g.winds);
     let [place, guess] = [0, 0];
     for (const g of this.iterated) {
       Object.assign(g, { place, guess, keys: g.start.map((_, i) => `x ${g.name} ${i}`) });
@@ -151,15 +104,41 @@ class Way {
     return Float64Array.from(q, (at) => {
       if (turned && (at < ends[0] || at > ends[1]) && within(at) <= ends[1]) at = within(at);
       if (!(at > nodes[0] - close && at < nodes[end] + close)) return NaN;
-      let [low, high] = [0, end];
-      while (high - low > 1) {
-        const middle = (low + high) >> 1;
-        if (nodes[middle] <= at) low = middle;
-        else high = middle;
-      }
-      const share = low === high ? 0 : Math.min(Math.max((at - nodes[low]) / (nodes[high] - nodes[low]), 0), 1);
-      return values[low] + (values[high] - values[low]) * share;
+      return interpolated(nodes, values, at);
     });
+  }
+
+  // the whole turns of the angle in a row of the tape of them, counted from the guess along the input
+  follow(state, row, grid) {
+    const [start] = state.at;
+    const angle = (q) => this.tapes.winds.run(this.beside(state, q), q.length)[row];
+    let nodes = Float64Array.from(new Set([...grid, start])).sort();
+    let angles = Float64Array.from(angle(nodes));
+    for (let round = 0; round < 64; round++) {
+      const more = [];
+      for (let i = 0; i + 1 < nodes.length; i++) {
+        const there = [angles[i], angles[i + 1]].map(Number.isFinite);
+        const far = there[0] !== there[1] || Math.abs(2 * Math.sin((angles[i + 1] - angles[i]) / 2)) > FAR;
+        if (far && nodes[i + 1] - nodes[i] > 1e-9 * state.turn) more.push((nodes[i] + nodes[i + 1]) / 2);
+      }
+      if (!more.length) break;
+      const between = Float64Array.from(more);
+      const known = new Map([...nodes].map((q, i) => [q, angles[i]]));
+      for (const [i, x] of angle(between).entries()) known.set(more[i], x);
+      nodes = Float64Array.from(known.keys()).sort();
+      angles = nodes.map((q) => known.get(q));
+    }
+    const good = nodes.filter((_, i) => Number.isFinite(angles[i]));
+    const values = angles.filter(Number.isFinite);
+    for (let i = 1; i < values.length; i++) values[i] -= TAU * Math.round((values[i] - values[i - 1]) / TAU);
+    const here = interpolated(good, values, start);
+    return { nodes: good, values: values.map((x) => x + (principal(here) - here)) };
+  }
+
+  // angles with their whole turns at inputs, of the bodies that are followed so far
+  turned(state, given, q) {
+    for (const body of this.winding) given[`near ${body}`] = NaN;
+    for (const [body, { nodes, values }] of state.turns) given[`near ${body}`] = Float64Array.from(q, (at) => interpolated(nodes, values, at));
   }
 
   // along the one input from low to high: change points, limits, the unknowns of iterated groups
@@ -167,11 +146,12 @@ class Way {
     const input = this.model.inputs[0];
     const turn = input.slides ? this.model.size : TAU;
     if (!(high - low > 1e-9 * turn)) [low, high] = [low - 1e-3 * turn, high + 1e-3 * turn];
-    const steps = Math.min(40000, Math.max(8, Math.ceil((PER_TURN * (high - low)) / turn)));
+    const steps = Math.min(40000, Math.max(8, Math.ceil((PER_TURN * this.model.pace * (high - low)) / turn)));
     const grid = Float64Array.from({ length: steps + 7 }, (_, i) => low + ((high - low) * (i - 2.5)) / steps);
-    Object.assign(state, { grid, flips: new Map(), limits: [], unknowns: new Map(), ends: new Map(), turn });
+    Object.assign(state, { grid, flips: new Map(), limits: [], unknowns: new Map(), ends: new Map(), turns: new Map(), turn });
     const given = { ...state.given, q0: grid };
     for (const g of this.iterated) g.start.forEach((_, i) => (given[`x ${g.name} ${i}`] = NaN));
+    for (const body of this.winding) given[`near ${body}`] = NaN;
     let margins;
     for (const g of this.model.groups) {
       if (g.start) {
@@ -185,6 +165,11 @@ class Way {
       if (flips.length) {
         state.flips.set(g.name, flips);
         given[`sign ${g.name}`] = this.signs(state, g, grid);
+        margins = undefined;
+      }
+      for (const body of g.winds) {
+        state.turns.set(body, this.follow(state, this.winding.indexOf(body), grid));
+        this.turned(state, given, grid);
         margins = undefined;
       }
     }
@@ -272,6 +257,7 @@ class Way {
   beside(state, q) {
     const given = { ...state.given, q0: q };
     for (const g of this.closed) given[`sign ${g.name}`] = this.signs(state, g, q);
+    this.turned(state, given, q);
     for (const g of this.iterated) {
       g.start.forEach((_, i) => {
         const key = `x ${g.name} ${i}`;
@@ -290,6 +276,7 @@ class Way {
     const scalar = (q) => {
       // what does not change is not copied
       const here = Object.assign(Object.create(state.given), { q0: q });
+      for (const [body, { nodes, values }] of state.turns) here[`near ${body}`] = interpolated(nodes, values, q);
       for (const other of this.closed) {
         const sign = this.signs(state, other, [q]);
         here[`sign ${other.name}`] = typeof sign === "number" ? sign : sign[0];

@@ -112,7 +112,7 @@ def test_two_planes(apart: float, options: tuple[str, ...], fewest: int, dalembe
             check(row, exact, fewest)
 
 
-@pytest.mark.parametrize(("turn", "fewest"), [("60", 12), ("20.0000001", 4)])
+@pytest.mark.parametrize(("turn", "fewest"), [("60", 12), ("20.0000001", 11)])
 def test_a_fit_of_all_runs(turn: str, fewest: int, dalembert: Dalembert) -> None:
     """Two states in runs of their own; masses that hardly differ leave fewer digits."""
     log = [
@@ -138,7 +138,7 @@ def test_a_fit_of_all_runs(turn: str, fewest: int, dalembert: Dalembert) -> None
             top, below = top - mp.conj(alpha) * x0, below + abs(alpha) ** 2
         check(row, top / below, fewest)
     if fewest < 12:
-        assert len(row["mass_g"]) < len(full["mass_g"]) - 4
+        assert len(row["mass_g"]) < len(full["mass_g"]) - 2
 
 
 def test_four_runs(dalembert: Dalembert) -> None:

@@ -16,6 +16,7 @@ import pytest
 
 from tests.cli.pages import FOUR_BAR, Opened
 from tests.conftest import Dalembert
+from tests.test_pages_of_redundant_statics import THREE_CRANKS
 from virtualwork import Mechanism
 from virtualwork.describe.dimensions import changed
 
@@ -233,14 +234,12 @@ def test_limits_are_those_of_inspect(dalembert: Dalembert, tmp_path: Path, brows
 def test_what_it_cannot_compute_it_replays_and_says_so(
     dalembert: Dalembert, tmp_path: Path, browser: Any
 ) -> None:
-    done = dalembert(
-        "forces",
-        EXAMPLES / "falling-four-bar" / "falling.toml",
-        "--over",
-        "60deg:90deg:5deg",
-        "--page",
-        "m.html",
+    """Three parallel cranks, and friction in one of them: a redundant statics of what rubs."""
+    (tmp_path / "m.toml").write_text(
+        THREE_CRANKS + "[[friction]]\njoint = 'A'\ncoefficient = 0.1\nradius = 0.01\n"
     )
+    sweep = ("--over", "60deg:90deg:5deg", "--set", "input.speed=2", "--set", "input.acceleration=0")
+    done = dalembert("forces", "m.toml", *sweep, "--page", "m.html")
     assert done.returncode == 0, done.stderr
     page = Opened(browser, tmp_path / "m.html")
     assert "friction" in page.text("note")
@@ -459,6 +458,62 @@ def test_a_sheet_names_what_is_beyond_a_limit(dalembert: Dalembert, tmp_path: Pa
     page.put(**{"initial/bearing/amplitude": 0.5})
     assert "no trim is needed, the vibration is within the limit" in page.text("answers")
     assert "is more than its limit" not in page.text("answers")
+    assert page.faults() == []
+
+
+def rows_of_a_sheet(
+    page: Computing, folder: Path, dalembert: Dalembert, *words: object
+) -> list[dict[str, Any]]:
+    """What the program makes of the rows of a sheet: its trims."""
+    (folder / "again.csv").write_text(page("return dalembert.csv()"))
+    done = dalembert("field", "again.csv", "--influence", "alpha.csv", *words, "--json")
+    assert done.returncode == 0, done.stderr
+    return list(json.loads(done.stdout)["rotors"][0]["trim"])
+
+
+PUMP = EXAMPLES / "pump-trials-left-on" / "pump.csv"
+
+
+def test_a_sheet_and_a_tolerance(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """A plane needs a trim where the program says so; of a limit of the vibration and a tolerance both must be met."""
+    assert dalembert("field", PUMP, "--save-influence", "alpha.csv").returncode == 0
+    words = ("--permissible", "2000g_mm", "--radius", "150mm", "--max-residual", "0.5mil")
+    done = dalembert("field", PUMP, *words, "--page", "f.html")
+    assert done.returncode == 0, done.stderr
+    page = Computing(browser, tmp_path / "f.html")
+    names = [name for name in page("return dalembert.names") if name.startswith("initial/")]
+    (tmp_path / "first.csv").write_text(page("return dalembert.csv()"))
+    first = {name: page.get(name) for name in names if name.endswith("amplitude")}
+    verdicts = set()
+    for share in (1.0, 0.3, 0.1, 0.03, 0.01):
+        page.put(**{name.replace(".", "__"): share * x for name, x in first.items()})
+        for row in rows_of_a_sheet(page, tmp_path, dalembert, *words):
+            said = f"Plane {row['plane']}: no trim is needed, the vibration is within the limit and the unbalance is within the tolerance."
+            assert (said not in page.text("answers")) == row["needed"]
+            verdicts.add(row["needed"])
+    assert verdicts == {True, False}
+    assert page.faults() == []
+
+
+def test_places_that_do_not_reach_a_trim(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """Two holes a third of a turn apart reach what lies between them; of the rest the nearer one takes what it can."""
+    file = EXAMPLES / "fan-one-plane" / "fan.csv"
+    assert dalembert("field", file, "--save-influence", "alpha.csv").returncode == 0
+    words = ("--positions", "100deg,30deg")
+    assert dalembert("field", file, *words, "--page", "f.html").returncode == 0
+    page = Computing(browser, tmp_path / "f.html")
+    for phase in range(5, 360, 40):
+        page.put(**{"initial/bearing/phase": math.radians(phase)})
+        (row,) = rows_of_a_sheet(page, tmp_path, dalembert, *words)
+        expected = {round(part["angle_deg"]): part["mass_kg"] for part in row["split"]}
+        found = {
+            round(math.degrees(page.get(f"split.1.{i}.angle"))): page.get(f"split.1.{i}.mass") for i in (1, 2)
+        }
+        assert {angle: mass for angle, mass in found.items() if mass} == {
+            angle: pytest.approx(mass, rel=1e-9) for angle, mass in expected.items()
+        }
+        missed = "cannot be reached from these places" in page.text("answers")
+        assert missed == (len(expected) < 2)
     assert page.faults() == []
 
 

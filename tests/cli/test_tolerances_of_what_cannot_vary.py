@@ -10,6 +10,8 @@ import pytest
 from tests.four_bars import four_bar
 from virtualwork import Force, Guess, Guide, Input, Link, Mechanism
 from virtualwork.describe.dimensions import named
+from virtualwork.formulas.forces import Effort, JointForce, Shaking
+from virtualwork.formulas.kinematics import Angle, Point, Slide
 
 SLIDE = """
 name = "vertical slide"
@@ -51,7 +53,7 @@ def varying(m, paths, keys, q, limit=1e-4):
     return motion.sensitivities.vary(keys, limits)
 
 
-POINT = [("point", "block", 0j, "R", k) for k in range(3)]
+POINT = [Point("block", 0j, "R", k) for k in range(3)]
 PATHS = ("links.crank.Q.x", "links.rod.R.x", "links.rod.R.y")
 
 
@@ -59,7 +61,7 @@ PATHS = ("links.crank.Q.x", "links.rod.R.x", "links.rod.R.y")
 def test_only_the_way_along_an_upright_slide_varies(size):
     q = np.linspace(0.1, 6.0, 23)
     for quarter in range(-3, 6):
-        found = varying(slide(quarter * np.pi / 2, size), PATHS, [*POINT, ("angle", "block", 0)], q, 1e-9)
+        found = varying(slide(quarter * np.pi / 2, size), PATHS, [*POINT, Angle("block", 0)], q, 1e-9)
         assert found[:3] == [(quarter % 2 == 0, quarter % 2 == 1)] * 3, quarter
         assert found[3] == (False,)
     # neither coordinate is constant where the slide leans, however little
@@ -70,12 +72,12 @@ def test_only_the_way_along_an_upright_slide_varies(size):
 def test_forces_across_and_along():
     q = np.linspace(0.1, 6.0, 23)
     m = slide(0.0)
-    keys = [("shaking",), ("effort", 0), ("angle", "rod", 0), ("angle", "crank", 0), ("slide", 0, 1)]
+    keys = [Shaking(), Effort(0), Angle("rod", 0), Angle("crank", 0), Slide(0, 1)]
     assert varying(m, PATHS, keys, q) == [(True, True), (True,), (True,), (False,), (True,)]
     # masses move nothing; the mass of what slides level loads its slide by its weight
-    assert varying(m, ["links.block.mass"], [*POINT, ("slide", 0, 0)], q) == [(False, False)] * 3 + [(False,)]
+    assert varying(m, ["links.block.mass"], [*POINT, Slide(0, 0)], q) == [(False, False)] * 3 + [(False,)]
     (joint,) = {j.key for j in m.motion(0.3).dynamics.reactions.joints if j.guide is not None}
-    assert varying(m, ["links.block.mass"], [("force", joint, "block")], q) == [(False, True)]
+    assert varying(m, ["links.block.mass"], [JointForce(joint, "block")], q) == [(False, True)]
 
 
 def test_the_command_shows_what_varies_alone(dalembert, tmp_path):

@@ -24,7 +24,7 @@ from dalembert.arithmetic.engines import run
 from dalembert.arithmetic.rounding import rounding_bounds
 from virtualwork import Mechanism
 from virtualwork.describe import MechanismError
-from virtualwork.formulas.asked import names
+from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.lanes import taped
 
 ANSWERS = json.loads(
@@ -114,7 +114,7 @@ def test_the_watt_six_bar_beside_its_limits() -> None:
     motion = m.motion(q, 3.0)
     stands = np.flatnonzero(motion.assembled)
     assert q[stands[[0, -1]]] == pytest.approx([-0.096, 0.09])
-    keys = tuple(("angle", link, order) for link in m.links for order in range(3))
+    keys = tuple(Angle(link, order) for link in m.links for order in range(3))
     lanes = motion.poses
     tape = taped(motion.assembly, lanes.recording, keys)
     given = lanes.entering(tape.inputs)
@@ -123,7 +123,7 @@ def test_the_watt_six_bar_beside_its_limits() -> None:
     for i in stands:
         truth = exact(tape, given, i)
         for key in keys:
-            (name,) = names(key)
+            (name,) = key.names
             value, bound = (np.broadcast_to(x, motion.n) for x in (found[name], bounds[f"error({name})"]))
             assert abs(value[i] - truth[name]) <= bound[i], (key, q[i])
             scale = np.nanmax(np.abs(value[stands]))

@@ -18,15 +18,14 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.computing import ORDERS
 from virtualwork.describe import MechanismError
 from virtualwork.describe.dimensions import changed, dimensions, value
-from virtualwork.formulas.asked import FORCES
 from virtualwork.formulas.lanes import over_blocks
 from virtualwork.motion import Motion
-from virtualwork.quantities import Quantity, forces, places
+from virtualwork.quantities import Component, forces, places
 
 pytestmark = needs_node
 EXAMPLES = (
     "andrews/andrews", "belt-drive/belt-drive", "block-on-bar/bar", "cam-valve/cam-valve",
-    "rack-lift/rack-lift", "boom/boom", "crank-press/press", "desk-lamp/lamp", "door-closer/door", "engine-start/engine-start", "engine/engine", "five-bar/five-bar",
+    "doubling-rack/doubling-rack", "rack-lift/rack-lift", "boom/boom", "crank-press/press", "desk-lamp/lamp", "door-closer/door", "engine-start/engine-start", "engine/engine", "falling-four-bar/falling", "grindstone/stone", "sledge/sledge", "five-bar/five-bar",
     "inclined-slider-crank/piston", "jansen/jansen", "klann/klann", "moving-ramp/ramp", "parallelogram/parallelogram",
     "peaucellier/peaucellier", "planetary-gear/planetary", "quick-return/quick-return", "robot-arm/arm",
     "scissors-lift/lift", "scotch-yoke/yoke", "stephenson-six-bar/stephenson", "toggle-clamp/clamp",
@@ -44,10 +43,13 @@ class Tried(NamedTuple):
     kinds: list[tuple[Any, ...]]
     true: list[list[float]]
     conditions: list[float]
+    rate: float
 
 
-def tried(name: str, m: Mechanism, rng: np.random.Generator, times: int, width: float) -> Tried | None:
-    """Some changes of a mechanism; None where its page replays, or it cannot be put together."""
+def tried(
+    name: str, m: Mechanism, rng: np.random.Generator, times: int, width: float, turns: float = 0.0
+) -> Tried | None:
+    """Some changes of a mechanism, its input up to so many turns away; None where its page replays, or it cannot be put together."""
     try:
         first = Motion(m.assembly, None, 3.0, 1.5)
     except MechanismError:
@@ -66,7 +68,7 @@ def tried(name: str, m: Mechanism, rng: np.random.Generator, times: int, width: 
     every = places(m, ORDERS)
     if of:
         every += forces(m, first.dynamics.reactions.order.pairs)
-    named: dict[str, Quantity] = {}
+    named: dict[str, Component] = {}
     for each in every:
         if each.key and not each.less:
             for word in each.names:
@@ -80,7 +82,10 @@ def tried(name: str, m: Mechanism, rng: np.random.Generator, times: int, width: 
             step = own or (0.1 * m.size if numbers[i].kind == "length" else 0.1)
             change[numbers[i].path] = own + width * step * rng.uniform(0 if own == 0 else -1, 1)
         at = [
-            float(q + width * rng.uniform(-1, 1) * (m.size if e.is_slide else 20.0))
+            float(
+                q
+                + rng.uniform(-1, 1) * (width * m.size if e.is_slide else 20.0 * width + 2 * math.pi * turns)
+            )
             for q, e in zip(m.at, m.inputs, strict=True)
         ]
         changes.append(change | dict(zip([e.name for e in m.inputs], at, strict=True)))
@@ -97,8 +102,9 @@ def tried(name: str, m: Mechanism, rng: np.random.Generator, times: int, width: 
     # a moment is a sum of forces at arms of about a metre: rounding is of their size
     alike = dict.fromkeys(("force", "effort", "newton-euler", "shaking", "moment", "shaking moment"), "load")
     alike |= {"point": "place", "slide": "place"}
-    kinds = [(alike.get(each.key[0], each.key[0]), each.order) for each in named.values()]
-    return Tried(name, page, changes, list(named), kinds, true, conditions)
+    kinds = [(alike.get(each.key.kind, each.key.kind), each.order) for each in named.values()]
+    rate = max(3.0 / (m.size if e.is_slide else 1.0) for e in m.inputs)
+    return Tried(name, page, changes, list(named), kinds, true, conditions, rate)
 
 
 def regular(m: Mechanism) -> bool:
@@ -109,14 +115,14 @@ def regular(m: Mechanism) -> bool:
         return False
 
 
-def number(motion: Motion, each: Quantity) -> float:
+def number(motion: Motion, each: Component) -> float:
     """One quantity of one pose, SI and radians."""
-    if each.key[0] in FORCES:
+    if each.key.is_force:
         z = np.ravel(over_blocks(motion.poses, each.key, motion.dynamics))[0]
     else:
         z = np.ravel(motion.value(each.key))[0]
     x = float(z.imag if each.imaginary else z.real)
-    return x % (2 * math.pi) if each.turns else x
+    return x % (2 * math.pi) if each.link else x
 
 
 def faults(every: list[Tried], folder: Path, allowed: float) -> list[str]:
@@ -133,6 +139,9 @@ def faults(every: list[Tried], folder: Path, allowed: float) -> list[str]:
         inertia = max(
             (abs(v) for of in t.changes for path, v in of.items() if path.endswith(".inertia")), default=0.0
         )
+        # of a link that only rounding turns, what cancels is of the size of the input's own rates
+        for kind in (kind for kind in largest if kind[0] == "angle" and kind[1]):
+            largest[kind] = max(largest[kind], t.rate ** kind[1])
         for kind in (kind for kind in largest if kind[0] == "load"):
             largest[kind] = max(largest[kind], 90 * inertia)
         for change, row, true, condition in zip(t.changes, rows, t.true, t.conditions, strict=True):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from virtualwork import Cam, Guide, Input, Link, Mechanism, Segment, Spring
+from virtualwork.formulas.kinematics import PressureAngle, Slide
 
 RNG = np.random.default_rng
 MOTIONS = ["simple harmonic", "cycloidal", "3-4-5", "4-5-6-7", "modified sine", "modified trapezoid"]
@@ -239,7 +240,7 @@ def test_pressure_angle_in_closed_form() -> None:
     offset = ((m.ground["O"] - m.through(guide)) * along.conjugate()).imag
     s, v = (lift_at(drive.lift, Q, k) for k in (0, 1))
     high = s + math.sqrt(m.cams[0].prime_radius ** 2 - offset**2)
-    (value,) = motion.values([("pressure angle", 0)])
+    (value,) = motion.values([PressureAngle(0)])
     assert np.allclose(value, np.arctan2(v - offset, high), rtol=0, atol=1e-15)
 
 
@@ -401,7 +402,7 @@ def test_digits_hold_against_fifty(seed: int) -> None:
     with mp.workdps(50):
         low, high = mp.mpf(str(a)) * mp.pi / 180, mp.mpf(str(b)) * mp.pi / 180
         for k in range(3):
-            key = "slide", 0, k
+            key = Slide(0, k)
             (values,), estimates = made.values([key]), made.rounding.of(key)
             for x, value, estimate in zip(q, values, estimates, strict=True):
                 u = (mp.mpf(float(x)) - low) / (high - low)

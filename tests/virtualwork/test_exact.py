@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.truth.mechanism import Exact
+from virtualwork.formulas.kinematics import Slide
 
 EPS = np.finfo(float).eps
 KINDS = ("four-bar", "slider-crank", "inverted slider-crank", "Watt", "Stephenson", "triad")
@@ -34,9 +35,7 @@ def errors(m, q, orders=3):
         sizes = [float(true) for _, true in values]
         for i, _ in enumerate(m.guides):
             true = exact.slide(i, order)
-            apart.append(
-                float(mp.mpf(float(motion.poses.values([("slide", i, order)])[0][0])) - true) / m.size
-            )
+            apart.append(float(mp.mpf(float(motion.poses.values([Slide(i, order)])[0][0])) - true) / m.size)
             sizes.append(float(true) / m.size)
         found.append(max(map(abs, apart)) / max(1.0, *map(abs, sizes)))
     return found, float(motion.condition[0])

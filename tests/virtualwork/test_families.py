@@ -13,6 +13,7 @@ from virtualwork import Force, Gear, Guess, Input, Link, Mechanism, Motor, Sprin
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.dimensions import changed, dimensions, value
 from virtualwork.family.part import Solver
+from virtualwork.formulas.forces import Effort
 
 KINDS = ["four-bar", "slider-crank", "inverted slider-crank", "Watt", "Stephenson", "triad"]
 
@@ -311,7 +312,7 @@ def test_torsion_springs_and_tables_over_the_input_are_lanes(last, wound):
     angle = np.linspace(0.7, last, 9)
     motion = m.vary(numbers).motion(angle)
     solver = Solver(motion.part)
-    _, alone = solver.lanes([("effort", 0)])
+    _, alone = solver.lanes([Effort(0)])
     assert alone.all() == wound
     assert wound or not alone.any()
     effort, force = motion.effort, motion.reaction("C", "rocker")

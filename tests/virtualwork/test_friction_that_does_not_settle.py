@@ -100,3 +100,15 @@ def test_the_digits_of_what_does_not_settle() -> None:
 @pytest.mark.parametrize("seed", range(100))
 def test_friction_fits_its_forces_at_random(seed: int) -> None:
     judged(seed)
+
+
+def test_what_locks_has_no_forces() -> None:
+    """Neither by virtual work nor by Newton and Euler, nor the moment of a pin that rubs."""
+    m, speed, _ = rocker_driven(34)
+    low, high = m.check.input_limits or (-math.pi, math.pi)
+    motion = m.motion([low + (high - low) / 41], speed=speed, acceleration=0.0)
+    of = motion.dynamics
+    assert of.locked.tolist() == [True]
+    joint = next(j for j in of.reactions.joints if j.name == m.friction[0].joint)
+    moments = [of.joint_moment(joint, body) for body in joint.bodies]
+    assert np.isnan([of.effort[0], of.newton_euler[0], *moments]).all()

@@ -14,6 +14,8 @@ from benchmarks.stress.topologies import generate
 from dalembert.arithmetic.engines import run
 from virtualwork import Mechanism
 from virtualwork.describe import DescriptionError, MechanismError
+from virtualwork.formulas.forces import Effort
+from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.lanes import over_blocks
 
 EXAMPLES = {
@@ -113,8 +115,8 @@ rocker = 1
     m = Mechanism.from_toml(tmp_path / "m.toml")
     compare(m, monkeypatch, "numpy")
     monkeypatch.setenv("DALEMBERT_ENGINE", "numpy")
-    q, key = np.linspace(0, 6, 20), ("angle", "coupler", int(over == "speed_rad_s"))
-    torque, turned = m.motion(q, 3.0).poses.values([("effort", 0), key])
+    q, key = np.linspace(0, 6, 20), Angle("coupler", int(over == "speed_rad_s"))
+    torque, turned = m.motion(q, 3.0).poses.values([Effort(0), key])
     assert np.isfinite(torque).all()
     assert np.array_equal(torque, m.motion(q, 3.0).effort)
     assert np.array_equal(turned, m.motion(q, 3.0).value(key))
@@ -178,7 +180,7 @@ def test_a_later_request_begins_at_what_earlier_ones_have_left(monkeypatch) -> N
     """The count of operations is the measure; the state of a pose is kept, no more arrays than are asked for."""
     monkeypatch.setenv("DALEMBERT_ENGINE", "numpy")
     klann = Mechanism.from_toml(EXAMPLES["klann/klann.toml"])
-    keys = [("angle", link, k) for k in (1, 2) for link in ("coupler", "rocker", "arm", "leg")]
+    keys = [Angle(link, k) for k in (1, 2) for link in ("coupler", "rocker", "arm", "leg")]
     motion = klann.motion(np.linspace(0, 6, 40), 2.0)
     ran: list = []
 

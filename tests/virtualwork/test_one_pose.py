@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.scenes import four_bar, klann
+from virtualwork.formulas.forces import Effort, Reaction
+from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.lanes import OFTEN
 
 PINS = (("A", "crank"), ("B", "coupler"), ("C", "rocker"), ("D", "rocker"))
@@ -21,7 +23,7 @@ def test_a_loop_over_poses_has_the_numbers_of_the_sweep() -> None:
         for pin in PINS:
             assert motion.reaction(*pin)[0] == pytest.approx(sweep.reaction(*pin)[i], rel=1e-11, abs=1e-11)
         # what was handed out once stays as it is, alone and beside others
-        keys = [("effort", 0), ("reaction", *PINS[1]), ("angle", "rocker", 1)]
+        keys = [Effort(0), Reaction(*PINS[1]), Angle("rocker", 1)]
         effort, reaction, omega = motion.values(keys)
         assert effort == motion.effort
         assert (np.array([[reaction[0].real, reaction[0].imag]]) == motion.reaction(*PINS[1])).all()

@@ -13,6 +13,8 @@ import pytest
 
 from virtualwork import Link, Mechanism, Spring, TorsionSpring
 from virtualwork.describe.parts import Force, Torque
+from virtualwork.formulas.forces import Effort, JointForce, JointMoment, NewtonEuler, Shaking, ShakingMoment
+from virtualwork.formulas.kinematics import Angle, Point, PointPartial, Slide
 from virtualwork.formulas.recording import Recording
 
 KINDS = ["four-bar", "slider-crank", "inverted slider-crank", "Watt", "Stephenson", "triad"]
@@ -48,21 +50,21 @@ def quantities(m, motion):
     for body, link in m.links.items():
         for name, z in link.points.items():
             for order in range(4):
-                found["point", body, z, name, order] = motion.at(body, name).complex(order)
-            found["dpoint", body, z + 0.1, None, 0, 1] = motion.at(body, z + 0.1).coefficient()
+                found[Point(body, z, name, order)] = motion.at(body, name).complex(order)
+            found[PointPartial(body, z + 0.1, None, 0, 1)] = motion.at(body, z + 0.1).coefficient()
         for order, what in enumerate(("angle", "omega", "alpha", "jerk")):
-            found["angle", body, order] = getattr(motion.link(body), what)
+            found[Angle(body, order)] = getattr(motion.link(body), what)
     for i in range(len(m.guides)):
         for order, what in enumerate(("position", "speed", "acceleration", "jerk")):
-            found["slide", i, order] = getattr(motion.slide(m.guides[i].point), what)
+            found[Slide(i, order)] = getattr(motion.slide(m.guides[i].point), what)
     forces = motion.dynamics
-    found["effort", 0], found["newton-euler", 0] = forces.effort[:, 0], forces.newton_euler[:, 0]
+    found[Effort(0)], found[NewtonEuler(0)] = forces.effort[:, 0], forces.newton_euler[:, 0]
     for joint in forces.reactions.joints:
         for body in joint.bodies:
-            found["force", joint.key, body] = forces.joint_force(joint, body)
-            found["moment", joint.key, body] = forces.joint_moment(joint, body)
+            found[JointForce(joint.key, body)] = forces.joint_force(joint, body)
+            found[JointMoment(joint.key, body)] = forces.joint_moment(joint, body)
     force, moment = forces.shaking
-    found["shaking",], found["shaking moment",] = force[:, 0] + 1j * force[:, 1], moment
+    found[Shaking()], found[ShakingMoment()] = force[:, 0] + 1j * force[:, 1], moment
     return found
 
 
@@ -86,11 +88,11 @@ def test_every_quantity_is_that_of_the_poses(kind, engine, random_mechanism, mon
 def test_what_is_not_asked_for_is_not_on_the_tape(random_mechanism) -> None:
     m = random_mechanism("Watt", np.random.default_rng(0))
     recording = Recording(m, m.assembly.plan, m.assembly.signs, (True, False, False))
-    crank = recording.tape([("angle", "crank", 1)])
+    crank = recording.tape([Angle("crank", 1)])
     assert crank.cost == 0, "the crank turns with the input"
-    dyad = recording.tape([("angle", "coupler", 0)]).cost
-    both = recording.tape([("angle", "coupler", 0), ("angle", "sixth", 0)]).cost
+    dyad = recording.tape([Angle("coupler", 0)]).cost
+    both = recording.tape([Angle("coupler", 0), Angle("sixth", 0)]).cost
     assert 0 < dyad < both
-    assert recording.tape([("angle", "coupler", 0)]).cost == dyad
+    assert recording.tape([Angle("coupler", 0)]).cost == dyad
     # without acceleration of the input there is none on the tape
-    assert "a0" not in recording.tape([("angle", "sixth", 2)]).inputs
+    assert "a0" not in recording.tape([Angle("sixth", 2)]).inputs

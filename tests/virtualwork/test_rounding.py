@@ -34,6 +34,7 @@ from virtualwork import (
 )
 from virtualwork.digits.estimates import Estimates
 from virtualwork.forces import Forces
+from virtualwork.formulas.forces import Effort, Shaking
 from virtualwork.formulas.lanes import taped
 
 EXAMPLES = files("cli") / "examples"
@@ -392,7 +393,7 @@ def test_every_engine_has_the_same_estimates(name: str, monkeypatch: pytest.Monk
     monkeypatch.setenv("DALEMBERT_ENGINE", "numpy")
     motion = m.motion(q, 3.0, 1.0)
     last = list(m.links)[-1]
-    keys = [motion.link(last).key(k) for k in (0, 1, 2)] + [("effort", 0), ("shaking",)]
+    keys = [motion.link(last).key(k) for k in (0, 1, 2)] + [Effort(0), Shaking()]
     values = dict(zip(keys, motion.values(keys), strict=True))
     found = {}
     for engine in ("python", "numpy", "llvm"):

@@ -12,6 +12,7 @@ from benchmarks.stress.random_linkages import four_bar
 from benchmarks.truth.mechanism import Exact
 from tests.virtualwork.let_go import G
 from virtualwork import Friction, Guide, Input, Link, Mechanism, Spring
+from virtualwork.formulas.kinematics import Angle
 
 
 def far_spring(k: float, mass: float, free: float, mu: float) -> Mechanism:
@@ -64,7 +65,7 @@ def test_rates_near_a_limit_round_as_those_of_the_pose(seed: int) -> None:
     exact = Exact(run.motion)
     with mp.workdps(50):
         for link in ("coupler", "rocker"):
-            own = run.rounding(("angle", link, 2))[0]
+            own = run.rounding(Angle(link, 2))[0]
             alpha = run.motion.link(link).alpha[0]
             error = float(abs(exact.angle(link, 2) - mp.mpf(float(alpha))))
             assert error <= own <= 1e-6 * abs(alpha)

@@ -22,7 +22,8 @@ from virtualwork.describe.dimensions import dimensions, value
 from virtualwork.describe.parts import Force, Torque
 from virtualwork.family.sensitivity import Sensitivities
 from virtualwork.family.written import Written
-from virtualwork.formulas.asked import names
+from virtualwork.formulas.forces import Effort, JointForce, NewtonEuler
+from virtualwork.formulas.kinematics import Angle, Point
 
 # between them every kind: lengths, angles, masses, guides, gears, springs, motors, loads
 EXAMPLES = ["boom/boom", "engine/engine", "crank-press/press", "desk-lamp/lamp", "two-disc-four-bar/four-bar",
@@ -52,10 +53,10 @@ def asked(m, motion):
     """Places and rates of the last link, effort, and a joint force."""
     last = list(m.links)[-1]
     point, z = next(reversed(m.links[last].points.items()))
-    keys = [("point", last, z, point, order) for order in range(3)]
-    keys += [("angle", last, order) for order in range(3)] + [("effort", 0)]
+    keys = [Point(last, z, point, order) for order in range(3)]
+    keys += [Angle(last, order) for order in range(3)] + [Effort(0)]
     joints = [j for j in motion.dynamics.reactions.joints if last in j.bodies]
-    return [*keys, ("force", joints[0].key, last)] if joints else keys
+    return [*keys, JointForce(joints[0].key, last)] if joints else keys
 
 
 def sizes(m, dims, values, found):
@@ -89,7 +90,7 @@ def compare(m, motion):
                 h = mp.mpf(10) ** -20 * max(1, abs(at[d.path]))
                 sides: list[Any] = [tape.on(at | {d.path: at[d.path] + s * h}, Digits()) for s in (-1, 1)]
                 for i, key in enumerate(keys):
-                    parts = [(sides[1][n] - sides[0][n]) / (2 * h) for n in names(key)]
+                    parts = [(sides[1][n] - sides[0][n]) / (2 * h) for n in key.names]
                     true = mp.mpc(*parts) if len(parts) == 2 else parts[0]
                     off = float(abs(mp.mpmathify(found[i][j][lane].item()) - true))
                     # what does not hang on it leaves the difference's own rounding
@@ -177,6 +178,6 @@ def test_torques_to_the_ratios_of_gears(gear: int) -> None:
         below, above = (Exact(_Nudged(motion, gear, ratio + s * h)).forces() for s in (-1, 1))
         true = [float((above["input", j, 0] - below["input", j, 0]) / (2 * h)) for j in "01"]
     assert max(map(abs, true)) > 1e-3
-    for way in "effort", "newton-euler":
-        found = [motion.derivative((way, j), f"gears.{gear + 1}.ratio")[0] for j in (0, 1)]
+    for way in Effort, NewtonEuler:
+        found = [motion.derivative(way(j), f"gears.{gear + 1}.ratio")[0] for j in (0, 1)]
         assert found == pytest.approx(true, rel=1e-12, abs=1e-13)

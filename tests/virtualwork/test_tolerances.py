@@ -8,8 +8,9 @@ import pytest
 from virtualwork import Guess, Input, Link, Mechanism
 from virtualwork.describe import DescriptionError
 from virtualwork.family.tolerance import STREAM, drawn, drawn_numbers, limits, spread, summary
+from virtualwork.formulas.kinematics import Point
 
-KEY = ("point", "coupler", 0j, "H", 0)
+KEY = Point("coupler", 0j, "H", 0)
 
 
 def four_bar(tolerances=None):

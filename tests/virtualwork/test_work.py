@@ -22,6 +22,7 @@ from virtualwork import (
     TorsionSpring,
 )
 from virtualwork.formulas.effort import ledger
+from virtualwork.formulas.forces import Effort, NewtonEuler, Reaction
 
 # -- virtual work and Newton-Euler ------------------------------------------------------------------------------
 
@@ -104,12 +105,12 @@ def test_only_what_is_asked_for_is_formed() -> None:
     effort, one, both = (
         poses.operations(keys)
         for keys in (
-            [("effort", 0)],
-            [("reaction", "C", "rocker")],
-            [("effort", 0), ("reaction", "C", "rocker")],
+            [Effort(0)],
+            [Reaction("C", "rocker")],
+            [Effort(0), Reaction("C", "rocker")],
         )
     )
-    assert max(effort, one) < both < poses.operations([("effort", 0), ("newton-euler", 0)]) + one
+    assert max(effort, one) < both < poses.operations([Effort(0), NewtonEuler(0)]) + one
 
 
 def test_loads_that_do_no_work_are_never_evaluated() -> None:

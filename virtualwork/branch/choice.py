@@ -15,7 +15,7 @@ from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.positions import State, principal, run
 from virtualwork.plan.order import plan
-from virtualwork.plan.steps import Group, Plan, Step, turns
+from virtualwork.plan.steps import Group, Plan, Step, geared
 
 
 @guarded
@@ -79,15 +79,8 @@ class Choice(Record):
 
     @cached_property
     def geared(self) -> set[str]:
-        """Bodies of which a gear of fractional ratio, or a rack, needs the angle itself, at first or second hand.
-
-        The angle with its whole turns.
-        """
-        result: set[str] = set()
-        for turn in reversed(list(turns(self.plan.steps))):
-            needs = turn.slides or turn.body in result
-            result |= {b for b, r in turn.angle.turning if needs or not float(r).is_integer()}
-        return result
+        """Bodies of which the angle is needed with its whole turns."""
+        return geared(self.plan.steps)
 
     @cached_property
     def plain(self) -> dict[str, Callable[[State], None]]:

@@ -11,9 +11,9 @@ import numpy as np
 from dalembert.arithmetic.recorded import bare, squared
 from dalembert.arithmetic.varied import rotation
 from virtualwork.branch.choice import Choice
+from virtualwork.branch.phases import Phases
 from virtualwork.describe import AssemblyError, MechanismError, MobilityError, ParallelGuidesError
-from virtualwork.describe.description import Description, known_by_guess, slide_by_guess
-from virtualwork.describe.meshes import Coordinate
+from virtualwork.describe.description import Description, known_by_guess
 from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.numbers import Number, cross, dot, stack, stack_rows
 from virtualwork.formulas.positions import State, columns, principal, run
@@ -135,17 +135,17 @@ class _Chooser:
     def _walk(self, st: State) -> None:
         """Pick the assembly of each group, and the constants of gears, in the order of solution."""
         waiting: list[Step] = []
+        phases = Phases(self.m, self.angles, self.points, float)
         for i, step in enumerate(self.plan.steps):
-            open_ = step
             if isinstance(step, Group) or (isinstance(step, Turn) and step.angle.gears):
                 run(waiting, st)
                 waiting = []
-            if isinstance(step, Turn) and step.angle.gears:
-                step = self._phased(step, st)
-            elif isinstance(step, Group) and any(tie.angle.gears for tie in step.ties):
-                step = replace(step, ties=tuple(self._phased(tie, st) for tie in step.ties))
-            if step is not open_:
-                self.plan = replace(self.plan, steps=(*self.plan.steps[:i], step, *self.plan.steps[i + 1 :]))
+            phased = phases.step(step, st)
+            if phased is not step:
+                self.plan = replace(
+                    self.plan, steps=(*self.plan.steps[:i], phased, *self.plan.steps[i + 1 :])
+                )
+                step = phased
             if not isinstance(step, Group):
                 waiting.append(step)
             elif step.kind == "Newton":
@@ -163,38 +163,6 @@ class _Chooser:
             )
             for i, mesh in enumerate(self.m.meshes)
         }
-
-    # --- gears --------------------------------------------------------------------------------------------------
-    def _phased(self, step: Turn, st: State) -> Turn:
-        """A turn with the constants of its gears: its link stands at its guess, where one of them is open still.
-
-        Of more of them all but the last are those of the guessed angles.
-        """
-        angle = step.angle
-        for i, _ in angle.gears[:-1]:
-            self.phases.setdefault(i, self._constant(i, st))
-        for i, p in angle.gears[-1:]:
-            rest = st.whole(angle)
-            if i not in self.phases and rest is not None:
-                rest += sum(k * self.phases[g] for g, k in angle.gears[:-1])
-                self.phases[i] = (self._guessed(step.body) - rest) / p
-            self.phases.setdefault(i, self._constant(i, st))
-        const = angle.const + sum(p * self.phases[i] for i, p in angle.gears)
-        return Turn(step.body, replace(angle, const=const, gears=()))
-
-    def _constant(self, gear: int, st: State) -> float:
-        """Σ c·x of a gear, a belt or a rack: of what is known, and of the guess for the others."""
-        total = 0.0
-        for x, c in self.m.meshes[gear].shares.items():
-            placed = st.slide.get(x) if isinstance(x, int) else st.angle.get(x)
-            total += c * float(self._guessed(x) if placed is None else placed)
-        return total
-
-    def _guessed(self, x: Coordinate) -> float:
-        """An angle or a slide of the guess; zero where it says nothing."""
-        if isinstance(x, int):
-            return slide_by_guess(self.m, x, self.angles, self.points) or 0.0
-        return self.angles.get(x, 0.0)
 
     # --- closed forms -------------------------------------------------------------------------------------------
     def _sign(self, group: Group, case: Case, st: State) -> int:

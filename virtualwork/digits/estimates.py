@@ -26,9 +26,11 @@ from dalembert.arithmetic.doubled import Doubled
 from dalembert.arithmetic.engines.doubled import OWN, estimated
 from dalembert.arithmetic.guard import guarded
 from virtualwork.digits.second_run import Found, SecondRun, answer, apart, parts
-from virtualwork.formulas.asked import FORCES, Key
+from virtualwork.formulas.kinematics import Turn
 from virtualwork.formulas.lanes import Lanes, over_blocks
+from virtualwork.formulas.loops import Margin
 from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.quantity import Quantity
 
 if TYPE_CHECKING:
     from virtualwork.formulas.dynamics import Dynamics
@@ -40,7 +42,7 @@ NODES, FARTHER = 24, (8.0, 5.0)
 # of the radicand: where branches are no farther apart they meet
 MEETING = 1e-18
 
-Values = Callable[[Sequence[Key]], Sequence[Any]]
+Values = Callable[[Sequence[Quantity]], Sequence[Any]]
 
 
 @guarded
@@ -63,16 +65,16 @@ class Estimates:
         self.branch = poses.branch
         self._values = values or (lambda keys: [over_blocks(poses, key) for key in keys])
         self._dynamics = dynamics
-        self._known: dict[Key, Reals] = {}
+        self._known: dict[Quantity, Reals] = {}
         # of each group, once it was looked at, the poses whose assembly rounding may have exchanged
         self._undecided: dict[str, NDArray[np.bool_]] = {}
 
-    def of(self, key: Key) -> Reals:
+    def of(self, key: Quantity) -> Reals:
         """The estimate of a quantity's error, (n,); the length of the error of a vector."""
         self.together([key])
         return self._known[key]
 
-    def together(self, keys: Iterable[Key]) -> None:
+    def together(self, keys: Iterable[Quantity]) -> None:
         """Form the estimates of several quantities, which have most of the second run in common; `of` gives them out."""
         new = [key for key in dict.fromkeys(keys) if key not in self._known]
         values = dict(zip(new, self._values(new), strict=True)) if new else {}
@@ -82,20 +84,18 @@ class Estimates:
         new = list(values)
         if not new:
             return
-        margins: list[Key] = [
-            ("margin", g.name) for g in self.second.exact.closed if g.name not in self._undecided
-        ]
+        margins = [Margin(g.name) for g in self.second.exact.closed if g.name not in self._undecided]
         if margins:
             # of groups that none of these depend on nothing is formed
-            depended = {group for key in new for group in self.second.exact.hangs_on(key)}
-            margins = [key for key in margins if key[1] in depended]
+            depended = {group for key in new for group in key.groups(self.second.exact)}
+            margins = [key for key in margins if key.group in depended]
         estimates, found = self.second.compared(values, margins)
-        self._undecided |= self._doubted({key[1]: found[key][0].value for key in margins})
+        self._undecided |= self._doubted({key.group: found[key][0].value for key in margins})
         rows = self._close_to_change
         if rows.any():
             self._pass(rows, values, estimates)
         for group, rows in self._undecided.items():
-            here = [key for key in new if group in self.second.exact.hangs_on(key)] if rows.any() else []
+            here = [key for key in new if group in key.groups(self.second.exact)] if rows.any() else []
             if here:
                 some = self.second.some(rows)
                 other = {f"sign {group}": -some.sign(group)}
@@ -117,12 +117,12 @@ class Estimates:
         """The poses in 32 digits."""
         return SecondRun(self.poses, dynamics=self._dynamics)
 
-    def _lost(self, key: Key) -> bool:
+    def _lost(self, key: Quantity) -> bool:
         """Whether a quantity has no second run: a rate where the speed is not determined."""
         if not self.branch.folded:
             return False
-        rates = key[0] in FORCES or (key[0] != "turn" and key[-1] != 0)
-        return rates and not self.branch.folded.isdisjoint(self.second.exact.hangs_on(key))
+        rates = key.is_force or key.order > 0
+        return rates and not self.branch.folded.isdisjoint(key.groups(self.second.exact))
 
     def _doubted(self, margins: Mapping[str, Any]) -> dict[str, NDArray[np.bool_]]:
         """The poses so near a limit of a group that rounding may have taken the one of its two assemblies for the other."""
@@ -152,13 +152,15 @@ class Estimates:
         _ = self.second.poses.recording
         return self.branch.close_to_change(self.poses.inputs[:, 0])
 
-    def _pass(self, rows: NDArray[np.bool_], values: Mapping[Key, Any], estimates: dict[Key, Reals]) -> None:
+    def _pass(
+        self, rows: NDArray[np.bool_], values: Mapping[Quantity, Any], estimates: dict[Quantity, Reals]
+    ) -> None:
         """The estimates close to change points, by interpolation where two branches meet there exactly.
 
         Where the numbers keep them apart, if only in their last digits, the formulas themselves say what happens.
         """
-        turns: list[Key] = [("turn", body) for g in self.second.exact.closed for body in g.angles]
-        margins: list[Key] = [("margin", g.name) for g in self.second.exact.closed]
+        turns: list[Quantity] = [Turn(body) for g in self.second.exact.closed for body in g.angles]
+        margins = [Margin(g.name) for g in self.second.exact.closed]
         some = self.second.some(rows)
         beside = self._interpolated([*values, *turns], rows)
         here = some.doubled([*turns, *margins])
@@ -172,7 +174,7 @@ class Estimates:
             smooth = np.maximum(*(estimated(each[key], answered, answer(key).turning) for each in beside))
             estimates[key][rows] = np.where(meet, smooth, estimates[key][rows])
 
-    def _interpolated(self, keys: Sequence[Key], rows: NDArray[np.bool_]) -> list[Found]:
+    def _interpolated(self, keys: Sequence[Quantity], rows: NDArray[np.bool_]) -> list[Found]:
         """The quantities close to change points from poses farther off, two times: how far these are apart tells of both."""
         q = self.poses.inputs[rows, 0]
         places = self.branch.change_points

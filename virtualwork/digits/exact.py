@@ -29,17 +29,13 @@ from dalembert.arithmetic.recorded import Number, Recorder, bare, lifted
 from dalembert.arithmetic.varied import Precise, Varied
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, dimensions, value
-from virtualwork.formulas.block import Block
-from virtualwork.formulas.dynamics import applied_loads, reduced
-from virtualwork.formulas.effort import generalized_force
 from virtualwork.formulas.lanes import Turning
-from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.newton import gaps, unknowns
-from virtualwork.formulas.numbers import Written, dot, plus
+from virtualwork.formulas.numbers import Written
 from virtualwork.formulas.positions import State
-from virtualwork.formulas.reactions import JointForces
-from virtualwork.formulas.recorded_forces import negative
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import Recording
+from virtualwork.formulas.rubbing import Rubbing
 from virtualwork.formulas.statics import equations
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, turns
@@ -140,18 +136,8 @@ class Numbers:
 
 
 @guarded
-class Exact(Recording):
+class Exact(Rubbing):
     """The formulas of an assembly, with its numbers as inputs.
-
-    Further keys of `value`
-    -----------------------
-    ("generalized", j)          the effort as if every motor sat on the body that its angle is measured from
-    ("applied", link)           complex: what acts on a link but its weight and inertia
-    ("applied moment", link)    about its centre of mass
-    ("rub", n)                  the friction of the n-th contact by the force that it bears
-    ("unknown", group, i)       an unknown of a group without a closed form
-    ("gap", group, loop)        complex: what the unknowns of a group leave open of a loop
-    ("balance", row)            what the forces that enter leave of an equation of redundant statics
 
     Parameters
     ----------
@@ -205,68 +191,11 @@ class Exact(Recording):
     def step(self, group: Group, st: State) -> list[Number] | None:
         return None if group.name in self.folded else super().step(group, st)
 
-    def _unknown(self, group: str, i: int) -> Number:
-        return unknowns(self.solved(group), self.st)[i]
-
-    def _gap(self, group: str, loop: int) -> Number:
-        return gaps(self.solved(group), self.st)[loop]
-
-    # --- friction -------------------------------------------------------------------------------------------------
-    @property
-    def forces(self) -> tuple[LoadPaths, JointForces, Block]:
-        """The loads over the recorded pose; the friction of each joint enters."""
-        known = self._forces
-        paths, of, block = super().forces
-        if known is None and paths.case.contacts:
-            self.solve(*paths.case.targets(paths.case.places))
-            for n, (joint, *_) in enumerate(paths.case.contacts):
-                rub = self.recorder.input(f"friction {n}")
-                block.friction[n] = rub if joint.guide is None else rub * of.rail(block, joint.guide)
-        return paths, of, block
-
-    def _rub(self, n: int) -> Number:
-        paths, of, block = self._places()
-        joint, body, _, coefficient, radius = paths.case.contacts[n]
-        force = plus(of.on_side(block, (joint.key, body)), of.borne(block, joint, body))
-        if force is None:
-            return None
-        slip = self.recorder.input(f"slip {n}") * bare(coefficient)
-        if joint.guide is None:
-            return -(slip * bare(radius)) * abs(force)
-        return -slip * abs(dot(force, 1j * of.rail(block, joint.guide)))
-
-    def _moment(self, joint: str, body: str) -> Number:
-        value = super()._moment(joint, body)
-        paths, _, block = self.forces
-        for load in paths.case.friction:
-            if load.path is None and load.joint == joint and load.body == body:
-                value = plus(value, load.form(block))
-        return value
-
-    # --- further forces -------------------------------------------------------------------------------------------
-    def _generalized(self, j: int) -> Number:
-        paths, _, block = self.forces
-        return negative(generalized_force(paths, block, j))
-
-    def _applied(self, link: str) -> Number:
-        return self._reduced(link)[0]
-
-    def _applied_moment(self, link: str) -> Number:
-        return self._reduced(link)[1]
-
-    def _reduced(self, link: str) -> tuple[Number, Number]:
-        self.solve([f"angle:{link}"], 0)
-        paths, _, block = self.forces
-        return reduced(applied_loads(paths.case.loads, link), block, self.mechanism.rigid[link].center)
-
-    def _balance(self, row: int) -> Number:
-        return self._balances.get(row, 0.0)
-
+    # --- redundant statics ----------------------------------------------------------------------------------------
     @cached_property
-    def _balances(self) -> dict[int, Number]:
+    def balances(self) -> dict[int, Number]:
         """What the unknown forces that enter leave of every equation."""
-        self._places()
-        _, of, block = self.forces
+        _, of, block = self.placed_forces()
         left: dict[int, Number] = {}
         for row, column, part in equations(of, block):
             part = bare(part)
@@ -274,3 +203,33 @@ class Exact(Recording):
                 part = part * self.recorder.input(f"f {column}")
             left[row] = left.get(row, 0.0) + part
         return left
+
+
+class Unknown(Quantity, kind="unknown"):
+    """An unknown of a group without a closed form."""
+
+    group: str
+    number: int
+
+    def write(self, recording: Exact) -> Number:
+        return unknowns(recording.solved(self.group), recording.st)[self.number]
+
+
+class Gap(Quantity, kind="gap"):
+    """What the unknowns of a group leave open of a loop."""
+
+    is_vector = True
+    group: str
+    loop: int
+
+    def write(self, recording: Exact) -> Number:
+        return gaps(recording.solved(self.group), recording.st)[self.loop]
+
+
+class Balance(Quantity, kind="balance"):
+    """What the forces that enter leave of an equation of redundant statics."""
+
+    row: int
+
+    def write(self, recording: Exact) -> Number:
+        return recording.balances.get(self.row, 0.0)

@@ -10,7 +10,7 @@ With joint friction, loads and forces are exchanged in 32 digits until neither c
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, cast
 
@@ -22,12 +22,27 @@ from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.guard import guarded
 from virtualwork.describe.parts import GROUND
 from virtualwork.digits.estimates import Estimates
-from virtualwork.formulas.asked import Key
-from virtualwork.formulas.dynamics import Dynamics, joints_at
+from virtualwork.digits.exact import Balance
+from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.forces import (
+    Applied,
+    AppliedMoment,
+    Contact,
+    Effort,
+    Generalized,
+    JointForce,
+    JointMoment,
+    NewtonEuler,
+    Reaction,
+    Shaking,
+    ShakingMoment,
+)
+from virtualwork.formulas.kinematics import Turn
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.statics import NULL, Column
-from virtualwork.plan.steps import Joint
+from virtualwork.plan.steps import Joint, joints_at
 
 
 @guarded
@@ -41,23 +56,28 @@ class ForceErrors:
         self._poses = cast(Lanes, dynamics.poses)
         self.estimates = Estimates(self._poses, self._values, lambda: dynamics)
 
-    def _values(self, keys: Sequence[Key]) -> list[Any]:
+    @property
+    def by_key(self) -> Mapping[str, Joint]:
+        """The joints by their keys."""
+        return self.dynamics.by_key
+
+    def _values(self, keys: Sequence[Quantity]) -> list[Any]:
         """The forces as they were handed out."""
         return self._poses.values(keys, lambda: self.dynamics)
 
-    def together(self, reactions: Iterable[Key] | None = None) -> None:
+    def together(self, reactions: Iterable[Quantity] | None = None) -> None:
         """Form the estimates of some joints' forces, or of all: they have most of the second run in common."""
         if reactions is not None:
             if self._redundant is None:
                 self.estimates.together(reactions)
             return
         inputs, joints = range(len(self.mechanism.inputs)), self.dynamics.reactions.joints
-        keys: list[Key] = [("shaking",), ("shaking moment",), *(("effort", j) for j in inputs)]
+        keys: list[Quantity] = [Shaking(), ShakingMoment(), *(Effort(j) for j in inputs)]
         if self._redundant is None:
-            keys += [("newton-euler", j) for j in inputs]
+            keys += [NewtonEuler(j) for j in inputs]
             sides = [(joint, body) for joint in joints for body in joint.bodies]
-            keys += [("force", joint.key, body) for joint, body in sides]
-            keys += [("moment", joint.key, body) for joint, body in sides if self._holds(joint)]
+            keys += [JointForce(joint.key, body) for joint, body in sides]
+            keys += [JointMoment(joint.key, body) for joint, body in sides if self._holds(joint)]
         self.estimates.together(keys)
 
     def _holds(self, joint: Joint) -> bool:
@@ -66,34 +86,34 @@ class ForceErrors:
             return True
         return joint.guide is not None and self.mechanism.guides[joint.guide].is_slider
 
-    def _each(self, kind: str) -> Reals:
+    def _each(self, kind: type[Effort | Generalized | NewtonEuler]) -> Reals:
         """Of a quantity of every input, (n, k)."""
-        keys: list[Key] = [(kind, j) for j in range(len(self.mechanism.inputs))]
+        keys = [kind(j) for j in range(len(self.mechanism.inputs))]
         self.estimates.together(keys)
         return np.stack([self.estimates.of(key) for key in keys], axis=1)
 
     @cached_property
     def effort(self) -> Reals:
         """Of `Dynamics.effort`, (n, k)."""
-        return self._each("effort")
+        return self._each(Effort)
 
     @cached_property
     def generalized(self) -> Reals:
         """Of the generalized forces Σ F·K_j, (n, k): the effort, but for motors that sit on another body than `on`."""
-        return self._each("generalized")
+        return self._each(Generalized)
 
     @cached_property
     def newton_euler(self) -> Reals:
         """Of `Dynamics.newton_euler`, (n, k)."""
         if self._redundant is None:
-            return self._each("newton-euler")
+            return self._each(NewtonEuler)
         kinds = ["force" if entry.is_slide else "torque" for entry in self.mechanism.inputs]
         return np.stack([self._of((kind, str(j), "")) for j, kind in enumerate(kinds)], axis=1)
 
     def joint_force(self, joint: Joint, body: str) -> Reals:
         """Of `Dynamics.joint_force`, (n,): the length of the error."""
         if self._redundant is None:
-            return self.estimates.of(("force", joint.key, body))
+            return self.estimates.of(JointForce(joint.key, body))
         if joint.guide is None:
             if body == GROUND:
                 others = [self.joint_force(joint, other) for other in joint.bodies if other != GROUND]
@@ -102,7 +122,7 @@ class ForceErrors:
         # along the rail's normal, whose direction rounds too
         assert self.dynamics.statics is not None
         normal: Column = ("normal", joint.key, "")
-        turned = self.estimates.of(("turn", self.mechanism.guides[joint.guide].on))
+        turned = self.estimates.of(Turn(self.mechanism.guides[joint.guide].on))
         along = self._rubbing(joint)
         return np.asarray(
             self._of(normal) + along + (turned + EPS) * np.abs(self.dynamics.statics.get(normal))
@@ -110,14 +130,14 @@ class ForceErrors:
 
     def contact(self, cam: int) -> Reals:
         """Of `Dynamics.contact`, (n,); infinite where statics is redundant."""
-        return self.estimates.of(("contact", cam)) if self._redundant is None else np.full(self.n, np.inf)
+        return self.estimates.of(Contact(cam)) if self._redundant is None else np.full(self.n, np.inf)
 
     def joint_moment(self, joint: Joint, body: str) -> Reals:
         """Of `Dynamics.joint_moment`, (n,)."""
         if not self._holds(joint):
             return np.zeros(self.n)
         if self._redundant is None:
-            return self.estimates.of(("moment", joint.key, body))
+            return self.estimates.of(JointMoment(joint.key, body))
         if joint.guide is None:
             return self._rubbing(joint)
         return self._of(("moment", joint.key, ""))
@@ -125,20 +145,22 @@ class ForceErrors:
     def reaction(self, joint: str, on: str) -> Reals:
         """Of `Dynamics.reaction`, (n,): the length of the error."""
         if self._redundant is None:
-            return self.estimates.of(("reaction", joint, on))
+            return self.estimates.of(Reaction(joint, on))
         here = joints_at(self.dynamics.reactions.joints, joint, on)
         return np.asarray(sum(self.joint_force(found, on) for found in here))
+
+    at_joint = reaction
 
     @cached_property
     def shaking(self) -> tuple[Reals, Reals]:
         """Of `Dynamics.shaking`: the length of the force's error (n,), and the moment's (n,)."""
-        self.estimates.together([("shaking",), ("shaking moment",)])
-        return self.estimates.of(("shaking",)), self.estimates.of(("shaking moment",))
+        self.estimates.together([Shaking(), ShakingMoment()])
+        return self.estimates.of(Shaking()), self.estimates.of(ShakingMoment())
 
     def applied(self, link: str) -> tuple[Reals, Reals]:
         """Of `Dynamics.applied`: the length of the force's error (n,), and the moment's (n,)."""
-        self.estimates.together([("applied", link), ("applied moment", link)])
-        return self.estimates.of(("applied", link)), self.estimates.of(("applied moment", link))
+        self.estimates.together([Applied(link), AppliedMoment(link)])
+        return self.estimates.of(Applied(link)), self.estimates.of(AppliedMoment(link))
 
     def _rubbing(self, joint: Joint) -> Reals:
         """Of a joint's friction, (n,): the torque of a pin, the force along a guide."""
@@ -158,7 +180,7 @@ class ForceErrors:
             return statics.unknowns, np.full(value.shape, np.nan)
         # what statics does not determine has a part in the balance too
         known = {f"f {i}": Doubled(column) for i, column in enumerate(np.nan_to_num(least).T)}
-        keys: list[Key] = [("balance", row) for row in range(statics.rows)]
+        keys: list[Quantity] = [Balance(row) for row in range(statics.rows)]
         left = self.estimates.second.doubled(keys, known)
         rest = np.stack([np.broadcast_to(left[key][0].value, self.n) for key in keys], axis=1)
         off = np.full(value.shape, np.inf)

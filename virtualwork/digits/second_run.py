@@ -20,12 +20,14 @@ from dalembert.arithmetic.engines.doubled import TURN, Answer, compared, run
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.guard import guarded
 from virtualwork.describe.dimensions import dimensions
-from virtualwork.digits.exact import Exact
-from virtualwork.formulas.asked import Key, names
+from virtualwork.digits.exact import Exact, Gap, Unknown
+from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.lanes import Lanes, taped
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Reals, dot
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import NAMES
+from virtualwork.formulas.rubbing import Rub
 from virtualwork.plan.steps import Group
 
 if TYPE_CHECKING:
@@ -38,7 +40,7 @@ STEPS, SMALL = 8, 2.0**-60
 # the last change of any friction, relative; by what share it is moved to see what depends on it
 SETTLED, NUDGE = 2.0**-72, 2.0**-40
 
-Found = dict[Key, list[Doubled]]
+Found = dict[Quantity, list[Doubled]]
 
 
 @guarded
@@ -109,7 +111,7 @@ class SecondRun:
         some.time = None if self.poses.time is None else np.asarray(self.poses.time)[each]
         return SecondRun(some, np.zeros((len(each), 1)))
 
-    def doubled(self, keys: Sequence[Key], changed: Mapping[str, Doubled] | None = None) -> Found:
+    def doubled(self, keys: Sequence[Quantity], changed: Mapping[str, Doubled] | None = None) -> Found:
         """The quantities, real or as two parts, each Doubled of (n,) or of a number.
 
         `changed` inputs enter in place of their own numbers.
@@ -118,14 +120,14 @@ class SecondRun:
         changed = dict(changed or {})
         found = run(tape, self.entering(name for name in tape.inputs if name not in changed) | changed)
         zero = Doubled(0.0)
-        return {key: [found.get(name, zero) for name in names(key)] for key in keys}
+        return {key: [found.get(name, zero) for name in key.names] for key in keys}
 
     def compared(
         self,
-        values: Mapping[Key, Any],
-        others: Sequence[Key] = (),
+        values: Mapping[Quantity, Any],
+        others: Sequence[Quantity] = (),
         changed: Mapping[str, Doubled] | None = None,
-    ) -> tuple[dict[Key, Reals], Found]:
+    ) -> tuple[dict[Quantity, Reals], Found]:
         """Estimates (n,) of the errors of quantities as they were handed out, (n,) each; and other quantities as `doubled`."""
         tape = taped(self.branch, self.exact, (*values, *others))
         changed = dict(changed or {})
@@ -138,10 +140,10 @@ class SecondRun:
                 key: of if np.shape(of) == (self.n,) else np.full(self.n, of)
                 for key, of in zip(values, estimates, strict=True)
             },
-            {key: [found.get(name, zero) for name in names(key)] for key in others},
+            {key: [found.get(name, zero) for name in key.names] for key in others},
         )
 
-    def uncertain(self, key: Key) -> list[Reals]:
+    def uncertain(self, key: Quantity) -> list[Reals]:
         """By how much a quantity moves with each number that is not known exactly."""
         moved: list[Reals] = []
         if not self._uncertain:
@@ -167,7 +169,7 @@ class SecondRun:
             if group.name in self.exact.folded and self.exact.enters(group):
                 # a double root moves by the root of what its loops leave open: an arm of length l that turns by a
                 # small angle φ is shorter along its line by l·φ²/2
-                keys: list[Key] = [("gap", group.name, i) for i in range(len(group.closures))]
+                keys: list[Quantity] = [Gap(group.name, i) for i in range(len(group.closures))]
                 gap = length([part.value for parts in self.doubled(keys).values() for part in parts])
                 turn = np.sqrt(2 * gap / _shortest(group, self.poses.mechanism.size))
                 for i in range(len(group.angles) + len(group.slides)):
@@ -213,16 +215,18 @@ class SecondRun:
             before = [
                 g for g in self.branch.plan.groups if self.exact.enters(g) and g.name not in self.exact.folded
             ]
-            keys: list[Key] = []
+            keys: list[Unknown] = []
             for g in before:
-                keys += [("unknown", g.name, k) for k in range(len(g.angles) + len(g.slides))]
+                keys += [Unknown(g.name, k) for k in range(len(g.angles) + len(g.slides))]
                 if g.name == group:
                     break
-            self._solve([key for key in keys if f"x {key[1]} {key[2]}" not in self._solutions] or keys, group)
+            self._solve(
+                [key for key in keys if f"x {key.group} {key.number}" not in self._solutions] or keys, group
+            )
         return self._solutions[f"x {group} {i}"]
 
-    def _solve(self, keys: Sequence[Key], group: str) -> None:
-        inputs = [f"x {of} {i}" for _, of, i in keys]
+    def _solve(self, keys: Sequence[Unknown], group: str) -> None:
+        inputs = [f"x {key.group} {key.number}" for key in keys]
         if any(g.name == group for g in self.branch.plan.groups if g.name in self.exact.folded):
             of = next(g for g in self.branch.plan.groups if g.name == group)
             inputs, keys = [f"x {group} {i}" for i in range(len(of.angles) + len(of.slides))], []
@@ -260,7 +264,7 @@ class SecondRun:
 
     def _unfit(self, names: Sequence[str], changed: Mapping[str, Doubled] | None = None) -> list[Doubled]:
         """By how much the forces of the contacts ask for other friction than enters, (n,) each."""
-        keys: list[Key] = [("rub", int(of.removeprefix("friction "))) for of in names]
+        keys: list[Quantity] = [Rub(int(of.removeprefix("friction "))) for of in names]
         found = self.doubled(keys, changed)
         enters = {of: self._solutions[of] for of in names} | dict(changed or {})
         zero = np.zeros(self.n)
@@ -322,7 +326,7 @@ class SecondRun:
             return self._input(0)
         if table.axis == "time":
             return Doubled(np.asarray(table.timed(self.poses.time), dtype=float))
-        key: Key = ("angle", table.body, int(table.axis == "speed"))
+        key: Quantity = Angle(table.body, int(table.axis == "speed"))
         (place,) = self.doubled([key])[key]
         if table.axis == "speed":
             return place + np.zeros(self.n)
@@ -348,21 +352,21 @@ def _friction_of(reactions: Reactions, n: int, block: Block) -> Any:
     return dot(value, reactions.rail(block, joint.guide))
 
 
-def answer(key: Key) -> Answer:
+def answer(key: Quantity) -> Answer:
     """What a quantity is called on a tape, and whether it is an angle without its whole turns."""
-    return Answer(tuple(names(key)), key[0] == "angle" and key[2] == 0)
+    return Answer(key.names, key.is_angle)
 
 
-def parts(key: Key, value: Any) -> list[Any]:
+def parts(key: Quantity, value: Any) -> list[Any]:
     """The parts of a quantity, (n,) each."""
-    return [value] if len(names(key)) == 1 else [value.real, value.imag]
+    return [value] if len(key.names) == 1 else [value.real, value.imag]
 
 
-def apart(key: Key, parts: Sequence[Any], others: Sequence[Any]) -> Reals:
+def apart(key: Quantity, parts: Sequence[Any], others: Sequence[Any]) -> Reals:
     """How far two values of a quantity lie from each other, (n,); angles have no whole turns."""
     with np.errstate(invalid="ignore"):
         differences = [a - b for a, b in zip(parts, others, strict=True)]
-        if key[0] == "angle" and key[2] == 0:
+        if key.is_angle:
             differences = [x - TURN * np.rint(x.high / (2 * math.pi)) for x in differences]
         return length([each.value for each in differences])
 

@@ -18,8 +18,10 @@ from virtualwork.branch.guess import BESIDE, informed
 from virtualwork.branch.sampling import TURNED
 from virtualwork.describe.description import Description
 from virtualwork.family.written import CHOICE, CLOSE, DIP, TOLD, Written
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.kinematics import Angle
+from virtualwork.formulas.loops import Margin
 from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.plan.steps import turns
 
 Mask = NDArray[np.bool_]
@@ -106,7 +108,7 @@ def signs(
         step = BESIDE * (m.size if m.inputs[0].is_slide else 1.0)
         for side in (step, -step):
             for name, open_ in opens.items():
-                depth = _sampled(written, ("margin", name), known, np.array([[m.at[0] + side]]), n)
+                depth = _sampled(written, Margin(name), known, np.array([[m.at[0] + side]]), n)
                 decided &= ~(open_ & (depth[0] >= 0))
     return chosen, decided
 
@@ -142,7 +144,7 @@ def meet_on_the_way(
         count = len(result[here])
         for lever in _levers(written):
             # what follows from a lever that turns far between two samples is told by none of them
-            turn = np.exp(1j * _sampled(written, ("angle", lever, 0), some, q, count))
+            turn = np.exp(1j * _sampled(written, Angle(lever, 0), some, q, count))
             with np.errstate(invalid="ignore"):
                 result[here] |= (np.abs(np.diff(turn, axis=0)) > TURNED).any(axis=0)
         clear = np.empty(count, dtype=bool)
@@ -151,7 +153,7 @@ def meet_on_the_way(
         if len(left):
             its, near = _of(some, left), q if q.shape[1] == 1 else q[:, left]
             for group in written.closed:
-                radicand = partial(_sampled, written, ("margin", group.name))
+                radicand = partial(_sampled, written, Margin(group.name))
                 result[left + here.start] |= _meets(its, near, radicand, len(left))
     return result
 
@@ -160,7 +162,7 @@ def stays_within(
     written: Written,
     m: Description,
     known: Mapping[str, Any],
-    key: Key,
+    key: Quantity,
     bound: float,
     n: int,
     low: Reals,
@@ -226,7 +228,7 @@ def _across(known: Mapping[str, Any]) -> dict[str, Any]:
     return {name: values[:, None] if np.ndim(values) else values for name, values in known.items()}
 
 
-def _sampled(written: Written, key: Key, known: Mapping[str, Any], q: Reals, n: int) -> Reals:
+def _sampled(written: Written, key: Quantity, known: Mapping[str, Any], q: Reals, n: int) -> Reals:
     """A quantity at inputs (samples, n or 1): (samples, n)."""
     tape = written.tape([key])
     shape = len(q), n

@@ -24,9 +24,12 @@ from virtualwork.describe.dimensions import Dimension, by_path, changed
 from virtualwork.family.branches import meet_on_the_way, samples, signs, with_signs
 from virtualwork.family.part import Part, Solver, assembled, parts
 from virtualwork.family.written import Written
-from virtualwork.formulas.asked import Key, names
+from virtualwork.formulas.forces import Effort
+from virtualwork.formulas.kinematics import Angle, Point, Slide
 from virtualwork.formulas.lanes import Lanes, over_blocks
+from virtualwork.formulas.loops import Transmission
 from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import NAMES
 
 REST = (0.0, 0.0, 0.0)
@@ -48,13 +51,15 @@ class Design:
         Designs worked out so far.
     """
 
-    def __init__(self, mechanism: Description, dimensions: Sequence[Dimension], keys: Sequence[Key]) -> None:
+    def __init__(
+        self, mechanism: Description, dimensions: Sequence[Dimension], keys: Sequence[Quantity]
+    ) -> None:
         if len(mechanism.inputs) != 1:
             raise DescriptionError(f"found {len(mechanism.inputs)} inputs, expected one")
         self.mechanism, self.dimensions, self.keys = mechanism, tuple(dimensions), tuple(keys)
         self.evaluations = 0
         own = np.zeros((1, len(self.dimensions)))
-        driven, forces = mechanism.inputs[0], any(key[0] == "effort" for key in keys)
+        driven, forces = mechanism.inputs[0], any(isinstance(key, Effort) for key in keys)
         self.rates = (float(driven.speed or 0.0), float(driven.acceleration or 0.0), 0.0) if forces else REST
         self._moving = {f"{name}0": rate for name, rate in zip(NAMES[1:], self.rates, strict=True)}
         self._at_rates: list[list[Any]] = [[rate] for rate in self.rates]
@@ -80,7 +85,7 @@ class Design:
     @property
     def rows(self) -> int:
         """How many rows a table has: two of each point, x and y, one of an angle or a slide."""
-        return sum(len(names(key)) for key in self.keys)
+        return sum(len(key.names) for key in self.keys)
 
     @property
     def exact(self) -> bool:
@@ -210,7 +215,7 @@ class Design:
             rows += [x + apart, x - apart]
             along += [q, q]
         table = self.table(np.array(rows), np.array(along))
-        angles = np.array([key[0] == "angle" for key in self.keys for _ in names(key)])[:, None]
+        angles = np.array([key.is_angle for key in self.keys for _ in key.names])[:, None]
         columns = []
         for i, h in enumerate((turn, *step)):
             apart = table[:, 2 * i] - table[:, 2 * i + 1]
@@ -223,7 +228,7 @@ class Design:
         self.evaluations += len(numbers)
         return table(self.solved(numbers, inputs, self.keys))
 
-    def solved(self, numbers: Reals, inputs: Reals, keys: Sequence[Key]) -> list[NDArray[Any]]:
+    def solved(self, numbers: Reals, inputs: Reals, keys: Sequence[Quantity]) -> list[NDArray[Any]]:
         """Any quantities of designs (v, d) at their inputs (v or 1, n), (v, n) each."""
         part = Part(self.mechanism, self.dimensions, numbers, inputs[:, :, None], self._at_rates)
         return Solver(part, self._first).values(keys)
@@ -240,14 +245,14 @@ class Alone:
     ----------
     mechanism : Description
     dimensions : sequence of Dimension
-    keys : sequence of Key
+    keys : sequence of Quantity
     """
 
     def __init__(
         self,
         mechanism: Description,
         dimensions: Sequence[Dimension],
-        keys: Sequence[Key],
+        keys: Sequence[Quantity],
         rates: tuple[float, float, float] = REST,
     ) -> None:
         self.mechanism, self.dimensions, self.keys, self.rates = (
@@ -278,15 +283,15 @@ class Alone:
         """What is asked for of one design, (rows, n); NaN where it cannot be assembled."""
         poses = self._poses(x, q)
         if poses is None:
-            return np.full((sum(len(names(key)) for key in self.keys), len(q)), np.nan)
-        if any(key[0] == "transmission" for key in self.keys):
+            return np.full((sum(len(key.names) for key in self.keys), len(q)), np.nan)
+        if any(isinstance(key, Transmission) for key in self.keys):
             # sines that are on the tape alone
             return self._rows(self.written, x, poses)
         return table(over_blocks(poses, key) for key in self.keys)
 
     def _rows(self, written: Written | None, x: Reals, poses: Lanes) -> Reals:
         """What is asked for, from the tape."""
-        of = [name for key in self.keys for name in names(key)]
+        of = [name for key in self.keys for name in key.names]
         if written is None:
             return np.full((len(of), poses.n), np.nan)
         tape = written.tape(self.keys)
@@ -298,7 +303,7 @@ class Alone:
 
     def slopes(self, x: Reals, q: Reals, enters: tuple[str, ...]) -> Reals:
         """Its derivatives to dimensions by their paths, and to the input `q0`, (rows, n, len(enters))."""
-        of = [name for key in self.keys for name in names(key)]
+        of = [name for key in self.keys for name in key.names]
         out = np.full((len(of), len(q), len(enters)), np.nan)
         poses = self._poses(x, q)
         if poses is None:
@@ -337,7 +342,7 @@ def table(quantities: Iterable[NDArray[Any]]) -> Reals:
     return np.stack([row for found in quantities for row in parts(found)])
 
 
-def place_key(m: Description, name: str) -> Key:
+def place_key(m: Description, name: str) -> Quantity:
     """The key of a place: `points.H` (or `H`), `links.rocker`, `slides.B`; of the input's effort: `effort.crank`.
 
     Raises
@@ -349,7 +354,7 @@ def place_key(m: Description, name: str) -> Key:
     if kind == "effort":
         if of != m.inputs[0].name:
             raise DescriptionError(f"the input is not named '{of}': expected effort.{m.inputs[0].name}")
-        return "effort", 0
+        return Effort(0)
     points = {point: body for body, named in m.bodies.items() for point in named}
     guides = {guide.point: i for i, guide in enumerate(m.guides)}
     for word, what, known in (
@@ -361,8 +366,8 @@ def place_key(m: Description, name: str) -> Key:
             if of not in known:
                 raise DescriptionError(f"no {what} is named '{of}'{nearest(of, known)}")
             if word == "points":
-                return "point", points[of], 0j, of, 0
-            return ("angle", of, 0) if word == "links" else ("slide", guides[of], 0)
+                return Point(points[of], 0j, of, 0)
+            return Angle(of, 0) if word == "links" else Slide(guides[of], 0)
     raise DescriptionError(
         f"'{name}': expected points.NAME, links.NAME, slides.NAME or effort.{m.inputs[0].name}"
     )

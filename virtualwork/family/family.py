@@ -32,9 +32,10 @@ from virtualwork.describe.dimensions import Dimension, by_path, changed, dimensi
 from virtualwork.describe.parts import Point, as_point
 from virtualwork.family.kept import answer, forget
 from virtualwork.family.part import ASSEMBLED, LANES, Part, room
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.forces import Effort, Reaction
 from virtualwork.formulas.numbers import Number, Reals, real_array, xy
 from virtualwork.formulas.poses import check_rate
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.parts_of_motion import LinkRates, PointRates, SlideRates
 from virtualwork.plan.steps import joints
 
@@ -214,7 +215,7 @@ class FamilyMotion:
     def __init__(self, part: Part, executor: Executor | None = None) -> None:
         self.part, self.executor = part, executor
         self._name = uuid4().hex
-        self._known: dict[Key, Any] = {}
+        self._known: dict[Quantity, Any] = {}
         self._reasons: dict[int, str] = {}
         weakref.finalize(self, forget, self._name)
 
@@ -243,7 +244,7 @@ class FamilyMotion:
         for number, i in enumerate(range(0, v, each)):
             yield number, slice(i, min(i + each, v))
 
-    def values(self, keys: Sequence[Key]) -> list[Any]:
+    def values(self, keys: Sequence[Quantity]) -> list[Any]:
         """Quantities by their keys (`Recording.value`), each (v, n), real or complex."""
         new = tuple(key for key in keys if key not in self._known)
         if new:
@@ -264,7 +265,7 @@ class FamilyMotion:
             self._known |= zip(new, out, strict=True)
         return [self._known[key] for key in keys]
 
-    def value(self, key: Key) -> Any:
+    def value(self, key: Quantity) -> Any:
         """A quantity by its key, (v, n)."""
         return self.values([key])[0].copy()
 
@@ -336,7 +337,7 @@ class FamilyMotion:
     def effort(self) -> Reals:
         """The effort at the input by virtual work, (v, n) N·m (N at a slide); (v, n, k) for k inputs."""
         k = len(self.part.mechanism.inputs)
-        result = self.values([("effort", j) for j in range(k)])
+        result = self.values([Effort(j) for j in range(k)])
         return result[0] if k == 1 else np.stack(result, axis=-1)
 
     def reaction(self, joint: str, on: str) -> Reals:
@@ -349,4 +350,4 @@ class FamilyMotion:
         """
         if not any(j.name == joint and on in j.bodies for j in joints(self.part.mechanism)):
             raise DescriptionError(f"link '{on}' has no joint at '{joint}'")
-        return xy(self.value(("reaction", joint, on)))
+        return xy(self.value(Reaction(joint, on)))

@@ -93,7 +93,7 @@ class _Problem(Generic[D]):
         self.aims = [Aim.read(m, target) for target in targets]
         if not self.aims:
             raise ValueError("target: expected one or more")
-        forces = any(key[0] == "effort" for aim in self.aims for key in aim.keys)
+        forces = any(key.is_force for aim in self.aims for key in aim.keys)
         forces = forces or any(bound.name.startswith("effort.") for bound in keep)
         found = _free(m, free, forces)
         self.dimensions = tuple(found)

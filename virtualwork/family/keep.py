@@ -17,8 +17,9 @@ from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension
 from virtualwork.family.design import Design, place_key
-from virtualwork.formulas.asked import Key, names
+from virtualwork.formulas.loops import Transmission
 from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.quantity import Quantity
 
 # poses of the sweep at which bounds are held, and at which they are judged
 HELD, JUDGED = 181, 1441
@@ -80,7 +81,7 @@ class Bounds:
         self.m, self.bounds = m, tuple(bounds)
         quantities = [_rows(m, bound) for bound in self.bounds]
         keys = list(dict.fromkeys(key for rows in quantities for key, _ in rows))
-        first = {key: sum(len(names(k)) for k in keys[:n]) for n, key in enumerate(keys)}
+        first = {key: sum(len(k.names) for k in keys[:n]) for n, key in enumerate(keys)}
         # of each bound the keys of its quantity and their rows in the design's one table
         self._rows = [[(key, first[key] + row) for key, row in rows] for rows in quantities]
         self._design = Design(m, dimensions, keys)
@@ -140,14 +141,14 @@ class Bounds:
         """A number of a quantity as margins have it."""
         return math.sin(number) ** 2 if self.bounds[i].name == "transmission" else number
 
-    def _unit(self, i: int, key: Key) -> float:
-        if key[0] in ("point", "slide"):
+    def _unit(self, i: int, key: Quantity) -> float:
+        if key.dimension == "length":
             return self.m.size
-        return max(abs(self._limits[i]), 1e-300) if key[0] == "effort" and self._limits[i] else 1.0
+        return max(abs(self._limits[i]), 1e-300) if key.is_force and self._limits[i] else 1.0
 
-    def _margin(self, i: int, key: Key, found: Reals) -> Reals:
+    def _margin(self, i: int, key: Quantity, found: Reals) -> Reals:
         apart = found - self._limits[i]
-        if key[0] == "angle":
+        if key.is_angle:
             apart = apart - 2 * np.pi * np.round(apart / (2 * np.pi))
         return np.asarray((-apart if self.bounds[i].least is None else apart) / self._unit(i, key))
 
@@ -160,7 +161,7 @@ class Bounds:
         return math.asin(math.sqrt(min(max(number, 0.0), 1.0)))
 
 
-def _rows(m: Description, bound: Bound) -> list[tuple[Key, int]]:
+def _rows(m: Description, bound: Bound) -> list[tuple[Quantity, int]]:
     """The keys of a bound's quantity, each with the row of its table."""
     _ = bound.value
     if bound.name == "transmission":
@@ -173,12 +174,12 @@ def _rows(m: Description, bound: Bound) -> list[tuple[Key, int]]:
         groups = [g for g in plan(m).groups if g.kind != "Newton"]
         if not groups:
             raise DescriptionError("transmission: the mechanism has no group of two links")
-        return [(("transmission", g.name), 0) for g in groups]
+        return [(Transmission(g.name), 0) for g in groups]
     of, _, part = bound.name.rpartition(".")
     if part in ("x", "y") and of.startswith("points."):
         return [(place_key(m, of), "xy".index(part))]
     key = place_key(m, bound.name)
-    if key[0] == "point":
+    if key.is_vector:
         raise DescriptionError(f"{bound.name}: a point has two coordinates: expected {bound.name}.x or .y")
     return [(key, 0)]
 

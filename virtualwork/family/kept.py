@@ -9,7 +9,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from virtualwork.family.part import Part, Solver
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.quantity import Quantity
 
 _lock = Lock()
 _solvers: dict[tuple[str, int], Solver] = {}
@@ -21,7 +21,7 @@ def answer(
     family: str,
     number: int,
     part: Part,
-    keys: Sequence[Key],
+    keys: Sequence[Quantity],
     out: Sequence[NDArray[Any]] | None = None,
 ) -> tuple[list[Any], dict[int, str]]:
     """Quantities of a part, and why some of its variants have none; what a process has solved of it is kept.

@@ -22,16 +22,21 @@ from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, by_path, changed
 from virtualwork.family.branches import at_guess, chosen, stays_within, with_signs
 from virtualwork.family.written import Written
-from virtualwork.formulas.asked import COMPLEX, FORCES, Key, quantity
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.lanes import Lanes, over_blocks
+from virtualwork.formulas.loops import Closed, Twist
 from virtualwork.formulas.numbers import Number, Reals, leave_out
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import NAMES, NEAR
 
+
+class Assembled(Quantity, kind="assembled"):
+    """0 where a pose is assembled."""
+
+
+ASSEMBLED = Assembled()
 Mask = NDArray[np.bool_]
 Seeds = dict[str, tuple[Reals, Reals]]
-# the key of 0 where a pose is assembled
-ASSEMBLED: Key = ("assembled",)
 RATES = ("speed", "acceleration", "jerk")
 # rad: a torsion spring that is twisted by no more all along its way counts no whole turns
 HALF = 2.6
@@ -195,7 +200,7 @@ class Solver:
         margins = at_guess(self.written, self.part.mechanism, self._given, self.part.shape[0])
         return np.asarray(~np.logical_and.reduce([margin > 0 for margin in margins.values()]))
 
-    def values(self, keys: Sequence[Key], out: Sequence[NDArray[Any]] | None = None) -> list[Any]:
+    def values(self, keys: Sequence[Quantity], out: Sequence[NDArray[Any]] | None = None) -> list[Any]:
         """Quantities by their keys (`Recording.value`), each (v, n); NaN where a pose is not assembled.
 
         `out`: where to write them, as `room` has it.
@@ -205,7 +210,9 @@ class Solver:
             self._one(int(place), keys, found)
         return found
 
-    def lanes(self, keys: Sequence[Key], out: Sequence[NDArray[Any]] | None = None) -> tuple[list[Any], Mask]:
+    def lanes(
+        self, keys: Sequence[Quantity], out: Sequence[NDArray[Any]] | None = None
+    ) -> tuple[list[Any], Mask]:
         """The quantities of the variants that are on the tape; and which are not, (v,): of those they are NaN."""
         v, n = self.part.shape
         there = self._taken(keys) if self.takes(keys) else np.zeros(v, dtype=bool)
@@ -222,21 +229,21 @@ class Solver:
                 leave_out(to, alone)
         return result, alone
 
-    def takes(self, keys: Sequence[Key]) -> bool:
+    def takes(self, keys: Sequence[Quantity]) -> bool:
         """Whether the tape has such quantities: friction iterates, redundant statics and twists are of each variant."""
         m, written = self.part.mechanism, self.written
         if written is None:
             return False
-        if all(key[0] not in FORCES for key in keys):
+        if all(not key.is_force for key in keys):
             return True
         if m.friction or any(table.axis != "input" for table in written.recording.tables):
             # what a table gives is known beforehand where it is over the input
             return False
         return written.recording.takes(keys)
 
-    def _taken(self, keys: Sequence[Key]) -> Mask:
+    def _taken(self, keys: Sequence[Quantity]) -> Mask:
         """Which variants have quantities on the tape: of forces those whose torsion springs count no whole turns."""
-        if any(key[0] in FORCES for key in keys):
+        if any(key.is_force for key in keys):
             return self.together & self._unwound
         return self.together
 
@@ -254,11 +261,11 @@ class Solver:
         low, high = self._span
         for number in range(len(m.torsion_springs)):
             known = with_signs(self._given, self.signs)
-            result &= stays_within(self.written, m, known, ("twist", number), HALF, v, low, high)
+            result &= stays_within(self.written, m, known, Twist(number), HALF, v, low, high)
         return result
 
     def _on_tape(
-        self, keys: Sequence[Key], rows: NDArray[np.intp] | slice, out: list[Any]
+        self, keys: Sequence[Quantity], rows: NDArray[np.intp] | slice, out: list[Any]
     ) -> NDArray[np.intp]:
         """Work out some variants on the tape; and which of all are better described alone."""
         assert self.written is not None
@@ -290,19 +297,19 @@ class Solver:
                 x[rows] = value
         return near
 
-    def _with_gaps(self, keys: Sequence[Key], rows: NDArray[np.intp]) -> tuple[list[Any], Mask]:
+    def _with_gaps(self, keys: Sequence[Quantity], rows: NDArray[np.intp]) -> tuple[list[Any], Mask]:
         """Some variants on the tape of which a pose is not assembled; and which of them are better described alone."""
         assert self.written is not None
         v, n = len(rows), self.part.shape[1]
         written = self.written
-        closed = {key: ("closed", *written.recording.hangs_on(key)) for key in keys}
-        margins = written.margins if any(key[0] in FORCES for key in keys) else []
+        closed = {key: Closed(key.groups(written.recording)) for key in keys}
+        margins = written.margins if any(key.is_force for key in keys) else []
         asked = [key for key in keys if key != ASSEMBLED]
         whole = list(dict.fromkeys(closed.values()))
         tape = written.tape((*asked, *whole, *margins))
         table = run_grid(tape, {name: self._entering(name, rows) for name in tape.inputs}, (v, n))
         outputs = Outputs(tape, np.reshape(table, (-1, v * n)))
-        lanes = {key: quantity(outputs, key, v * n).reshape(v, n) for key in (*asked, *whole, *margins)}
+        lanes = {key: key.of_rows(outputs, v * n).reshape(v, n) for key in (*asked, *whole, *margins)}
         near = np.zeros(v, dtype=bool)
         for key in margins:
             near |= (np.abs(lanes[key]) < NEAR).any(axis=1)
@@ -345,7 +352,7 @@ class Solver:
         low, high = self._span
         return {} if self.assembly is None else seeds_of(self.assembly, float(low.min()), float(high.max()))
 
-    def _one(self, i: int, keys: Sequence[Key], out: list[Any]) -> None:
+    def _one(self, i: int, keys: Sequence[Quantity], out: list[Any]) -> None:
         """Describe one variant alone."""
         if i not in self._poses or self._poses[i] is None:
             try:
@@ -368,9 +375,9 @@ class Solver:
                         values[i] = over_blocks(poses, key, forces)
 
 
-def room(keys: Sequence[Key], v: int, n: int) -> list[NDArray[Any]]:
+def room(keys: Sequence[Quantity], v: int, n: int) -> list[NDArray[Any]]:
     """Arrays (v, n) for quantities, real or complex."""
-    return [np.empty((v, n), complex if key[0] in COMPLEX else float) for key in keys]
+    return [np.empty((v, n), complex if key.is_vector else float) for key in keys]
 
 
 def parts(x: NDArray[Any]) -> list[Reals]:

@@ -12,18 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from dalembert.arithmetic.bounds import CONSTANT
 from dalembert.arithmetic.engines import run
 from dalembert.arithmetic.guard import guarded
-from dalembert.arithmetic.rounding import UNIT_ROUNDOFF, bounds_of_few
+from dalembert.arithmetic.rounding import CONSTANT, UNIT_ROUNDOFF, bounds_of_few
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.dimensions import Dimension, named, value
 from virtualwork.family.written import Written
-from virtualwork.formulas.asked import FORCES, JOINTS, Key, names, quantity
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import leave_out
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import NAMES
 
 # so many poses are looked at for whether a quantity varies
@@ -58,7 +57,7 @@ class Sensitivities:
             )
         return result[0]
 
-    def of(self, keys: Sequence[Key], dimensions: Sequence[Dimension]) -> list[list[Any]]:
+    def of(self, keys: Sequence[Quantity], dimensions: Sequence[Dimension]) -> list[list[Any]]:
         """The derivative of each quantity (`Recording.value`) to each dimension, (n,), real or complex.
 
         Raises
@@ -75,7 +74,7 @@ class Sensitivities:
         given = self._given(tape, every)
         with np.errstate(all="ignore"):
             found = run(tape, given)
-        slopes = [[quantity(found, key, self.poses.n, to=name) for name in enters] for key in keys]
+        slopes = [[key.of_rows(found, self.poses.n, to=name) for name in enters] for key in keys]
         nowhere = ~self.poses.assembled
         if nowhere.any():
             for slope in (slope for row in slopes for slope in row):
@@ -97,7 +96,7 @@ class Sensitivities:
         }
         return own | self.poses.entering([name for name in tape.inputs if name not in own])
 
-    def vary(self, keys: Sequence[Key], limits: Mapping[Dimension, float]) -> list[tuple[bool, ...]]:
+    def vary(self, keys: Sequence[Quantity], limits: Mapping[Dimension, float]) -> list[tuple[bool, ...]]:
         """Which quantities vary at all with these dimensions: of each its parts, x and y of what is complex.
 
         What is constant, as a coordinate across its slide is, has derivatives of nothing but rounding. So a quantity
@@ -107,7 +106,7 @@ class Sensitivities:
         there = np.flatnonzero(self.poses.assembled)
         if not len(there):
             # nothing is known: no number of it is shown either
-            return [(True,) * len(names(key)) for key in keys]
+            return [(True,) * len(key.names) for key in keys]
         every = tuple(limits)
         # of no simple ratio to each other: derivatives do not cancel
         steps = [limit * (1 + GOLDEN * i % 1) for i, limit in enumerate(limits.values(), 1)]
@@ -118,14 +117,14 @@ class Sensitivities:
             for name, value in self._given(tape, every).items()
         }
         off = {f"off {name}": OFF * np.abs(value) for name, value in given.items()}
-        parts = [name for key in keys for name in names(key)]
+        parts = [name for key in keys for name in key.names]
         errors = {name: f"off {name}" for name in given}
         found = bounds_of_few(tape, given | off, errors, parts, CONSTANT)
         with np.errstate(invalid="ignore"):
             varies = {name: bool(np.any(np.abs(found[name]) > found[f"error({name})"])) for name in parts}
-        return [tuple(varies[name] for name in names(key)) for key in keys]
+        return [tuple(varies[name] for name in key.names) for key in keys]
 
-    def values(self, keys: Sequence[Key]) -> list[Any]:
+    def values(self, keys: Sequence[Quantity]) -> list[Any]:
         """The quantities themselves, (n,)."""
         return self.poses.values(list(keys))
 
@@ -142,7 +141,7 @@ class Sensitivities:
             self._written[dimensions] = Written(self.assembly, inner, moves, own_signs=False, settled=False)
         return self._written[dimensions]
 
-    def _refuse(self, keys: Sequence[Key], written: Written) -> None:
+    def _refuse(self, keys: Sequence[Quantity], written: Written) -> None:
         m = self.assembly.mechanism
         if not written.placed:
             raise MechanismError(
@@ -150,8 +149,8 @@ class Sensitivities:
             )
         if self.assembly.folded:
             raise MechanismError("sensitivity: the mechanism is singular in every pose")
-        if any(key[0] in FORCES for key in keys):
+        if any(key.is_force for key in keys):
             if m.friction:
                 raise MechanismError("sensitivity: forces with friction are not differentiated")
-            if any(key[0] in JOINTS for key in keys) and written.recording.forces[0].order.redundant:
+            if any(key.is_joint_force for key in keys) and written.recording.forces[0].order.redundant:
                 raise MechanismError("sensitivity: redundant joint forces are not differentiated")

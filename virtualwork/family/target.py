@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
 from virtualwork.family.design import place_key
-from virtualwork.formulas.asked import Key
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.quantity import Quantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ class Aim:
     inputs : array (n,) or None
     """
 
-    keys: tuple[Key, ...]
+    keys: tuple[Quantity, ...]
     names: tuple[str, ...]
     wanted: Reals
     scale: Reals
@@ -122,17 +122,17 @@ class Aim:
         wanted, scale, angle = [], [], []
         n = None
         for name, key in keys.items():
-            rows = _rows(name, key[0] == "point", target.places[name], n)
+            rows = _rows(name, key.is_vector, target.places[name], n)
             n = rows.shape[1]
             weight = np.asarray(target.weights.get(name, 1.0), dtype=float)
             if weight.shape not in ((), (n,)) or not (np.isfinite(weight) & (weight >= 0)).all():
                 raise ValueError(f"weights of {name}: expected one number, or {n}, 0 or more")
             wanted.append(rows)
-            unit = 1.0 if key[0] == "angle" else 1.0 / m.size
-            if key[0] == "effort":
+            unit = 1.0 if key.is_angle else 1.0 / m.size
+            if key.is_force:
                 unit = 1.0 / _largest(m, rows, target.inputs)
             scale.append(np.broadcast_to(np.sqrt(weight) * unit, rows.shape))
-            angle += [key[0] == "angle"] * len(rows)
+            angle += [key.is_angle] * len(rows)
         strange = [name for name in target.weights if name not in keys]
         if strange:
             raise ValueError(f"weights: '{strange[0]}' is not in the target")
@@ -167,12 +167,12 @@ class Aim:
         """What a design does, (rows, n)."""
         out, row = [], 0
         for name, key in zip(self.names, self.keys, strict=True):
-            if key[0] == "point":
+            if key.is_vector:
                 values, target = (each[row] + 1j * each[row + 1] for each in (found, self.wanted))
             else:
                 values, target = found[row], self.wanted[row]
-            out.append(Reached(name, key[0], inputs, values, target))
-            row += 2 if key[0] == "point" else 1
+            out.append(Reached(name, key.kind, inputs, values, target))
+            row += 2 if key.is_vector else 1
         return tuple(out)
 
 

@@ -19,8 +19,8 @@ import numpy as np
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, dimensions, named, value
 from virtualwork.family.family import Family
-from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.quantity import Quantity
 
 # draws of one stream of random numbers
 STREAM = 4096
@@ -123,7 +123,7 @@ def drawn(
     numbers: Mapping[str, Reals],
     inputs: Reals,
     rates: Sequence[Any],
-    keys: Sequence[Key],
+    keys: Sequence[Quantity],
     executor: Executor | None = None,
 ) -> Iterator[tuple[slice, list[Any], Any]]:
     """Quantities of drawn mechanisms, some poses at a time: (poses, values (draws, poses) of each key, assembled).

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -12,22 +11,24 @@ from dalembert.arithmetic.adjoint import derivatives
 from dalembert.arithmetic.guard import guarded, own_lock
 from dalembert.arithmetic.recorded import RECORDED, Recorder, bare
 from dalembert.arithmetic.tape import Tape
-from dalembert.arithmetic.varied import Varied, made
+from dalembert.arithmetic.varied import Varied
 from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.guess import distance, sign_of_angles
+from virtualwork.branch.phases import Phases, with_constants
 from virtualwork.branch.solutions import guessed_slide
-from virtualwork.describe.description import Description, joints_apart, known_by_guess, slide_by_guess
+from virtualwork.describe.description import Description, joints_apart, known_by_guess
 from virtualwork.describe.dimensions import Dimension, changed, value
 from virtualwork.describe.keys import keys_of
 from virtualwork.describe.parts import Link
-from virtualwork.formulas.asked import FORCES, Key, names
 from virtualwork.formulas.closed_forms import Case, missing
+from virtualwork.formulas.loops import Closed, Margin
 from virtualwork.formulas.newton import gaps, put_unknowns, unknowns
 from virtualwork.formulas.numbers import PARTS, WRITTEN, Number
-from virtualwork.formulas.positions import State, columns, run
+from virtualwork.formulas.positions import State, columns, principal_of, run
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import NEAR, Recording
 from virtualwork.plan.order import plan
-from virtualwork.plan.steps import Group, Plan, Step, Turn
+from virtualwork.plan.steps import Group, Plan, geared, turns
 
 # what the tape of the choice says of each group
 CHOICE = ("margin", "plus", "minus", "guessed", "sign")
@@ -75,12 +76,17 @@ class Written:
         self.lock = own_lock(recorder)
         m: Description = assembly.mechanism
         self.mechanism = varied(m, dimensions, recorder)
-        self.plan = plan(self.mechanism)
+        self.plan = self._open_plan = plan(self.mechanism)
         # whether a gear's constant is that of links which the guess has to place first
-        self.open_gears = any(turn.angle.gears for step in self.plan.steps for turn in _turns(step))
+        self.phases = sorted({i for turn in turns(self.plan.steps) for i, _ in turn.angle.gears})
+        self.open_gears = bool(self.phases)
         # the same of one assembly with its own signs, whose links the tape places at the guess
         self.placed = not self.open_gears
-        if self.open_gears and not own_signs:
+        winding = assembly.geared
+        if self.open_gears and own_signs:
+            enter = {i: recorder.input(f"phase {i}") for i in self.phases}
+            self.plan, winding = with_constants(self.plan, enter), geared(self.plan.steps)
+        elif self.open_gears:
             placed = _placed(self.mechanism, self.plan, assembly)
             if placed is not None:
                 self.plan, self.placed = placed, True
@@ -88,7 +94,7 @@ class Written:
         signs = {g.name: assembly.signs.get(g.name, 1) for g in self.plan.groups if g.kind != "Newton"}
         turning = [g.name for g in self.closed] if own_signs else assembly.turning_over
         self.recording = recording(
-            self.mechanism, self.plan, signs, moves, turning, assembly.geared, settled, recorder
+            self.mechanism, self.plan, signs, moves, turning, winding, settled, recorder
         )
         self._tapes: dict[tuple[Any, ...], Tape] = {}
         # of each group without a closed form the unknowns that the guess leaves to the loops, once `guessed` is written
@@ -100,9 +106,9 @@ class Written:
         return [g for g in self.plan.groups if g.kind not in ("Newton", "PRP")]
 
     @cached_property
-    def margins(self) -> list[Key]:
+    def margins(self) -> list[Quantity]:
         """The keys of their radicands."""
-        return [("margin", group.name) for group in self.closed]
+        return [Margin(group.name) for group in self.closed]
 
     def _once(self, write: Callable[..., Tape], *arguments: Any) -> Tape:
         """A tape, written on the first request."""
@@ -111,21 +117,21 @@ class Written:
             self._tapes[key] = write(*arguments)
         return self._tapes[key]
 
-    def tape(self, keys: Iterable[Key]) -> Tape:
+    def tape(self, keys: Iterable[Quantity]) -> Tape:
         """The tape of quantities."""
         return self._once(self.recording.tape, tuple(keys))
 
-    def tested(self, keys: Sequence[Key], also: Sequence[Key] = ()) -> Tape:
+    def tested(self, keys: Sequence[Quantity], also: Sequence[Quantity] = ()) -> Tape:
         """The tape of quantities, and `sound`: positive where all is assembled that they, and others, depend on.
 
         And where forces among them have digits.
         """
         return self._once(self._tested, tuple(keys), tuple(also))
 
-    def _tested(self, keys: tuple[Key, ...], also: tuple[Key, ...]) -> Tape:
-        closed = [("closed", *self.recording.hangs_on(key)) for key in (*keys, *also)]
+    def _tested(self, keys: tuple[Quantity, ...], also: tuple[Quantity, ...]) -> Tape:
+        closed = [Closed(key.groups(self.recording)) for key in (*keys, *also)]
         sound = [sys.float_info.max - abs(self.recording.value(key)) for key in dict.fromkeys(closed)]
-        if any(key[0] in FORCES for key in keys):
+        if any(key.is_force for key in keys):
             sound += [abs(self.recording.value(key)) - NEAR for key in self.margins]
         return self.recording.tape(keys, {"sound": every(sound)})
 
@@ -202,7 +208,7 @@ class Written:
             plain.append(RECORDED.select(TOLD * plus - minus, 1.0, TOLD * minus - plus))
         return plain
 
-    def evaluation(self, keys: Sequence[Key], enters: tuple[str, ...] | None, own_signs: bool) -> Tape:
+    def evaluation(self, keys: Sequence[Quantity], enters: tuple[str, ...] | None, own_signs: bool) -> Tape:
         """The tape of quantities, or of the derivatives of each to all that enters, one after the other.
 
         `own_signs`: the signs are those of the guess, at the input `at`, and last comes `fine`: positive where these are
@@ -210,7 +216,9 @@ class Written:
         """
         return self._once(self._evaluation, tuple(keys), enters, own_signs)
 
-    def _evaluation(self, keys: tuple[Key, ...], enters: tuple[str, ...] | None, own_signs: bool) -> Tape:
+    def _evaluation(
+        self, keys: tuple[Quantity, ...], enters: tuple[str, ...] | None, own_signs: bool
+    ) -> Tape:
         recorder = Recorder()
         signs: dict[str, Number] = {}
         fine: list[Number] = []
@@ -221,32 +229,32 @@ class Written:
         if enters is None:
             margins = self.margins if own_signs else []
             outputs = _again(self.tape((*keys, *margins)), recorder, signs)
-            fine += [outputs.pop(name) - DIP for key in margins for name in names(key)]
+            fine += [outputs.pop(name) - DIP for key in margins for name in key.names]
         else:
             numbers = _again(self.slopes(keys, enters), recorder, signs)
-            parts = [part for key in keys for part in names(key)]
+            parts = [part for key in keys for part in key.names]
             every_one = [f"d({part})/d({name})" for part in parts for name in enters]
             outputs = {name: numbers.get(name, 0.0) for name in every_one}
         if own_signs:
             outputs["fine"] = every(fine)
         return recorder.tape(outputs)
 
-    def slopes(self, keys: tuple[Key, ...], enters: tuple[str, ...]) -> Tape:
+    def slopes(self, keys: tuple[Quantity, ...], enters: tuple[str, ...]) -> Tape:
         """The tape of quantities' derivatives to what enters, as far as they depend on that."""
         return self._once(self._slopes, keys, enters)
 
-    def _slopes(self, keys: tuple[Key, ...], enters: tuple[str, ...]) -> Tape:
+    def _slopes(self, keys: tuple[Quantity, ...], enters: tuple[str, ...]) -> Tape:
         tape = self.tape(keys)
         return derivatives(tape, [name for name in enters if name in tape.inputs])
 
-    def along(self, keys: tuple[Key, ...], steps: tuple[tuple[str, float], ...]) -> Tape:
+    def along(self, keys: tuple[Quantity, ...], steps: tuple[tuple[str, float], ...]) -> Tape:
         """The tape of quantities' derivatives along one direction: `steps` of what enters, taken together."""
         return self._once(self._along, keys, steps)
 
-    def _along(self, keys: tuple[Key, ...], steps: tuple[tuple[str, float], ...]) -> Tape:
+    def _along(self, keys: tuple[Quantity, ...], steps: tuple[tuple[str, float], ...]) -> Tape:
         recorder = Recorder()
         result = _again(self.slopes(keys, tuple(name for name, _ in steps)), recorder, {})
-        parts = [part for key in keys for part in names(key)]
+        parts = [part for key in keys for part in key.names]
         return recorder.tape(
             {
                 part: sum(step * result.get(f"d({part})/d({name})", 0.0) for name, step in steps)
@@ -260,11 +268,13 @@ class Written:
 
         Of a group without one the unknowns enter. Of each other group: its radicand (`margin`), the distance of both assemblies from what the guess says (`plus`,
         `minus`), the sign that the guessed angles have (`guessed`), and what follows from these (`sign`): the nearer
-        assembly, or where there is none the guessed angles' sign. And `allowed`: positive where no description is refused.
+        assembly, or where there is none the guessed angles' sign. Then the constants of gears that are open (`phase i`), and
+        `allowed`: positive where no description is refused.
         """
         recorder, m = self.recording.recorder, self.mechanism
         st = State([recorder.input(f"q{j}") for j in range(len(m.inputs))], kind=WRITTEN)
         angles, points = known_by_guess(m)
+        phases = Phases(m, angles, points, bare)
         outputs: dict[str, Number] = {}
         allowed = list(self._allowed())
 
@@ -272,6 +282,10 @@ class Written:
             if group.kind == "Newton":
                 put_unknowns(group, st, self.recording.unknowns(group))
                 return
+            choose(group, st)
+            st.angle.update({body: principal_of(st.turn[body]) for body in group.members})
+
+        def choose(group: Group, st: State) -> None:
             case, size, name = Case(group, bare), bare(m.size), group.name
             if group not in self.closed:
                 case.solve(st, 1, size)
@@ -294,7 +308,9 @@ class Written:
             values = margin, apart[0], apart[1], guessed, sign
             outputs.update(zip((f"{what} {name}" for what in CHOICE), values, strict=True))
 
-        run(self.plan.steps, st, close)
+        for step in self._open_plan.steps:
+            run([phases.step(step, st)], st, close)
+        outputs.update({f"phase {i}": bare(phases.constants[i]) for i in self.phases})
         outputs["allowed"] = every(allowed)
         return recorder.tape(outputs)
 
@@ -316,6 +332,7 @@ class Written:
             if group.kind != "Newton":
                 sign = recorder.input(f"sign {name}") if group in self.closed else 1
                 Case(group, bare).solve(st, sign, bare(m.size))
+                st.angle.update({body: principal_of(st.turn[body]) for body in group.members})
                 return
             trial = st.copy()
             x: list[Number] = [bare(angles.get(body, 0.0)) for body in group.angles]
@@ -344,37 +361,20 @@ def _placed(m: Description, order: Plan, assembly: Assembly) -> Plan | None:
 
     None where a group without a closed form has to be placed for one.
     """
-    angles, points = known_by_guess(m)
+    phases = Phases(m, *known_by_guess(m), bare)
     st = State([bare(q) for q in m.at], kind=WRITTEN)
-    steps: list[Step] = []
 
     def close(group: Group, st: State) -> None:
         Case(group, bare).solve(st, assembly.signs.get(group.name, 1), bare(m.size))
-        for body in group.members:
-            st.angle[body] = WRITTEN.angle(st.turn[body])
+        st.angle.update({body: principal_of(st.turn[body]) for body in group.members})
 
-    for step in order.steps:
-        if isinstance(step, Group) and any(tie.angle.gears for tie in step.ties):
-            return None
-        if isinstance(step, Turn) and step.angle.gears:
-            of, rest = step.angle, st.whole(step.angle)
-            if len(of.gears) > 1 or rest is None:
-                return None
-            ((number, share),) = of.gears
-            guess: Number = angles.get(step.body, 0.0) if isinstance(step.body, str) else None
-            if isinstance(step.body, int):
-                guess = slide_by_guess(m, step.body, angles, points) or 0.0
-            # it stands at its guess there
-            recorded = bare(guess) - bare(rest) + bare(of.const)
-            const = made(float(complex(of.const).real) + share * assembly.phases[number], recorded)
-            step = Turn(step.body, replace(of, const=const, gears=()))
-        steps.append(step)
+    for i, step in enumerate(order.steps):
         if isinstance(step, Group) and step.kind == "Newton":
-            if any(turn.angle.gears for later in order.steps[len(steps) :] for turn in _turns(later)):
+            if any(turn.angle.gears for turn in turns(order.steps[i:])):
                 return None
             break
-        run([step], st, close)
-    return replace(order, steps=(*steps, *order.steps[len(steps) :]))
+        run([phases.step(step, st)], st, close)
+    return with_constants(order, phases.constants)
 
 
 def every(conditions: Iterable[Number], value: Number = 1.0, otherwise: float = -1.0) -> Number:
@@ -388,10 +388,6 @@ def _again(tape: Tape, recorder: Recorder, values: Mapping[str, Number]) -> dict
     """The outputs of a tape on another one, where some of what enters is known."""
     enters = {name: values[name] if name in values else recorder.input(name) for name in tape.inputs}
     return tape.on(enters, RECORDED)
-
-
-def _turns(step: Step) -> tuple[Turn, ...]:
-    return (step,) if isinstance(step, Turn) else step.ties if isinstance(step, Group) else ()
 
 
 def varied(m: Description, dimensions: Sequence[Dimension], recorder: Recorder) -> Description:

@@ -12,26 +12,46 @@ from functools import cached_property
 from dalembert.arithmetic.recorded import Number, bare
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.kinematics import Angle
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import Recording
+from virtualwork.formulas.rubbing import Rubbing
 from virtualwork.formulas.statics import Column, equations, unknowns
 
 
-class Balanced(Recording):
-    """The formulas of an assembly; where its statics is redundant, the unknown forces enter.
+class Over(Quantity, kind="over"):
+    """What the table of a load, by its number, is over; an angle of unknown turns in (−π, π]."""
 
-    A further key of `value`: ("over", number), what a load's table is over.
-    """
+    number: int
+
+    def write(self, recording: Recording) -> Number:
+        load = recording.tables[self.number]
+        if load.axis == "time":
+            return recording.recorder.input("time")
+        if load.axis == "input":
+            return recording.st.inputs[0]
+        angle = recording.plan.angles[load.body]
+        if load.axis == "angle" and not angle.bases:
+            return recording.st.affine(angle)
+        return recording.value(Angle(load.body, int(load.axis == "speed")))
+
+
+class Balanced(Rubbing):
+    """The formulas of an assembly; where its statics is redundant, the unknown forces enter."""
 
     @property
     def redundant(self) -> bool:
         """Whether they do."""
         return bool(self.forces[0].order.redundant)
 
-    def takes(self, keys: Iterable[Key]) -> bool:
-        """Whether quantities can be written down: not with friction, nor with racks or cams where statics is redundant."""
-        toothed = bool(self.mechanism.racks or self.mechanism.cams)
-        return super().takes(keys) or not (self.mechanism.friction or toothed)
+    def takes(self, quantities: Iterable[Quantity]) -> bool:
+        """Whether quantities can be written down: not where statics is redundant with friction, racks or cams."""
+        m = self.mechanism
+        toothed = bool(m.racks or m.cams)
+        concerned = any(
+            (m.friction and each.is_force) or (toothed and each.is_joint_force) for each in quantities
+        )
+        return not (concerned and self.redundant)
 
     @cached_property
     def unknown_forces(self) -> list[Column]:
@@ -41,7 +61,7 @@ class Balanced(Recording):
     @cached_property
     def system(self) -> dict[tuple[int, int | None], Number]:
         """The entries of A by row and column, those of b by row and None."""
-        _, of, block = self._places()
+        _, of, block = self.placed_forces()
         entries: dict[tuple[int, int | None], Number] = {}
         for row, column, part in equations(of, block):
             entries[row, column] = entries.get((row, column), 0.0) + bare(part)
@@ -57,38 +77,26 @@ class Balanced(Recording):
         f = self.recorder.input(f"f {self.unknown_forces.index((kind, key, body))}")
         return f * bare(self.mechanism.size) if kind in ("moment", "torque") else f
 
-    def _over(self, number: int) -> Number:
-        """What a table is over; an angle of unknown turns in (−π, π]."""
-        load = self.tables[number]
-        if load.axis == "time":
-            return self.recorder.input("time")
-        if load.axis == "input":
-            return self.st.inputs[0]
-        angle = self.plan.angles[load.body]
-        if load.axis == "angle" and not angle.bases:
-            return self.st.affine(angle)
-        return self.value(("angle", load.body, int(load.axis == "speed")))
-
-    def _newton_euler(self, j: int) -> Number:
+    def newton_euler(self, j: int) -> Number:
         if not self.redundant:
-            return super()._newton_euler(j)
+            return super().newton_euler(j)
         return self._bears("force" if self.mechanism.inputs[j].is_slide else "torque", str(j))
 
-    def _force(self, joint: str, body: str) -> Number:
+    def joint_force(self, joint: str, body: str) -> Number:
         if not self.redundant:
-            return super()._force(joint, body)
-        _, of, block = self._places()
+            return super().joint_force(joint, body)
+        _, of, block = self.placed_forces()
         at = of.by_key[joint]
         if at.guide is not None:
             sign = 1.0 if body == self.mechanism.guides[at.guide].link else -1.0
             return (sign * self._bears("normal", joint)) * (1j * of.rail(block, at.guide))
         if body == GROUND:
-            return -sum((self._force(joint, other) for other in at.bodies if other != GROUND), 0j)
+            return -sum((self.joint_force(joint, other) for other in at.bodies if other != GROUND), 0j)
         return self._bears("fx", joint, body) + 1j * self._bears("fy", joint, body)
 
-    def _moment(self, joint: str, body: str) -> Number:
+    def joint_moment(self, joint: str, body: str) -> Number:
         if not self.redundant:
-            return super()._moment(joint, body)
+            return super().joint_moment(joint, body)
         guide = self.forces[1].by_key[joint].guide
         if guide is None or not self.mechanism.guides[guide].is_slider:
             return None

@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Mapping
 from functools import cached_property, partial
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.arithmetic.guard import guarded
-from virtualwork.describe import DescriptionError
-from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.asked import Key
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import effort, generalized
-from virtualwork.formulas.loads import EXTERNAL, OWN, Load
-from virtualwork.formulas.numbers import TOGETHER, Complexes, Number, Reals, cross, leave_out, plus, xy
+from virtualwork.formulas.forces import (
+    Effort,
+    Force,
+    JointForce,
+    JointMoment,
+    NewtonEuler,
+    Shaking,
+    ShakingMoment,
+)
+from virtualwork.formulas.numbers import TOGETHER, Complexes, Number, Reals, leave_out, xy
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.reactions import Reactions, settle
+from virtualwork.formulas.resultants import applied_loads, reduced, resultant, shaking_loads
 from virtualwork.formulas.scene import Scene
 from virtualwork.formulas.statics import Statics
-from virtualwork.plan.steps import Joint
+from virtualwork.plan.steps import Joint, joints_at
+
+V = TypeVar("V", Reals, Complexes)
 
 
 @guarded
@@ -49,9 +57,9 @@ class Dynamics:
         self._euler: Reals | None = None
         self._forces: dict[tuple[str, str], Complexes] = {}
 
-    def _from_tape(self, *keys: Key) -> list[Any] | None:
-        """Forces by their keys, (n,) each; None where they are formed over blocks."""
-        return self.poses.taped(keys) if self.taped else None
+    def _from_tape(self, *quantities: Force) -> list[Any] | None:
+        """Forces, (n,) each; None where they are formed over blocks."""
+        return self.poses.taped(quantities) if self.taped else None
 
     @cached_property
     def over_blocks(self) -> Dynamics:
@@ -74,6 +82,13 @@ class Dynamics:
         """(n,): poses in which friction locks the mechanism: no reaction balances its own friction."""
         return ~self._settled[1]
 
+    def _moving(self, values: V) -> V:
+        """Values that depend on friction, without those of poses in which it locks the mechanism."""
+        if self.scene.friction:
+            values = values.copy()
+            leave_out(values, self.locked)
+        return values
+
     @cached_property
     def without_length(self) -> dict[int, NDArray[np.bool_]]:
         """Of the springs whose pull needs a direction, by number: the poses in which their ends meet, (n,)."""
@@ -90,26 +105,30 @@ class Dynamics:
     def effort(self) -> Reals:
         """The effort at each input by virtual work, (n, k)."""
         if self._effort is None:
-            found = self._from_tape(*(("effort", j) for j in range(len(self.poses.mechanism.inputs))))
+            found = self._from_tape(*(Effort(j) for j in range(len(self.poses.mechanism.inputs))))
             self._effort = None if found is None else np.stack(found, axis=1)
         if self._effort is None:
             # friction settles first: the loads depend on it
-            _, settled = self._settled
-            self._effort = effort(self.scene)
-            self._effort[~settled] = np.nan
+            _ = self._settled
+            self._effort = self._moving(effort(self.scene))
         return self._effort
 
     @property
     def generalized(self) -> Reals:
         """What balances the loads at each input, (n, k): the effort, but for motors that sit on another body than `on`."""
         _ = self._settled
-        return generalized(self.scene)
+        return self._moving(generalized(self.scene))
 
     @cached_property
     def reactions(self) -> Reactions:
         """The joint forces, each formed when asked for."""
         _ = self._settled
         return Reactions(self.scene)
+
+    @property
+    def by_key(self) -> Mapping[str, Joint]:
+        """The joints by their keys."""
+        return self.reactions.by_key
 
     @cached_property
     def statics(self) -> Statics | None:
@@ -122,7 +141,7 @@ class Dynamics:
     def newton_euler(self) -> Reals:
         """The effort at each input by Newton and Euler, (n, k): ΣM = 0 of the driven link with its joint forces."""
         if self._euler is None:
-            found = self._from_tape(*(("newton-euler", j) for j in range(len(self.poses.mechanism.inputs))))
+            found = self._from_tape(*(NewtonEuler(j) for j in range(len(self.poses.mechanism.inputs))))
             self._euler = None if found is None else np.stack(found, axis=1)
         if self._euler is None:
             r, inputs = self.reactions, self.poses.mechanism.inputs
@@ -133,14 +152,14 @@ class Dynamics:
                 ]
             else:
                 found = r.over(*(partial(r.effort, j=j) for j in range(len(inputs))))
-            self._euler = np.stack(found, axis=1)
+            self._euler = self._moving(np.stack(found, axis=1))
         return self._euler
 
     def joint_force(self, joint: Joint, body: str) -> Complexes:
         """The force of a joint on one of its bodies, (n,) complex; NaN where statics does not determine it."""
         key = joint.key, body
         if key not in self._forces:
-            found = self._from_tape(("force", *key))
+            found = self._from_tape(JointForce(*key))
             if found is not None:
                 self._forces[key] = found[0]
             elif self.statics is not None:
@@ -148,13 +167,12 @@ class Dynamics:
             else:
                 form = partial(self.reactions.joint_force, joint=joint, body=body)
                 (self._forces[key],) = self.reactions.over(form, kind=complex)
-            if self.scene.friction:
-                leave_out(self._forces[key], self.locked)
+            self._forces[key] = self._moving(self._forces[key])
         return self._forces[key]
 
     def joint_moment(self, joint: Joint, body: str) -> Reals:
         """The moment of a joint on one of its bodies about the joint's point, (n,): a guide's, or a pin's friction."""
-        found = self._from_tape(("moment", joint.key, body))
+        found = self._from_tape(JointMoment(joint.key, body))
         if found is not None:
             return np.asarray(found[0])
         r = self.reactions
@@ -169,13 +187,13 @@ class Dynamics:
         for load in self.scene.friction:
             if load.path is None and load.joint == joint.key and load.body == body:
                 result = result + r.over(load.form)[0]
-        return result
+        return self._moving(result)
 
     def contact(self, cam: int) -> Reals:
         """How hard a cam (from 0) presses on its follower along the normal, (n,); below zero it would have to pull."""
         statics, r = self.statics, self.reactions
         if statics is None:
-            return np.asarray(r.over(lambda block: r.contact(block, cam))[0])
+            return self._moving(r.over(lambda block: r.contact(block, cam))[0])
         drive = self.poses.mechanism.cam_drives[cam]
         unit = 1.0 if drive.guide is not None else self.poses.mechanism.size
         push = statics.get(("contact", str(cam), "")) * unit
@@ -184,7 +202,7 @@ class Dynamics:
             here = push[block.rows]
             return r.contact(block, cam, here if block.st.many else float(here[0]))
 
-        return np.asarray(r.over(form)[0])
+        return self._moving(r.over(form)[0])
 
     def reaction(self, joint: str, on: str) -> Reals:
         """The force of all others on a link at a joint, (n, 2)."""
@@ -199,27 +217,6 @@ class Dynamics:
             total = total + force
         return total
 
-    def value(self, key: Key) -> Any:
-        """A force by its key, (n,)."""
-        kind, *of = key
-        if kind == "effort":
-            return self.effort[:, of[0]]
-        if kind == "generalized":
-            return self.generalized[:, of[0]]
-        if kind.startswith("applied"):
-            return self.applied(of[0])[kind != "applied"]
-        if kind == "newton-euler":
-            return self.newton_euler[:, of[0]]
-        if kind.startswith("shaking"):
-            force, moment = self.shaking
-            return moment if kind == "shaking moment" else force[:, 0] + 1j * force[:, 1]
-        if kind == "contact":
-            return self.contact(of[0])
-        if kind == "reaction":
-            return self.at_joint(*of)
-        joint = self.reactions.by_key[of[0]]
-        return self.joint_force(joint, of[1]) if kind == "force" else self.joint_moment(joint, of[1])
-
     @cached_property
     def shaking(self) -> tuple[Reals, Reals]:
         """Shaking force (n, 2) and shaking moment (n,) on the ground, about its origin.
@@ -227,9 +224,9 @@ class Dynamics:
         All that the moving links do to the ground through joints, springs and the drive's own reaction: by
         d'Alembert the sum of their weights, applied loads and inertia loads. No reaction is formed for it.
         """
-        found = self._from_tape(("shaking",), ("shaking moment",))
-        if found is not None:
-            return xy(found[0]), found[1]
+        taped = self._from_tape(Shaking(), ShakingMoment())
+        if taped is not None:
+            return xy(taped[0]), taped[1]
         n = self.poses.n
         force, moment = np.zeros(n, complex), np.zeros(n)
         loads = shaking_loads(self.scene.loads)
@@ -259,63 +256,7 @@ class Dynamics:
             f, m = reduced(loads, block, self.scene.rigid[link].center)
             force[block.rows] += 0.0 if f is None else f
             moment[block.rows] += 0.0 if m is None else m
-        return force, moment
-
-
-def joints_at(joints: Iterable[Joint], name: str, on: str) -> list[Joint]:
-    """The joints of a link at a point: a pin, a guide, or both.
-
-    Raises
-    ------
-    DescriptionError
-        Where there is none.
-    """
-    named = [joint for joint in joints if joint.name == name]
-    if not named:
-        known = ", ".join(dict.fromkeys(joint.name for joint in joints))
-        raise DescriptionError(f"no joint at '{name}': expected one of {known}")
-    result = [joint for joint in named if on in joint.bodies]
-    if not result:
-        raise DescriptionError(f"link '{on}' has no joint at '{name}'")
-    return result
-
-
-def applied_loads(loads: Iterable[Load], link: str) -> list[Load]:
-    """What acts on a link but its weight and inertia."""
-    return [load for load in loads if load.body == link and load.kind not in OWN]
-
-
-def reduced(loads: Iterable[Load], block: Block, center: complex) -> tuple[Number, Number]:
-    """The sum of a link's loads over a block and their moment about a point of the link; None where zero."""
-    return _summed(loads, block, lambda load: load.arm(block, center))
-
-
-def shaking_loads(loads: Iterable[Load]) -> list[Load]:
-    """What acts on the moving links from outside."""
-    return [load for load in loads if load.kind in EXTERNAL and load.body != GROUND]
-
-
-def resultant(loads: Iterable[Load], block: Block) -> tuple[Number, Number]:
-    """The sum of loads over a block and their moment about the ground's origin; None where zero."""
-    return _summed(loads, block, lambda load: None if load.path is None else block.position(load.path))
-
-
-def _summed(loads: Iterable[Load], block: Block, arm: Callable[[Load], Number]) -> tuple[Number, Number]:
-    """The sum of loads, and their moment by the arm of each."""
-    force: Number = None
-    moment: Number = None
-    for load in loads:
-        value = block.formed(load)
-        if value is None:
-            continue
-        if load.path is None:
-            moment = plus(moment, value)
-            continue
-        force = plus(force, value)
-        at = arm(load)
-        if at is not None:
-            moment = plus(moment, cross(at, value))
-    return force, moment
+        return self._moving(force), self._moving(moment)
 
 
 class Moving(Protocol):

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from virtualwork.formulas.block import Block
+from virtualwork.formulas.kinematics import AnglePartial
 from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.numbers import Number, Reals, plus, times
 from virtualwork.formulas.positions import BLOCK
@@ -94,7 +95,7 @@ def through_carriers(scene: Scene, force: Reals) -> Reals:
     for j in scene.mechanism.carried:
         for i in range(k):
             bodies = str(inputs[j].link), scene.mechanism.carrier(j)
-            driven, carrier = poses.values([("dangle", body, i, 1) for body in bodies])
+            driven, carrier = poses.values([AnglePartial(body, i, 1) for body in bodies])
             matrix[:, i, j] = driven - carrier
     if k == 1:
         with np.errstate(divide="ignore", invalid="ignore"):

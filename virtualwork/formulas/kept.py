@@ -11,7 +11,7 @@ from collections.abc import Container, Iterator, Sequence
 from dalembert.arithmetic.recorded import Complex, Number, Real
 from dalembert.arithmetic.tape import Operation, Tape, reached, shortened
 from dalembert.dataclass import dataclass
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import Recording
 
 # operations that a value must spare those who ask later: what it takes to write an array and to read it
@@ -37,7 +37,7 @@ class Later:
     leaves: dict[str, int]
 
 
-def later(recording: Recording, keys: Sequence[Key], formed: Container[int]) -> Later:
+def later(recording: Recording, keys: Sequence[Quantity], formed: Container[int]) -> Later:
     """The tape of quantities from the values of operations that are known, and what it leaves besides."""
     with recording.lock:
         outputs = recording.recorder.numbers(recording.outputs(keys))

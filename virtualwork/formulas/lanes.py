@@ -17,14 +17,15 @@ from dalembert.arithmetic.choice import wanted
 from dalembert.arithmetic.engines import as_part, floats, run
 from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.tape import Tape
-from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.asked import COMPLEX, FORCES, Key, names, quantity
+from virtualwork.formulas.forces import Force
 from virtualwork.formulas.kept import Later, later
+from virtualwork.formulas.loops import Closed, Margin, Regularity
 from virtualwork.formulas.newton import unknowns
 from virtualwork.formulas.numbers import SINGULAR, Number, Reals, leave_out
 from virtualwork.formulas.poses import Branch, Poses
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import NAMES, NEAR, Recording
-from virtualwork.plan.steps import Step, joints
+from virtualwork.plan.steps import Step
 
 if TYPE_CHECKING:
     from virtualwork.formulas.dynamics import Dynamics
@@ -106,14 +107,14 @@ class Lanes(Poses):
         block_of: int | None = None,
     ) -> None:
         super().__init__(branch, angle, speed, acceleration, jerk, block_of)
-        self.known: dict[Key, Any] = {}
+        self.known: dict[Quantity, Any] = {}
         # which quantities of one pose come from the tape
-        self._taped: dict[Key, bool] = {}
+        self._taped: dict[Quantity, bool] = {}
         # values of operations for later requests, by their numbers; and where doubts are right
         self._kept: dict[int, Any] = {}
-        self._bad: dict[Key, NDArray[np.bool_] | None] = {}
+        self._bad: dict[Quantity, NDArray[np.bool_] | None] = {}
         # kinds and orders that were requested
-        self._requested: set[tuple[str, int]] = set()
+        self._requested: set[tuple[type[Quantity], int]] = set()
         self._repeated = False
 
     @cached_property
@@ -129,20 +130,20 @@ class Lanes(Poses):
     def solved(self) -> list[tuple[Step, int]]:
         """What has been worked out so far, (step, order); order 0 is position."""
         result = {(id(step), k): (step, k) for step, k in self._solved}
-        for steps, order in map(self.recording.steps, self.known):
+        for steps, order in (key.steps(self.recording) for key in self.known):
             result |= {(id(step), k): (step, k) for k in range(order + 1) for step in steps}
         return list(result.values())
 
-    def takes(self, keys: Iterable[Key]) -> bool:
+    def takes(self, keys: Iterable[Quantity]) -> bool:
         """Whether the tape has these quantities; a group that is singular in every pose it has not."""
         recording = self.recording
         return not self.branch.folded and recording.takes(keys)
 
-    def operations(self, keys: Iterable[Key]) -> int:
+    def operations(self, keys: Iterable[Quantity]) -> int:
         """What quantities of a pose cost, in operations on real numbers, with all that they depend on."""
         return taped(self.branch, self.recording, tuple(keys)).cost
 
-    def values(self, keys: Sequence[Key], forces: Callable[[], Dynamics] | None = None) -> list[Any]:
+    def values(self, keys: Sequence[Quantity], forces: Callable[[], Dynamics] | None = None) -> list[Any]:
         """The quantities, each (n,), real or complex: of many poses from the tape, of one by the formulas on floats.
 
         One pose that is asked for often comes from the tape too, as a function of floats. What `takes` does not take, and
@@ -161,48 +162,34 @@ class Lanes(Poses):
         by_blocks = self._by_blocks([key for key in keys if not self._taped[key]], forces)
         return [self.known[key].copy() if self._taped[key] else by_blocks[key] for key in keys]
 
-    def _foreseen(self, keys: tuple[Key, ...]) -> tuple[Key, ...]:
+    def _foreseen(self, keys: tuple[Quantity, ...]) -> tuple[Quantity, ...]:
         """What a request is answered with: the second of a kind and order over very many poses brings all of them.
 
         One tape for all is cheaper than one for each; what nobody asks for twice is not computed.
         """
-        kinds = {_kind(key) for key in keys}
+        kinds = {key.family for key in keys}
         self._repeated = self._repeated or not kinds.isdisjoint(self._requested)
         self._requested |= kinds
         if len(kinds) > 1 or not self._repeated or self.n < MANY_POSES:
             return keys
-        more = [key for key in self._every(*next(iter(kinds))) if key not in self.known]
-        spent = self.operations([*keys, *(key for key in self.known if _kind(key) in kinds)])
+        ((kind, order),) = kinds
+        more = [key for key in kind.every(self.mechanism, order) if key not in self.known]
+        spent = self.operations([*keys, *(key for key in self.known if key.family in kinds)])
         if not self.takes(more) or self.operations([*keys, *more]) > WASTE * spent:
             return keys
         return tuple(dict.fromkeys((*keys, *more)))
 
-    def _every(self, kind: str, order: int) -> Iterator[Key]:
-        """All quantities of a kind: of points, links, slides that are not driven; of forces efforts and one side of each joint."""
-        m = self.mechanism
-        driven = {entry.link for entry in m.inputs}
-        if kind == "point":
-            moving = ((body, name) for name, (body, _) in m.points.items() if body != GROUND)
-            yield from (("point", body, 0j, name, order) for body, name in moving)
-        elif kind == "angle":
-            yield from (("angle", link, order) for link in m.links if link not in driven)
-        elif kind == "slide":
-            yield from (("slide", guide, order) for guide in range(len(m.guides)))
-        elif kind == "forces":
-            yield from (("effort", j) for j in range(len(m.inputs)))
-            yield from (("reaction", joint.name, joint.bodies[-1]) for joint in joints(m))
-
-    def taped(self, keys: Sequence[Key]) -> list[Any] | None:
+    def taped(self, keys: Sequence[Quantity]) -> list[Any] | None:
         """Quantities of many poses from the tape; None of one pose, and where the tape does not have them."""
         return self.values(keys) if self.many and self.takes(keys) else None
 
-    def _often(self, keys: tuple[Key, ...]) -> bool:
+    def _often(self, keys: tuple[Quantity, ...]) -> bool:
         """Whether one pose has been asked for so often that to write the tape pays: some milliseconds."""
         counts = self.branch.recordings.setdefault("asked", {})
         counts[keys] = counts.get(keys, 0) + 1
         return bool(counts[keys] > OFTEN)
 
-    def _fill(self, keys: tuple[Key, ...], forces: Callable[[], Dynamics] | None) -> None:
+    def _fill(self, keys: tuple[Quantity, ...], forces: Callable[[], Dynamics] | None) -> None:
         if self.takes(keys):
             # a part of a sweep has the digits of the whole
             if self.block_of:
@@ -212,17 +199,19 @@ class Lanes(Poses):
         else:
             self.known |= self._by_blocks(keys, forces)
 
-    def _by_blocks(self, keys: Sequence[Key], forces: Callable[[], Dynamics] | None = None) -> dict[Key, Any]:
+    def _by_blocks(
+        self, keys: Sequence[Quantity], forces: Callable[[], Dynamics] | None = None
+    ) -> dict[Quantity, Any]:
         """Quantities worked out over blocks."""
-        loaded = [key for key in keys if key[0] in FORCES]
-        moving = [key for key in keys if key[0] not in FORCES]
+        loaded = [key for key in keys if isinstance(key, Force)]
+        moving = [key for key in keys if not key.is_force]
         result = dict(zip(moving, self.by_blocks(moving), strict=True))
         if loaded:
             of = _dynamics_of(self) if forces is None else forces()
-            result |= {key: of.value(key) for key in loaded}
+            result |= {key: key.read(of) for key in loaded}
         return result
 
-    def one(self, keys: tuple[Key, ...]) -> bool:
+    def one(self, keys: tuple[Quantity, ...]) -> bool:
         """Work out one pose that depends on nothing but its input, by a function of floats; False where it depends on more."""
         given = [self.inputs, *(rates[0] for rates in self.rates)]
         values = [x if isinstance(x, float) else float(np.ravel(x)[0]) for x in given]
@@ -238,7 +227,7 @@ class Lanes(Poses):
             self.known[key] = np.array([complex(next(found), next(found)) if vector else next(found) + 0.0])
         return True
 
-    def _run(self, keys: list[Key]) -> None:
+    def _run(self, keys: list[Quantity]) -> None:
         doubts = [key for key in dict.fromkeys(self._doubts(keys)) if key not in self._bad]
         # what is asked for first may be all: from the second time on, something is kept for those to come
         kept = dict(self._kept) if self.known and self.n > 1 else None
@@ -247,14 +236,14 @@ class Lanes(Poses):
         given = self.entering(name for name in cut.tape.inputs if name not in cut.takes)
         if kept:
             given |= {name: kept[number] for name, number in cut.takes.items()}
-        out = run(cut.tape, given, pairs=[names(key)[0] for key in keys if key[0] in COMPLEX])
+        out = run(cut.tape, given, pairs=[key.names[0] for key in keys if key.is_vector])
         self._kept.update((number, out[name]) for name, number in cut.leaves.items())
         for key in doubts:
-            self._bad[key] = self._where_bad(key, out[names(key)[0]])
+            self._bad[key] = self._where_bad(key, out[key.names[0]])
         # what a table is over has been handed out
         keys = [key for key in keys if key not in self.known]
         for key in keys:
-            value = quantity(out, key, self.n)
+            value = key.of_rows(out, self.n)
             for nowhere in (self._nowhere, *map(self._bad.get, self._closed(key))):
                 if nowhere is not None:
                     leave_out(value, nowhere)
@@ -262,36 +251,34 @@ class Lanes(Poses):
         careful = self._careful
         for key in self._doubts(keys):
             bad = self._bad[key]
-            if key[0] != "closed" and bad is not None:
+            if not isinstance(key, Closed) and bad is not None:
                 careful = careful | bad
         if careful.any():
             again = self.some(careful)._by_blocks(keys)
             for key in keys:
                 self.known[key][careful] = again[key]
 
-    def _doubts(self, keys: Iterable[Key]) -> Iterator[Key]:
+    def _doubts(self, keys: Iterable[Quantity]) -> Iterator[Quantity]:
         """What tells where quantities cannot be had, or not from the tape."""
         forces = False
         for key in keys:
             yield from self._closed(key)
-            forces = forces or key[0] in FORCES
-            if key[0] in FORCES or (key[0] != "turn" and key[-1] != 0):
-                yield from (("regularity", g.name) for g in self.branch.plan.groups if g.kind == "Newton")
+            forces = forces or key.is_force
+            if key.is_force or key.order:
+                yield from (Regularity(g.name) for g in self.branch.plan.groups if g.kind == "Newton")
         if forces:
-            yield from (
-                ("margin", g.name) for g in self.branch.plan.groups if g.kind not in ("Newton", "PRP")
-            )
+            yield from (Margin(g.name) for g in self.branch.plan.groups if g.kind not in ("Newton", "PRP"))
 
-    def _closed(self, key: Key) -> list[Key]:
+    def _closed(self, key: Quantity) -> list[Quantity]:
         """What tells where the groups that a quantity depends on are not assembled."""
-        return [("closed", group) for group in self.recording.hangs_on(key)] if self.branch.may_open else []
+        return [Closed((group,)) for group in key.groups(self.recording)] if self.branch.may_open else []
 
-    def _where_bad(self, key: Key, found: Any) -> NDArray[np.bool_] | None:
+    def _where_bad(self, key: Quantity, found: Any) -> NDArray[np.bool_] | None:
         """The poses that a doubt is right about; None where it is right about none."""
-        if key[0] == "closed":
+        if isinstance(key, Closed):
             bad = ~np.isfinite(found)
         else:
-            bad = np.abs(found) < (NEAR if key[0] == "margin" else SINGULAR)
+            bad = np.abs(found) < (NEAR if isinstance(key, Margin) else SINGULAR)
         return np.broadcast_to(bad, self.n) if np.any(bad) else None
 
     @cached_property
@@ -369,10 +356,10 @@ class Lanes(Poses):
         return np.asarray(known.const + sum(c * self.inputs[:, j] for j, c in known.inputs))
 
 
-def over_blocks(poses: Poses, key: Key, forces: Dynamics | None = None) -> Any:
+def over_blocks(poses: Poses, key: Quantity, forces: Dynamics | None = None) -> Any:
     """A quantity worked out over blocks of poses, (n,)."""
-    if key[0] in FORCES:
-        return (forces or _dynamics_of(poses)).value(key)
+    if isinstance(key, Force):
+        return key.read(forces or _dynamics_of(poses))
     return poses.by_blocks((key,))[0]
 
 
@@ -381,13 +368,6 @@ def _dynamics_of(poses: Poses) -> Dynamics:
     from virtualwork.formulas.dynamics import Dynamics
 
     return Dynamics(poses, taped=False)
-
-
-def _kind(key: Key) -> tuple[str, int]:
-    """The kind and order of a quantity."""
-    if key[0] in FORCES:
-        return "forces", 0
-    return key[0], key[-1] if key[0] in ("point", "angle", "slide") else 0
 
 
 def recorded(branch: Turning, moves: tuple[bool, ...]) -> Recording:
@@ -402,7 +382,7 @@ def recorded(branch: Turning, moves: tuple[bool, ...]) -> Recording:
     return result
 
 
-def taped(branch: Turning, recording: Recording, keys: tuple[Key, ...]) -> Tape:
+def taped(branch: Turning, recording: Recording, keys: tuple[Quantity, ...]) -> Tape:
     """The tape of quantities, pruned once."""
     key = recording, keys
     with branch.lock:
@@ -412,7 +392,9 @@ def taped(branch: Turning, recording: Recording, keys: tuple[Key, ...]) -> Tape:
     return result
 
 
-def _cut(branch: Turning, recording: Recording, keys: tuple[Key, ...], known: frozenset[int] | None) -> Later:
+def _cut(
+    branch: Turning, recording: Recording, keys: tuple[Quantity, ...], known: frozenset[int] | None
+) -> Later:
     """The tape of quantities, from what is known on; None where nothing is, nor to be left."""
     if known is None:
         return Later(taped(branch, recording, keys), {}, {})
@@ -427,7 +409,7 @@ def _cut(branch: Turning, recording: Recording, keys: tuple[Key, ...], known: fr
         return result
 
 
-def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Ready | None:
+def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Quantity, ...]) -> Ready | None:
     """Quantities of one pose as a function of floats; None where they depend on more than the input and its rates.
 
     Such a mechanism has one input that turns, no change point, no limit, and a closed form for every group.
@@ -441,7 +423,7 @@ def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Re
     return result
 
 
-def _made(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Ready | None:
+def _made(branch: Turning, moves: tuple[bool, ...], keys: tuple[Quantity, ...]) -> Ready | None:
     poses = Lanes(branch)
     if poses.inputs.shape[1] > 1 or not (branch.settled and poses.takes(keys)) or branch.may_open:
         return None
@@ -450,4 +432,4 @@ def _made(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Re
     if not floats.takes(tape) or not set(tape.inputs) <= set(arguments):
         return None
     places = tuple(arguments.index(name) for name in tape.inputs)
-    return floats.compiled(tape), places, tuple(len(names(key)) == 2 for key in keys)
+    return floats.compiled(tape), places, tuple(len(key.names) == 2 for key in keys)

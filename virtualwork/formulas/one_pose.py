@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from dalembert.dataclass import dataclass, field
-from virtualwork.formulas.asked import Key
 from virtualwork.formulas.lanes import OFTEN, Ready, Turning, ready
+from virtualwork.formulas.quantity import Quantity
 
 RATES = ("speed", "acceleration", "jerk")
 
@@ -22,8 +22,8 @@ class Together:
     """What a first request brings: the function, its quantities, and how often others were requested after it."""
 
     function: Ready
-    keys: tuple[Key, ...]
-    later: dict[tuple[Key, ...], int] = field(default_factory=dict)
+    keys: tuple[Quantity, ...]
+    later: dict[tuple[Quantity, ...], int] = field(default_factory=dict)
 
 
 class OnePose:
@@ -41,10 +41,10 @@ class OnePose:
     def __init__(self, branch: Turning, numbers: tuple[float, float, float, float]) -> None:
         self.branch, self.numbers = branch, numbers
         self._moves = numbers[1] != 0.0, numbers[2] != 0.0, numbers[3] != 0.0
-        self.known: dict[Key, float | complex] = {}
+        self.known: dict[Quantity, float | complex] = {}
         self._first: Together | None = None
 
-    def values(self, keys: tuple[Key, ...]) -> list[Any] | None:
+    def values(self, keys: tuple[Quantity, ...]) -> list[Any] | None:
         """Quantities, (1,) each; None where a function of floats has not been made of them, or fails."""
         known = self.known
         new = tuple(key for key in keys if key not in known)
@@ -52,7 +52,7 @@ class OnePose:
             return None
         return [np.array([known[key]]) for key in keys]
 
-    def _work_out(self, keys: tuple[Key, ...]) -> bool:
+    def _work_out(self, keys: tuple[Quantity, ...]) -> bool:
         made: Ready | None = self.branch.recordings.get(("ready", self._moves, keys))
         if made is None:
             return False
@@ -70,7 +70,7 @@ class OnePose:
                 first.function, first.keys = together, wanted
         return self._run(made, keys)
 
-    def _run(self, made: Ready, keys: tuple[Key, ...]) -> bool:
+    def _run(self, made: Ready, keys: tuple[Quantity, ...]) -> bool:
         function, places, vectors = made
         numbers = self.numbers
         try:

@@ -9,20 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property, partial
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.describe.description import Description
-from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.kinematics import Angle, Kinematic, Partial, Point
 from virtualwork.formulas.numbers import Complexes, Number, Reals, condition, real_array
 from virtualwork.formulas.positions import BLOCK, State, columns, run
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.rates import Passage, Rates, chain_rule
-from virtualwork.formulas.touches import Touch
-from virtualwork.plan.steps import Group, Plan, Step, Term, path_reads
+from virtualwork.plan.steps import Group, Plan, Step
 
 
 class Branch(Protocol):
@@ -74,19 +73,6 @@ class Branch(Protocol):
 
     def cover(self, low: float, high: float) -> None:
         """Look for change points and limits over the inputs from low to high."""
-
-
-class _Asked(NamedTuple):
-    """A quantity: what it depends on, to which order, over which input; what a state has of it, and its rates."""
-
-    targets: tuple[str, ...]
-    order: int
-    which: int
-    # over one input alone
-    alone: bool
-    number: type
-    place: Callable[[State], Number]
-    rate: Callable[[Rates, int], Number]
 
 
 def check_rate(name: str, rate: Reals, n: int, k: int) -> None:
@@ -353,75 +339,45 @@ class Poses:
         """The order-th derivative of input j in time, (n,)."""
         return np.broadcast_to(np.asarray(self.rates[order - 1][j], dtype=float), (self.n,))
 
-    def values(self, keys: Sequence[Key]) -> list[Any]:
-        """Quantities by their keys, (n,) each."""
-        return self.by_blocks(keys)
+    def values(self, quantities: Sequence[Quantity]) -> list[Any]:
+        """Quantities, (n,) each."""
+        return self.by_blocks(quantities)
 
-    def taped(self, keys: Sequence[Key]) -> list[Any] | None:
+    def taped(self, quantities: Sequence[Quantity]) -> list[Any] | None:
         """Quantities from the tape; None where there is none."""
         return None
 
-    def by_blocks(self, keys: Sequence[Key]) -> list[Any]:
+    def by_blocks(self, quantities: Sequence[Quantity]) -> list[Any]:
         """Quantities of motion by the formulas over blocks, (n,) each; what they depend on is solved in one pass."""
-        asked = [self._asked(key) for key in keys]
         wanted: dict[tuple[int, int], dict[str, None]] = {}
-        for quantity in asked:
-            wanted.setdefault((quantity.order, quantity.which), {}).update(dict.fromkeys(quantity.targets))
+        kinematic = []
+        for quantity in quantities:
+            if not isinstance(quantity, Kinematic):
+                raise KeyError(quantity)
+            which = quantity.input if isinstance(quantity, Partial) and self.inputs.shape[1] > 1 else -1
+            kinematic.append((quantity, (quantity.order, which)))
+            wanted.setdefault((quantity.order, which), {}).update(dict.fromkeys(quantity.targets(self)))
         rates = {of: self.solve(targets, *of) for of, targets in wanted.items()}
-        return [self._formed(quantity, rates[quantity.order, quantity.which]) for quantity in asked]
+        return [self._formed(quantity, rates[of]) for quantity, of in kinematic]
 
-    def _asked(self, key: Key) -> _Asked:
-        """What a quantity depends on, and what the states and their rates have of it."""
-        kind, of, *more = key
-        alone = kind in ("dpoint", "dangle")
-        how = more[-1] if more else 0, more[-2] if alone and self.inputs.shape[1] > 1 else -1, alone
-        if kind in ("point", "dpoint"):
-            z, node = more[:2]
-            if node is not None:
-                return _Asked(
-                    (f"point:{node}",),
-                    *how,
-                    complex,
-                    lambda st: st.point[node],
-                    lambda r, k: r.point[node][k - 1],
-                )
-            base, terms = self.plan.anchors[of]
-            path = base, (*terms, Term(z, of))
-            reads = tuple(sorted(path_reads(path)))
-            return _Asked(reads, *how, complex, lambda st: st.at(path), lambda r, k: r.vector(path, k))
-        if kind == "slide":
-            return _Asked(
-                (f"slide:{of}",), *how, float, lambda st: st.slide[of], lambda r, k: r.slide[of][k - 1]
-            )
-        if kind in ("pressure angle", "curvature radius"):
-            touch = Touch(self.mechanism, self.plan, self.mechanism.cam_drives[of])
-            name, reads = kind.replace(" ", "_"), tuple(sorted(touch.targets))
-            return _Asked(
-                reads, 0, -1, False, float, lambda st: getattr(touch.at(st), name)(), lambda r, k: None
-            )
-        target = (f"angle:{of}",)
-        if kind == "turn":
-            return _Asked(target, *how, complex, lambda st: st.turn[of], lambda r, k: r.turn(of, k))
-        if kind not in ("angle", "dangle"):
-            raise KeyError(key)
-        if of == GROUND:
-            return _Asked((), 0, -1, False, float, lambda st: 0.0, lambda r, k: None)
-        return _Asked(target, *how, float, lambda st: np.angle(st.turn[of]), lambda r, k: r.angle[of][k - 1])
-
-    def _formed(self, of: _Asked, rates: list[Rates]) -> Any:
+    def _formed(self, of: Kinematic, rates: list[Rates]) -> Any:
+        number = complex if of.is_vector else float
         if of.order == 0:
-            return self.over(lambda _, st: of.place(st), of.number)
-        if of.alone:
-            return self.over(lambda i, _: of.rate(rates[i], of.order), of.number)
-        return self.in_time(of.order, lambda i, k: of.rate(rates[i], k), of.number)
+            return self.over(lambda _, st: of.place(self, st), number)
+        if not rates:
+            # nothing moves it
+            return np.zeros(self.n, number)
+        if isinstance(of, Partial):
+            return self.over(lambda i, _: of.rate(self, rates[i], of.order), number)
+        return self.in_time(of.order, lambda i, k: of.rate(self, rates[i], k), number)
 
     def angle(self, body: str, order: int = 0) -> Reals:
         """A link's angle, (n,) rad, or its ω, α or angular jerk."""
-        return self.values((("angle", body, order),))[0]  # type: ignore[no-any-return]
+        return self.values((Angle(body, order),))[0]  # type: ignore[no-any-return]
 
     def point(self, body: str, z: complex, order: int = 0, node: str | None = None) -> Complexes:
         """Position (order 0) or a time derivative of any point of a body, x + iy, (n,)."""
-        return self.values((("point", body, z, node, order),))[0]  # type: ignore[no-any-return]
+        return self.values((Point(body, z, node, order),))[0]  # type: ignore[no-any-return]
 
     def columns(self, group: Group) -> list[list[Complexes]]:
         """The Jacobian of one Assur group: for each of its loops, the column of each of its unknowns, (n,) complex."""

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from dalembert.arithmetic.recorded import RECORDED, bare
 from virtualwork.describe.laws import Lift
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.lifts import Located, lift, located
@@ -26,6 +27,8 @@ EMPTY: Mapping[str, Any] = MappingProxyType({})
 FAR = 1.0
 # of the whole way, or of a turn of the input: samples this near are not divided again
 SHORTEST = 1e-9
+# rad: an angle so little above −π is half a turn but for its rounding
+HALF_TURN = 1e-9
 # nodes and angles, (n,) each; NaN where there is no angle
 Samples = tuple[Reals, Reals]
 NONE: Samples = np.empty(0), np.empty(0)
@@ -252,7 +255,13 @@ def principal(angle: Number) -> Number:
     >>> float(principal(-math.pi + 1e-15) - math.pi) < 2e-15
     True
     """
-    return angle - 2 * math.pi * np.ceil((angle - math.pi - 1e-9) / (2 * math.pi))
+    return angle - 2 * math.pi * np.ceil((angle - math.pi - HALF_TURN) / (2 * math.pi))
+
+
+def principal_of(turn: Number) -> Number:
+    """The `principal` angle of a recorded rotation."""
+    angle = RECORDED.angle(bare(turn))
+    return RECORDED.select(angle + (math.pi - HALF_TURN), angle, angle + 2 * math.pi)
 
 
 def follow(

@@ -2,37 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Protocol
-
 from dalembert.arithmetic.recorded import Number, bare
-from virtualwork.formulas import numbers
-from virtualwork.formulas.block import Block
+from virtualwork.describe.parts import TorsionSpring
+from virtualwork.formulas.block import Block, Shared, Table
 from virtualwork.formulas.effort import generalized_force
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.load_paths import LoadPaths
+from virtualwork.formulas.numbers import WRITTEN
+from virtualwork.formulas.positions import State
+from virtualwork.formulas.quantity import Recording
 from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.reactions import JointForces
-from virtualwork.formulas.recorded_block import RecordedBlock, Recording
 
 
-class Written(Recording, Protocol):
-    """A recording of positions and rates, as its forces need it; see `recording.Recording`."""
+class RecordedSetting(Shared):
+    """What the one recorded block is told of its poses."""
 
-    @property
-    def kind(self) -> numbers.Written: ...
-    @property
-    def moves(self) -> tuple[bool, ...]: ...
-    @property
-    def by(self) -> list[Rates]: ...
-    @property
-    def together(self) -> Rates | None: ...
-    @property
-    def forces(self) -> tuple[LoadPaths, JointForces, Block]: ...
-    def solve(self, targets: Iterable[str], order: int) -> None: ...
+    def __init__(self, recording: Recording) -> None:
+        super().__init__(recording.mechanism, recording.plan)
+        self.recording = recording
+
+    def rates(self, rows: slice, many: bool) -> tuple[Number, Number]:
+        """q̇ and q̈ of the one input."""
+        speed, acceleration, _ = self.recording.rates
+        return speed[0], acceleration[0]
+
+    def wound(self, spring: TorsionSpring, st: State, within: Number) -> Number:
+        """The twist next to the one that enters."""
+        number = self.mechanism.torsion_springs.index(spring)
+        return self.recording.unwrapped(f"near spring {number}", WRITTEN.exp(within))
 
 
-def forces_of(recording: Written) -> tuple[LoadPaths, JointForces, Block]:
+class RecordedBlock(Block):
+    """The recorded pose as the loads see it."""
+
+    def __init__(self, recording: Recording, along: Rates | None, by: list[Rates]) -> None:
+        super().__init__(RecordedSetting(recording), slice(None), recording.st, along, by)
+        self.recording = recording
+
+    def drive(self, j: int) -> Number:
+        """The torque of input j's motor."""
+        return self.recording.efforts[j]
+
+    def table(self, load: Table) -> Number:
+        """The force of a table, as it enters."""
+        number = next(i for i, of in enumerate(self.recording.tables) if of is load)
+        enter = self.recording.recorder.input
+        return WRITTEN.join(enter(f"table {number} x"), enter(f"table {number} y"))
+
+
+def forces_of(recording: Recording) -> tuple[LoadPaths, JointForces, Block]:
     """The loads over the recorded pose, with everything solved that they depend on."""
     case = LoadCase(recording.mechanism, recording.plan, any(recording.moves[:2]))
     paths = LoadPaths(case)
@@ -40,11 +59,11 @@ def forces_of(recording: Written) -> tuple[LoadPaths, JointForces, Block]:
     return paths, JointForces(paths, set()), RecordedBlock(recording, recording.together, recording.by)
 
 
-def efforts(recording: Written) -> list[Number]:
+def efforts(recording: Recording) -> list[Number]:
     """The effort at each input by virtual work, through the carriers of motors."""
-    paths, _, block = recording.forces
+    _, _, block = recording.forces
     m, k = recording.mechanism, len(recording.mechanism.inputs)
-    force = [negative(generalized_force(paths, block, j)) for j in range(k)]
+    force = [generalized(recording, j) for j in range(k)]
     if not m.carried:
         return force
     matrix: list[list[Number]] = [[float(i == j) for j in range(k)] for i in range(k)]
@@ -58,6 +77,8 @@ def efforts(recording: Written) -> list[Number]:
     return recording.kind.system(matrix, force) if k > 1 else [force[0] / matrix[0][0]]
 
 
-def negative(value: Number) -> Number:
-    """−value, where None is zero."""
-    return 0.0 if value is None else -bare(value)
+def generalized(recording: Recording, j: int) -> Number:
+    """The effort at input j as if every motor sat on the body that its angle is measured from."""
+    paths, _, block = recording.forces
+    force = generalized_force(paths, block, j)
+    return 0.0 if force is None else -bare(force)

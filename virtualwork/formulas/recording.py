@@ -23,19 +23,16 @@ from typing import TYPE_CHECKING
 
 from dalembert.arithmetic.guard import Lock, guarded, own_lock
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare, squared
-from dalembert.arithmetic.systems import regularity
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.description import Description
-from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.asked import FORCES, JOINTS, LOADS, Key, names
 from virtualwork.formulas.closed_forms import Case
-from virtualwork.formulas.newton import gaps, put_unknowns, unknowns
-from virtualwork.formulas.numbers import PARTS, WRITTEN, Written
+from virtualwork.formulas.newton import gaps, put_unknowns
+from virtualwork.formulas.numbers import WRITTEN, Written
 from virtualwork.formulas.positions import State, columns, run
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.rates import Rates, chain_rule
-from virtualwork.formulas.touches import Touch
 from virtualwork.plan.order import plan
-from virtualwork.plan.steps import Group, Path, Plan, Step, Term, path_reads
+from virtualwork.plan.steps import Group, Plan
 
 if TYPE_CHECKING:
     from virtualwork.formulas.block import Block
@@ -102,7 +99,7 @@ class Recording:
         # in time, with several inputs
         self.together = Rates(plan, self.st, given) if k > 1 else None
         self._done: set[tuple[int, int, int]] = set()
-        self._values: dict[Key, Number] = {}
+        self._values: dict[Quantity, Number] = {}
         self._forces: tuple[LoadPaths, JointForces, Block] | None = None
         # how far the loops of groups without a closed form are from closing as they enter, m
         self.open_loops: dict[str, Number] = {}
@@ -171,7 +168,7 @@ class Recording:
         """The derivatives over the one input, or in time with several."""
         return self.by[0] if self.together is None else self.together
 
-    def _in_time(self, order: int, get: Callable[[int], Number]) -> Number:
+    def in_time(self, order: int, get: Callable[[int], Number]) -> Number:
         """A derivative in time, of derivatives over the one input or along all."""
         if self.together is not None:
             return get(order)
@@ -188,71 +185,92 @@ class Recording:
             self._forces = forces_of(self)
         return self._forces
 
-    def _places(self) -> tuple[LoadPaths, JointForces, Block]:
+    def placed_forces(self) -> tuple[LoadPaths, JointForces, Block]:
         """The forces, with everything solved that the places of all joints depend on."""
         case = self.forces[0].case
         self.solve(*case.targets(case.places))
         return self.forces
 
-    # --- what can be asked ------------------------------------------------------------------------------------------
-    def value(self, key: Key) -> Number:
-        """A quantity, written down once.
+    @cached_property
+    def tables(self) -> list[Tabled]:
+        """The loads that tables give, in the order in which their forces enter."""
+        return self.forces[0].case.tables
 
-        Keys
-        ----
-        ("point", body, z, node or None, order)      position or a time derivative, complex
-        ("angle", body, order)                       θ in (−π, π], ω, α, the angular jerk
-        ("turn", body)                               e^{iθ}, complex
-        ("dpoint", body, z, node or None, j, order)  ∂P/∂q_j, complex; order 2 with one input: ∂²P/∂q²
-        ("dangle", body, j, order)
-        ("slide", guide, order), ("dslide", guide, j, order)
-        ("effort", j), ("newton-euler", j), ("force", joint's key, body), ("moment", joint's key, body)
-        ("reaction", joint's name, body)             of all joints of that name: a pin, and the guide its point runs in
-        ("shaking",), ("shaking moment",)            complex; real
-        ("load", n), ("load at", n), ("load torque", n), ("rail", guide)   see `single_loads.OF_ONE`
-        ("contact", cam)                             how hard a cam, from 0, presses on its follower
-        ("pressure angle", cam), ("curvature radius", cam)
-        ("closed", groups' names …)                  a finite number where these groups are assembled
-        ("margin", group's name)                     the radicand of a closed form, relative
-        ("transmission", group's name)               sin² of the transmission angle of a two-link group
-        ("twist", number)                            of a torsion spring, within half a turn of free
-        ("column", loop, unknown)                    of the Jacobian of all loops (`loops`), complex; as their columns
-        ("size",)                                    the mechanism's characteristic length
-        ("regularity", group's name)                 of a larger group: how far its Jacobian is from singular, of 1
-        """
-        if key not in self._values:
-            kind, *of = key
-            if kind in LOADS:
-                from virtualwork.formulas.single_loads import OF_ONE
+    @cached_property
+    def efforts(self) -> list[Number]:
+        """The effort at each input by virtual work."""
+        from virtualwork.formulas.recorded_forces import efforts
 
-                found = OF_ONE[kind](*self._places(), *of)
-            else:
-                found = getattr(self, f"_{kind.replace('-', '_').replace(' ', '_')}")(*of)
-            self._values[key] = 0.0 if found is None else bare(found)
-        return self._values[key]
+        return efforts(self)
 
-    def takes(self, keys: Iterable[Key]) -> bool:
+    def generalized(self, j: int) -> Number:
+        """The effort at input j as if every motor sat on the body that its angle is measured from."""
+        from virtualwork.formulas.recorded_forces import generalized
+
+        return generalized(self, j)
+
+    def newton_euler(self, j: int) -> Number:
+        """The effort at input j by Newton and Euler."""
+        _, of, block = self.placed_forces()
+        return of.effort(block, j)
+
+    def joint_force(self, joint: str, body: str) -> Number:
+        """The force of a joint, by its key, on a body."""
+        _, of, block = self.placed_forces()
+        return of.joint_force(block, of.by_key[joint], body)
+
+    def joint_moment(self, joint: str, body: str) -> Number:
+        """The moment of a joint, by its key, on a body; None where it has none."""
+        _, of, block = self.placed_forces()
+        guide = of.by_key[joint].guide
+        return None if guide is None else of.guide_moment(block, guide, body)
+
+    @cached_property
+    def shaking(self) -> tuple[Number, Number]:
+        """The shaking force and moment."""
+        from virtualwork.formulas.resultants import resultant, shaking_loads
+
+        paths, _, block = self.forces
+        return resultant(shaking_loads(paths.case.loads), block)
+
+    def applied(self, link: str) -> tuple[Number, Number]:
+        """What acts on a link but its weight and inertia, reduced to its centre of mass."""
+        from virtualwork.formulas.resultants import applied_loads, reduced
+
+        self.solve([f"angle:{link}"], 0)
+        paths, _, block = self.forces
+        return reduced(applied_loads(paths.case.loads, link), block, self.mechanism.rigid[link].center)
+
+    # --- quantities -----------------------------------------------------------------------------------------------
+    def value(self, quantity: Quantity) -> Number:
+        """A quantity, written down once."""
+        if quantity not in self._values:
+            value = quantity.write(self)
+            self._values[quantity] = 0.0 if value is None else bare(value)
+        return self._values[quantity]
+
+    def takes(self, quantities: Iterable[Quantity]) -> bool:
         """Whether quantities can be written down: friction iterates, and redundant statics is a system of its own."""
-        kinds = {key[0] for key in keys}
-        if kinds.isdisjoint(FORCES):
+        forces = [quantity for quantity in quantities if quantity.is_force]
+        if not forces:
             return True
         if self.mechanism.friction:
             return False
-        return kinds.isdisjoint(JOINTS) or not self.forces[0].order.redundant
+        return not (any(each.is_joint_force for each in forces) and self.forces[0].order.redundant)
 
-    def tape(self, keys: Iterable[Key], more: Mapping[str, Number] | None = None) -> Tape:
-        """The tape of quantities: outputs are called as `names` says; and of `more` numbers by name."""
-        return self.recorder.tape({**self.outputs(keys), **(more or {})})
+    def tape(self, quantities: Iterable[Quantity], more: Mapping[str, Number] | None = None) -> Tape:
+        """The tape of quantities: outputs are called by their `names`; and of `more` numbers by name."""
+        return self.recorder.tape({**self.outputs(quantities), **(more or {})})
 
-    def outputs(self, keys: Iterable[Key]) -> dict[str, Number]:
+    def outputs(self, quantities: Iterable[Quantity]) -> dict[str, Number]:
         """The numbers of quantities, written down, by their names."""
         outputs: dict[str, Number] = {}
-        for key in keys:
-            value = self.value(key)
-            parts = [value.real, value.imag][: len(names(key))]
-            if key[0] in FORCES:
+        for quantity in quantities:
+            value = self.value(quantity)
+            parts = [value.real, value.imag][: len(quantity.names)]
+            if quantity.is_force:
                 parts = [RECORDED.unsigned(part) for part in parts]
-            outputs.update(zip(names(key), parts, strict=True))
+            outputs.update(zip(quantity.names, parts, strict=True))
         return outputs
 
     def state(self) -> Iterator[Number]:
@@ -261,183 +279,10 @@ class Recording:
         if self._forces:
             yield from (value[1] for of, value in self._forces[2].kept.items() if of.lasts)
 
-    def _point(self, body: str, z: complex, node: str | None, order: int) -> Number:
-        path = self._path(body, z, node)
-        self.solve(path_reads(path), order)
-        if order == 0:
-            return self.st.at(path)
-        return self._in_time(order, lambda k: self.along.vector(path, k))
-
-    def _dpoint(self, body: str, z: complex, node: str | None, j: int, order: int = 1) -> Number:
-        path = self._path(body, z, node)
-        self.solve(path_reads(path), order)
-        return self.by[j].vector(path, order)
-
-    def _path(self, body: str, z: complex, node: str | None) -> Path:
-        if node is not None:
-            return node, ()
-        base, terms = self.plan.anchors[body]
-        return base, (*terms, Term(z, body))
-
-    def _turn(self, body: str) -> Number:
-        self.solve((f"angle:{body}",), 0)
-        return self.st.turn[body]
-
-    def _twist(self, number: int) -> Number:
-        spring = self.mechanism.torsion_springs[number]
-        if all(self.plan.angles[body].by_inputs for body in spring.links):
-            # the inputs alone fix it, whole turns included
-            return 0.0
-        from virtualwork.formulas.block import Shared
-
-        self.solve([f"angle:{body}" for body in spring.links], 0)
-        return Shared.within(self.st, spring)
-
-    @cached_property
-    def tables(self) -> list[Tabled]:
-        """The loads that tables give, in the order in which their forces enter."""
-        return self.forces[0].case.tables
-
-    def _angle(self, body: str, order: int) -> Number:
-        if body == GROUND:
-            return 0.0
-        self.solve((f"angle:{body}",), order)
-        if order == 0:
-            return WRITTEN.angle(self.st.turn[body])
-        return self._in_time(order, lambda k: self.along.angle[body][k - 1])
-
-    def _dangle(self, body: str, j: int, order: int = 1) -> Number:
-        if body == GROUND:
-            return 0.0
-        self.solve((f"angle:{body}",), order)
-        return self.by[j].angle[body][order - 1]
-
-    def _slide(self, guide: int, order: int) -> Number:
-        self.solve((f"slide:{guide}",), order)
-        if order == 0:
-            return self.st.slide[guide]
-        return self._in_time(order, lambda k: self.along.slide[guide][k - 1])
-
-    def _dslide(self, guide: int, j: int, order: int = 1) -> Number:
-        self.solve((f"slide:{guide}",), order)
-        return self.by[j].slide[guide][order - 1]
-
-    def _effort(self, j: int) -> Number:
-        from virtualwork.formulas.recorded_forces import efforts
-
-        return efforts(self)[j]
-
-    def _newton_euler(self, j: int) -> Number:
-        _, of, block = self._places()
-        return of.effort(block, j)
-
-    def _force(self, joint: str, body: str) -> Number:
-        _, of, block = self._places()
-        return of.joint_force(block, of.by_key[joint], body)
-
-    def _reaction(self, joint: str, body: str) -> Number:
-        from virtualwork.formulas.dynamics import joints_at
-
-        of = joints_at(self.forces[1].joints, joint, body)
-        return sum((self.value(("force", j.key, body)) for j in of), 0.0)
-
-    def _moment(self, joint: str, body: str) -> Number:
-        _, of, block = self._places()
-        guide = of.by_key[joint].guide
-        return None if guide is None else of.guide_moment(block, guide, body)
-
-    def _contact(self, cam: int) -> Number:
-        _, of, block = self._places()
-        self.solve(of.paths.touches.every[cam].targets, 0)
-        return of.contact(block, cam)
-
-    def _pressure_angle(self, cam: int) -> Number:
-        return self._touch(cam).at(self.st).pressure_angle()
-
-    def _curvature_radius(self, cam: int) -> Number:
-        return self._touch(cam).at(self.st).curvature_radius()
-
-    def _touch(self, cam: int) -> Touch:
-        touch = Touch(self.mechanism, self.plan, self.mechanism.cam_drives[cam])
-        self.solve(touch.targets, 0)
-        return touch
-
-    def _shaking(self, part: int = 0) -> Number:
-        from virtualwork.formulas.dynamics import resultant, shaking_loads
-
-        paths, _, block = self.forces
-        return resultant(shaking_loads(paths.case.loads), block)[part]
-
-    def _shaking_moment(self) -> Number:
-        return self._shaking(1)
-
-    def hangs_on(self, key: Key) -> tuple[str, ...]:
-        """The groups that a quantity depends on, by name: where one of them is not assembled, it has no value.
-
-        What cancels is not on the tape: a platform that stays level has the angle 0 there, whatever carries it.
-        """
-        steps = () if key[0] in ("margin", "transmission", "size") else self.steps(key)[0]
-        return tuple(step.name for step in steps if isinstance(step, Group))
-
-    def steps(self, key: Key) -> tuple[tuple[Step, ...], int]:
-        """The steps that a quantity depends on, and how often they are differentiated."""
-        kind, *of = key
-        order = of[-1] if kind in ("point", "angle", "slide", "dpoint", "dangle", "dslide") else 0
-        if kind in ("point", "dpoint"):
-            targets = path_reads(self._path(*of[:3]))
-        elif kind in ("angle", "dangle", "turn"):
-            targets = {f"angle:{of[0]}"}
-        elif kind in ("slide", "dslide"):
-            targets = {f"slide:{of[0]}"}
-        elif kind in ("pressure angle", "curvature radius"):
-            targets = Touch(self.mechanism, self.plan, self.mechanism.cam_drives[of[0]]).targets
-        else:
-            targets = {key for g in self.plan.groups for key in self.plan.writes(g)}
-            order = self.forces[0].case.targets()[1] if kind in FORCES else 0
-        return self.plan.needed(targets), order
-
-    def _closed(self, *groups: str) -> Number:
-        total: Number = 0.0
-        for group in map(self.solved, groups):
-            if self.enters(group):
-                total = sum(map(abs, unknowns(group, self.st)), total)
-            else:
-                total = total + WRITTEN.sqrt(self.st.margin[group.name])
-                if group.kind == "PRP":
-                    total = total + abs(self.st.slide[group.slides[0]])
-        return total
-
-    def _regularity(self, group: str) -> Number:
-        cols = columns(self.solved(group), self.st)
-        return regularity([[part(c) for c in row] for row in cols for part in PARTS])
-
     @cached_property
     def loops(self) -> Group | None:
         """All loops at once: one group of every unknown; None where there is no loop."""
         return next(iter(plan(self.mechanism, merged=True).groups), None)
-
-    def _column(self, loop: int, unknown: int) -> Number:
-        assert self.loops is not None
-        self.solve([key for s in self.plan.steps for key in self.plan.writes(s)], 0)
-        return columns(self.loops, self.st)[loop][unknown]
-
-    def _size(self) -> Number:
-        longest: Number = 0.0
-        for span in map(bare, self.mechanism.spans):
-            longest = RECORDED.select(span - longest, span, longest)
-        return longest
-
-    def _margin(self, group: str) -> Number:
-        return self.st.margin[self.solved(group).name]
-
-    def _transmission(self, group: str) -> Number:
-        """Between the two links, between a rod and the normal of its guide, of a slot as it passes its pivot, between guides."""
-        of = self.solved(group)
-        margin: Number = self.st.margin[of.name]
-        if of.kind != "RPR":
-            return margin
-        size, w = bare(self.mechanism.size), self.cases[of.name].offset(self.st)
-        return margin * (size * size / (w.conjugate() * w).real)
 
     def solved(self, group: str) -> Group:
         """A group, with its position written down."""

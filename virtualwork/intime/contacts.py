@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from virtualwork.describe.description import CamDrive
+from virtualwork.describe.cams import CamDrive
 from virtualwork.formulas.numbers import Reals
 
 if TYPE_CHECKING:

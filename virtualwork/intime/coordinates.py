@@ -24,6 +24,7 @@ from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
 from virtualwork.describe.parts import GROUND, Guess, Input
+from virtualwork.formulas.loops import Margin, Regularity
 from virtualwork.formulas.numbers import PARTS, Reals
 from virtualwork.formulas.positions import columns, unwound
 from virtualwork.intime.equations import Equations
@@ -96,10 +97,10 @@ class Coordinates:
         for g in groups:
             if g.kind == "Newton":
                 # of two links this is the sine, and its square the radicand
-                regular = recording.value(("regularity", g.name))
+                regular = recording.value(Regularity(g.name))
                 result[g.name] = regular * regular
             else:
-                result[g.name] = recording.value(("margin", g.name))
+                result[g.name] = recording.value(Margin(g.name))
         return recording.recorder.tape(result) if result else None
 
     @cached_property

@@ -26,6 +26,7 @@ from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
 from virtualwork.formulas.effort import effort
+from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.newton import unknowns
@@ -300,7 +301,7 @@ class Equations:
     def _followed(self, load: Tabled) -> Value:
         """The angle or speed of a link that depends on more than the inputs, by a tape of its own."""
         order = 1 if load.axis == "speed" else 0
-        function = self.function(self.recording(True, False, False).tape([("angle", load.body, order)]))
+        function = self.function(self.recording(True, False, False).tape([Angle(load.body, order)]))
         first = load.table[0][0]
 
         def at(t: float, q: Floats, v: Floats) -> float:

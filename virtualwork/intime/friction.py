@@ -28,6 +28,7 @@ from dalembert.arithmetic.recorded import Number
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe import MechanismError
 from virtualwork.formulas.block import Block
+from virtualwork.formulas.forces import JointForce
 from virtualwork.formulas.numbers import Reals, dot, minus, plus
 from virtualwork.intime.equations import Equations, Lost
 from virtualwork.intime.powers import motion_of
@@ -120,7 +121,7 @@ class Rubbing(Equations):
             block.friction[n] = rub if joint.guide is None else rub * of.rail(block, joint.guide)
         result: dict[str, Number] = {}
         for n, (joint, body, other, *_) in enumerate(paths.case.contacts):
-            recording.value(("force", joint.key, body))
+            recording.value(JointForce(joint.key, body))
             force = of.on_side(block, (joint.key, body))
             if joint.guide is None:
                 force = plus(force, of.borne(block, joint, body))

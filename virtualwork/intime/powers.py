@@ -8,6 +8,7 @@ from dalembert.arithmetic.adjoint import derivatives
 from dalembert.arithmetic.recorded import RECORDED, Number
 from dalembert.arithmetic.systems import solved
 from dalembert.arithmetic.tape import Tape
+from virtualwork.formulas.forces import Effort
 from virtualwork.formulas.recording import Recording
 
 
@@ -42,7 +43,7 @@ def _motion_of(
     again = recording.recorder
     paths, _, block = recording.forces
     efforts, accelerations = [f"effort {j}" for j in range(k)], names(k)[2][:-1]
-    motion = recording.tape([("effort", j) for j in range(k)], more)
+    motion = recording.tape([Effort(j) for j in range(k)], more)
     free = [name for name in (*accelerations, *frictions) if name in motion.inputs]
     inputs = {name: again.input(name) for name in motion.inputs}
     slopes = derivatives(motion, free).on(inputs, RECORDED)

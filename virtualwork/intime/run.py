@@ -15,8 +15,8 @@ from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
 from virtualwork.describe.parts import Input
-from virtualwork.formulas.asked import FORCES, Key
 from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.intime.coordinates import Coordinates
 from virtualwork.intime.equations import Equations
 from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, UNKNOWN, apart, rounding, share, spread
@@ -129,13 +129,13 @@ class Run:
             result.append((error + off[: -len(ROUNDINGS)].sum(axis=0) + 2 * rounded)[rows])
         return result
 
-    def rounding(self, key: Key) -> Reals:
+    def rounding(self, key: Quantity) -> Reals:
         """What the evaluation of a quantity at the states rounds, (n,), by its key (`Recording.value`): computed twice.
 
         Friction at rest is no force by the formula, and redundant statics is solved in another way: of forces with these, 0.
         """
         m, motion = self.assembly.mechanism, self.motion
-        if key[0] in FORCES and (m.friction or self.first_motion.dynamics.statics is not None):
+        if key.is_force and (m.friction or self.first_motion.dynamics.statics is not None):
             return np.zeros(len(self.t))
         return np.asarray(motion.rounding.of(key))
 

@@ -12,6 +12,7 @@ from dalembert.drawing.labels import Label, place
 from dalembert.drawing.sheet import plain, sheet
 from virtualwork.describe.parts import GROUND
 from virtualwork.drawing import Circle, Coil, Drawing, Shape, draw, tracers
+from virtualwork.formulas.kinematics import Slide
 from virtualwork.formulas.numbers import Complexes
 from virtualwork.formulas.poses import Poses
 
@@ -72,7 +73,7 @@ def travel_of(*motions: Poses) -> list[tuple[float, float]]:
     """Return the least and the largest slide of each guide in the poses of all motions, m."""
     spans = []
     for i in range(len(motions[0].mechanism.guides)):
-        slide = np.concatenate([poses.values([("slide", i, 0)])[0] for poses in motions])
+        slide = np.concatenate([poses.values([Slide(i, 0)])[0] for poses in motions])
         used = slide[np.isfinite(slide)]
         spans.append((float(used.min()), float(used.max())) if len(used) else (-np.inf, np.inf))
     return spans

@@ -9,6 +9,7 @@ import numpy as np
 
 from dalembert.hints import nearest
 from virtualwork.describe import DescriptionError
+from virtualwork.formulas.kinematics import Slide
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.poses import Poses
 
@@ -60,7 +61,7 @@ def _quantity(poses: Poses, word: str) -> Quantity:
         return Quantity(word, "deg", unwrapped(poses.angle(name)), 180.0)
     if name in guides and what in SLIDES:
         order = SLIDES[what]
-        values = poses.values([("slide", guides[name], order)])[0]
+        values = poses.values([Slide(guides[name], order)])[0]
         return Quantity(word, LENGTHS[order], values, m.size * pace(poses) ** order)
     kinds = ((POINTS, m.points), (LINKS, m.links), (SLIDES, guides))
     choices = [choice for of, holders in kinds if name in holders for choice in of]

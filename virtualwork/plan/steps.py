@@ -21,6 +21,7 @@ from functools import cached_property
 from typing import Literal, TypeVar
 
 from dalembert.dataclass import dataclass, field
+from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
 from virtualwork.describe.laws import Lift
 from virtualwork.describe.meshes import Coordinate
@@ -210,6 +211,15 @@ def turns(steps: Iterable[Step]) -> Iterator[Turn]:
             yield from step.ties
 
 
+def geared(steps: Iterable[Step]) -> set[str]:
+    """Bodies of which a gear of fractional ratio, or a rack, needs the angle with its whole turns, directly or indirectly."""
+    result: set[str] = set()
+    for turn in reversed(list(turns(steps))):
+        needs = turn.slides or turn.body in result
+        result |= {body for body, ratio in turn.angle.turning if needs or not ratio.is_integer()}
+    return result
+
+
 @dataclass(frozen=True)
 class Blocks:
     """The irreducible blocks of coordinates in their order of solution, and the redundant equations."""
@@ -311,6 +321,24 @@ def joints(m: Description) -> list[Joint]:
         bodies = tuple(sorted((g.link, g.on), key=order.index))
         joints.append(Joint(f"guide:{i}", g.point, bodies, i, guide_label(m, i)))
     return joints
+
+
+def joints_at(joints: Iterable[Joint], name: str, on: str) -> list[Joint]:
+    """The joints of a link at a point: a pin, a guide, or both.
+
+    Raises
+    ------
+    DescriptionError
+        Where there is none.
+    """
+    named = [joint for joint in joints if joint.name == name]
+    if not named:
+        known = ", ".join(dict.fromkeys(joint.name for joint in joints))
+        raise DescriptionError(f"no joint at '{name}': expected one of {known}")
+    result = [joint for joint in named if on in joint.bodies]
+    if not result:
+        raise DescriptionError(f"link '{on}' has no joint at '{name}'")
+    return result
 
 
 def guide_label(m: Description, i: int) -> str:

@@ -12,6 +12,8 @@ import numpy as np
 
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.forces import Effort, JointForce, JointMoment, Load, LoadPlace, LoadTorque, Rail
+from virtualwork.formulas.kinematics import Point
 from virtualwork.formulas.touches import Touch
 from virtualwork.plan.joint_forces import pairs
 
@@ -19,10 +21,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from virtualwork.describe.description import Description
-    from virtualwork.formulas.asked import Key
     from virtualwork.formulas.block import Block
     from virtualwork.formulas.load_case import LoadCase
     from virtualwork.formulas.numbers import Complexes, Number, Reals
+    from virtualwork.formulas.quantity import Quantity
     from virtualwork.plan.steps import Joint
 
 SHORT = {
@@ -56,32 +58,33 @@ class Part(NamedTuple):
 
     name: str
     kind: str
-    key: Key
-    at: Key | None
+    key: Quantity
+    at: Quantity | None
     sign: float
-    along: Key | None = None
+    along: Quantity | None = None
     """Of a drive along a guide: the direction of its effort."""
 
 
 def parts(m: Description, case: LoadCase, joints: Sequence[Joint]) -> dict[str, list[Part]]:
-    """Return what acts on every link, as `free_bodies` has it over poses, for tapes: friction apart."""
+    """Return what acts on every link, as `free_bodies` has it over poses, for tapes."""
+    rubbing = {joint.key for joint, *_ in case.contacts if joint.guide is None}
     result: dict[str, list[Part]] = {body: [] for body in m.links}
     for i, load in enumerate(case.loads):
         if load.body != GROUND:
             name = SHORT.get(load.kind, load.kind)
             torque = load.path is None
-            key: Key = ("load torque", i) if torque else ("load", i)
-            result[load.body].append(Part(name, load.kind, key, None if torque else ("load at", i), 1.0))
+            key: Quantity = LoadTorque(i) if torque else Load(i)
+            result[load.body].append(Part(name, load.kind, key, None if torque else LoadPlace(i), 1.0))
     for joint in joints:
         for body in joint.bodies:
             if body == GROUND:
                 continue
             guide = joint.guide
-            at: Key | None = ("point", body, 0j, joint.name, 0) if guide is None else _block_key(m, guide)
+            at: Quantity | None = Point(body, 0j, joint.name, 0) if guide is None else _block_key(m, guide)
             name = f"{joint.name}: {_other(joint, body)}"
-            result[body].append(Part(name, "joint force", ("force", joint.key, body), at, 1.0))
-            if guide is not None and m.guides[guide].is_slider:
-                result[body].append(Part(name, "joint moment", ("moment", joint.key, body), None, 1.0))
+            result[body].append(Part(name, "joint force", JointForce(joint.key, body), at, 1.0))
+            if joint.key in rubbing or (guide is not None and m.guides[guide].is_slider):
+                result[body].append(Part(name, "joint moment", JointMoment(joint.key, body), None, 1.0))
     for j, entry in enumerate(m.inputs):
         guide = m.guide_of(entry) if entry.is_slide else None
         ends = (
@@ -90,16 +93,16 @@ def parts(m: Description, case: LoadCase, joints: Sequence[Joint]) -> dict[str, 
         for body, sign in zip(ends, (1.0, -1.0), strict=True):
             if body == GROUND:
                 continue
-            at, along = (None, None) if guide is None else (_block_key(m, guide), ("rail", guide))
+            at, along = (None, None) if guide is None else (_block_key(m, guide), Rail(guide))
             letter = "T" if guide is None else "F"
             name = letter if sign > 0 else f"−{letter}"
-            result[body].append(Part(name, "drive", ("effort", j), at, sign, along))
+            result[body].append(Part(name, "drive", Effort(j), at, sign, along))
     return result
 
 
-def _block_key(m: Description, guide: int) -> Key:
+def _block_key(m: Description, guide: int) -> Quantity:
     g = m.guides[guide]
-    return ("point", g.link, 0j, g.point, 0)
+    return Point(g.link, 0j, g.point, 0)
 
 
 def _other(joint: Joint, body: str) -> str:

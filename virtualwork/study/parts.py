@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.kinematics import Slide, Turn
 from virtualwork.textbook.combinations import block_on_bar, second_point
 
 if TYPE_CHECKING:
@@ -98,9 +99,9 @@ def _slide(poses: Poses, i: int) -> Parts:
     g = m.guides[i]
     through = m.through(g)
     omega, alpha = _turning(poses, g.on, 1), _turning(poses, g.on, 2)
-    s, speed, rate = (poses.values((("slide", i, k),))[0] for k in range(3))
+    s, speed, rate = (poses.values((Slide(i, k),))[0] for k in range(3))
     rail = poses.plan.directions[i]
-    along = rail if g.on == GROUND else rail * poses.values((("turn", g.on, 0),))[0]
+    along = rail if g.on == GROUND else rail * poses.values((Turn(g.on),))[0]
     v, a = (_place(poses, g.on, through, k) for k in (1, 2))
     its = block_on_bar(s * along, omega, alpha, speed, rate, v, a, along)
     base = g.through if isinstance(g.through, str) else f"({through.real:g}, {through.imag:g})"

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from dalembert.dataclass import dataclass
 from virtualwork.branch.assembly import Assembly
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.kinematics import Angle, Point, Slide
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.formulas.quantity import Quantity
 
 SAMPLES = 720
 # what moves less than this, of the mechanism's size or of a radian, rests; at a limit of the input places are known to √ε
@@ -63,22 +64,22 @@ class _Place(NamedTuple):
     """What may travel: its name, what poses compute for it, whether it is the y of a point."""
 
     name: str
-    key: Key
+    key: Quantity
     imaginary: bool = False
 
     @property
     def turns(self) -> bool:
         """Whether it is an angle."""
-        return bool(self.key[0] == "angle")
+        return self.key.is_angle
 
     def of(self, value: Any) -> Reals:
         """The number from what poses computed."""
         number = np.asarray(value)
         return np.asarray(number.imag if self.imaginary else number.real)
 
-    def rate(self, order: int) -> Key:
+    def rate(self, order: int) -> Quantity:
         """What poses compute for a derivative."""
-        return (*self.key[:-1], order)
+        return self.key.of_order(order)
 
 
 def _places(assembly: Assembly) -> list[_Place]:
@@ -86,13 +87,13 @@ def _places(assembly: Assembly) -> list[_Place]:
     m = assembly.mechanism
     driven = m.inputs[0]
     guides = {g.point: i for i, g in reversed(list(enumerate(m.guides)))}
-    places = [_Place(name, ("slide", i, 0)) for name, i in guides.items() if name != driven.slider]
+    places = [_Place(name, Slide(i, 0)) for name, i in guides.items() if name != driven.slider]
     for name, (body, _) in m.points.items():
-        key = ("point", body, 0j, name, 0)
+        key = Point(body, 0j, name, 0)
         places += [_Place(f"{name}.x", key), _Place(f"{name}.y", key, True)]
     return [
         *places,
-        *(_Place(f"{link}.angle", ("angle", link, 0)) for link in m.links if link != driven.link),
+        *(_Place(f"{link}.angle", Angle(link, 0)) for link in m.links if link != driven.link),
     ]
 
 
@@ -162,7 +163,7 @@ class _Search:
         keys = dict.fromkeys(s.key for s in shown)
         at = self._poses(q)
         places = [at.values((key,))[0] for key in keys]
-        rates = [at.values(((*key[:-1], 1),))[0] for key in keys]
+        rates = [at.values((key.of_order(1),))[0] for key in keys]
         self.values = dict(zip(keys, zip(places, rates, strict=True), strict=True))
         self.ends = [self._at_limit(end, list(keys)) for end in ((0, 1.0), (-1, -1.0))] if limited else []
 

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.read.rounding import vector_error
 from dalembert.angles import phasor
 from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number
-from dalembert.tables.table import Cells, Table, numbered
+from dalembert.tables.table import Cells, Numbers, Table, numbered
 from dalembert.units import LARGEST, SMALLEST, UNITS, to_si
 
+if TYPE_CHECKING:
+    from dalembert.arithmetic.doubled_vectors import Vectors
+
+    OfRows = list[dict[str, Vectors] | None]
+
+T = TypeVar("T", complex, "Vectors")
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Rows = NDArray[np.intp]
@@ -35,10 +40,14 @@ class Masses(NamedTuple):
     """SI."""
     stated: NDArray[np.bool_]
     """Whether a row says anything of masses, (n,)."""
+    exact: Callable[[], Vectors]
+    """The values in 32 digits, as the file has them; worked out on request."""
 
     @classmethod
-    def of(cls, rows: Sequence[dict[str, complex] | None]) -> Masses:
-        """Take the masses of each row, plane -> mass; None where it says nothing of them."""
+    def of(
+        cls, rows: Sequence[dict[str, complex] | None], exact: Callable[[], OfRows] | None = None
+    ) -> Masses:
+        """Take the masses of each row, plane -> mass; None where it says nothing of them. `exact`: in 32 digits."""
         planes: dict[str, int] = {}
         entries = [
             (i, planes.setdefault(plane, len(planes)), mass)
@@ -48,12 +57,29 @@ class Masses(NamedTuple):
         row, plane, value = zip(*entries, strict=True) if entries else ((), (), ())
         stated = np.array([masses is not None for masses in rows])
         at, of = (np.array(part, dtype=np.intp) for part in (row, plane))
-        return cls(list(planes), at, of, np.array(value, dtype=complex), stated)
+
+        def values() -> Vectors:
+            from dalembert.arithmetic.doubled_vectors import Vectors
+
+            if exact is None or not entries:
+                return Vectors.of(np.array(value, dtype=complex))
+            each = [mass for masses in exact() for mass in (masses or {}).values()]
+            return Vectors.joined([mass[None] for mass in each])
+
+        return cls(list(planes), at, of, np.array(value, dtype=complex), stated, values)
 
     def by_row(self) -> list[dict[str, complex] | None]:
         """Return them as `of` takes them."""
-        out: list[dict[str, complex] | None] = [{} if stated else None for stated in self.stated.tolist()]
-        for i, plane, mass in zip(self.row.tolist(), self.plane.tolist(), self.value.tolist(), strict=True):
+        return self._rows(self.value.tolist())
+
+    def exact_by_row(self) -> OfRows:
+        """Return the same in 32 digits."""
+        values = self.exact()
+        return self._rows([values[k] for k in range(len(self.row))])
+
+    def _rows(self, values: Sequence[T]) -> list[dict[str, T] | None]:
+        out: list[dict[str, T] | None] = [{} if stated else None for stated in self.stated.tolist()]
+        for i, plane, mass in zip(self.row.tolist(), self.plane.tolist(), values, strict=True):
             mine = out[i]
             assert mine is not None
             mine[self.planes[plane]] = mass
@@ -130,14 +156,14 @@ class MassColumns:
     def _wrong(self, row: int, column: str, value: str, expected: str) -> DataError:
         return self.table.error(row, column, value, expected)
 
-    def masses(self, loaded: Flags) -> tuple[Masses, float]:
-        """Read the masses of each row, several joined by ';', and by what share of it one may be off as it is rounded."""
+    def masses(self, loaded: Flags) -> Masses:
+        """Read the masses of each row, several joined by ';'."""
         table, size, per = self.table, self.size, self.per
         angle = table.cells.get("trial_angle")
         if angle is None and not self.fitted and loaded.any():
             raise DataError(f"{table.file}: no column trial_angle_deg {table.told}")
         if not loaded.any():
-            return Masses.of([None] * table.rows), 0.0
+            return Masses.of([None] * table.rows)
         names, code = table.numbered("trial_plane")
         planes: dict[str, int] = {}
         for name in names:
@@ -166,14 +192,21 @@ class MassColumns:
         where = np.concatenate([plane[plain], where.astype(np.intp)])
         around = np.concatenate([angles[plain], turns])
         unit = angle.unit if angle is not None else "deg"
-        on = phasor(np.asarray(to_si(np.concatenate([sizes[plain], more]), per, size.unit)), around, unit)
+        amounts = np.concatenate([sizes[plain], more])
+        on = phasor(np.asarray(to_si(amounts, per, size.unit)), around, unit)
         # several in one plane of a run are one
         _, first, entry = np.unique(row * max(len(planes), 1) + where, return_index=True, return_inverse=True)
         value = np.zeros(len(first), dtype=complex)
         np.add.at(value, entry, on)
-        share = float(vector_error(np.ones(len(around)), around, unit).max(initial=0.0))
+
+        def exact() -> Vectors:
+            from cli.read.exact import vectors
+
+            each = vectors(Numbers("", size.unit, amounts, per).exact, Numbers("", unit, around, "angle"))
+            return _added(each, entry, len(first))
+
         says = np.array([bool(cell) for cell in size.values]) if self.fitted else loaded
-        return Masses(list(planes), row[first], where[first], value, says), share
+        return Masses(list(planes), row[first], where[first], value, says, exact)
 
     def _of_row(self, i: int, name: str, angle: Cells | None) -> Iterator[tuple[str, float, float]]:
         """Yield plane, size and angle of each mass of a row, as the file has them."""
@@ -228,18 +261,47 @@ def _first_of_run(of_run: Rows, rows: Flags) -> Rows:
     return first[of_run]
 
 
+def _added(each: Vectors, entry: Rows, count: int) -> Vectors:
+    """Add up vectors (k,) of like entries."""
+    from dalembert.arithmetic.doubled_vectors import Vectors
+
+    total = Vectors.of(np.zeros(count))
+    order = np.argsort(entry, kind="stable")
+    starts = np.searchsorted(entry[order], np.arange(count))
+    rank = np.arange(len(entry)) - starts[entry[order]]
+    for k in range(int(rank.max(initial=-1)) + 1):
+        mine = order[rank == k]
+        total[entry[mine]] = total[entry[mine]] + each[mine]
+    return total
+
+
+def turned(angle: float, unit: str) -> complex:
+    """e^{iφ} of an angle."""
+    return complex(phasor(np.ones(1), np.array([angle]), unit)[0])
+
+
+def turned_exactly(angle: float, unit: str) -> Vectors:
+    """The same in 32 digits."""
+    from cli.read.exact import turns
+
+    return turns(Numbers("", unit, np.array([angle]), "angle"))[0]
+
+
 def on_top(
-    table: Table, rotor: Rows, masses: list[dict[str, complex] | None]
-) -> list[dict[str, complex] | None]:
+    table: Table,
+    rotor: Rows,
+    masses: list[dict[str, T] | None],
+    turn_of: Callable[[float, str], T],
+) -> list[dict[str, T] | None]:
     """Add what is below each mass: `ref` numbers the run, within its state, on top of which it stands; -1 for none.
 
-    Its angle counts from the angle written in that run's row.
+    Its angle counts from the angle written in that run's row; `turn_of` makes a vector of an angle in a unit.
     """
     angle = table.cells.get("trial_angle")
     state = table.named("state", "")
     sensor = table.named("sensor")
     seen: dict[tuple[int, str, str], list[int]] = {}
-    out: list[dict[str, complex] | None] = []
+    out: list[dict[str, T] | None] = []
     for i, text in enumerate(table.texts["ref"]):
         before = seen.setdefault((int(rotor[i]), state[i], sensor[i]), [])
         try:
@@ -254,12 +316,11 @@ def on_top(
         if 1 <= below < own:
             base = before[below - 1]
             written = angle.values[base] if angle is not None else ""
-            turn = 1 + 0j
             if written and angle is not None:
-                turn = complex(phasor(np.ones(1), np.array([angle.number(written)]), angle.unit)[0])
-            mine = {plane: mass * turn for plane, mass in mine.items()}
+                turn = turn_of(angle.number(written), angle.unit)
+                mine = {plane: mass * turn for plane, mass in mine.items()}
             for plane, mass in (out[base] or {}).items():
-                mine[plane] = mine.get(plane, 0) + mass
+                mine[plane] = mine[plane] + mass if plane in mine else mass
         before.append(i)
         out.append(mine)
     return out

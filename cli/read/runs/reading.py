@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from datetime import datetime
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cli.read import options
-from cli.read.rounding import EPS, vector_error
 from cli.read.runs.channels import OfInitialRun, near_speeds
 from cli.read.runs.layouts import Layout, alpha_of, is_log, log_table, runs_table
-from cli.read.runs.masses import MassColumns, Masses, on_top
+from cli.read.runs.masses import MassColumns, Masses, on_top, turned, turned_exactly
 from cli.read.runs.rows import NoInitialRun, Sorted
 from cli.read.runs.runs import Complex, LogRows, Real, Rows, Runs
 from cli.read.runs.stored import Sisters, Stored, read_stored, stored_alpha
@@ -21,6 +21,9 @@ from dalembert.angles import phasor
 from dalembert.errors import DataError, quote
 from dalembert.tables.table import Cells, Table
 from dalembert.units import UNITS
+
+if TYPE_CHECKING:
+    from dalembert.arithmetic.doubled_vectors import Vectors
 
 OF_LOGS = ("date", "ref", "use")  # columns that count where all runs are fitted
 
@@ -153,7 +156,7 @@ class _Reading:
     def measured(self) -> Measured:
         """Read the rows, sorted by rotor."""
         table, runs, rotor = self.table, self.runs, self.masses.rotor
-        vibration, share = self._vibration()
+        vibration = self._vibration()
         when = None
         if self.fitted:
             when = years(table)
@@ -167,17 +170,21 @@ class _Reading:
             ]
         run_names, run = table.numbered("run", "initial")
         named, loaded = self.masses.rows(run_names, run, self.stored is not None)
-        masses, mass_share = self.masses.masses(loaded)
+        masses = self.masses.masses(loaded)
         if self.fitted:
             if "ref" in table.texts:
-                masses = Masses.of(on_top(table, rotor, masses.by_row()))
+                alone = masses
+                masses = Masses.of(
+                    on_top(table, rotor, alone.by_row(), turned),
+                    lambda: on_top(table, rotor, alone.exact_by_row(), turned_exactly),
+                )
             channels, channel = near_speeds(table, rotor)
             if "run" not in table.texts:
                 run_names, run = _run_names(rotor, channel, when, masses)
             for name in self.exclude:
                 if name not in run_names:
                     raise options.bad("--exclude", f"no run {quote(name)} in {table.file}")
-        rows = LogRows(runs, rotor, vibration, masses, named, run, run_names, when, share, mass_share)
+        rows = LogRows(runs, rotor, vibration, masses, named, run, run_names, self._exact, when)
         ordered = Sorted(rows, self.exclude)
         if not self.fitted:
             ordered.find_initial(self.stored is not None)
@@ -185,8 +192,23 @@ class _Reading:
         rows.channels, rows.channel = channels, channel
         return Measured(ordered, self.stored, self.sisters, self.warnings)
 
-    def _vibration(self) -> tuple[Complex, float]:
-        """Return what each row reads, NaN where it is blank, and by what share of it that may be off from its decimals."""
+    def _exact(self) -> Vectors:
+        """Return what each row reads in 32 digits, of the decimals as they are written; 0 where it is blank."""
+        from cli.read.exact import vectors
+        from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array
+
+        numbers = self.table.numbers
+        columns = [self.amplitude] if self.four_run else [self.amplitude, numbers["phase"]]
+        read = np.isfinite([column.values for column in columns]).all(axis=0)
+        size, *phase = (replace(column, values=np.where(read, column.values, 0.0)) for column in columns)
+        if self.four_run:
+            exact = doubled_array(size.decimals, size.values.shape)
+            return Vectors(exact, exact * 0.0)
+        result = vectors(size.decimals, phase[0])
+        return result.conj if self.against else result
+
+    def _vibration(self) -> Complex:
+        """Return what each row reads, NaN where it is blank."""
         table, amplitude = self.table, self.amplitude
         table.reject(amplitude.values < 0, "amplitude", "an amplitude that is not negative")
         unread = np.isnan(amplitude.values)
@@ -194,7 +216,7 @@ class _Reading:
             table.reject(table.numbers["weight"].values < 0, "weight", "a weight that is not negative")
         if self.four_run:
             table.reject(unread, "amplitude", "a number")
-            return amplitude.values.astype(complex), EPS
+            return amplitude.values.astype(complex)
         phase = table.require("phase", "angle")
         expected = "a number"
         if self.fitted:
@@ -205,8 +227,7 @@ class _Reading:
         for numbers, name in ((amplitude, "amplitude"), (phase, "phase")):
             table.reject(np.isnan(numbers.values) & ~unread, name, expected)
         turn = np.where(unread, 0.0, -phase.values if self.against else phase.values)
-        vibration = np.where(unread, complex(np.nan), phasor(amplitude.values, turn, phase.unit))
-        return vibration, float(vector_error(np.ones(table.rows), turn, phase.unit).max())
+        return np.where(unread, complex(np.nan), phasor(amplitude.values, turn, phase.unit))
 
 
 def _run_names(rotor: Rows, channel: Rows, when: Real | None, masses: Masses) -> tuple[list[str], Rows]:

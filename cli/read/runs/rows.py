@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cli.read.runs.masses import NO, YES
-from cli.read.runs.runs import SHOWN, Complex, Group, Lines, LogRows, Real, Rows, Trial
+from cli.read.runs.runs import SHOWN, Complex, Exact, Group, Lines, LogRows, Real, Rows, Trial
 from dalembert.errors import DataError, quote
 from dalembert.tables.table import numbered
+
+if TYPE_CHECKING:
+    from dalembert.arithmetic.doubled_vectors import Vectors
+
+T = TypeVar("T", Complex, "Vectors")
 
 
 class _Listed:
@@ -64,46 +71,63 @@ class Sorted:
         place = np.empty(len(self.order), dtype=np.intp)
         place[self.order] = np.arange(len(self.order))
         at = place[masses.row]
-        by_rotor = np.argsort(at, kind="stable")
-        at, plane, value = at[by_rotor], masses.plane[by_rotor], masses.value[by_rotor]
+        entry = np.argsort(at, kind="stable")
+        at, plane, value = at[entry], masses.plane[entry], masses.value[entry]
         loaded = np.flatnonzero(masses.stated[self.order])
         first = np.full(len(self.runs.first), -1)
         first[self.run[loaded[::-1]]] = loaded[::-1]
         counts = at == first[self.run[at]]
         self._agree(loaded, first, at, plane, value, counts)
-        at, plane, value = at[counts], plane[counts], value[counts]
+        at, plane, entry = at[counts], plane[counts], entry[counts]
         # planes in the order of the runs
         by_run = np.argsort(self.run[at], kind="stable")
-        at, plane, value = at[by_run], plane[by_run], value[by_run]
+        at, plane, entry = at[by_run], plane[by_run], entry[by_run]
         rotors = len(rows.of.rotors)
         self.planes = _Listed(self.rotor[at], plane, rotors)
         width = int(self.planes.count.max(initial=0))
         on = np.zeros((len(first), width), dtype=complex)
-        on[self.run[at], self.planes.place] = value
-        sizes = np.abs(on)
+        on[self.run[at], self.planes.place] = masses.value[entry]
+        self._puts = self.run[at], self.planes.place, entry
         self.has = np.zeros(on.shape, dtype=bool)
         self.has[self.run[at], self.planes.place] = True
-        self.on, self.sizes = on, sizes
+        self.on = on
         self.stays = stays = self._stays()
-        self.after_kept = np.zeros(len(first), dtype=bool)
+        self.after_kept = self._left_on(on, np.zeros((rotors, width), dtype=complex))
         """Whether an earlier run of the rotor has left a mass on."""
         if stays.any():
-            standing, size = np.zeros((rotors, width), dtype=complex), np.zeros((rotors, width))
-            kept = np.zeros(rotors, dtype=bool)
-            for j in range(int(self.runs.count.max())):
-                mine = np.flatnonzero(self.runs.count > j)
-                run = self.runs.start[mine] + j
-                self.after_kept[run] = kept[mine]
-                on[run] += standing[mine]
-                sizes[run] += size[mine]
-                stay, here = mine[stays[run]], run[stays[run]]
-                standing[stay], size[stay], kept[stay] = on[here], sizes[here], True
             self.has |= on != 0
         read = np.zeros(len(first), dtype=bool)
         read[self.run[np.isfinite(rows.vibration[self.order])]] = True
         numbers = np.where(read, np.arange(len(first)), np.repeat(self.runs.start, self.runs.count))
         self.last = np.maximum.reduceat(numbers, self.runs.start)
         """The last run of each rotor in which anything was read."""
+
+    def _left_on(self, on: T, standing: T) -> NDArray[np.bool_]:
+        """Add to the masses of each run (runs, planes) what earlier ones left on, and return which runs have any.
+
+        `standing` is nothing, (rotors, planes).
+        """
+        stays, after = self.stays, np.zeros(len(self.runs.first), dtype=bool)
+        kept = np.zeros(len(self.runs.count), dtype=bool)
+        for j in range(int(self.runs.count.max()) if stays.any() else 0):
+            mine = np.flatnonzero(self.runs.count > j)
+            run = self.runs.start[mine] + j
+            after[run] = kept[mine]
+            on[run] = on[run] + standing[mine]
+            stay, here = mine[stays[run]], run[stays[run]]
+            standing[stay], kept[stay] = on[here], True
+        return after
+
+    @cached_property
+    def _exactly_on(self) -> Vectors:
+        """`on` in 32 digits."""
+        from dalembert.arithmetic.doubled_vectors import Vectors
+
+        run, place, entry = self._puts
+        on = Vectors.of(np.zeros(self.on.shape))
+        on[run, place] = self.rows.masses.exact()[entry]
+        self._left_on(on, Vectors.of(np.zeros((len(self.runs.count), self.on.shape[1]))))
+        return on
 
     def find_initial(self, stored: bool) -> None:
         """Find the initial run of each rotor, and refuse runs that are none with trial runs."""
@@ -242,10 +266,11 @@ class Sorted:
         ):
             here, heads, columns = lines.of(group), channels.of(group), planes.of(group)
             readings = np.full((*here.shape, heads.shape[1]), complex(np.nan))
-            readings[rank[rotor[at]], lines.place[at], channels.place[at]] = rows.vibration[
-                self.order[mine[at]]
-            ]
+            cells, source = (rank[rotor[at]], lines.place[at], channels.place[at]), self.order[mine[at]]
+            readings[cells] = rows.vibration[source]
             first = lines.first[here]
+            loads = run[first][..., None], places[columns][:, None, :]
+            stand = self.last[group][:, None], places[columns]
             when = None if years is None else years[here]
             if when is not None:
                 self._lacking(group, when, self.runs.code[run[first]])
@@ -255,14 +280,28 @@ class Sorted:
                 [rows.channels[c] for c in channels.code[heads[0]].tolist()],
                 [rows.masses.planes[k] for k in planes.code[columns[0]].tolist()],
                 readings,
-                np.take_along_axis(self.on[run[first]], places[columns][:, None, :], axis=2),
-                np.take_along_axis(self.sizes[run[first]], places[columns][:, None, :], axis=2),
-                np.take_along_axis(self.on[self.last[group]], places[columns], axis=1),
+                self.on[loads],
+                self.on[stand],
                 [rows.runs[k] for k in self.runs.code[self.last[group]].tolist()],
                 self._weights(group, self.order[mine[channels.first[heads]]]),
                 [] if rows.of.fitted else self._trials(run[first[0]]),
-                (rows.reading_share, rows.mass_share),
+                partial(self._exact, readings.shape, cells, source, loads, stand),
             )
+
+    def _exact(
+        self,
+        shape: tuple[int, ...],
+        cells: tuple[Rows, ...],
+        source: Rows,
+        loads: tuple[Rows, Rows],
+        stand: tuple[Rows, Rows],
+    ) -> Exact:
+        """Lay the same rows side by side in 32 digits."""
+        from dalembert.arithmetic.doubled_vectors import Vectors
+
+        readings = Vectors.of(np.zeros(shape))
+        readings[cells] = self.rows.exact()[source]
+        return Exact(readings, self._exactly_on[loads], self._exactly_on[stand])
 
     def _trials(self, run: Rows) -> list[Trial]:
         """Return the runs of rotors that were measured alike, in order; `run` is that of each row of readings."""

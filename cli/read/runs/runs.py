@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,9 @@ from cli.read.runs.masses import Masses
 from dalembert.errors import DataError
 from dalembert.tables.table import Table
 from dalembert.units import UNITS, Scaled, amplitude_kind, from_si, to_si
+
+if TYPE_CHECKING:
+    from dalembert.arithmetic.doubled_vectors import Vectors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -107,8 +112,6 @@ class Group:
     """(g, r, s), in the table's amplitude unit; NaN where a row lacks a channel."""
     masses: Complex
     """What was on the rotor, (g, r, p), SI."""
-    sizes: Real
-    """The sizes of all masses of which these are the sum, (g, r, p)."""
     standing: Complex
     """What is on the rotor in its last run, whether it is meant to stay or not, (g, p), SI."""
     last: list[str]
@@ -117,8 +120,8 @@ class Group:
     """Those of the channels, (g, s)."""
     trials: list[Trial]
     """The runs, the initial one first; none of a log whose runs are all fitted together."""
-    shares: tuple[float, float] = (0.0, 0.0)
-    """By what share of it a reading and a mass may be off from the decimals of the table."""
+    exact: Callable[[], Exact]
+    """Readings, masses and standing in 32 digits, as the table has them; worked out on request."""
     fit: balancing.JointFit | None = None
     """Where the readings tell the coefficients: not with stored ones, nor without phase."""
     before: Before | None = None
@@ -134,20 +137,15 @@ class Group:
             channels=[self.channels[s] for s in channels],
             readings=self.readings[np.ix_(rotors, lines, channels)],
             masses=self.masses[mine],
-            sizes=self.sizes[mine],
             standing=self.standing[rotors],
             last=[self.last[k] for k in rotors],
             weights=None if self.weights is None else self.weights[np.ix_(rotors, channels)],
+            exact=lambda: self.exact().only(rotors, lines, channels),
         )
 
     def own_weights(self, i: int) -> Real | None:
         """The weights of one rotor's channels, (s,)."""
         return None if self.weights is None else self.weights[i]
-
-    def errors(self) -> tuple[Real, Real]:
-        """Return bounds of the errors of `readings` and `masses` against the decimals of the table."""
-        of_reading, of_mass = self.shares
-        return of_reading * np.nan_to_num(np.abs(self.readings)), of_mass * self.sizes
 
     @property
     def fitted(self) -> balancing.JointFit:
@@ -181,6 +179,39 @@ class Group:
         return self.masses[:, [of.lines[0] for of in self.trials]]
 
 
+class Exact(NamedTuple):
+    """The numbers of a group in 32 digits."""
+
+    readings: Vectors
+    """(g, r, s); 0 where a row lacks a channel."""
+    masses: Vectors
+    """(g, r, p)."""
+    standing: Vectors
+    """(g, p)."""
+
+    def only(self, rotors: Rows, lines: Rows, channels: Rows) -> Exact:
+        """Return some lines and channels of some of the rotors."""
+        readings, masses, standing = self
+        return Exact(
+            readings[np.ix_(rotors, lines, channels)], masses[np.ix_(rotors, lines)], standing[rotors]
+        )
+
+    def with_planes(self, at: list[int], count: int) -> Exact:
+        """Return the same with masses in the planes `at` of so many."""
+        from dalembert.arithmetic.doubled_vectors import Vectors
+
+        masses, standing = (
+            Vectors.of(np.zeros((*of.shape[:-1], count))) for of in (self.masses, self.standing)
+        )
+        masses[..., at], standing[..., at] = self.masses, self.standing
+        return Exact(self.readings, masses, standing)
+
+    def turned(self, rotors: NDArray[np.bool_]) -> Exact:
+        """Return the same with the phases of some rotors counted in the other sense, (g,)."""
+        sign = np.where(rotors, -1.0, 1.0)[:, None, None]
+        return self._replace(readings=type(self.readings)(self.readings.x, self.readings.y * sign))
+
+
 @dataclass(eq=False, repr=False)
 class Runs:
     """A table of runs."""
@@ -198,6 +229,8 @@ class Runs:
     """Whether the runs themselves told that the phase lags, and it was turned round."""
     runout: dict[str, complex] = field(default_factory=dict)
     """What the file itself states of it, sensor -> vector as read."""
+    exact_runout: Callable[[], dict[str, Vectors]] | None = None
+    """The same in 32 digits, of a file of run-out; None: it is the floats."""
     warnings: list[str] = field(default_factory=list)
     """Shown once each, however often they stand here."""
 
@@ -261,11 +294,10 @@ class LogRows:
     """Whether a row names a plane, or a mass where there is but one plane."""
     run: Rows
     runs: list[str]
+    exact: Callable[[], Vectors]
+    """`vibration` in 32 digits, as the table has it; worked out on request."""
     years: Real | None = None
     """When it was read; NaN where the row does not say."""
-    reading_share: float = 0.0
-    """By what share of it a reading may be off from its decimals."""
-    mass_share: float = 0.0
     channels: list[Channel] = field(default_factory=list)
     channel: Rows = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
     """The sensor, state and speed of each row."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,9 +13,14 @@ from cli.read.runs.layouts import Alpha, alpha_of
 from cli.read.runs.runs import Before, Channel, Complex, Real, Rows, Runs, apart
 from dalembert.angles import phasor
 from dalembert.errors import DataError, quote
-from dalembert.quantities import parse_number
+from dalembert.quantities import exactly, parse_number
 from dalembert.tables.table import Numbers, Table, read
 from dalembert.units import UNITS, from_si
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from dalembert.arithmetic.doubled_vectors import Vectors
 
 
 def read_runout(path: str, runs: Runs, *, lagging: bool) -> dict[str, complex]:
@@ -34,10 +39,27 @@ def read_runout(path: str, runs: Runs, *, lagging: bool) -> dict[str, complex]:
         if sensor not in measured:
             raise table.error(i, "sensor", sensor, f"a sensor of the runs ({', '.join(sorted(measured))})")
         out[sensor] = vector
+
+    def exact() -> dict[str, Vectors]:
+        from cli.read.exact import vectors
+
+        each = vectors(
+            _converted(amplitude.decimals, "amplitude", amplitude.unit, runs.amplitude_unit), phase
+        )
+        each = each.conj if lagging else each
+        return {sensor: each[i] for i, sensor in enumerate(sensors)}
+
+    runs.exact_runout = exact
     runs.warnings += table.warnings
     for sensor in sorted(measured - set(out)):
         runs.warnings.append(f"{table.file}: no run-out of sensor {sensor}: taken as zero")
     return out
+
+
+def _converted(sizes: list[Fraction], dimension: str, unit: str, to: str) -> list[Fraction]:
+    """Convert exact numbers from one unit to another."""
+    factor = exactly("1", UNITS[dimension][unit]) / exactly("1", UNITS[dimension][to])
+    return [size * factor for size in sizes]
 
 
 class Coefficients(NamedTuple):
@@ -92,6 +114,16 @@ class Stored:
         plane = self._column("plane")
         return list(dict.fromkeys(plane[i] for i in self._rows(rotor)))
 
+    def exact_matrix(self, rotor: str, channels: Sequence[Channel], runs: Runs) -> Vectors:
+        """Return α (s, p) of a rotor in 32 digits, of the decimals as they are written."""
+        from cli.read.exact import vectors
+
+        size, phase = (self.table.numbers[name] for name in ("magnitude_per", "phase"))
+        sizes = [x / exactly("1", UNITS["per"][size.unit]) for x in size.decimals]
+        if self.amplitude_unit:
+            sizes = _converted(sizes, "amplitude", self.amplitude_unit, runs.amplitude_unit)
+        return vectors(sizes, phase)[self._rows_of(rotor, channels, self.planes(rotor))]
+
     def matrix(self, rotor: str, channels: Sequence[Channel], runs: Runs) -> tuple[list[str], Complex]:
         """Return the planes and α (s, p) of a rotor."""
         planes = self.planes(rotor)
@@ -101,13 +133,30 @@ class Stored:
         self, rotor: str, channels: Sequence[Channel], planes: list[str], runs: Runs
     ) -> Coefficients:
         """Return what the file knows of a machine in these channels."""
-        mine, sensor, plane = self._rows(rotor), self._column("sensor"), self._column("plane")
-        state = self.table.texts.get("state")
         speeds = {channel.speed for channel in channels}
-        if len(speeds) > 1 and np.isnan(self.speed[list(mine)]).any():
+        if len(speeds) > 1 and np.isnan(self.speed[self._rows(rotor)]).any():
             runs.warnings.append(
                 f"{self.table.file}: coefficients without a speed are used at each of {len(speeds)} speeds"
             )
+        at = self._rows_of(rotor, channels, planes)
+        factor = 1.0
+        if self.amplitude_unit:
+            factor = runs.in_unit(1.0, self.amplitude_unit, self.table.file)
+        sd, nu = np.nan, np.inf
+        if "reading_sd" in self.table.numbers:
+            sd = factor * float(self.table.numbers["reading_sd"].values[at[0, 0]])
+        if "degrees_of_freedom" in self.table.numbers:
+            nu = float(self.table.numbers["degrees_of_freedom"].values[at[0, 0]])
+            nu = nu if nu > 0 else np.inf
+        covariance = self._covariance(at)
+        return Coefficients(
+            self.values[at] * factor, None if covariance is None else covariance * factor**2, sd, nu
+        )
+
+    def _rows_of(self, rotor: str, channels: Sequence[Channel], planes: list[str]) -> Rows:
+        """Find the row of each channel and plane, (s, p)."""
+        mine, sensor, plane = self._rows(rotor), self._column("sensor"), self._column("plane")
+        state = self.table.texts.get("state")
         at = np.zeros((len(channels), len(planes)), dtype=np.intp)
         for s, channel in enumerate(channels):
             for p, name in enumerate(planes):
@@ -131,19 +180,7 @@ class Stored:
                         f"one coefficient for sensor {channel} and plane {name}",
                     )
                 at[s, p] = best[0]
-        factor = 1.0
-        if self.amplitude_unit:
-            factor = runs.in_unit(1.0, self.amplitude_unit, self.table.file)
-        sd, nu = np.nan, np.inf
-        if "reading_sd" in self.table.numbers:
-            sd = factor * float(self.table.numbers["reading_sd"].values[at[0, 0]])
-        if "degrees_of_freedom" in self.table.numbers:
-            nu = float(self.table.numbers["degrees_of_freedom"].values[at[0, 0]])
-            nu = nu if nu > 0 else np.inf
-        covariance = self._covariance(at)
-        return Coefficients(
-            self.values[at] * factor, None if covariance is None else covariance * factor**2, sd, nu
-        )
+        return at
 
     def _covariance(self, at: Rows) -> Complex | None:
         """Return E δδᴴ of each channel, (s, p, p), out of deviations and correlations."""

@@ -1,0 +1,82 @@
+"""Arrays of numbers of 32 digits in numpy's own functions, against mpmath."""
+
+from __future__ import annotations
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from dalembert.arithmetic.doubled_arrays import DoubledArray, exponential, logarithm
+
+
+def exact(x: DoubledArray) -> list[mp.mpf]:
+    return [mp.mpf(float(h)) + mp.mpf(float(r)) for h, r in zip(x.high.flat, x.low.flat, strict=True)]
+
+
+A, B = (DoubledArray(np.random.default_rng(5).normal(size=(2, 8))[k] * (3 - k)) for k in (0, 1))
+EACH = {
+    "sum": (lambda a, b: a + b, lambda x, y: x + y),
+    "product": (lambda a, b: a * b, lambda x, y: x * y),
+    "quotient": (lambda a, b: a / b, lambda x, y: x / y),
+    "constant": (lambda a, _: 0.3 * a * np.pi, lambda x, _: x * 3 / 10 * mp.pi),
+    "power": (lambda a, _: a**4, lambda x, _: x**4),
+    "root": (lambda a, _: np.sqrt(np.abs(a)), lambda x, _: mp.sqrt(abs(x))),
+    "hypot": (lambda a, b: np.hypot(a, b), mp.hypot),
+    "sine": (lambda a, _: np.sin(a), lambda x, _: mp.sin(x)),
+    "angle": (lambda a, b: np.arctan2(a, b), mp.atan2),
+    "exponential": (lambda a, _: exponential(a), lambda x, _: mp.exp(x)),
+    "logarithm": (lambda a, _: logarithm(np.abs(a)), lambda x, _: mp.log(abs(x))),
+    "sign": (lambda a, b: np.copysign(a, b), lambda x, y: abs(x) * mp.sign(y)),
+    "least": (lambda a, b: np.minimum(a, b), min),
+}
+
+
+@pytest.mark.parametrize("name", EACH)
+def test_thirty_digits(name: str) -> None:
+    work, true = EACH[name]
+    third = DoubledArray(A.high, A.high * 1e-17)
+    with mp.workdps(50):
+        for got, x, y in zip(exact(work(third, B)), exact(third), exact(B), strict=True):
+            assert abs(got - true(x, y)) <= mp.mpf(10) ** -30 * max(1, abs(true(x, y)))
+
+
+def test_vectors_and_matrices_as_numpy_has_them() -> None:
+    rng = np.random.default_rng(6)
+    M, v = rng.normal(size=(2, 3, 3)), rng.normal(size=3)
+    wide, vector = DoubledArray(M), DoubledArray(v)
+    pairs = [
+        (wide @ wide, M @ M),
+        (wide @ vector, M @ v),
+        (vector @ wide[0], v @ M[0]),
+        (v @ wide[0], v @ M[0]),
+        (np.cross(wide, vector), np.cross(M, v)),
+        (np.swapaxes(wide, -1, -2), np.swapaxes(M, -1, -2)),
+        (np.stack([vector, v, wide[0, 0]]), np.stack([v, v, M[0, 0]])),
+        (np.where(M > 0, wide, 0.0), np.where(M > 0, M, 0.0)),
+        (wide.sum(axis=0), M.sum(axis=0)),
+        (wide.T, M.T),
+    ]
+    for got, true in pairs:
+        assert got.shape == true.shape
+        np.testing.assert_allclose(got.value, true, rtol=1e-14, atol=1e-15)
+
+
+def test_what_floats_cannot_see_decides() -> None:
+    one, more = DoubledArray(1.0), DoubledArray(1.0, 1e-25)
+    assert more > one
+    assert not more <= one
+    assert one != more
+    assert np.rint(DoubledArray(2.5, 1e-20)).value == 3
+    assert np.arctan2(DoubledArray(0.0), DoubledArray(-1.0)).low == 1.2246467991473532e-16
+    with pytest.raises(TypeError, match="no floats"):
+        np.asarray(one)
+    with pytest.raises(TypeError):
+        np.tan(one)
+
+
+def test_entries_are_set_without_touching_another_array() -> None:
+    x = DoubledArray(np.zeros(3)) + 0.0
+    x[1] = DoubledArray(1.0) / 3
+    x[2] += 2.0
+    assert x.off([0, 1 / 3, 2]).max() < 2e-17
+    assert x.low[1] == 1.850371707708594e-17

@@ -1,0 +1,218 @@
+"""The quantities of forces: efforts of the inputs, what joints carry, what shakes the ground, single loads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from virtualwork.describe.description import Description
+from virtualwork.formulas.numbers import Number
+from virtualwork.formulas.quantity import Quantity, Recording
+from virtualwork.plan.steps import joints, joints_at
+
+
+class Force(Quantity):
+    """A quantity that the loads have a part in."""
+
+    is_force = True
+
+    def steps(self, recording: Recording) -> tuple[tuple[Any, ...], int]:
+        """The steps that it depends on, as often differentiated as the loads need."""
+        return super().steps(recording)[0], recording.forces[0].case.targets()[1]
+
+    def read(self, forces: Any) -> Any:
+        """Its values, (n,), of `dynamics.Dynamics`, or the estimates of their errors."""
+        raise NotImplementedError
+
+    @property
+    def family(self) -> tuple[type[Quantity], int]:
+        return Force, 0
+
+    @classmethod
+    def every(cls, m: Description, order: int) -> Iterator[Quantity]:
+        yield from (Effort(j) for j in range(len(m.inputs)))
+        yield from (Reaction(joint.name, joint.bodies[-1]) for joint in joints(m))
+
+
+class Effort(Force, kind="effort"):
+    """The effort at an input by virtual work, N·m, or N at a slide."""
+
+    input: int
+
+    def write(self, recording: Recording) -> Number:
+        return recording.efforts[self.input]
+
+    def read(self, forces: Any) -> Any:
+        return forces.effort[:, self.input]
+
+
+class Generalized(Force, kind="generalized"):
+    """The effort as if every motor sat on the body that its angle is measured from."""
+
+    input: int
+
+    def write(self, recording: Recording) -> Number:
+        return recording.generalized(self.input)
+
+    def read(self, forces: Any) -> Any:
+        return forces.generalized[:, self.input]
+
+
+class NewtonEuler(Force, kind="newton-euler"):
+    """The effort at an input by Newton and Euler."""
+
+    is_joint_force = True
+    input: int
+
+    def write(self, recording: Recording) -> Number:
+        return recording.newton_euler(self.input)
+
+    def read(self, forces: Any) -> Any:
+        return forces.newton_euler[:, self.input]
+
+
+class JointForce(Force, kind="force"):
+    """The force of a joint, by its key, on a body, N."""
+
+    is_vector = is_joint_force = True
+    joint: str
+    body: str
+
+    def write(self, recording: Recording) -> Number:
+        return recording.joint_force(self.joint, self.body)
+
+    def read(self, forces: Any) -> Any:
+        return forces.joint_force(forces.by_key[self.joint], self.body)
+
+
+class JointMoment(Force, kind="moment"):
+    """The moment of a joint, by its key, on a body about the joint's point, N·m: a guide's, or a pin's friction."""
+
+    is_joint_force = True
+    joint: str
+    body: str
+
+    def write(self, recording: Recording) -> Number:
+        return recording.joint_moment(self.joint, self.body)
+
+    def read(self, forces: Any) -> Any:
+        return forces.joint_moment(forces.by_key[self.joint], self.body)
+
+
+class Reaction(Force, kind="reaction"):
+    """The force of all joints of a name on a body, N: of a pin, and of the guide its point runs in."""
+
+    is_vector = is_joint_force = True
+    name: str
+    body: str
+
+    def write(self, recording: Recording) -> Number:
+        here = joints_at(recording.forces[1].joints, self.name, self.body)
+        return sum((recording.value(JointForce(joint.key, self.body)) for joint in here), 0.0)
+
+    def read(self, forces: Any) -> Any:
+        return forces.at_joint(self.name, self.body)
+
+
+class Contact(Force, kind="contact"):
+    """How hard a cam, from 0, presses on its follower, N."""
+
+    is_joint_force = True
+    cam: int
+
+    def write(self, recording: Recording) -> Number:
+        _, of, block = recording.placed_forces()
+        recording.solve(of.paths.touches.every[self.cam].targets, 0)
+        return of.contact(block, self.cam)
+
+    def read(self, forces: Any) -> Any:
+        return forces.contact(self.cam)
+
+
+class Shaking(Force, kind="shaking"):
+    """The shaking force on the ground, N."""
+
+    is_vector = True
+
+    def write(self, recording: Recording) -> Number:
+        return recording.shaking[0]
+
+    def read(self, forces: Any) -> Any:
+        force = forces.shaking[0]
+        return force if force.ndim == 1 else force[:, 0] + 1j * force[:, 1]
+
+
+class ShakingMoment(Force, kind="shaking moment"):
+    """The shaking moment about the ground's origin, N·m."""
+
+    def write(self, recording: Recording) -> Number:
+        return recording.shaking[1]
+
+    def read(self, forces: Any) -> Any:
+        return forces.shaking[1]
+
+
+class Applied(Force, kind="applied"):
+    """What acts on a link but its weight and inertia, N, reduced to its centre of mass."""
+
+    is_vector = True
+    link: str
+
+    def write(self, recording: Recording) -> Number:
+        return recording.applied(self.link)[0]
+
+    def read(self, forces: Any) -> Any:
+        return forces.applied(self.link)[0]
+
+
+class AppliedMoment(Force, kind="applied moment"):
+    """The moment of the same about the centre of mass, N·m."""
+
+    link: str
+
+    def write(self, recording: Recording) -> Number:
+        return recording.applied(self.link)[1]
+
+    def read(self, forces: Any) -> Any:
+        return forces.applied(self.link)[1]
+
+
+# --- one load alone, for free-body diagrams ----------------------------------------------------------------------------
+class LoadTorque(Force, kind="load torque"):
+    """A torque of the load case, by its number, N·m."""
+
+    number: int
+
+    def write(self, recording: Recording) -> Number:
+        paths, _, block = recording.placed_forces()
+        return paths.case.loads[self.number].form(block)
+
+
+class Load(LoadTorque, kind="load"):
+    """A force of the load case, by its number, N."""
+
+    is_vector = True
+
+
+class LoadPlace(Force, kind="load at"):
+    """Where a force of the load case acts, m."""
+
+    is_vector = True
+    number: int
+
+    def write(self, recording: Recording) -> Number:
+        paths, _, block = recording.placed_forces()
+        path = paths.case.loads[self.number].path
+        assert path is not None
+        return block.position(path)
+
+
+class Rail(Force, kind="rail"):
+    """The unit vector along a guide, in which an input drives."""
+
+    is_vector = is_joint_force = True
+    guide: int
+
+    def write(self, recording: Recording) -> Number:
+        _, of, block = recording.placed_forces()
+        return of.rail(block, self.guide)
