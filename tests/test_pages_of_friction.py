@@ -14,7 +14,7 @@ from virtualwork import Mechanism
 from virtualwork.describe.dimensions import changed
 from virtualwork.formulas.lanes import over_blocks
 from virtualwork.motion import Motion
-from virtualwork.quantities import Quantity, forces
+from virtualwork.quantities import Component, forces
 
 pytestmark = needs_node
 # a block of 60 kg pushed along the ground at 2 m/s, with and against a wind of 10 N
@@ -56,10 +56,10 @@ def test_the_simplest(tmp_path: Path) -> None:
     assert [row[0] for row in shown] == pytest.approx(expected, rel=1e-14)
 
 
-def forces_of(m: Mechanism, poses: list[float], speed: float) -> tuple[dict[str, Quantity], Motion]:
+def forces_of(m: Mechanism, poses: list[float], speed: float) -> tuple[dict[str, Component], Motion]:
     """All forces by their names, and the motion."""
     motion = m.motion(poses, speed, 0.0)
-    every: dict[str, Quantity] = {}
+    every: dict[str, Component] = {}
     for each in forces(m, motion.dynamics.reactions.order.pairs):
         if each.key and not each.less:
             every.setdefault(each.names[0], each)

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cli.cases.inputs import InputGrid, Inputs
-from cli.cases.quantities import Component
+from cli.cases.quantities import chosen, unknown
 from cli.read import options
 from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError
 from dalembert.hints import nearest
 from dalembert.memory import memory
 from dalembert.results.way import figures
+from virtualwork import quantities
 from virtualwork.formulas.kinematics import Angle, Point
+from virtualwork.quantities import Component
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,7 +11,6 @@ from cli.cases import poses
 from cli.cases.analysis import Analysis
 from cli.cases.case import Case
 from cli.cases.poses import column
-from cli.cases.quantities import Component
 from cli.cases.study import PoseCase
 from cli.show.picture import shown
 from dalembert.page import Shown
@@ -20,7 +19,7 @@ from virtualwork import MechanismError, quantities
 from virtualwork.animation import JointForce, Series, moving_page
 from virtualwork.computing import ORDERS, computing_page
 from virtualwork.motion import Motion
-from virtualwork.quantities import Quantity
+from virtualwork.quantities import Component
 
 SWEEP = 361
 """Poses of a turn, where one pose was requested."""

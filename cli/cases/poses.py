@@ -12,7 +12,6 @@ import numpy as np
 from cli.cases.analysis import Analysis
 from cli.cases.quantities import (
     TURNED,
-    Component,
     bound,
     bounds_of,
     cells,
@@ -25,6 +24,7 @@ from cli.cases.quantities import (
 )
 from dalembert.results.columns import Column, Table
 from virtualwork.formulas.forces import JointMoment
+from virtualwork.quantities import Component
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

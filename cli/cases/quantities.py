@@ -12,48 +12,7 @@ from dalembert.angles import degrees
 from virtualwork.formulas.forces import Force
 from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.quantity import Quantity
-from virtualwork.quantities import (
-    FORCE as FORCE,
-)
-from virtualwork.quantities import (
-    LINK as LINK,
-)
-from virtualwork.quantities import (
-    POINT as POINT,
-)
-from virtualwork.quantities import (
-    SLIDE as SLIDE,
-)
-from virtualwork.quantities import (
-    Component as Component,
-)
-from virtualwork.quantities import (
-    called as called,
-)
-from virtualwork.quantities import (
-    effort_name as effort_name,
-)
-from virtualwork.quantities import (
-    forces as forces,
-)
-from virtualwork.quantities import (
-    links as links,
-)
-from virtualwork.quantities import (
-    places as places,
-)
-from virtualwork.quantities import (
-    points as points,
-)
-from virtualwork.quantities import (
-    reactions as reactions,
-)
-from virtualwork.quantities import (
-    slides as slides,
-)
-from virtualwork.quantities import (
-    vector as vector,
-)
+from virtualwork.quantities import Component
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, NamedTuple
 from cli.cases.analysis import Analysis, Request
 from cli.cases.inputs import of_one
 from cli.cases.poses import column
-from cli.cases.quantities import Component, cells_of, keys_of, solved
+from cli.cases.quantities import cells_of, keys_of, solved
 from cli.cases.values import Varied, dimension_named, place_or_angle, with_numbers
 from cli.read import seeking
 from cli.read.options import bad
 from dalembert.errors import DataError
 from dalembert.units import UNITS, from_si, written
 from virtualwork import MechanismError
-from virtualwork.quantities import Quantity
+from virtualwork.quantities import Component
 
 if TYPE_CHECKING:
     from cli.cases.axes import Grid

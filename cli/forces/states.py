@@ -20,6 +20,7 @@ from cli.cases.quantities import bound, bounds_of, cells, cells_of, keys_of, sol
 from dalembert.results.columns import Table
 from virtualwork.formulas.forces import Applied, AppliedMoment
 from virtualwork.formulas.kinematics import Angle, Point, Slide, Turn
+from virtualwork.quantities import FORCE, LINK, POINT, links, vector
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -14,7 +14,7 @@ from cli.cases.analysis import Analysis
 from cli.cases.axes import input_values
 from cli.cases.case import Case, TableCase, TableStudy
 from cli.cases.poses import column
-from cli.cases.quantities import SLIDE, Component, bounds_of, cells, in_rows, keys_of, nested
+from cli.cases.quantities import bounds_of, cells, in_rows, keys_of, nested
 from cli.read import options
 from cli.show.picture import shown as on_page
 from cli.show.terminal import progress_in_time
@@ -27,6 +27,7 @@ from dalembert.results.way import Topic, figures
 from virtualwork import MechanismError, quantities
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.forces import Shaking
+from virtualwork.quantities import SLIDE, Component
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,7 +11,7 @@ import numpy as np
 from cli.cases import poses
 from cli.cases.analysis import Analysis
 from cli.cases.case import TableCase, TableStudy
-from cli.cases.quantities import Component, cells, keys_of
+from cli.cases.quantities import cells, keys_of
 from cli.cases.study import METHOD
 from cli.read.options import processes
 from dalembert.dataclass import dataclass, field
@@ -21,6 +21,7 @@ from virtualwork.describe.dimensions import Dimension
 from virtualwork.family.tolerance import Drawn, Spread, drawn, drawn_numbers, limits, spread, summary
 from virtualwork.formulas.kinematics import Point
 from virtualwork.formulas.quantity import Quantity
+from virtualwork.quantities import Component
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

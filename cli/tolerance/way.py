@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from cli.cases.analysis import Analysis
-    from cli.cases.quantities import Component
     from virtualwork.describe.dimensions import Dimension
     from virtualwork.formulas.quantity import Quantity
+    from virtualwork.quantities import Component
 
 
 def way(
