@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing.tapes import measured, split
-from balancing.unbalance import initial_unbalance
 from dalembert.angles import degrees
 from dalembert.arithmetic.engines.javascript import engine, written
 from dalembert.page import Page
@@ -47,6 +46,7 @@ def machine_sheet(
     limits: Sequence[float | None] = (),
     ceiling: float | None = None,
     permissible: Sequence[float] | None = None,
+    unbalance: Complex | None = None,
     facts: Sequence[tuple[str, str]] = (),
 ) -> Page:
     """Return the sheet of one machine.
@@ -77,17 +77,17 @@ def machine_sheet(
         The largest vibration with which no trim is needed, in the amplitude unit.
     permissible : sequence of float, optional
         The largest unbalance of each plane with which no trim is needed, in kg or kg·m as `mass` is.
+    unbalance : complex array (s, p), optional
+        The unbalance that explains a vibration of 1 at each sensor (`initial_unbalance`), NaN where readings do not determine it.
     facts : sequence of (name, text)
         What is to be known of the machine.
     """
-    unbalance, shares = None, None
-    if permissible is not None:
-        each = np.stack([initial_unbalance(influence, one, weights) for one in np.eye(len(influence))])
-        unbalance = np.nan_to_num(each, nan=0.0)
-        # readings that do not determine a plane's unbalance say nothing of its tolerance
-        hidden = [bool(column.any()) for column in np.isnan(each).T]
-        shares = [None if unseen else share for unseen, share in zip(hidden, permissible, strict=True)]
-    tape = measured(influence, weights, ridge, RUNS, errors, runout, covariance, unbalance)
+    seen, shares = None, None
+    if permissible is not None and unbalance is not None:
+        seen = np.nan_to_num(unbalance, nan=0.0)
+        hidden = [bool(column.any()) for column in np.isnan(unbalance).T]
+        shares = [None if unknown else share for unknown, share in zip(hidden, permissible, strict=True)]
+    tape = measured(influence, weights, ridge, RUNS, errors, runout, covariance, seen)
     values: dict[str, float] = {}
     for sensor, v in zip(sensors, initial, strict=True):
         # fifteen digits: a reading stands there as it was typed

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.shapes import as_array
+from dalembert.arithmetic.shapes import as_array, is_doubled
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -79,7 +79,8 @@ def normalize(q: ArrayLike) -> Array:
         raise ValueError("a quaternion must be finite and not zero")
     scaled = q / largest
     # a quaternion that is one already stays the one that was given
-    return np.where(np.abs(np.square(q).sum(axis=-1, keepdims=True) - 1) < 4e-16, q, scaled / length(scaled))
+    near = 0.0 if is_doubled(q) else 4e-16
+    return np.where(np.abs(np.square(q).sum(axis=-1, keepdims=True) - 1) < near, q, scaled / length(scaled))
 
 
 def rotate(q: ArrayLike, vector: ArrayLike) -> Array:
@@ -201,6 +202,18 @@ def angle_between(a: ArrayLike, b: ArrayLike) -> Array:
     turn = compose(a, inverse(b))
     sine = length(turn[..., 1:])[..., 0]
     return 2 * np.arctan2(sine, np.abs(turn[..., 0]))
+
+
+def apart(a: ArrayLike, b: ArrayLike) -> Array:
+    """Return the difference of two attitudes as quaternions, (..., 4), of which each is one of ±q: the lesser one.
+
+    Examples
+    --------
+    >>> apart([-1.0, 0.0, 0.0, 0.0], [0.8, 0.6, 0.0, 0.0])[:2]
+    array([ 0.2, -0.6])
+    """
+    a, b = as_array(a), as_array(b)
+    return a * np.where((a * b).sum(axis=-1) < 0, -1.0, 1.0)[..., None] - b
 
 
 def length(vectors: Array) -> Array:

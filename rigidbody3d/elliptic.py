@@ -9,7 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from dalembert.arithmetic.shapes import is_doubled
 
 Array = NDArray[np.float64]
 
@@ -54,14 +56,14 @@ def parameter(m: Array, m1: Array) -> Parameter:
     1.854074677301371...
     """
     lone = m1 == 0
-    a = np.ones_like(m1)
+    a = np.zeros_like(m1) + 1.0
     b = np.sqrt(np.where(lone, 1.0, m1))
     ladder = []
     # 9 steps at m₁ = 1e-300
     for _ in range(24):
         ladder.append((a, b))
         # the next step squares it
-        if np.all(np.abs(a - b) <= 2e-8 * a):
+        if (np.abs(a - b) <= (2e-16 if is_doubled(a) else 2e-8) * a).all():
             break
         a, b = (a + b) / 2, np.sqrt(a * b)
     mean = (a + b) / 2
@@ -89,11 +91,11 @@ def jacobi(u: Array, p: Parameter) -> Jacobi:
     x = r * p.mean
     sine, cosine = np.sin(x), np.cos(x)
     # there sn = r, to r³
-    small = np.abs(x) < 1e-9
+    small = np.abs(x) < (1e-16 if is_doubled(x) else 1e-9)
     cotangent = cosine / np.where(small, 1.0, sine)
     c = p.mean * cotangent
     a = cotangent
-    dn = np.ones_like(a)
+    dn = np.zeros_like(a) + 1.0
     for b, e in reversed(p.ladder):
         a = a * c
         c = c * dn
@@ -105,7 +107,8 @@ def jacobi(u: Array, p: Parameter) -> Jacobi:
     dn = np.where(small, 1.0, dn)
     if np.any(lone):
         w = np.where(lone, r, 0.0)
-        sech = 1 / np.cosh(np.clip(w, -700, 700))
+        far = 300.0 if is_doubled(w) else 700.0
+        sech = 1 / np.cosh(np.minimum(np.abs(w), far))
         sn, cn, dn = np.where(lone, np.tanh(w), sn), np.where(lone, sech, cn), np.where(lone, sech, dn)
     return Jacobi(turns, r, sn, cn, dn)
 
@@ -122,12 +125,12 @@ def argument(sn: Array, cn: Array, p: Parameter) -> Array:
     >>> round(float(argument(np.array(0.6), np.array(0.8), parameter(np.array(0.5), np.array(0.5)))), 15)
     0.66584782526294...
     """
-    from scipy.special import elliprf
-
     lone = np.isinf(p.quarter)
     c2 = cn * cn
     with np.errstate(divide="ignore"):
-        u = np.where(lone, np.arctanh(sn), sn * elliprf(c2, np.where(lone, 1.0, c2 + p.m1 * sn * sn), 1.0))
+        u = np.where(
+            lone, np.arcsinh(sn / np.abs(cn)), sn * _first(c2, np.where(lone, 1.0, c2 + p.m1 * sn * sn), 1.0)
+        )
     return np.where(cn < 0, np.copysign(2 * p.quarter, sn) - u, u)
 
 
@@ -145,22 +148,42 @@ def third(at: Jacobi, p: Parameter, n: Array) -> Array:
     >>> round(float(third(jacobi(np.array(1.0), p), p, np.array(0.7))), 12)
     0.199247296731
     """
-    from scipy.special import elliprj
-
     lone = np.isinf(p.quarter)
     s2 = at.sn * at.sn
     safe = np.where(lone, 1.0, at.cn * at.cn)
-    value = at.sn * s2 / 3 * elliprj(safe, np.where(lone, 1.0, at.dn * at.dn), 1.0, 1 + n * s2)
+    value = at.sn * s2 / 3 * _third(safe, np.where(lone, 1.0, at.dn * at.dn), 1.0, 1 + n * s2)
     if np.any(lone):
         root = np.sqrt(np.where(lone & (n > 0), n, 1.0))
         arc = np.where(n > 0, np.arctan(root * at.sn) / root, at.sn)
         value = np.where(lone, (at.r - arc) / (1 + n), value)
-    return np.asarray(value)
+    return value
 
 
 def third_complete(p: Parameter, n: Array) -> Array:
     """Return `third` over a quarter period, ∫₀ᴷ sn²/(1 + n·sn²) du; 0 where the period is infinite."""
+    lone = np.isinf(p.quarter)
+    return np.where(lone, 0.0, _third(0.0, np.where(lone, 1.0, p.m1), 1.0, 1 + n) / 3)
+
+
+def _first(x: Array, y: Array, z: float) -> Array:
+    """R_F: scipy's of floats, our own of doubled numbers."""
+    if is_doubled(x):
+        from rigidbody3d import carlson
+
+        doubled: Array = carlson.first(x, y, z)
+        return doubled
+    from scipy.special import elliprf
+
+    return np.asarray(elliprf(x, y, z))
+
+
+def _third(x: ArrayLike, y: Array, z: float, p: Array) -> Array:
+    """R_J: scipy's of floats, our own of doubled numbers."""
+    if is_doubled(y):
+        from rigidbody3d import carlson
+
+        doubled: Array = carlson.third(x, y, z, p)
+        return doubled
     from scipy.special import elliprj
 
-    lone = np.isinf(p.quarter)
-    return np.where(lone, 0.0, elliprj(0.0, np.where(lone, 1.0, p.m1), 1.0, 1 + n) / 3)
+    return np.asarray(elliprj(x, y, z, p))

@@ -18,27 +18,17 @@ cancels on either side of the separatrix, nor for nearly symmetric bodies. Its i
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.arithmetic.doubled import Doubled
+from dalembert.arithmetic.shapes import as_array, filled, is_doubled
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
 
 Array = NDArray[np.float64]
-
-
-class PhaseErrors(NamedTuple):
-    """What rounding does to the phases of b bodies at n times, in units of ε."""
-
-    late: Array
-    """By how much the state may be late, (b, n), s."""
-    turned: Array
-    """By how much the body may be turned, (b, n), rad."""
-    across: Array
-    """What of ω turns about a body of revolution's axis, in principal axes, (b, 1, 3), rad/s."""
 
 
 class FreeRotation:
@@ -56,8 +46,8 @@ class FreeRotation:
         self.simple = (
             (moments[:, 0] == moments[:, 1]) | (moments[:, 1] == moments[:, 2]) | ((H != 0).sum(axis=-1) < 2)
         )
-        self.period = np.full(self.count, np.inf)
-        self.m1 = np.ones(self.count)
+        self.period = filled((self.count,), np.inf, moments)
+        self.m1 = filled((self.count,), 1.0, moments)
         self._start, self._q = start, q
         self._prepare_simple(np.flatnonzero(self.simple), H)
         self._prepare_general(np.flatnonzero(~self.simple), H)
@@ -107,9 +97,7 @@ class FreeRotation:
         c3 = (I1 * (I3 - I1) * w1**2 + I2 * (I3 - I2) * w2**2) / I3
         c1 = (I3 * (I3 - I1) * w3**2 + I2 * (I2 - I1) * w2**2) / I1
         # on the separatrix it is all cancellation
-        apart = (
-            (Doubled(I2) - I1) * I1 * (Doubled(w1) * w1) - (Doubled(I3) - I2) * I3 * (Doubled(w3) * w3)
-        ).value / I2
+        apart = _apart(I1, I2, I3, w1, w3) / I2
         # circles the axis of the largest moment
         self._large = apart <= 0
         big = np.where(self._large, d23 * c1, d12 * c3)
@@ -170,7 +158,8 @@ class FreeRotation:
         turns = np.where(np.isinf(self._p.quarter), 0.0, at.turns)
         smooth = 2 * turns * self._third_quarter + third(at, self._p, self._n)
         angle = np.arctan2(self._steep * at.sn, at.cn * at.dn) + np.pi * turns
-        return np.asarray(self._weight * smooth + self._arc * angle)
+        node: Array = self._weight * smooth + self._arc * angle
+        return node
 
     def _momentum(self, at: Jacobi) -> tuple[Array, Array, Array]:
         """H1, H2, H3 in principal axes, without the sign (-1)ⁿ of the half turns for the two that have it."""
@@ -206,7 +195,7 @@ class FreeRotation:
 
     def attitude_at(self, t: Array) -> Array:
         """Quaternions (b, n, 4)."""
-        out = np.empty((self.count, len(t), 4))
+        out = filled((self.count, len(t), 4), 0.0, self.omega)
         if len(self._simple):
             turn = quaternion.from_vector(self._precession[:, None, :] * t[:, None])
             spin = quaternion.from_vector(self._spin[:, None, :] * t[:, None])
@@ -222,7 +211,7 @@ class FreeRotation:
 
     def omega_at(self, t: Array) -> Array:
         """Angular velocity in the given body axes (b, n, 3)."""
-        spin = np.empty((self.count, len(t), 3))
+        spin = filled((self.count, len(t), 3), 0.0, self.omega)
         if len(self._simple):
             turn = quaternion.from_vector(-self._spin[:, None, :] * t[:, None])
             spin[self._simple] = quaternion.rotate(turn, self.omega[self._simple][:, None, :])
@@ -234,26 +223,21 @@ class FreeRotation:
             spin[self._general] = np.stack([h1, h2, h3], axis=-1) / self._I[:, None, :] * self._scale[:, None]
         return spin @ self.axes
 
-    def phase_errors(self, t: Array) -> PhaseErrors:
-        """Bound what rounding does to the phases at times t, in units of ε.
 
-        Each phase u0 + λt, and each angle that runs on, is a large number and rounded as one.
-        """
-        late, turned = np.zeros((2, self.count, len(t)))
-        across = np.zeros((self.count, 1, 3))
-        way = np.abs(t)
-        if len(self._simple):
-            spin, nod = (quaternion.length(x) for x in (self._spin, self._precession))
-            late[self._simple] = 4 * way
-            turned[self._simple] = 4 * (spin + nod) * way
-            own = np.where(self._spin != 0, 0.0, self.omega[self._simple])
-            across[self._simple, 0] = np.where(self._spin != 0, 0.0, quaternion.length(own))
-        if len(self._general):
-            begin = 1 + np.abs(self._u0)
-            late[self._general] = 3 * begin / self._rate + 4 * way
-            node = np.abs(self._node(self._jacobi(t))) + np.abs(self._node(self._jacobi(np.zeros(1))))
-            turned[self._general] = begin + 4 * (np.abs(self._drift) + self._rate) * way + 3 * node
-        return PhaseErrors(late, turned, across)
+def _apart(I1: Array, I2: Array, I3: Array, w1: Array, w3: Array) -> Array:
+    """I1 (I2 - I1) w1² - I3 (I3 - I2) w3², whose terms all but cancel near the separatrix."""
+    exact: Any = (I1, I2, I3, w1, w3)
+    if is_doubled(I1):
+        from dalembert.arithmetic.doubled_arrays import by_fractions
+
+        doubled: Any = by_fractions(_difference, *exact)
+        return as_array(doubled)
+    result = _difference(*map(Doubled, exact))
+    return np.asarray(result.value)
+
+
+def _difference(I1: Any, I2: Any, I3: Any, w1: Any, w3: Any) -> Any:
+    return (I2 - I1) * I1 * (w1 * w1) - (I3 - I2) * I3 * (w3 * w3)
 
 
 def _cyclic(count: int) -> Array:

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
-from dalembert.arithmetic.shapes import as_numbers, common_shape
+from dalembert.arithmetic.shapes import as_array, as_numbers, common_shape, in_32_digits, is_doubled
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.free_rotation import FreeRotation
 from rigidbody3d.inertia import check, principal
-from rigidbody3d.rounding_in_time import FEW, STATE, apart, require, tensors_off
-from rigidbody3d.states import AtTimes, Seen, in_blocks
+from rigidbody3d.states import STATE, AtTimes, Seen, difference, in_blocks, require
 
 Array = NDArray[np.float64]
 
@@ -63,35 +61,26 @@ class FreeBody:
     _lead: tuple[int, ...] = field(init=False, repr=False, compare=False)
     _rotation: FreeRotation = field(init=False, repr=False, compare=False)
 
-    # moments put off by their errors, to see what that does, may be those of no body
-    _of_a_body: ClassVar[bool] = True
-
     def __post_init__(self) -> None:
-        moments, axes = principal(self.inertia)
+        moments, axes = _moments_and_axes(self.inertia)
         omega, q = as_numbers("omega", self.omega), as_numbers("attitude", self.attitude)
         if omega.shape[-1:] != (3,):
             raise ValueError(f"omega has three components, found the shape {omega.shape}")
         if not np.isfinite(omega).all():
             raise ValueError("omega must be finite")
-        if (moments < 0).any() or (moments[..., 1] <= 0).any():
-            raise ValueError(
-                f"the principal moments of inertia must be positive (one may be zero: a thin rod), found {moments}"
-            )
-        if ((moments[..., 0] == 0) & (moments[..., 1] != moments[..., 2])).any():
-            raise ValueError("a body with one zero moment is a thin rod: the other two moments must be equal")
-        if self._of_a_body and (reason := check(moments).reason):
-            raise ValueError(f"{reason}: no body has these")
+        if not is_doubled(moments):
+            _check(moments)
         lead = common_shape(inertia=moments.shape[:-1], omega=omega.shape[:-1], attitude=q.shape[:-1])
         unit = np.broadcast_to(quaternion.normalize(q), lead + (4,)).reshape(-1, 4)
         moments = np.broadcast_to(moments, lead + (3,)).reshape(-1, 3)
         axes = np.broadcast_to(axes, lead + (3, 3)).reshape(-1, 3, 3)
-        spin = np.einsum("bij,bj->bi", axes, np.broadcast_to(omega, lead + (3,)).reshape(-1, 3))
+        spin = (axes * np.broadcast_to(omega, lead + (3,)).reshape(-1, 1, 3)).sum(axis=-1)
         object.__setattr__(self, "_lead", lead)
         object.__setattr__(self, "_rotation", FreeRotation(moments, axes, spin, unit))
 
     def at(self, t: ArrayLike) -> FreeState:
         """Return the state at times t, (n,) or a single one, s: `.omega` (..., n, 3), `.attitude` (..., n, 4)."""
-        time = np.asarray(t, dtype=float)
+        time = as_array(t)
         if time.ndim > 1:
             raise ValueError(f"times are a number or one row of numbers, found the shape {time.shape}")
         if not np.isfinite(time).all():
@@ -112,23 +101,24 @@ class FreeBody:
     def energy(self) -> Array:
         """The kinetic energy, constant, (...), J."""
         m = self._rotation
-        return np.asarray((m.moments * m.omega**2).sum(axis=-1) / 2).reshape(self._lead)
+        return as_array((m.moments * m.omega**2).sum(axis=-1) / 2).reshape(self._lead)
 
-    def error_estimate(self, of: str = "period", tensor: ArrayLike = 0.0) -> Array:
-        """Return a bound of the rounding error of the period, the energy (...) or the momentum (..., 3).
+    @cached_property
+    def in_32_digits(self) -> FreeBody:
+        """The same body in doubled numbers."""
+        return FreeBody(*map(in_32_digits, (self.inertia, self.omega, self.attitude)))
 
-        `tensor` bounds the errors of the tensor's own entries, (..., 3, 3), kg·m², where it was worked out.
+    def error_estimate(self, of: str = "period", exact: FreeBody | None = None) -> Array:
+        """Return an estimate of the error of the period, the energy (...) or the momentum (..., 3).
+
+        Computed twice, with 16 and with 32 digits; `exact` is the body in doubled numbers, where more of it is known than floats.
         """
         require(of, "period", "momentum", "energy")
+        second: Any = getattr(exact or self.in_32_digits, of)
         here = getattr(self, of)
-        size = quaternion.length(here) if of == "momentum" else np.abs(here)
-        total = FEW * np.where(np.isfinite(size), size, 0.0)
-        for other in tensors_off(self.inertia, tensor):
-            there = getattr(_PutOff(other, self.omega, self.attitude), of)
-            with np.errstate(invalid="ignore"):
-                change = np.where(there == here, 0.0, np.abs(there - here))
-            total = total + (change.max(axis=-1, keepdims=True) if of == "momentum" else change)
-        return np.asarray(total + np.zeros(np.shape(here)))
+        off = second.off(here)
+        # there may be none
+        return np.where(np.isinf(here) & np.isinf(second.high), 0.0, np.where(np.isnan(off), np.inf, off))
 
     @property
     def separatrix(self) -> Array:
@@ -136,10 +126,26 @@ class FreeBody:
         return self._rotation.m1.reshape(self._lead)
 
 
-class _PutOff(FreeBody):
-    """A free body whose tensor is put off by its error."""
+def _moments_and_axes(inertia: ArrayLike) -> tuple[Array, Array]:
+    moments, axes = principal(inertia)
+    if is_doubled(inertia):
+        # a thin rod is one to 16 digits
+        rod = principal(inertia.value).moments[..., :1] == 0
+        middle = (moments[..., 1:2] + moments[..., 2:]) / 2
+        moments, axes = np.where(rod, middle * [0.0, 1.0, 1.0], moments), in_32_digits(axes)
+    return moments, axes
 
-    _of_a_body = False
+
+def _check(moments: Array) -> None:
+    """Raise ValueError for moments that no body has."""
+    if (moments < 0).any() or (moments[..., 1] <= 0).any():
+        raise ValueError(
+            f"the principal moments of inertia must be positive (one may be zero: a thin rod), found {moments}"
+        )
+    if ((moments[..., 0] == 0) & (moments[..., 1] != moments[..., 2])).any():
+        raise ValueError("a body with one zero moment is a thin rod: the other two moments must be equal")
+    if reason := check(moments).reason:
+        raise ValueError(f"{reason}: no body has these")
 
 
 @record
@@ -163,39 +169,38 @@ class FreeState(AtTimes):
     @cached_property
     def momentum(self) -> Array:
         """Angular momentum in space axes from this very state, (..., n, 3), kg·m²/s."""
-        moments, axes = principal(self.body.inertia)
-        tensor = np.einsum("...ki,...k,...kj->...ij", axes, moments, axes)
-        one = tensor[..., None, :, :] if self.time.ndim else tensor
-        body = np.einsum("...ij,...j->...i", one, self.omega)
+        moments, axes = self._moments_and_axes
+        spin = (axes * self.omega[..., None, :]).sum(axis=-1)
+        body = (axes * (moments * spin)[..., :, None]).sum(axis=-2)
         return quaternion.rotate(self.attitude, body)
 
     @cached_property
     def energy(self) -> Array:
         """Kinetic energy from this very state, (..., n), J."""
-        moments, axes = principal(self.body.inertia)
-        if self.time.ndim:
-            moments, axes = moments[..., None, :], axes[..., None, :, :]
-        spin = np.einsum("...ij,...j->...i", axes, self.omega)
-        return np.asarray((moments * spin**2).sum(axis=-1) / 2)
+        moments, axes = self._moments_and_axes
+        spin = (axes * self.omega[..., None, :]).sum(axis=-1)
+        return as_array((moments * spin**2).sum(axis=-1) / 2)
+
+    @property
+    def _moments_and_axes(self) -> tuple[Array, Array]:
+        """The principal moments and axes, for each time."""
+        moments, axes = _moments_and_axes(self.body.inertia)
+        return (moments[..., None, :], axes[..., None, :, :]) if self.time.ndim else (moments, axes)
 
     @property
     def _seen(self) -> Seen:
         return Seen(self.body.inertia, free=True, top=False)
 
-    def error_estimate(self, of: str = "attitude", tensor: ArrayLike = 0.0) -> Array:
-        """Return a bound of the rounding error of a quantity, the given data as exact.
+    def error_estimate(self, of: str = "attitude", exact: FreeState | None = None) -> Array:
+        """Return an estimate of the error of a quantity: computed twice, with 16 and with 32 digits.
 
         Parameters
         ----------
         of
-            "attitude", as an angle (..., n), rad; "omega" or "momentum", (..., n, 3); "energy", (..., n).
-        tensor
-            Bounds of the errors of the tensor's own entries, (..., 3, 3), kg·m², where it was worked out.
-
-        Notes
-        -----
-        A phase is rounded where it is a large number: the error of attitude and omega grows as ε·|ω|t, and in no
-        other way; momentum and energy do not feel it. An oblique tensor counts as off by a few ε.
+            "attitude", as an angle (..., n), rad, or "quaternion", its components (..., n, 4); "omega" or "momentum",
+            (..., n, 3); "energy", (..., n).
+        exact
+            The state in doubled numbers, where more is known than floats: default of the given data as exact.
 
         Examples
         --------
@@ -204,30 +209,9 @@ class FreeState(AtTimes):
         array([ True, False])
         """
         require(of, *STATE)
-        body = self.body
-        total: Array | float = 0.0
-        # each entry of the tensor in turn is put off by its error, and by that of working out principal axes
-        for other in tensors_off(body.inertia, tensor):
-            total = total + apart(_PutOff(other, body.omega, body.attitude).at(self.time), self, of)
-        return np.asarray(self._rounding(of) + total)
+        return difference(exact or self.in_32_digits, self, of)
 
-    def _rounding(self, of: str) -> Array:
-        """Bound what rounding does on the way from the given tensor to the state."""
-        body = self.body
-        motion, lead = body._rotation, body._lead
-        late, angle, across = motion.phase_errors(np.atleast_1d(self.time))
-        shape = lead + self.time.shape
-        if of == "attitude":
-            return (FEW + EPS * angle).reshape(shape)
-        if of == "omega":
-            axes = np.broadcast_to(principal(body.inertia).axes, (*lead, 3, 3)).reshape(-1, 3, 3)
-            w = self.omega.reshape(motion.count, -1, 3) @ np.swapaxes(axes, -1, -2)
-            I = motion.moments[:, None, :]
-            torque = np.cross(I * w, w)
-            rise = np.divide(torque, I, out=np.zeros_like(torque), where=I > 0)
-            bound = EPS * late[..., None] * np.abs(rise) + FEW * (np.abs(w) + across)
-            return (bound @ np.abs(axes)).reshape(*shape, 3)
-        # both stay what they were however late the state is
-        size = FEW * 3 * (np.abs(body.energy) if of == "energy" else quaternion.length(body.momentum)[..., 0])
-        rounding = np.zeros(shape) + (size[..., None] if self.time.ndim else size)
-        return rounding[..., None] + np.zeros(3) if of == "momentum" else rounding
+    @cached_property
+    def in_32_digits(self) -> FreeState:
+        """The same state in doubled numbers."""
+        return self.body.in_32_digits.at(in_32_digits(self.time))

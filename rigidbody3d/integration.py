@@ -13,15 +13,19 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.inertia import principal
-from rigidbody3d.rounding_in_time import FEW, STATE, apart, require, tensors_off
-from rigidbody3d.states import AtTimes, Seen
+from rigidbody3d.states import STATE, AtTimes, Seen, State, require
+
+if TYPE_CHECKING:
+    from dalembert.arithmetic.doubled_arrays import DoubledArray
 
 Array = NDArray[np.float64]
 Torque = Callable[[float, Array, Array], ArrayLike]
@@ -73,15 +77,16 @@ class Trajectory(AtTimes):
     def _seen(self) -> Seen:
         return Seen(self.tensor, free=False, top=self.mgl != 0)
 
-    def error_estimate(self, of: str = "attitude", tensor: ArrayLike = 0.0) -> Array:
+    def error_estimate(self, of: str = "attitude", exact: DoubledArray | None = None) -> Array:
         """Return an estimate of the error, of the method and of rounding together.
 
         Parameters
         ----------
         of
-            "attitude", as an angle (n,), rad; "omega" or "momentum", (n, 3); "energy", (n,).
-        tensor
-            Bounds of the errors of the tensor's own entries, (3, 3), kg·m²: a further run for each.
+            "attitude", as an angle (n,), rad, or "quaternion", its components (n, 4); "omega" or "momentum", (n, 3);
+            "energy", (n,).
+        exact
+            The tensor in doubled numbers, (3, 3), where more of it is known than floats: a further run.
 
         Notes
         -----
@@ -99,16 +104,20 @@ class Trajectory(AtTimes):
         walk = FEW * (1 + np.sqrt(self.evaluations))
         # both methods are at least of the sixth order: the finer run is off by some 2 % of this one's error, or by
         # rounding alone; twice the difference leaves room where the error does not yet follow that law
-        bound = 2 * apart(finer, self, of)
-        if of == "attitude":
-            bound = bound + walk
-        elif of == "energy":
+        bound = 2 * _apart(finer, self, of)
+        if of == "energy":
             bound = bound + walk * (np.abs(self.energy) + abs(self.mgl))
+        elif of in ("attitude", "quaternion"):
+            bound = bound + walk
         else:
             here: Array = getattr(self, of)
-            bound = bound + walk * quaternion.length(here) + 0 * here
-        for other in tensors_off(self.tensor, tensor, axes=False):
-            bound = bound + apart(self._run_again(other), finer, of)
+            bound = bound + walk * quaternion.length(here)
+        off = np.zeros((3, 3)) if exact is None else (exact - self.tensor).value
+        if off.any():
+            # by so many times what the tensor is off, that it shows; no moment becomes negative
+            moments = principal(self.tensor).moments
+            times = max(1.0, float(min(1e-7 * moments[2], 1e-3 * moments[0]) / np.abs(off).max()))
+            bound = bound + _apart(self._run_again(self.tensor + times * off), finer, of) / times
         return np.asarray(bound)
 
     def _run_again(self, tensor: Array) -> Trajectory:
@@ -117,6 +126,18 @@ class Trajectory(AtTimes):
         return self.finer(tensor)
 
 
+def _apart(there: State, here: State, of: str) -> Array:
+    """Return how far two states are apart: an angle, the components of a vector, a difference."""
+    if of == "attitude":
+        return quaternion.angle_between(there.attitude, here.attitude)
+    if of == "quaternion":
+        return np.abs(quaternion.apart(there.attitude, here.attitude))
+    apart: Array = np.abs(getattr(there, of) - getattr(here, of))
+    return apart
+
+
+FEW = 12 * EPS
+"""What a dozen roundings leave."""
 MOST = 10_000_000
 """So many steps take some quarter of an hour."""
 

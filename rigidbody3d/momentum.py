@@ -20,8 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.records import components, numbers, record, table
 from dalembert.arithmetic.shapes import as_array, as_numbers, common_shape, in_32_digits, is_doubled
-from rigidbody3d.rounding_in_time import require
-from rigidbody3d.states import BLOCK
+from rigidbody3d.states import BLOCK, require
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -23,7 +23,7 @@ from dalembert.arithmetic.records import components, numbers, record, table
 from dalembert.arithmetic.shapes import as_array, in_32_digits
 from rigidbody3d.attitude import length
 from rigidbody3d.body import Body
-from rigidbody3d.rounding_in_time import require
+from rigidbody3d.states import require
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.records import components, table
-from rigidbody3d.rounding_in_time import State
+from rigidbody3d import attitude as quaternion
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,11 +27,46 @@ def in_blocks(work: Callable[[Array], Array], time: Array, lead: tuple[int, ...]
     """Return what `work` gives of b bodies at times (n,), (b, n, width), as (..., n, width); at one time (..., width)."""
     t = np.atleast_1d(time)
     bodies = int(np.prod(lead))
-    out = np.empty((bodies, len(t), width))
     step = max(1, BLOCK // max(bodies, 1))
-    for start in range(0, len(t), step):
-        out[:, start : start + step] = work(t[start : start + step])
+    blocks = [work(t[start : start + step]) for start in range(0, len(t), step)] or [
+        np.zeros((bodies, 0, width))
+    ]
+    out = blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=1)
     return out.reshape(lead + time.shape + (width,))
+
+
+STATE = ("attitude", "quaternion", "omega", "momentum", "energy")
+"""What a state in time has estimates of."""
+
+
+def require(of: str, *names: str) -> None:
+    """Raise ValueError where there is no estimate of a quantity of this name."""
+    if of not in names:
+        raise ValueError(f"no estimate for '{of}': expected one of {', '.join(names)}")
+
+
+def difference(exact: Any, here: State, of: str) -> Array:
+    """Return how far a state is from the same one in doubled numbers: an angle, components, a number."""
+    if of in ("attitude", "quaternion"):
+        off: Any = quaternion.apart(exact.attitude, here.attitude)
+        each = np.asarray(off.off(np.zeros(off.shape)))
+        # a turn by an angle moves a quaternion by half of it
+        return 2 * quaternion.length(each)[..., 0] if of == "attitude" else each
+    result: Array = getattr(exact, of).off(getattr(here, of))
+    return result
+
+
+class State(Protocol):
+    """A state in time, of whatever kind."""
+
+    @property
+    def attitude(self) -> Array: ...
+    @property
+    def omega(self) -> Array: ...
+    @property
+    def momentum(self) -> Array: ...
+    @property
+    def energy(self) -> Array: ...
 
 
 def _columns(state: StateInTime) -> dict[str, Array]:

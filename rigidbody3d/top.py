@@ -18,19 +18,19 @@ differences: they are worked out once per top with 200 digits.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from decimal import Decimal
+from fractions import Fraction
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
-from dalembert.arithmetic.shapes import as_numbers, common_shape
+from dalembert.arithmetic.shapes import as_array, as_numbers, common_shape, filled, in_32_digits, is_doubled
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
-from rigidbody3d.rounding_in_time import FEW, STATE, apart, require
-from rigidbody3d.states import AtTimes, Seen, in_blocks
+from rigidbody3d.states import STATE, AtTimes, Seen, difference, in_blocks, require
 from rigidbody3d.top_roots import constants
 
 Array = NDArray[np.float64]
@@ -80,7 +80,7 @@ class Top:
     _rotation: TopRotation = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        I = np.asarray(self.inertia, dtype=float)
+        I = as_array(self.inertia)
         if I.shape[-2:] == (3, 3):
             if (I * np.eye(3) != I).any():
                 raise ValueError("a top's axis is body z: expected a tensor without products of inertia")
@@ -116,7 +116,7 @@ class Top:
 
     def at(self, t: ArrayLike) -> TopState:
         """Return the state at times t, (n,) or a single one, s: `.omega` (..., n, 3), `.attitude` (..., n, 4)."""
-        time = np.asarray(t, dtype=float)
+        time = as_array(t)
         if time.ndim > 1 or not np.isfinite(time).all():
             raise ValueError("times are a finite number or one row of them")
         return TopState(self, time)
@@ -132,7 +132,12 @@ class Top:
     @property
     def nutation_period(self) -> Array:
         """The period of that angle, (...), s; infinite on the way to the sleeping position."""
-        return np.asarray(2 * self._rotation.p.quarter / self._rotation.rate).reshape(self._lead)
+        return as_array(2 * self._rotation.p.quarter / self._rotation.rate).reshape(self._lead)
+
+    @cached_property
+    def in_32_digits(self) -> Top:
+        """The same top in doubled numbers."""
+        return Top(*map(in_32_digits, (self.inertia, self.mgl, self.omega, self.attitude)))
 
 
 @record
@@ -166,69 +171,31 @@ class TopState(AtTimes):
     def energy(self) -> Array:
         """Kinetic and potential energy, m g l cos θ included, (..., n), J."""
         w, x, y, z = np.moveaxis(self.attitude, -1, 0)
-        return np.asarray(
-            (self._moments * self.omega**2).sum(axis=-1) / 2 + self._mgl * (w * w + z * z - x * x - y * y)
-        )
+        kinetic = (self._moments * self.omega**2).sum(axis=-1) / 2
+        return as_array(kinetic + self._mgl * (w * w + z * z - x * x - y * y))
 
     @property
     def _seen(self) -> Seen:
         return Seen(self.top.inertia, free=False, top=True)
 
-    def error_estimate(self, of: str = "attitude", moments: ArrayLike = 0.0) -> Array:
-        """Return a bound of the rounding error of a quantity, the given data as exact.
+    def error_estimate(self, of: str = "attitude", exact: TopState | None = None) -> Array:
+        """Return an estimate of the error of a quantity: computed twice, with 16 and with 32 digits.
 
         Parameters
         ----------
         of
-            "attitude", as an angle (..., n), rad; "omega" or "momentum", (..., n, 3); "energy", (..., n).
-        moments
-            Bounds of the errors of the moments of inertia, (..., 3), kg·m², where they were worked out.
+            "attitude", as an angle (..., n), rad, or "quaternion", its components (..., n, 4); "omega" or "momentum",
+            (..., n, 3); "energy", (..., n).
+        exact
+            The state in doubled numbers, where more is known than floats: default of the given data as exact.
         """
         require(of, *STATE)
-        bound = self._rounding(of)
-        E, top = np.asarray(moments, dtype=float), self.top
-        # each moment in turn is put off by its error
-        for entry in ([1.0, 1.0, 0.0], [0.0, 0.0, 1.0]) if E.any() else ():
-            I = _moments(top.inertia) + E * entry
-            bound = bound + apart(Top(I, top.mgl, top.omega, top.attitude).at(self.time), self, of)
-        return bound
+        return difference(exact or self.in_32_digits, self, of)
 
-    def _rounding(self, of: str) -> Array:
-        """Bound what rounding does on the way from the given moments to the state."""
-        rotation, lead = self.top._rotation, self.top._lead
-        shape = lead + self.time.shape
-        late, turned, runs = (v.reshape(shape) for v in rotation.phase_errors(np.atleast_1d(self.time)))
-        late, turned, runs = EPS * late, FEW + EPS * turned, EPS * runs
-        if of == "attitude":
-            return turned
-        I = np.broadcast_to(self._moments, self.omega.shape)
-        w, x, y, z = np.moveaxis(self.attitude, -1, 0)
-        mgl, omega = self._mgl, self.omega
-        weight = np.stack([2 * mgl * (y * z + w * x), -2 * mgl * (x * z - w * y), 0 * x], axis=-1)
-        torque = np.cross(I * omega, omega) + weight
-        rise = np.divide(torque, I, out=np.zeros_like(torque), where=I > 0)
-        # the swing is a sum of two terms with opposite signs, each as large as the fall from the vertical gives
-        up, down = np.sqrt(w * w + z * z), np.sqrt(x * x + y * y)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            terms = [
-                np.abs(push.reshape(lead + (1,) * self.time.ndim)) * np.where(b > 0, a / b, 0.0)
-                for push, a, b in ((rotation.plus, down, up), (rotation.minus, up, down))
-            ]
-        swing = np.minimum(terms[0] + terms[1], 1e300) / (2 * I[..., 0])
-        level = quaternion.length(omega[..., :2])[..., 0]
-        around = FEW * (level + swing) + runs * level
-        bound = late[..., None] * quaternion.length(rise) + around[..., None]
-        bound = np.concatenate([bound, np.zeros_like(bound), EPS * np.abs(omega[..., 2:])], axis=-1)
-        bound[..., 1] = bound[..., 0]
-        if of == "omega":
-            return np.asarray(bound)
-        kinetic = (I * omega**2).sum(axis=-1) / 2
-        # it stays what it was however late the state is
-        if of == "energy":
-            return np.asarray(2 * FEW * (kinetic + np.abs(mgl)) + I[..., 0] * level * FEW * swing)
-        size = quaternion.length(I * omega)[..., 0]
-        error = turned * size + quaternion.length(I * bound)[..., 0]
-        return np.asarray(error[..., None] + np.zeros(3))
+    @cached_property
+    def in_32_digits(self) -> TopState:
+        """The same state in doubled numbers."""
+        return self.top.in_32_digits.at(in_32_digits(self.time))
 
     @property
     def _moments(self) -> Array:
@@ -237,25 +204,14 @@ class TopState(AtTimes):
 
     @property
     def _mgl(self) -> Array:
-        mgl = np.asarray(self.top.mgl, dtype=float)
+        mgl = as_array(self.top.mgl)
         return mgl[..., None] if self.time.ndim and mgl.ndim else mgl
 
 
 def _moments(inertia: ArrayLike) -> Array:
     """Return principal moments (..., 3) that are given as such or as a diagonal tensor."""
-    I = np.asarray(inertia, dtype=float)
+    I = as_array(inertia)
     return np.diagonal(I, axis1=-2, axis2=-1) if I.shape[-2:] == (3, 3) else I
-
-
-class PhaseErrors(NamedTuple):
-    """What rounding does to the phases of b tops at n times, (b, n) each, in units of ε."""
-
-    late: Array
-    """By how much the state may be late, s."""
-    turned: Array
-    """By how much the body may be turned, rad."""
-    runs: Array
-    """How far the angles have run that turn ω about the axis, rad."""
 
 
 class TopRotation:
@@ -270,11 +226,8 @@ class TopRotation:
         # a centre of mass below: the same motion seen upside down
         self.upside = mgl < 0
         q = np.where(self.upside[:, None], quaternion.compose([0.0, 1.0, 0.0, 0.0], q), q)
-        rows = [
-            constants(float(I[b, 0]), float(I[b, 2]), abs(float(mgl[b])), omega[b], q[b])
-            for b in range(self.count)
-        ]
-        c = {name: np.array([[row[name]] for row in rows]) for name in rows[0]} if rows else {}
+        rows = [constants(I[b], mgl[b : b + 1], omega[b], q[b]) for b in range(self.count)]
+        c = {name: _column([row[name] for row in rows], I) for name in rows[0]} if rows else {}
         self.p = parameter(c["m"], c["m1"])
         self.rate, self.span, self.above, self.below = c["rate"], c["span"], c["above"], c["below"]
         self.plus, self.minus, self.twice_I1 = c["plus"], c["minus"], 2 * I[:, :1]
@@ -288,23 +241,22 @@ class TopRotation:
                 np.where(sharp, c["m"] / n, n) for sharp, n in zip(self.sharp, (n_plus, n_minus), strict=True)
             )
         self.quarter = tuple(third_complete(self.p, n) for n in self.n)
-        a, b = q[:, :1] + 1j * q[:, 3:], q[:, 1:2] + 1j * q[:, 2:3]
+        a, b = _complex(q[:, :1], q[:, 3:]), _complex(q[:, 1:2], q[:, 2:3])
         w1, w2 = omega[:, :1], omega[:, 1:2]
         # from sn and cn as given: near the vertical the phases turn too fast to be had from a rounded argument
         dn = np.sqrt(self.p.m1 + self.p.m * c["cn"] ** 2)
         at = Jacobi(np.zeros_like(dn), self.begin, c["sn"], c["cn"], dn)
         start = self._phases(at)
-        half = 0.5j
         # where α or β is zero its direction is that of its rate, just before or just after as rounding has it
         before_a = np.where(at.sn < 0, -1.0, 1.0)
         before_b = np.where(at.r > 0, -1.0, 1.0)
-        a_rate = -(q[:, 1:2] * w1 + q[:, 2:3] * w2) / 2 + half * (q[:, 1:2] * w2 - q[:, 2:3] * w1)
-        b_rate = (a * (w1 + 1j * w2)) / 2
-        self.a0 = np.where(np.abs(a) > 0, _unit(a), before_a * _unit(a_rate)) * np.exp(-1j * start[0])
-        self.b0 = np.where(np.abs(b) > 0, _unit(b), before_b * _unit(b_rate)) * np.exp(-1j * start[1])
+        a_rate = _complex(-(q[:, 1:2] * w1 + q[:, 2:3] * w2), q[:, 1:2] * w2 - q[:, 2:3] * w1)
+        b_rate = a * _complex(w1, w2)
+        self.a0 = _direction(a, a_rate, before_a) * _polar(-start[0])
+        self.b0 = _direction(b, b_rate, before_b) * _polar(-start[1])
         self.q = q
         # no lever, or upright or hanging at rest but for its spin: q(t) = exp(P t) q0 exp(S t)
-        self.simple = np.flatnonzero(c["still"][:, 0])
+        self.simple = np.flatnonzero(c["still"][:, 0] != 0)
         of = self.simple
         free = (mgl[of] == 0)[:, None]
         momentum = quaternion.rotate(q[of], I[of] * omega[of])
@@ -365,27 +317,9 @@ class TopRotation:
             c["minus_line"] * (at.r - (n + p.m) * smooth),
         )
 
-    def phase_errors(self, t: Array) -> PhaseErrors:
-        """Bound what rounding does to the phases at times t."""
-        way = np.abs(t)
-        phases = (
-            *self._phases(jacobi(self.begin + self.rate * t, self.p)),
-            *self._phases(jacobi(self.begin, self.p)),
-        )
-        begin = 1 + np.abs(self.begin)
-        late = 3 * begin / self.rate + 4 * way
-        runs = sum(np.abs(x) for x in phases) + np.abs(self.extra) * way
-        turned = begin + 4 * self.rate * way + 3 * runs
-        if len(self.simple):
-            spin, nod = (quaternion.length(x) for x in (self.spin, self.precession))
-            late[self.simple] = 4 * way
-            runs[self.simple] = (spin + nod) * way
-            turned[self.simple] = 4 * (spin + nod) * way
-        return PhaseErrors(late, turned, runs)
-
     def state_at(self, t: Array) -> Array:
         """Attitude and angular velocity at times t, (b, n, 7)."""
-        out = np.empty((self.count, len(t), 7))
+        out = filled((self.count, len(t), 7), 0.0, self.omega)
         at = jacobi(self.begin + self.rate * t, self.p)
         plus, minus = self._phases(at)
         turn = self.extra * t / 2
@@ -395,13 +329,13 @@ class TopRotation:
         across_a, across_b = np.sqrt(self.above / 2), np.sqrt(self.below / 2)
         swing_by = np.sqrt(self.span / 2)
         size_a, size_b = np.hypot(across_a, swing_by * sn), np.hypot(across_b, swing_by * cn)
-        way_a, way_b = self.a0 * np.exp(1j * (plus + turn)), self.b0 * np.exp(1j * (minus - turn))
-        a, b = size_a * way_a, size_b * way_b
+        way_a, way_b = self.a0 * _polar(plus + turn), self.b0 * _polar(minus - turn)
+        a, b = way_a * size_a, way_b * size_b
         # θ̇ and φ̇ sin θ, each as the small over the small
         with np.errstate(divide="ignore", invalid="ignore"):
             tilt = -self.span * self.rate * sn * cn * at.dn / (size_a * size_b)
             swing = (self.plus * (size_b / size_a) + self.minus * (size_a / size_b)) / self.twice_I1
-        across = np.conj(way_a) * way_b * (tilt + 1j * swing)
+        across = way_a.conj() * way_b * _complex(tilt, swing)
         out[..., 0], out[..., 1], out[..., 2], out[..., 3] = a.real, b.real, b.imag, a.imag
         out[..., 4], out[..., 5] = across.real, across.imag
         out[..., 6] = self.omega[:, 2:]
@@ -419,5 +353,38 @@ class TopRotation:
         return out
 
 
-def _unit(z: Array | NDArray[np.complex128]) -> NDArray[np.complex128]:
-    return np.asarray(np.exp(1j * np.angle(z)))
+def _column(numbers: list[Decimal], like: Array) -> Array:
+    """Numbers of 200 digits as a column (b, 1), rounded once."""
+    if is_doubled(like):
+        from dalembert.arithmetic.doubled_arrays import exactly
+
+        return as_array(exactly(map(Fraction, numbers), (len(numbers), 1)))
+    return np.array([[float(x)] for x in numbers])
+
+
+def _complex(x: Any, y: Any) -> Any:
+    """x + iy."""
+    if is_doubled(x):
+        from dalembert.arithmetic.doubled_arrays import DoubledComplex
+
+        return DoubledComplex(x, y)
+    return x + 1j * y
+
+
+def _polar(angle: Array) -> Any:
+    """e^{i·angle}."""
+    return _complex(np.cos(angle), np.sin(angle)) if is_doubled(angle) else np.exp(1j * angle)
+
+
+def _direction(z: Any, otherwise: Any, sign: Array) -> Any:
+    """z/|z|, or where z is zero that of another number with a sign."""
+    zero = (z.real == 0) & (z.imag == 0)
+    x, y = np.where(zero, otherwise.real, z.real), np.where(zero, otherwise.imag, z.imag)
+    sign = np.where(zero, sign, 1.0)
+    if not is_doubled(x):
+        return sign * _polar(np.arctan2(y, x))
+    size = np.hypot(x, y)
+    # nothing turns about nothing
+    still = size == 0
+    size = np.where(still, 1.0, size)
+    return _complex(np.where(still, 1.0, x / size), y / size) * sign

@@ -1,4 +1,4 @@
-"""The constants of a heavy top's motion, from its cubic's three roots: worked out with 200 digits, rounded once."""
+"""The constants of a heavy top's motion, from its cubic's three roots: worked out with 200 digits."""
 
 from __future__ import annotations
 
@@ -7,18 +7,21 @@ from decimal import Decimal, localcontext
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.arithmetic.shapes import is_doubled
+
 Array = NDArray[np.float64]
 
 DIGITS = 200
 
 
-def constants(I1: float, I3: float, mgl: float, omega: Array, q: Array) -> dict[str, float]:
-    """The roots of the cubic and what follows from them, each rounded once from 200 digits."""
+def constants(I: Array, mgl: Array, omega: Array, q: Array) -> dict[str, Decimal]:
+    """The roots of the cubic and what follows from them, to 200 digits; of moments (3,), floats or doubled numbers."""
     with localcontext() as context:
         context.prec = DIGITS
-        A, C, a = Decimal(I1), Decimal(I3), Decimal(mgl)
-        w1, w2, w3 = map(Decimal, omega.tolist())
-        w, x, y, z = map(Decimal, q.tolist())
+        A, _, C = _decimals(I)
+        a = abs(_decimals(mgl)[0])
+        w1, w2, w3 = _decimals(omega)
+        w, x, y, z = _decimals(q)
         norm = w * w + x * x + y * y + z * z
         # (1 ± u)/2
         up, down = (w * w + z * z) / norm, (x * x + y * y) / norm
@@ -62,25 +65,33 @@ def constants(I1: float, I3: float, mgl: float, omega: Array, q: Array) -> dict[
         rising = g1 * w2 - g2 * w1 >= 0
         sn, cn = sn2.sqrt(), (1 - sn2).sqrt()
         return {
-            "still": 0.0,
-            "m": float(m),
-            "m1": float(m1),
-            "rate": float(rate),
-            "span": float(span),
-            "above": float(above),
-            "below": float(below),
-            "plus": float(plus),
-            "minus": float(minus),
-            "sn": float(sn if rising else -sn),
-            "cn": float(cn),
+            "still": Decimal(0),
+            "m": m,
+            "m1": m1,
+            "rate": rate,
+            "span": span,
+            "above": above,
+            "below": below,
+            "plus": plus,
+            "minus": minus,
+            "sn": sn if rising else -sn,
+            "cn": cn,
             **_phase(plus, above, span, m * above / span if span else Decimal(0), m, scale, "plus"),
             **_phase(minus, below, m * beyond, below / beyond if beyond else Decimal(0), m, scale, "minus"),
         }
 
 
+def _decimals(numbers: Array) -> list[Decimal]:
+    """Numbers as they are exactly."""
+    if is_doubled(numbers):
+        pairs = zip(numbers.high.ravel().tolist(), numbers.low.ravel().tolist(), strict=True)
+        return [Decimal(high) + Decimal(low) for high, low in pairs]
+    return [Decimal(x) for x in np.ravel(numbers).tolist()]
+
+
 def _phase(
     push: Decimal, least: Decimal, wide: Decimal, inverse: Decimal, m: Decimal, scale: Decimal, name: str
-) -> dict[str, float]:
+) -> dict[str, Decimal]:
     """The weights of one phase: push/(scale·least) ∫ du/(1 + n sn²), n = wide/least, and m/n = inverse."""
     root = (least * (least + wide) * (1 + inverse)).sqrt()
     line = push / (scale * least) if least else Decimal(0)
@@ -93,28 +104,28 @@ def _phase(
         rest = Decimal(0)
         if wide and least * least * m < wide * wide:
             line = push * m / (scale * wide)
-    n = float(wide / least) if least and wide < least * Decimal(10) ** 290 else 1e290 if wide else 0.0
-    g = 1e200 if n >= 1e290 else float(((1 + wide / least) * (1 + inverse)).sqrt()) if least else 1.0
+    most = Decimal(10) ** 290
+    n = wide / least if least and wide < least * most else most if wide else Decimal(0)
+    steep = Decimal(10) ** 200
+    g = steep if n >= most else ((1 + wide / least) * (1 + inverse)).sqrt() if least else Decimal(1)
     # on the way to the sleeping position β keeps its direction
     if not wide and not least:
         arc = Decimal(0)
     return {
         f"n_{name}": n,
         f"{name}_g": g,
-        f"{name}_line": float(line),
-        f"{name}_arc": float(arc),
-        f"{name}_rest": float(rest),
+        f"{name}_line": line,
+        f"{name}_arc": arc,
+        f"{name}_rest": rest,
     }
 
 
-def _uniform(up: Decimal, down: Decimal) -> dict[str, float]:
+def _uniform(up: Decimal, down: Decimal) -> dict[str, Decimal]:
     """The constants of a top that needs none: its weight has no lever, or it stands or hangs still."""
-    flat = {f"{name}_{sign}": 0.0 for name in ("n",) for sign in ("plus", "minus")}
-    flat |= {f"{sign}_{name}": 0.0 for name in ("g", "line", "arc", "rest") for sign in ("plus", "minus")}
-    return flat | {
-        "still": 1.0, "m": 1.0, "m1": 0.0, "rate": 1.0, "span": 0.0, "sn": 0.0, "cn": 1.0, "plus": 0.0, "minus": 0.0,
-        "above": float(2 * up), "below": float(2 * down),
-    }  # fmt: skip
+    zero = ["m1", "span", "sn", "plus", "minus", "n_plus", "n_minus"]
+    zero += [f"{sign}_{name}" for name in ("g", "line", "arc", "rest") for sign in ("plus", "minus")]
+    one = dict.fromkeys(("still", "m", "rate", "cn"), Decimal(1))
+    return dict.fromkeys(zero, Decimal(0)) | one | {"above": 2 * up, "below": 2 * down}
 
 
 def _largest_root(c2: Decimal, c1: Decimal, c0: Decimal) -> Decimal:

@@ -66,21 +66,19 @@ class Evaluator:
             NaN where the pose cannot be assembled.
         """
         if isinstance(angle, float):
-            inputs = angle, speed, acceleration, jerk
             moves = speed != 0.0, acceleration != 0.0, jerk != 0.0
             if moves not in self._ready:
                 self._ready[moves] = ready(self.assembly, moves, self.keys)
-            made = self._ready[moves]
-            if made is not None:
-                function, places, vectors = made
+            function = self._ready[moves]
+            if function is not None:
                 try:
-                    values = iter(function(*[inputs[i] for i in places]))
+                    values = function(angle, speed, acceleration, jerk)
                 except (ZeroDivisionError, ValueError, OverflowError):
                     pass
                 else:
                     return {
-                        name: (next(values), next(values)) if vector else next(values)
-                        for name, vector in zip(self.wanted, vectors, strict=True)
+                        name: (value.real, value.imag) if isinstance(value, complex) else value
+                        for name, value in zip(self.wanted, values, strict=True)
                     }
         numbers = Lanes(self.assembly, angle, speed, acceleration, jerk).values(self.keys)
         shown = {

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.guard import guarded
+from dalembert.arithmetic.guard import guarded, unlocked
 from dalembert.arithmetic.records import alike
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError
@@ -67,8 +67,7 @@ class Motion(Pictured):
         block_of: int | None = None,
     ) -> None:
         self.assembly, self.lock = assembly, assembly.lock
-        self._units: dict[int, Motion] = {}
-        self._one = one_pose(assembly, (angle, speed, acceleration, jerk))
+        self._one = one_pose(assembly, angle, speed, acceleration, jerk)
         if self._one is None:
             self.poses = Lanes(assembly, angle, speed, acceleration, jerk, block_of)
 
@@ -92,6 +91,10 @@ class Motion(Pictured):
         return _again, (self.assembly, own, poses.rates, poses.block_of, poses.time)
 
     @cached_property
+    def _units(self) -> dict[int, Motion]:
+        return {}
+
+    @cached_property
     def poses(self) -> Lanes:
         """What has been solved of it."""
         # only of one pose are they not made with the motion
@@ -100,6 +103,7 @@ class Motion(Pictured):
 
     # --- over what ------------------------------------------------------------------------------------------------
     @property
+    @unlocked
     def mechanism(self) -> Description:
         """What moves."""
         return self.assembly.mechanism
@@ -139,6 +143,7 @@ class Motion(Pictured):
         return self.poses.condition
 
     # --- what moves -----------------------------------------------------------------------------------------------
+    @unlocked
     def point(self, name: str) -> PointMotion:
         """Motion of a named point.
 
@@ -147,16 +152,19 @@ class Motion(Pictured):
         DescriptionError
             Where no body has a point of that name.
         """
-        if name not in self.mechanism.points:
+        place = self.mechanism.points.get(name)
+        if place is None:
             raise DescriptionError(f"no point is named '{name}'")
-        return PointMotion(self, *self.mechanism.points[name], name)
+        return PointMotion(self, *place, name)
 
+    @unlocked
     def at(self, link: str, point: Point | str) -> PointMotion:
         """Motion of any point of a link: a name, or coordinates in the link's own axes."""
         if isinstance(point, str):
             return PointMotion(self, link, self.mechanism.bodies[link][point], point)
         return PointMotion(self, link, point if isinstance(point, complex) else as_point(point))
 
+    @unlocked
     def link(self, name: str) -> LinkMotion:
         """Motion of a link.
 
@@ -169,6 +177,7 @@ class Motion(Pictured):
             raise DescriptionError(f"no link is named '{name}'")
         return LinkMotion(self, name)
 
+    @unlocked
     def slide(self, name: str) -> SlideMotion:
         """Motion along the guide in which the named point runs."""
         for i, guide in enumerate(self.mechanism.guides):
@@ -176,13 +185,16 @@ class Motion(Pictured):
                 return SlideMotion(self, i)
         raise DescriptionError(f"no slot or slider runs at a point named '{name}'")
 
+    @unlocked
     def values(self, keys: Sequence[Quantity]) -> list[Any]:
-        """Quantities by their keys (`Recording.value`), (n,) each."""
+        """Quantities, (n,) each."""
         return self._values(tuple(keys))
 
+    @unlocked
     def value(self, key: Quantity) -> Any:
         """A quantity by its key, (n,)."""
-        return self._values((key,))[0]
+        result = None if self._one is None else self._one.value(key)
+        return self._values((key,))[0] if result is None else result
 
     def _values(self, keys: tuple[Quantity, ...]) -> list[Any]:
         if self._one is not None:
@@ -245,14 +257,18 @@ class Motion(Pictured):
         return Forces(self.poses)
 
     @property
+    @unlocked
     def effort(self) -> Reals:
         """The effort at the input by virtual work, (n,) N·m (N at a slide); (n, k) for k inputs.
 
         Static where speed and acceleration are zero (Riul, unit II, eq. 3), else with inertia loads (eq. 5).
         """
-        result = self._values(tuple(Effort(j) for j in range(len(self.mechanism.inputs))))
-        return result[0] if len(result) == 1 else np.stack(result, axis=1)
+        inputs = len(self.mechanism.inputs)
+        if inputs == 1:
+            return self.value(Effort(0))  # type: ignore[no-any-return]
+        return np.stack(self._values(tuple(Effort(j) for j in range(inputs))), axis=1)
 
+    @unlocked
     def reaction(self, joint: str, on: str) -> Reals:
         """The force of all others on a link at a joint, (n, 2) N (Ibrahim §2.2).
 
@@ -263,7 +279,7 @@ class Motion(Pictured):
         on : str
             A link that the joint holds.
         """
-        return xy(self._values((Reaction(joint, on),))[0])
+        return xy(self.value(Reaction(joint, on)))
 
     def applied(self, link: str) -> tuple[Complexes, Reals]:
         """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""
@@ -302,7 +318,7 @@ class Motion(Pictured):
         return Sensitivities(self.assembly, self.poses)
 
     def derivative(self, key: Quantity, path: str) -> Any:
-        """The derivative (n,) of a quantity, by its key (`Recording.value`), to the number at a path."""
+        """The derivative (n,) of a quantity, to the number at a path."""
         sensitivities = self.sensitivities
         return sensitivities.of([key], [sensitivities.dimension(path)])[0][0]
 

@@ -17,7 +17,7 @@ class Asked(Protocol):
     """What has quantities: the motion of one mechanism, (n,) each, or of variants, (v, n) each."""
 
     def value(self, key: Quantity) -> Any:
-        """A quantity by its key (`Recording.value`)."""
+        """A quantity."""
 
 
 class Whole(Asked, Protocol):
@@ -49,7 +49,7 @@ class PartOfMotion:
         self.motion = motion
 
     def key(self, order: int = 0) -> Quantity:
-        """What the position, the angle or a rate is asked for by (`Recording.value`)."""
+        """The position or the angle, or a rate of it, as `Motion.value` takes it."""
         raise NotImplementedError
 
     def value(self, order: int) -> Reals:
@@ -61,8 +61,7 @@ class PointRates(PartOfMotion):
     """A point of a link, and its rates."""
 
     def __init__(self, motion: Asked, body: str, place: complex, node: str | None = None) -> None:
-        super().__init__(motion)
-        self.body, self.place, self.node = body, place, node
+        self.motion, self.body, self.place, self.node = motion, body, place, node
         # a named point stands wherever the description, or a variant, has it
         self._where = 0j if node is not None else place
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from decimal import Decimal, localcontext
 from fractions import Fraction
+from math import isqrt
 from operator import mul
 from typing import Any
 
@@ -83,7 +84,10 @@ def taylor(
     if mgl:
         fast = max(fast, _power_of_two(np.sqrt(abs(mgl) / max(inertia))))
     moments = [_fixed(Fraction(x) / heavy) for x in inertia]
-    state = [*(_fixed(Fraction(x) / fast) for x in omega), *map(_fixed, attitude)]
+    direction = [_fixed(x) for x in attitude]
+    # the weight's torque would feel a length of 1 + 1e-16
+    size = isqrt(sum(x * x for x in direction))
+    state = [*(_fixed(Fraction(x) / fast) for x in omega), *((x << BITS) // size for x in direction)]
     left, push = _fixed(Fraction(time) * fast), _fixed(Fraction(mgl) / (heavy * fast * fast))
     given = [_fixed(Fraction(x) / (heavy * fast * fast)) for x in torque]
     length = sum(x * x for x in state[3:])

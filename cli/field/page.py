@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from balancing import initial_unbalance
 from balancing.sheet import machine_sheet
 from cli.field.field_balancing import FieldBalancing
 from cli.field.logs import spread
@@ -46,6 +47,12 @@ def sheet(b: FieldBalancing) -> Page:
             each = np.sqrt(np.einsum("spp->sp", covariance).real / 2)
             deviations = each, each
     weights = group.own_weights(0)
+    permissible, unbalance = None, None
+    if request.tolerance is not None:
+        of_one = b.in_kg_m(np.ones(1, dtype=complex))
+        permissible = (request.tolerance.shares(len(solved.planes)) / of_one).tolist()
+        readings = np.eye(len(group.channels))
+        unbalance = np.stack([initial_unbalance(solved.alpha[0], one, weights) for one in readings])
     return machine_sheet(
         np.asarray(solved.alpha[0]),
         np.asarray(group.initial[0]),
@@ -65,9 +72,8 @@ def sheet(b: FieldBalancing) -> Page:
         spread=deviations,
         limits=[b.max_mass.get(plane, b.max_mass.get("")) for plane in solved.planes] if b.max_mass else (),
         ceiling=b.ceiling,
-        permissible=None
-        if request.tolerance is None
-        else (request.tolerance.shares(len(solved.planes)) / b.in_kg_m(np.ones(1, dtype=complex))).tolist(),
+        permissible=permissible,
+        unbalance=unbalance,
         facts=[("Convention", sense(b)), *([("Objective", LEAST_SQUARES)] if b.limited else [])],
         places=None
         if request.places is None

@@ -62,6 +62,12 @@ def array(numbers: ArrayLike) -> DoubledArray:
     return DoubledArray.of(writtens(numbers))
 
 
+def plain(numbers: ArrayLike) -> DoubledArray:
+    """Numbers of a file that has no units, as the shortest decimals that are read as them."""
+    values = np.asarray(numbers, dtype=float)
+    return DoubledArray.of(doubled_array([Fraction(repr(x)) for x in values.ravel().tolist()], values.shape))
+
+
 def rates(numbers: ArrayLike) -> DoubledArray:
     """Angular velocities or accelerations of options, in SI, as they were written: in radians, or in degrees or turns.
 
@@ -87,6 +93,5 @@ def column(numbers: Numbers, rows: Sequence[int]) -> DoubledArray:
 
 def cosine_and_sine(angle: Numbers, rows: Sequence[int]) -> tuple[DoubledArray, DoubledArray]:
     """Cosines and sines of rows of a column of angles."""
-    values = np.nan_to_num(angle.values[list(rows)])
-    unit = vectors([Fraction(1)] * len(values), replace(angle, values=values))
+    unit = turns(replace(angle, values=np.nan_to_num(angle.values[list(rows)])))
     return DoubledArray.of(unit.x), DoubledArray.of(unit.y)

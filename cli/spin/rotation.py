@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,9 @@ from rigidbody3d import sleeping_threshold as threshold_of
 from rigidbody3d import steady_precession as steady_of
 from rigidbody3d.attitude import normalize, rotate
 from rigidbody3d.integration import MOST
+
+if TYPE_CHECKING:
+    from dalembert.arithmetic.doubled_arrays import DoubledArray
 
 Array = NDArray[np.float64]
 
@@ -44,8 +48,22 @@ class TurningBody:
     warnings: list[str]
     about: dict[str, str]
     """What the file says for the head of a report."""
-    rounded: Callable[[], Array] | None = None
-    """Bounds of the errors of the tensor of a body made of parts, (3, 3)."""
+    exact_tensor: Callable[[], DoubledArray] | None = None
+    """The tensor of a body made of parts to 32 digits, (3, 3)."""
+    written_attitude: Array | None = None
+    """The attitude as the file has it, of any length."""
+
+    def exact(self) -> TurningBody:
+        """Return the body in doubled numbers, the decimals of the file exact."""
+        from cli.read.exact import plain
+
+        written = self.written_attitude
+        same = written is not None and np.array_equal(normalize(written), self.attitude)
+        attitude: Any = plain(written if same and written is not None else self.attitude)
+        inertia: Any = self.exact_tensor() if self.exact_tensor is not None else plain(self.inertia)
+        mgl: Any = None if self.mgl is None else plain(self.mgl)
+        omega: Any = plain(self.omega)
+        return replace(self, inertia=inertia, omega=omega, attitude=attitude, mgl=mgl)
 
 
 def read_body(path: str) -> TurningBody:
@@ -67,7 +85,7 @@ def read_body(path: str) -> TurningBody:
         if not isinstance(top, dict) or set(top) != {"mgl"}:
             raise DataError(f"{file}: [top] holds mgl = weight times distance, N·m, and nothing else")
         mgl = float(_numbers(file, "top.mgl", top["mgl"], ()))
-    inertia, rounded, warnings = _inertia(file, path, document, mgl is not None)
+    inertia, exact_tensor, warnings = _inertia(file, path, document, mgl is not None)
     try:
         verdict = check(inertia)
     except ValueError as error:
@@ -85,9 +103,9 @@ def read_body(path: str) -> TurningBody:
     frame = document.get("frame", "body")
     if frame not in ("body", "space"):
         raise DataError(f'{file}: frame: found {frame!r}, expected "body" or "space"')
-    attitude = _numbers(file, "attitude", document.get("attitude", [1, 0, 0, 0]), (4,))
+    written = _numbers(file, "attitude", document.get("attitude", [1, 0, 0, 0]), (4,))
     try:
-        attitude = normalize(attitude)
+        attitude = normalize(written)
     except ValueError as error:
         raise DataError(f"{file}: attitude: {error}") from None
     return TurningBody(
@@ -101,14 +119,15 @@ def read_body(path: str) -> TurningBody:
         frame,
         warnings,
         about(file, document),
-        rounded,
+        exact_tensor,
+        written,
     )
 
 
 def _inertia(
     file: str, path: str, document: Mapping[str, object], top: bool
-) -> tuple[Array, Callable[[], Array] | None, list[str]]:
-    """Return the tensor, what bounds its errors where it is that of parts, and warnings."""
+) -> tuple[Array, Callable[[], DoubledArray] | None, list[str]]:
+    """Return the tensor, the one of parts to 32 digits as well, and warnings."""
     if ("inertia" in document) == ("parts" in document):
         raise DataError(f'{file}: expected inertia = [I1, I2, I3] (or a matrix) or parts = "parts.csv"')
     if "inertia" in document:
@@ -121,11 +140,13 @@ def _inertia(
     parts = read_parts(str((Path() if path == "-" else Path(path).parent) / named))
     point = [0.0, 0.0, 0.0] if top else None
     inertia = parts.whole.inertia if point is None else parts.whole.about(point)
-    return inertia, partial(_tensor_error, parts.whole, point), parts.warnings
+    return inertia, partial(_exact_tensor, parts.whole, point), parts.warnings
 
 
-def _tensor_error(body: Body, about: list[float] | None) -> Array:
-    return body.error_estimate(about).inertia
+def _exact_tensor(body: Body, about: list[float] | None) -> DoubledArray:
+    exact: Any = body.in_32_digits
+    tensor: DoubledArray = exact.inertia if about is None else exact.about(about)
+    return tensor
 
 
 def _numbers(file: str, key: str, value: object, *shapes: tuple[int, ...]) -> Array:
@@ -173,10 +194,7 @@ class Rotation:
             if np.abs(I - np.diag(np.diag(I))).max() > EQUAL * size:
                 return None
             I = np.diag(I)
-        if abs(I[0] - I[1]) > EQUAL * size:
-            return None
-        across = I[0] if I[0] == I[1] else (I[0] + I[1]) / 2
-        return np.array([across, across, I[2]])
+        return None if abs(I[0] - I[1]) > EQUAL * size else _round(I)
 
     @cached_property
     def exact(self) -> bool:
@@ -291,19 +309,38 @@ class Rotation:
         """The period of nutation of a top; None of any other body."""
         return finite(float(self.states.top.nutation_period)) if isinstance(self.states, TopState) else None
 
-    def bounds(self, of: str) -> Array:
-        """Bounds of the rounding errors of the states, of an integration of its method too."""
-        return self.states.error_estimate(of, self._tensor_errors)
+    def errors(self, of: str) -> Array:
+        """The errors of a quantity of the states by computing twice, of an integration of its method too."""
+        s, exact = self.states, self._exact
+        if isinstance(s, Trajectory):
+            return s.error_estimate(of, exact)
+        errors = s.error_estimate(of, exact[0])
+        if len(exact) > 1:
+            # two moments that differ by rounding were taken as one
+            errors = 3 * errors + 2 * s.error_estimate(of, exact[1])
+        return np.asarray(errors)
 
     @cached_property
-    def _tensor_errors(self) -> Array:
-        rounded = self.body.rounded
-        tensor = np.zeros((3, 3)) if rounded is None else rounded()
-        if not isinstance(self.states, TopState):
-            return tensor
-        # two moments that differ by rounding were taken as one
-        between = np.abs(np.diff(np.diag(_tensor(self.body.inertia))[:2]))[0] / 2
-        return np.asarray(np.diag(tensor) + [between, between, 0.0])
+    def _exact(self) -> Any:
+        """The states in doubled numbers; of an integration the tensor alone."""
+        body = self.body.exact()
+        I: Any = body.inertia
+        if isinstance(self.states, Trajectory):
+            return I if I.ndim == 2 else I[:, None] * np.eye(3)
+        from cli.read.exact import array
+
+        time: Any = array(self.time)
+        if isinstance(self.states, FreeState):
+            return [FreeBody(I, body.omega, body.attitude).at(time)]
+        mgl: Any = body.mgl
+        moments = I if I.ndim == 1 else np.diagonal(I)
+        each = [_round(moments), *([moments[[0, 0, 2]]] if (moments[0] != moments[1]).any() else [])]
+        return [Top(about, mgl, body.omega, body.attitude).at(time) for about in each]
+
+
+def _round(I: Array) -> Array:
+    """Moments (I1, I1, I3) of those of a top, (3,)."""
+    return (I[[0, 1, 2]] + I[[1, 0, 2]]) / 2
 
 
 def _tensor(inertia: Array) -> Array:

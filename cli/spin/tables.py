@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,8 +43,7 @@ def states(r: Rotation, only: Collection[str] = QUANTITIES) -> Table:
     s = r.states
 
     def error(of: str) -> Callable[[], Array]:
-        # a turn by an angle moves a quaternion by half of it
-        return lambda: r.bounds(of) / 2 if of == "attitude" else r.bounds(of)
+        return partial(r.errors, "quaternion" if of == "attitude" else of)
 
     columns = [number("t", "time", r.time + 0.0)]
     for name, dimension, axes in (

@@ -34,14 +34,14 @@ def run(own: Options, show: ShowOptions) -> Result:
     from cli.cases.quantities import unknown
     from cli.read.options import bad
     from cli.tolerance.spread import Spreads
-    from virtualwork import quantities
+    from virtualwork.quantities import places
 
     if own.draws is not None and own.draws < 2:
         raise bad("--draws", f"{own.draws}: expected two or more drawn mechanisms")
     order = None if own.order is None else ORDERS.index(own.order)
     call = Call.of(own, show, Request(own.file, names(own.only), order))
     only = call.request.only
-    if only is not None and unknown(quantities.places(call.mechanism, 3, only), only) is not None:
+    if only is not None and unknown(places(call.mechanism, 3, only), only) is not None:
         call.request = call.request._replace(forces=True)
     call.check_names()
     workers = 1 if call.varied is not None else call.workers

@@ -8,7 +8,7 @@ run.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any
@@ -144,6 +144,30 @@ class DoubledArray(NDArrayOperatorsMixin):
         return NotImplemented
 
 
+class DoubledComplex:
+    """x + iy of doubled arrays, for formulas of complex arrays.
+
+    >>> z = DoubledComplex(DoubledArray(1.0), DoubledArray(2.0))
+    >>> (z * z.conj()).real.value
+    array(5.)
+    """
+
+    def __init__(self, real: Any, imag: Any) -> None:
+        self.real, self.imag = real, imag
+
+    def conj(self) -> DoubledComplex:
+        """The conjugate."""
+        return DoubledComplex(self.real, -self.imag)
+
+    def __mul__(self, other: DoubledComplex | DoubledArray) -> DoubledComplex:
+        if isinstance(other, DoubledComplex):
+            return DoubledComplex(
+                self.real * other.real - self.imag * other.imag,
+                self.real * other.imag + self.imag * other.real,
+            )
+        return DoubledComplex(self.real * other, self.imag * other)
+
+
 @lru_cache(maxsize=256)
 def _constant(x: float) -> Doubled:
     """A constant of a formula as it is written: a short decimal, or π times a power of two."""
@@ -209,6 +233,13 @@ def _root(x: Doubled) -> Doubled:
     return DOUBLED.sqrt(Doubled(np.asarray(x.high), x.low))
 
 
+def _hypot(a: DoubledArray, b: DoubledArray) -> DoubledArray:
+    # by a power of two near the larger: no square underflows
+    size = np.exp2(np.floor(np.log2(np.maximum(np.maximum(np.abs(a.high), np.abs(b.high)), 1e-290))))
+    x, y = a / size, b / size
+    return np.sqrt(x * x + y * y) * size  # type: ignore[no-any-return]
+
+
 def _angle(y: Doubled, x: Doubled) -> Doubled:
     angle = DOUBLED.atan2(*(Doubled(np.asarray(part.high), part.low) for part in (y, x)))
     # on the axes, and with the sign of a zero, as floats have it
@@ -265,7 +296,7 @@ def exponential(x: Any) -> Any:
         less = r + less * r / n if n == 9 else r * (1.0 + less / n)
     for _ in range(10):
         less = less * (less + 2.0)
-    power = np.exp2(np.clip(k, -1000, 1000))
+    power = np.exp2(np.clip(k, -1022, 1022))
     e = less + 1.0
     return DoubledArray(e.high * power, e.low * power)
 
@@ -290,7 +321,7 @@ _UFUNCS: dict[Any, Callable[..., Any]] = {
     np.square: _of(lambda x: x * x),
     np.power: _power,
     np.sqrt: _of(_root),
-    np.hypot: _of(lambda a, b: _root(a * a + b * b)),
+    np.hypot: _hypot,
     np.sin: _of(DOUBLED.sin),
     np.cos: _of(DOUBLED.cos),
     np.arctan2: _of(_angle),
@@ -298,7 +329,13 @@ _UFUNCS: dict[Any, Callable[..., Any]] = {
     np.copysign: lambda x, y: _chosen(x, -x, np.signbit(x.high) == np.signbit(y.high)),
     np.minimum: lambda a, b: _chosen(a, b, a < b),
     np.maximum: lambda a, b: _chosen(a, b, a > b),
+    np.arcsinh: lambda x: np.copysign(logarithm(np.abs(x) + np.sqrt(x * x + 1.0)), x),
+    np.cosh: lambda x: (exponential(x) + exponential(-x)) / 2.0,
+    np.tanh: lambda x: np.copysign(1.0 - 2.0 / (exponential(np.abs(x) * 2.0) + 1.0), x),
     np.rint: _rint,
+    # of whole numbers
+    np.fmod: lambda x, y: DoubledArray(np.fmod(x.high, y.high)),
+    np.remainder: lambda x, y: DoubledArray(np.remainder(x.high, y.high)),
     np.isfinite: lambda x: np.isfinite(x.high),
     np.isinf: lambda x: np.isinf(x.high),
     np.isnan: lambda x: np.isnan(x.high),
@@ -333,9 +370,21 @@ _OWN: dict[Any, Callable[..., Any]] = {
 }
 
 
-def exactly(numbers: Sequence[Fraction], shape: tuple[int, ...]) -> DoubledArray:
+def exactly(numbers: Iterable[Fraction], shape: tuple[int, ...]) -> DoubledArray:
     """Exact numbers as a doubled array of this shape."""
     each = [Doubled.of(x) for x in numbers]
     return DoubledArray(
         np.array([x.high for x in each]).reshape(shape), np.array([x.low for x in each]).reshape(shape)
     )
+
+
+def by_fractions(formula: Callable[..., Fraction], *numbers: DoubledArray) -> DoubledArray:
+    """A formula of arrays of one shape in fractions, number by number: what cancels in it is exact.
+
+    >>> by_fractions(lambda a, b: a - b, DoubledArray([1.0], [1e-30]), DoubledArray([1.0])).value
+    array([1.e-30])
+    """
+    rows = [
+        [Fraction(a) + Fraction(b) for a, b in zip(x.high.flat, x.low.flat, strict=True)] for x in numbers
+    ]
+    return exactly([formula(*row) for row in zip(*rows, strict=True)], numbers[0].shape)

@@ -62,6 +62,12 @@ def alone(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S, P],
     return held
 
 
+def unlocked(method: Callable[P, R]) -> Callable[P, R]:
+    """Let any thread into a method of a guarded class at any time: it changes nothing but what takes the lock itself."""
+    method.__dict__["unlocked"] = True
+    return method
+
+
 class Once(cached_property[Any]):
     """A property that is worked out once, by one thread, and kept."""
 
@@ -79,7 +85,7 @@ class Once(cached_property[Any]):
 
 
 def guarded(kind: Kind) -> Kind:
-    """Let one thread at a time into all methods and properties of a class, but those that begin with `_`.
+    """Let one thread at a time into all methods and properties of a class, but `unlocked` ones and those that begin with `_`.
 
     The class has a property or an attribute `lock`. What it inherits is guarded where its base is.
     """
@@ -88,7 +94,7 @@ def guarded(kind: Kind) -> Kind:
             once = Once(member.func)
             once.__set_name__(kind, name)
             setattr(kind, name, once)
-        elif name.startswith("_") or name == "lock":
+        elif name.startswith("_") or name == "lock" or hasattr(getattr(member, "fget", member), "unlocked"):
             continue
         elif isinstance(member, FunctionType):
             setattr(kind, name, alone(member))

@@ -30,6 +30,16 @@ def in_32_digits(x: ArrayLike) -> Any:
     return x if is_doubled(x) else DoubledArray(x)
 
 
+def filled(shape: Shape, value: float, like: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return an array of one value, of numbers of the kind of another array.
+
+    >>> filled((2,), 0.5, np.zeros(3))
+    array([0.5, 0.5])
+    """
+    numbers = np.full(shape, value)
+    return as_array(in_32_digits(numbers)) if is_doubled(like) else numbers
+
+
 def sorting(x: NDArray[np.float64]) -> NDArray[np.intp]:
     """Return the order in which the numbers of the last axis ascend."""
     if is_doubled(x):

@@ -56,7 +56,8 @@ function update() {
   cancelAnimationFrame(due);
   due = 0;
   copied("");
-  if (wrong.size) $("limits").textContent = "";
+  // those of the earlier numbers
+  $("limits").textContent = "";
   recompute(whole);
   for (const { series, parts } of figures) {
     for (const [k, shape] of series.shapes.entries()) if (shape.s !== undefined) parts[k].setAttribute("r", Math.max(shape.s * scale, LEAST[shape.r] ?? 0).toFixed(2));
@@ -254,8 +255,10 @@ const handleParts = model.handles.map((handle) => {
     grip = [px(x) - event.clientX, py(y) - event.clientY];
     moved = false;
     event.preventDefault();
-    group.focus();
+    group.focus({ preventScroll: true });
   });
+  // a finger on a handle never scrolls the page, though the drawing around it does
+  group.addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
   group.addEventListener("pointermove", (event) => {
     if (!grip) return;
     // a touch alone changes nothing

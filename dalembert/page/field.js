@@ -85,13 +85,15 @@ solveSheet = () => {
     const limits = [];
     if (sheet.ceiling !== null) limits.push([stands.every((x) => x <= sheet.ceiling * (1 + 1e-9)), TEXTS.vibrationWithin]);
     if (sheet.permissible) limits.push([sheet.permissible[p] !== null && out.get(`left ${last} ${p}`)[0] <= sheet.permissible[p], TEXTS.unbalanceWithin]);
-    if (!Number(shownAnswer(`trim.${plane}.${word}`, sheet.mass.si))) idle.push(TEXTS.idle(plane, TEXTS.nothingLeft));
+    if (nothing(plane) && !answers.has(`fresh.${plane}.${word}`)) idle.push(TEXTS.idle(plane, TEXTS.nothingLeft));
     else if (sheet.errors && answer(`trim.${plane}.${word}`) < answer(`trim.${plane}.${word}_uncertainty`)) idle.push(TEXTS.idle(plane, TEXTS.belowUncertainty));
     else if (limits.length && limits.every(([met]) => met)) idle.push(TEXTS.idle(plane, limits.map(([, why]) => why).join(TEXTS.and)));
     if (sheet.limits[p] !== null && answer(`${plane}.${word}`) > sheet.limits[p] * (1 + 1e-12)) beyond.push(TEXTS.beyondLimit(plane, amount(answer(`${plane}.${word}`)), amount(sheet.limits[p])));
   });
   sheet.sensors.forEach((sensor, s) => {
-    answers.set(`residual/${sensor}/amplitude`, out.get(`residual ${s} size`));
+    // rounding of nothing is nothing, as in the program
+    const left = out.get(`residual ${s} size`);
+    answers.set(`residual/${sensor}/amplitude`, left[0] > 1e-12 * out.get(`initial ${s} size`)[0] ? left : [0, 0]);
     answers.set(`residual/${sensor}/phase`, phase(`residual ${s} angle`));
   });
   // a reading that is farther off what the others say than three of its own standard deviations
@@ -106,9 +108,12 @@ solveSheet = () => {
   }
   if (sheet.places) sheet.planes.forEach(splitOn);
 };
+// whether no digit of a trim holds
+const nothing = (plane) => !Number(shownAnswer(`trim.${plane}.${word}`, sheet.mass.si));
 // a trim on the two places on either side of it, or where these do not reach it on the nearer one
 function splitOn(plane) {
   const [size, angle] = [answer(`trim.${plane}.${word}`), answer(`trim.${plane}.angle`)];
+  if (nothing(plane)) return;
   const k = sheet.places.findLastIndex(([, place]) => place <= angle);
   const pair = [sheet.places.at(k), sheet.places.at((k + 1) % sheet.places.length)];
   const [low, high] = pair.map(([, place]) => place);
@@ -162,7 +167,7 @@ function build() {
   }
   update();
 }
-const R = 78; // of a dial
+const R = 70; // of a dial
 function dial(parent, plane) {
   const host = put(parent, "figure");
   put(host, "figcaption", {}, TEXTS.dial(plane));
@@ -173,7 +178,7 @@ function dial(parent, plane) {
     const [x, y] = at(place, R);
     put(picture, "circle", { class: "place", cx: x, cy: y, r: 4 });
   }
-  const marks = (sheet.places ? [`split.${plane}.1`, `split.${plane}.2`] : [`trim.${plane}`]).map((name, i) => [answer(`${name}.angle`), answer(`${name}.${word}`), placeNames.get(plane)?.[i]]).filter(([angle, size]) => Number.isFinite(angle) && size > 0);
+  const marks = (sheet.places ? [`split.${plane}.1`, `split.${plane}.2`] : [`trim.${plane}`]).map((name, i) => [answer(`${name}.angle`), answer(`${name}.${word}`), placeNames.get(plane)?.[i]]).filter(([angle, size]) => Number.isFinite(angle) && size > 0 && !nothing(plane));
   // the words of two marks that are close stand farther apart
   const between = marks.length < 2 ? 0 : Math.atan2(Math.sin(marks[1][0] - marks[0][0]), Math.cos(marks[1][0] - marks[0][0]));
   const apart = between ? (Math.sign(between) * Math.max(0, 0.7 - Math.abs(between))) / 2 : 0;

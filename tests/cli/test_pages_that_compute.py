@@ -267,6 +267,12 @@ def test_a_parallelogram_goes_through_its_change_points(
         assert apart.max() < 1e-9
 
 
+def touch(page: Computing, kind: str, at: list[tuple[float, float]]) -> None:
+    """A finger, as the browser gets it from the screen."""
+    points = [{"x": x, "y": y} for x, y in at]
+    page.browser.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True])
 def test_it_fits_a_phone_and_can_be_touched(klann: Computing, dark: bool) -> None:
@@ -288,17 +294,24 @@ def test_it_fits_a_phone_and_can_be_touched(klann: Computing, dark: bool) -> Non
         assert klann(
             "return [...document.querySelectorAll('input')].every((i) => i.getAttribute('aria-label'))"
         )
-        # a finger moves a handle
-        klann(
-            "const h = document.querySelector('[data-name=\"links.crank.B\"]'), r = h.querySelector('.knob').getBoundingClientRect();"
-            "h.setPointerCapture = () => {};"
-            "const at = (k) => ({pointerId: 1, pointerType: 'touch', bubbles: true, clientX: r.x + r.width / 2 + k, clientY: r.y});"
-            "h.dispatchEvent(new PointerEvent('pointerdown', at(0)));"
-            "h.dispatchEvent(new PointerEvent('pointermove', at(9)));"
-            "h.dispatchEvent(new PointerEvent('pointerup', at(9)))"
-        )
-        time.sleep(0.2)
-        assert klann.get("links.crank.B.x") != 0.12
+        # a finger moves a handle, up and down too, and the page stays where it is; beside it the page scrolls
+        klann.browser.refresh()
+        scrolled, length = [], []
+        for start in ('[data-name="links.crank.B"] .knob', "#view svg"):
+            corner = "const r = document.querySelector(arguments[0]).getBoundingClientRect();"
+            inside = "[r.x + r.width / 2, r.y + r.height / 2]" if "knob" in start else "[r.x + 9, r.y + 150]"
+            x, y = klann(f"{corner} return {inside}", start)
+            touch(klann, "touchStart", [(x, y)])
+            for k in range(1, 9):
+                touch(klann, "touchMove", [(x + k, y - 5 * k)])
+                time.sleep(0.02)
+            touch(klann, "touchEnd", [])
+            time.sleep(0.3)
+            scrolled.append(klann("return scrollY"))
+            length.append(abs(klann.get("links.crank.B.x") + 1j * klann.get("links.crank.B.y")))
+        assert scrolled[0] == 0
+        assert scrolled[1] > 10
+        assert length[0] == length[1] > 0.15
     finally:
         klann.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
         klann.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})

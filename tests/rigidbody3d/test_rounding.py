@@ -198,7 +198,8 @@ def test_states_in_time_have_bounds_of_their_own_shapes() -> None:
             state.error_estimate("speed")
     late = many.error_estimate()
     assert (late[:, 2] > 1e4 * late[:, 0]).all()
-    assert (many.error_estimate("momentum")[:, 2] == many.error_estimate("momentum")[:, 0]).all()
+    # momentum stays what it was however late the state is
+    assert many.error_estimate("momentum").max() < 8 * EPS * np.abs(many.body.momentum).max()
     assert many.body.error_estimate().shape == (2,)
     with pytest.raises(ValueError, match="expected one of period"):
         many.body.error_estimate("attitude")
@@ -209,17 +210,19 @@ def test_states_in_time_have_bounds_of_their_own_shapes() -> None:
 
 
 def test_a_tensor_that_was_worked_out_carries_its_errors_on() -> None:
-    tilted = tensor(2.0, 3.0, 4.0, ixy=0.3)
-    body = FreeBody(tilted, [1.0, 0.2, 0.1])
-    off = np.full((3, 3), 1e-9)
-    state = body.at([50.0])
-    for of in ("attitude", "omega", "momentum", "energy"):
-        assert state.error_estimate(of, off).max() > 1e3 * state.error_estimate(of).max()
-    # another tensor within that: no further off than the bound, and the bound no idle one
-    other = FreeBody(tilted + 1e-9 * np.eye(3), [1.0, 0.2, 0.1]).at([50.0])
-    apart = float(angle_between(other.attitude, state.attitude)[0])
-    assert apart < state.error_estimate(tensor=off)[0] < 1e4 * apart
-    assert body.error_estimate("period", off) > 1e3 * body.error_estimate("period")
+    tilted, omega = tensor(2.0, 3.0, 4.0, ixy=0.3), [1.0, 0.2, 0.1]
+    body = FreeBody(tilted, omega)
+    # to 32 digits the tensor is another one
+    other = FreeBody(DoubledArray(tilted) + 1e-9 * np.eye(3), omega)
+    state, exact = body.at([50.0]), other.at([50.0])
+    for of in ("attitude", "quaternion", "omega", "momentum", "energy"):
+        assert state.error_estimate(of, exact).max() > 1e3 * state.error_estimate(of).max()
+    near = FreeBody(tilted + 1e-9 * np.eye(3), omega).at([50.0])
+    apart = float(angle_between(near.attitude, state.attitude)[0])
+    assert apart < state.error_estimate("attitude", exact)[0] < 1.02 * apart
+    assert body.error_estimate("period", other) > 1e3 * body.error_estimate("period")
+    run = integrate(tilted, omega, t=[50.0])
+    assert apart < run.error_estimate("attitude", DoubledArray(tilted) + 1e-9 * np.eye(3))[0] < 1.1 * apart
 
 
 @pytest.mark.parametrize("method", ["DOP853", "RK45", "splitting"])

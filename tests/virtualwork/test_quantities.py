@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import pickle
 
+import numpy as np
 import pytest
+from mpmath import mp
 
+from virtualwork import Input, Link, Mechanism, TorsionSpring
 from virtualwork.digits.exact import Gap
 from virtualwork.family.part import Assembled
 from virtualwork.formulas.balanced import Over
@@ -77,3 +80,23 @@ def test_fields_orders_and_what_is_nothing() -> None:
     assert not NOTHING
     with pytest.raises(AttributeError):
         point.order = 1  # type: ignore[misc]
+
+
+def test_the_error_of_what_acts_on_a_link() -> None:
+    """The torque of a torsion spring, against itself in fifty digits."""
+    arm = Mechanism(
+        {"O": 0j},
+        {"arm": Link({"O": 0j, "P": 1})},
+        inputs=Input(link="arm"),
+        torsion_springs=[TorsionSpring(("ground", "arm"), 0.3, 0.1)],
+    )
+    q = np.linspace(0.2, 1.3, 7)
+    motion = arm.motion(q)
+    _, torque = motion.applied("arm")
+    force_error, error = motion.dynamics.error_estimate().applied("arm")
+    with mp.workdps(50):
+        true = [-mp.mpf(0.3) * (mp.mpf(x) - mp.mpf(0.1)) for x in q.tolist()]
+        off = np.array([float(abs(mp.mpf(x) - y)) for x, y in zip(torque.tolist(), true, strict=True)])
+    assert (force_error == 0).all()
+    assert (off <= 1.0001 * error + 1e-30).all()
+    assert (error <= 4 * np.spacing(np.abs(torque))).all()

@@ -47,7 +47,7 @@ Values = Callable[[Sequence[Quantity]], Sequence[Any]]
 
 @guarded
 class Estimates:
-    """Estimates of the rounding errors of quantities, by their keys (`Recording.value`).
+    """Estimates of the rounding errors of quantities.
 
     Parameters
     ----------

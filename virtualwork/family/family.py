@@ -245,7 +245,7 @@ class FamilyMotion:
             yield number, slice(i, min(i + each, v))
 
     def values(self, keys: Sequence[Quantity]) -> list[Any]:
-        """Quantities by their keys (`Recording.value`), each (v, n), real or complex."""
+        """Quantities, each (v, n), real or complex."""
         new = tuple(key for key in keys if key not in self._known)
         if new:
             rows = [rows for _, rows in self.parts()]

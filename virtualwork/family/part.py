@@ -201,7 +201,7 @@ class Solver:
         return np.asarray(~np.logical_and.reduce([margin > 0 for margin in margins.values()]))
 
     def values(self, keys: Sequence[Quantity], out: Sequence[NDArray[Any]] | None = None) -> list[Any]:
-        """Quantities by their keys (`Recording.value`), each (v, n); NaN where a pose is not assembled.
+        """Quantities, each (v, n); NaN where a pose is not assembled.
 
         `out`: where to write them, as `room` has it.
         """

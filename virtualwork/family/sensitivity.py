@@ -58,7 +58,7 @@ class Sensitivities:
         return result[0]
 
     def of(self, keys: Sequence[Quantity], dimensions: Sequence[Dimension]) -> list[list[Any]]:
-        """The derivative of each quantity (`Recording.value`) to each dimension, (n,), real or complex.
+        """The derivative of each quantity to each dimension, (n,), real or complex.
 
         Raises
         ------

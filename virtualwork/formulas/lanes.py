@@ -38,8 +38,8 @@ OFTEN = 50
 # tapes of later requests that an assembly keeps
 MANY = 256
 
-# a function of floats, the places of its arguments among the input and its rates, and whether each result is a vector
-Ready = tuple[Callable[..., tuple[float, ...]], tuple[int, ...], tuple[bool, ...]]
+# quantities of one pose, real or complex, as a function of the input, its speed, acceleration and jerk
+Ready = Callable[[float, float, float, float], tuple[complex, ...]]
 
 
 class Turning(Branch, Protocol):
@@ -90,7 +90,7 @@ class Turning(Branch, Protocol):
 
 @guarded
 class Lanes(Poses):
-    """Poses of an assembly whose quantities come from the tape, by their keys (`Recording.value`).
+    """Poses of an assembly whose quantities come from the tape.
 
     Parameters are those of `Poses`.
     """
@@ -215,16 +215,14 @@ class Lanes(Poses):
         """Work out one pose that depends on nothing but its input, by a function of floats; False where it depends on more."""
         given = [self.inputs, *(rates[0] for rates in self.rates)]
         values = [x if isinstance(x, float) else float(np.ravel(x)[0]) for x in given]
-        made = ready(self.branch, tuple(x != 0.0 for x in values[1:]), keys)
-        if made is None:
+        function = ready(self.branch, tuple(x != 0.0 for x in values[1:]), keys)
+        if function is None:
             return False
-        function, places, vectors = made
         try:
-            found = iter(function(*[values[i] for i in places]))
+            result = function(*values)
         except (ZeroDivisionError, ValueError, OverflowError):
             return False
-        for key, vector in zip(keys, vectors, strict=True):
-            self.known[key] = np.array([complex(next(found), next(found)) if vector else next(found) + 0.0])
+        self.known.update((key, np.array([value])) for key, value in zip(keys, result, strict=True))
         return True
 
     def _run(self, keys: list[Quantity]) -> None:
@@ -428,8 +426,7 @@ def _made(branch: Turning, moves: tuple[bool, ...], keys: tuple[Quantity, ...]) 
     if poses.inputs.shape[1] > 1 or not (branch.settled and poses.takes(keys)) or branch.may_open:
         return None
     tape = taped(branch, recorded(branch, moves), keys)
-    arguments = [f"{name}0" for name in NAMES]
+    arguments = tuple(f"{name}0" for name in NAMES)
     if not floats.takes(tape) or not set(tape.inputs) <= set(arguments):
         return None
-    places = tuple(arguments.index(name) for name in tape.inputs)
-    return floats.compiled(tape), places, tuple(len(key.names) == 2 for key in keys)
+    return floats.compiled(tape, among=arguments, vectors=tuple(len(key.names) == 2 for key in keys))

@@ -97,8 +97,7 @@ def xy(z: Complexes) -> Reals:
     >>> xy(np.array([1 + 2j]))
     array([[1., 2.]])
     """
-    z = np.ascontiguousarray(z)
-    return z.view(float).reshape(*z.shape, 2)
+    return z[..., None].view(float)
 
 
 # --- linear systems of loops: from complex columns to real solutions, over all poses together ------------------------

@@ -14,20 +14,19 @@ from dalembert.dataclass import dataclass, field
 from virtualwork.formulas.lanes import OFTEN, Ready, Turning, ready
 from virtualwork.formulas.quantity import Quantity
 
-RATES = ("speed", "acceleration", "jerk")
-
 
 @dataclass
 class Together:
-    """What a first request brings: the function, its quantities, and how often others were requested after it."""
+    """What a first request brings, a function and its quantities, and how often others were requested after it."""
 
-    function: Ready
-    keys: tuple[Quantity, ...]
+    brought: tuple[Ready, tuple[Quantity, ...]]
     later: dict[tuple[Quantity, ...], int] = field(default_factory=dict)
 
 
 class OnePose:
     """The quantities of one pose that depend on nothing but its input and its rates.
+
+    Several threads may ask it: each number is put down whole, and the first that was put down stays.
 
     Parameters
     ----------
@@ -36,71 +35,76 @@ class OnePose:
         The input, its speed, acceleration and jerk.
     """
 
-    __slots__ = ("_first", "_moves", "branch", "known", "numbers")
+    __slots__ = ("_first", "branch", "known", "numbers")
 
     def __init__(self, branch: Turning, numbers: tuple[float, float, float, float]) -> None:
         self.branch, self.numbers = branch, numbers
-        self._moves = numbers[1] != 0.0, numbers[2] != 0.0, numbers[3] != 0.0
         self.known: dict[Quantity, float | complex] = {}
         self._first: Together | None = None
+
+    def value(self, key: Quantity) -> Any:
+        """A quantity, (1,); None where a function of floats has not been made of it, or fails."""
+        known = self.known
+        if key not in known and not self._work_out((key,)):
+            return None
+        return np.array([known[key]])
 
     def values(self, keys: tuple[Quantity, ...]) -> list[Any] | None:
         """Quantities, (1,) each; None where a function of floats has not been made of them, or fails."""
         known = self.known
-        new = tuple(key for key in keys if key not in known)
+        new = tuple([key for key in keys if key not in known])
         if new and not self._work_out(new):
             return None
         return [np.array([known[key]]) for key in keys]
 
     def _work_out(self, keys: tuple[Quantity, ...]) -> bool:
-        made: Ready | None = self.branch.recordings.get(("ready", self._moves, keys))
+        recordings, (_, speed, acceleration, jerk) = self.branch.recordings, self.numbers
+        moves = speed != 0.0, acceleration != 0.0, jerk != 0.0
+        first = self._first
+        if first is None:
+            every = recordings.get("together")
+            first = None if every is None else every.get((moves, keys))
+            if first is not None:
+                self._first = first
+                return self._run(*first.brought)
+        made: Ready | None = recordings.get(("ready", moves, keys))
         if made is None:
             return False
-        if self._first is None:
-            every = self.branch.recordings.setdefault("together", {})
-            name = self._moves, keys
-            self._first = every.get(name) or every.setdefault(name, Together(made, keys))
-            return self._run(self._first.function, self._first.keys)
-        first = self._first
-        first.later[keys] = first.later.get(keys, 0) + 1
-        if first.later[keys] == OFTEN:
-            wanted = tuple(dict.fromkeys((*first.keys, *keys)))
-            together = ready(self.branch, self._moves, wanted)
+        if first is None:
+            every = recordings.setdefault("together", {})
+            self._first = every.setdefault((moves, keys), Together((made, keys)))
+            return self._run(made, keys)
+        count = first.later[keys] = first.later.get(keys, 0) + 1
+        if count == OFTEN:
+            wanted = tuple(dict.fromkeys((*first.brought[1], *keys)))
+            together = ready(self.branch, moves, wanted)
             if together is not None:
-                first.function, first.keys = together, wanted
+                first.brought = together, wanted
         return self._run(made, keys)
 
     def _run(self, made: Ready, keys: tuple[Quantity, ...]) -> bool:
-        function, places, vectors = made
-        numbers = self.numbers
         try:
-            found = iter(function(*[numbers[i] for i in places]))
+            result = made(*self.numbers)
         except (ZeroDivisionError, ValueError, OverflowError):
             return False
-        for key, vector in zip(keys, vectors, strict=True):
-            self.known[key] = complex(next(found), next(found)) if vector else next(found) + 0.0
+        keep = self.known.setdefault
+        for key, value in zip(keys, result, strict=True):
+            keep(key, value)
         return True
 
 
-def one_pose(branch: Turning, given: tuple[Any, ...]) -> OnePose | None:
-    """The one pose at a float, over one input; None where it is anything else.
-
-    Parameters
-    ----------
-    given : tuple
-        The input, its speed, acceleration and jerk, as they are requested; None: the description's own.
-    """
-    angle, *rates = given
-    if not isinstance(angle, float):
-        return None
+def one_pose(branch: Turning, angle: Any, speed: Any, acceleration: Any, jerk: Any) -> OnePose | None:
+    """The one pose at a float, over one input; None where it is anything else. A rate of None is the description's own."""
     entries = branch.mechanism.inputs
-    if len(entries) > 1:
+    if not isinstance(angle, float) or len(entries) > 1:
         return None
-    numbers = [angle]
-    for name, value in zip(RATES, rates, strict=True):
-        if value is None:
-            value = getattr(entries[0], name) or 0.0
-        elif not isinstance(value, float):
-            return None
-        numbers.append(value)
-    return OnePose(branch, (numbers[0], numbers[1], numbers[2], numbers[3]))
+    own = entries[0]
+    if speed is None:
+        speed = own.speed or 0.0
+    if acceleration is None:
+        acceleration = own.acceleration or 0.0
+    if jerk is None:
+        jerk = own.jerk or 0.0
+    if isinstance(speed, float) and isinstance(acceleration, float) and isinstance(jerk, float):
+        return OnePose(branch, (angle, speed, acceleration, jerk))
+    return None

@@ -130,7 +130,7 @@ class Run:
         return result
 
     def rounding(self, key: Quantity) -> Reals:
-        """What the evaluation of a quantity at the states rounds, (n,), by its key (`Recording.value`): computed twice.
+        """What the evaluation of a quantity at the states rounds, (n,): computed twice.
 
         Friction at rest is no force by the formula, and redundant statics is solved in another way: of forces with these, 0.
         """

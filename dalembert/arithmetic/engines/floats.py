@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import lru_cache
+from typing import Any
 
 from dalembert.arithmetic.loop import called
 from dalembert.arithmetic.recorded import binade
@@ -16,8 +17,12 @@ DEEPEST = 12  # operations of one expression
 
 @lru_cache(maxsize=256)
 def compiled(
-    tape: Tape, passed: tuple[str, ...] = (), found: tuple[str, ...] = ()
-) -> Callable[..., tuple[float, ...]]:
+    tape: Tape,
+    passed: tuple[str, ...] = (),
+    found: tuple[str, ...] = (),
+    among: tuple[str, ...] = (),
+    vectors: tuple[bool, ...] = (),
+) -> Callable[..., tuple[Any, ...]]:
     """The tape as a function of floats: inputs in the order of `tape.inputs`, outputs in that of `tape.outputs`.
 
     It raises where Python's own arithmetic does: ZeroDivisionError, ValueError (a root), OverflowError.
@@ -29,8 +34,12 @@ def compiled(
         Of the body of a `loop.Loop`: what each call is given, which may be nothing, and what it finds. Where `found`
         is not empty the function that is called comes first among the arguments, and what calls are given is no
         output. A call whose results nothing uses is left out.
+    among : names, optional
+        The arguments, among which the inputs are; by default the inputs alone.
+    vectors : tuple of bool, optional
+        Whether each result is a complex number, of two outputs; one of a single output has no −0 then.
     """
-    inputs = [name for name in tape.inputs if called(name) is None]
+    inputs = list(among) or [name for name in tape.inputs if called(name) is None]
     places = dict(tape.outputs)
     uses = [0] * len(tape.operations)
     for kind, *arguments in tape.operations:
@@ -71,7 +80,11 @@ def compiled(
                 text.append(f"v{number}")
                 depth.append(0)
     names = ", ".join([*(["f"] if found else []), *(f"x{k}" for k in range(len(inputs)))])
-    results = "".join(f"{text[number]}, " for name, number in tape.outputs if called(name) is None)
+    values = [text[number] for name, number in tape.outputs if called(name) is None]
+    if vectors:
+        rest = iter(values)
+        values = [f"complex({next(rest)}, {next(rest)})" if v else f"{next(rest)} + 0.0" for v in vectors]
+    results = "".join(f"{value}, " for value in values)
     source = (
         f"def tape({names}):\n" + "".join(f"    {line}\n" for line in lines) + f"    return ({results})\n"
     )
