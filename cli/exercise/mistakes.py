@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from cli.exercise import motion_slips, rotor_slips, work_slips
+from cli.exercise import load_slips, motion_slips, rotor_slips, work_slips
 from cli.exercise.recomputed import Recomputed
 from cli.exercise.slips import Candidates, joined
 from cli.exercise.variants import Variant
@@ -23,5 +23,11 @@ def _of_question(variant: Variant, k: int, runs: Recomputed) -> Candidates:
     own = None if provider is None else provider(variant, k)
     if own is not None:
         return own
-    singles, pairs = motion_slips.slips(variant, k)
-    return Candidates(variant.answers[k], [*singles, *runs.slips(k)], joined([pairs, partial(runs.pairs, k)]))
+    answer = variant.answers[k]
+    parts, pairs = motion_slips.slips(variant, k)
+    of_loads, two_loads = (
+        load_slips.slips(answer, k, runs.loads) if load_slips.is_sum(answer) else ([], lambda: None)
+    )
+    return Candidates(
+        answer, [*parts, *of_loads, *runs.slips(k)], joined([pairs, two_loads, partial(runs.pairs, k)])
+    )

@@ -14,6 +14,7 @@ import numpy as np
 
 from cli.exercise.answers import Answer, Solved
 from cli.exercise.description import Value
+from cli.exercise.load_slips import Load, loads
 from cli.exercise.slips import Pairs, Slip
 from cli.exercise.solving import Problem
 from cli.exercise.variants import Variant
@@ -68,6 +69,11 @@ class Recomputed:
             if values is not None:
                 runs.append(Run(edit, values))
         return runs
+
+    @cached_property
+    def loads(self) -> list[Load]:
+        """The part of each load in all answers, where they are sums."""
+        return loads(self.variant, self._values)
 
     @cached_property
     def _pair_runs(self) -> list[tuple[Edit, Edit, list[float | None]]]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from cli.exercise import rotor_slips
 from cli.exercise.answers import Answer
+from cli.exercise.load_slips import WRONG, is_sum
 from cli.exercise.recomputed import Recomputed
 from cli.exercise.rotor_slips import Range, polar_range
 from cli.exercise.variants import Variant
@@ -49,14 +50,27 @@ class Follows:
                 yield _range([(value - half) * share, (value + half) * share])
 
     def same_slip(self, k: int, value: float, half: float, typed: Typed, wrong: frozenset[int]) -> bool:
-        """Whether one slip in the data, or another assembly, makes both this answer and an earlier wrong one."""
+        """Whether one slip in the data or in a load, or another assembly, makes both this answer and an earlier wrong one."""
         if self.variant.problem.exercise.command[0] == "balance":
             return False
         others = [j for j in wrong if self._vector(j) != self._vector(k)]
         return any(
             self._near(k, values[k], value, half) and any(self._near(j, values[j], *typed[j]) for j in others)
-            for values in (*(run.values for run in self.runs.runs), *self.runs.assemblies)
+            for values in (*(run.values for run in self.runs.runs), *self.runs.assemblies, *self._with_loads)
         )
+
+    @cached_property
+    def _with_loads(self) -> list[list[float | None]]:
+        """The answers with each slip in a load; None where it changes nothing, or is no sum over the loads."""
+        every = [(k, answer.value, is_sum(answer)) for k, answer in enumerate(self.variant.answers)]
+        return [
+            [
+                value + times * part if of_loads and (part := load.parts[k]) else None
+                for k, value, of_loads in every
+            ]
+            for load in (self.runs.loads if any(of_loads for *_, of_loads in every) else ())
+            for times in WRONG.values()
+        ]
 
     def _near(self, k: int, slipped: float | None, value: float, half: float) -> bool:
         return slipped is not None and abs(self._distance(k, slipped, value)) <= half * (1 + 1e-9)

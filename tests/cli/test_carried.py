@@ -172,3 +172,62 @@ def test_the_same_slip_twice_is_one(dalembert: Any, tmp_path: Path) -> None:
         "carried",
     ]
     assert grade(dalembert, tmp_path, speaking, questions[1:3], answers[1:3]) == ["wrong", "wrong"]
+
+
+BEAM = """
+gravity = [0, -10]
+[ground]
+O = [0, 0]
+[links.arm]
+points = { O = [0, 0] }
+mass = 2
+center = [0.5, 0]
+inertia = 0.3
+[input]
+link = "arm"
+angle = "30 deg"
+speed = "4 rad/s"
+acceleration = "6 rad/s2"
+"""
+BEAM_ASKS = ("input_torque_N_m", "O_ground_on_arm_fx_N", "O_ground_on_arm_fy_N")
+
+
+@pytest.mark.parametrize(
+    ("answers", "verdicts", "mistakes"),
+    [
+        # T = m·g·r·cos θ + (I + m·r²)·α, F = m·a − m·g: a_n = 8, a_t = 3 m/s²
+        ((13.46, -16.86, 17.20), ("right", "right", "right"), ("", "", "")),
+        # the weight upwards
+        (
+            (-3.860, -16.86, -22.80),
+            ("wrong", "right", "carried"),
+            ("weight of link arm has the wrong sign", "", ""),
+        ),
+        # a tenth of −m·a everywhere
+        ((10.76, -1.686, 19.72), ("wrong", "carried", "carried"), ("inertia force of link arm", "", "")),
+        # right but for the joint
+        (
+            (13.46, -16.86, -22.80),
+            ("right", "right", "wrong"),
+            ("", "", "weight of link arm has the wrong sign"),
+        ),
+        # another slip than the one before
+        (
+            (11.66, -16.86, -22.80),
+            ("wrong", "right", "wrong"),
+            ("inertia torque of link arm is left out", "", "weight"),
+        ),
+    ],
+)
+def test_from_a_load_to_the_joint(
+    dalembert: Any,
+    tmp_path: Path,
+    answers: tuple[float, ...],
+    verdicts: tuple[str, ...],
+    mistakes: tuple[str, ...],
+) -> None:
+    (tmp_path / "arm.toml").write_text(BEAM)
+    assert tuple(grade(dalembert, tmp_path, "forces arm.toml", BEAM_ASKS, answers)) == verdicts
+    marks = json.loads(dalembert("grade", "e.toml", "a.csv", "--json").stdout)["marks"]
+    for mark, mistake in zip(marks, mistakes, strict=True):
+        assert mistake in (mark["mistake"] or ""), mark

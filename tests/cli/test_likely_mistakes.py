@@ -36,7 +36,40 @@ TORQUE = "angle_deg,torque_N_m\n0,100\n60,340\n150,-80\n240,260\n300,-20\n360,10
 READINGS = "turned_deg,amplitude_um,phase_deg\n0,52,30\n90,41,75\n180,60,130\n270,33,200\n"
 CYLINDERS = "cylinder,crank_deg,z_mm,throw_mm,rod_mm,reciprocating_kg,rotating_kg\n1,0,0,40,140,0.5,0.3\n2,180,90,40,140,0.6,0.3\n"
 TOP = "inertia = [0.02, 0.02, 0.01]\nomega = [0, 0, 200]\nattitude = [0.9659258262890683, 0.25881904510252074, 0, 0]\n[top]\nmgl = 2\n"
+SLIDER = """
+gravity = [0, -10]
+[ground]
+O = [0, 0]
+[links.crank]
+points = { O = [0, 0], A = [0.06, 0] }
+mass = 1.3
+center = [0.03, 0]
+inertia = 0.002
+[links.rod]
+points = { A = [0, 0], B = [0.23, 0] }
+mass = 0.8
+center = [0.08, 0]
+inertia = 0.005
+[links.piston]
+points = { B = [0, 0] }
+mass = 0.5
+[[sliders]]
+point = "B"
+link = "piston"
+turned = 0
+[[forces]]
+link = "piston"
+point = "B"
+force = [-700, 0]
+[input]
+link = "crank"
+angle = "50 deg"
+speed = "140 rad/s"
+[guess]
+rod = "-11 deg"
+"""
 OTHERS = {
+    "forces": ("engine.toml", SLIDER, "forces engine.toml", ['"O_ground_on_crank_fx_N"', '"A_crank_on_rod_fy_N"', '"B_ground_on_piston_fy_N"']),
     "field": ("runs.csv", FIELD, "field runs.csv", ['"mass_g"@plane=A', '"angle_deg"@plane=A', '"mass_g"@plane=B', '"trim_mass_g"@plane=A']),
     "flywheel": ("torque.csv", TORQUE, "flywheel torque.csv --speed 600rpm --fluctuation 0.02", ['"mean_torque_N_m"', '"flywheel_inertia_kg_m2"']),
     "index": ("readings.csv", READINGS, "index readings.csv", ['"amplitude_um"@part=rotor', '"phase_deg"@part=rotor']),
@@ -78,7 +111,7 @@ def every_question(name: str, folder: Path, count: int) -> list[Candidates]:
 def test_a_slip_is_named_in_every_command(
     name: str, dalembert: Dalembert, tmp_path: Path, first_seed: int
 ) -> None:
-    """Of 1000 answers with one slip at least 99 % are named, of 1000 random numbers at most 2 %; fifteen exercises."""
+    """Of 1000 answers with one slip at least 99 % are named, of 1000 random numbers at most 2 %; sixteen exercises."""
     if name not in OTHERS:
         assert dalembert("examples", name).returncode == 0
     slipped, met = share_named(every_question(name, tmp_path, 2), 1000, first_seed)
