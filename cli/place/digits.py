@@ -92,24 +92,20 @@ class SecondRun:
             masses = share.placed.second_run(goal, arms, masses)
         return masses, angles
 
-    def column(self, of: Callable[[Made], Doubled]) -> Doubled:
-        """One number of all masses, (n,)."""
-        return _row(of(made) for made in self.made)
-
 
 def _row(numbers: Iterable[Doubled]) -> Doubled:
     pairs = [(float(x.high), float(x.low)) for x in numbers]
     return Doubled(*(np.array([pair[k] for pair in pairs]) for k in (0, 1)))
 
 
-def column(placings: Iterable[Placing], of: Callable[[Made], Doubled]) -> Doubled:
+def column(runs: Iterable[SecondRun], of: Callable[[Made], Doubled]) -> Doubled:
     """One number of all masses of several placements."""
-    return _row(of(made) for placing in placings for made in placing.again.made)
+    return _row(of(made) for run in runs for made in run.made)
 
 
-def goals(placings: Iterable[Placing], of: Callable[[SecondRun], Iterable[Vectors]]) -> Vectors:
+def goals(runs: Iterable[SecondRun], of: Callable[[SecondRun], Iterable[Vectors]]) -> Vectors:
     """Vectors of several placements, one after the other."""
-    return Vectors.joined([vector[None] for placing in placings for vector in of(placing.again)])
+    return Vectors.joined([vector[None] for run in runs for vector in of(run)])
 
 
 def _depth(mass: Doubled, drill: Drill) -> Doubled:

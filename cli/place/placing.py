@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +15,6 @@ from cli.place.corrections import Correction, Drill, Request
 from dalembert.angles import degrees, phasor
 from dalembert.errors import DataError
 from dalembert.units import from_si, to_si
-
-if TYPE_CHECKING:
-    from cli.place.digits import SecondRun
 
 Real = NDArray[np.float64]
 HOLES = 10_000  # more at one place are refused
@@ -173,13 +169,6 @@ class Placing:
                 f"{self.text(placed.bound)}"
             )
         return np.degrees(placed.angles).tolist(), placed
-
-    @cached_property
-    def again(self) -> SecondRun:
-        """The second run, in 32 digits."""
-        from cli.place.digits import SecondRun
-
-        return SecondRun(self)
 
 
 def _drilled(mass: float, drill: Drill | None) -> tuple[float | None, int | None]:

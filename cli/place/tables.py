@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from dalembert.units import from_si, to_si
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.place.digits import Made
+    from cli.place.digits import Made, SecondRun
     from cli.place.placing import Placing
     from dalembert.arithmetic.doubled import Doubled
     from dalembert.arithmetic.doubled_vectors import Vectors
@@ -71,17 +72,31 @@ def _vector(
     ]
 
 
+def second_runs(placings: Sequence[Placing]) -> Callable[[], list[SecondRun]]:
+    """The second runs of placements, worked out on the first request."""
+
+    @cache
+    def runs() -> list[SecondRun]:
+        from cli.place.digits import SecondRun
+
+        return [SecondRun(placing) for placing in placings]
+
+    return runs
+
+
 def masses(placings: Sequence[Placing]) -> Table:
     """A row for each mass of each correction; of one alone without rotor and plane."""
     unit, request = placings[0].of.unit, placings[0].request
     every = [(k, mass) for k, placing in enumerate(placings) for mass in placing.masses]
     named, hidden = _named(placings, [k for k, _ in every])
 
+    runs = second_runs(placings)
+
     def exact(of: Callable[[Made], Doubled]) -> Callable[[], Doubled]:
         def again() -> Doubled:
             from cli.place.digits import column
 
-            return column(placings, of)
+            return column(runs(), of)
 
         return again
 
@@ -120,7 +135,7 @@ def corrections(placings: Sequence[Placing]) -> Table:
     def targets() -> Vectors:
         from cli.place.digits import goals
 
-        return goals(placings, lambda run: [run.target])
+        return goals(second_runs(placings)(), lambda run: [run.target])
 
     columns = [
         *named,
@@ -147,7 +162,7 @@ def planes(placings: Sequence[Placing]) -> Table:
     def goals_again() -> Vectors:
         from cli.place.digits import goals
 
-        return goals(placings, lambda run: run.goals)
+        return goals(second_runs(placings)(), lambda run: run.goals)
 
     columns = [
         *named,
