@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.placement import Placement
+
+if TYPE_CHECKING:
+    from dalembert.arithmetic.doubled import Doubled
+    from dalembert.arithmetic.doubled_vectors import Vectors
 
 Real = NDArray[np.float64]
 
@@ -62,6 +68,62 @@ def place_weights(target: complex, weights: ArrayLike) -> Placement:
         return Placement(goal, angles, masses, float(masses[longest] - rest - size))
     arcs = _arcs(np.append(masses, size))[:-1]
     return Placement(goal, toward + np.cumsum(arcs) - arcs / 2 - arcs.sum() / 2, masses)
+
+
+def angles_again(placed: Placement, target: Vectors, weights: Doubled) -> Doubled:
+    """Return the angles (n,) of `place_weights` in 32 digits, rad; NaN where the polygon is so flat that they are not reached."""
+    from dalembert.arithmetic.doubled import PI, Doubled
+    from dalembert.arithmetic.doubled_vectors import part, total
+
+    size, masses = abs(placed.target), placed.masses
+    toward = target[None].angle if size else Doubled(np.zeros(1))
+    ones = np.ones(len(masses))
+    longest = int(masses.argmax())
+    whole, rest = float(masses.sum()), float(np.delete(masses, longest).sum())
+    if size >= whole:
+        return toward + 0.0 * ones
+    if size <= masses[longest] - rest:
+        opposite = np.where(np.arange(len(masses)) == longest, 0.0, 1.0)
+        return toward + PI * opposite
+    goal = target.size
+    sides = Doubled(np.append(weights.high, goal.high), np.append(weights.low + 0 * ones, goal.low))
+    arcs = _arcs_again(sides, _arcs(np.append(masses, size)))
+    # the sum before each, exactly
+    before = [Doubled(0.0)]
+    for k in range(len(masses)):
+        before.append(before[-1] + part(arcs, k))
+    middles = [(before[k] + before[k + 1]) / 2.0 for k in range(len(masses))]
+    half = total(part(arcs, slice(len(masses)))) / 2.0
+    return toward + Doubled(np.array([x.high for x in middles]), np.array([x.low for x in middles])) - half
+
+
+def _arcs_again(sides: Doubled, arcs: Real) -> Doubled:
+    """Return the arcs in 32 digits, by Newton's method from those in 16; NaN where it does not converge."""
+    from dalembert.arithmetic.doubled import PI, Doubled
+    from dalembert.arithmetic.doubled_functions import DOUBLED
+    from dalembert.arithmetic.doubled_vectors import part, total
+
+    longest = int(sides.high.argmax())
+    share = part(sides, np.delete(np.arange(len(arcs)), longest)) / part(sides, longest)
+    square = (1.0 - share) * (share + 1.0)
+    outside = float(np.arcsin(share.high).sum()) < np.pi / 2
+    own = (PI if outside else Doubled(0.0)) + (-0.5 if outside else 0.5) * float(arcs[longest])
+    last = np.inf
+    for _ in range(60):
+        sine, cosine = DOUBLED.sincos(own)
+        rest = DOUBLED.sqrt(cosine * cosine + square * sine * sine)
+        halves = DOUBLED.atan2(share * sine, rest)
+        slope = float((share.high * cosine.high / rest.high).sum())
+        miss = total(halves) + (-own if outside else own - PI)
+        step = float(miss.value) / (slope + (-1 if outside else 1))
+        if abs(step) <= 1e-30 or (abs(step) >= last / 2 and last < 1e-22):
+            every = (PI - own if outside else own) * 2.0
+            parts = ((halves.high * 2, every.high), (halves.low * 2, every.low))
+            return Doubled(*(np.insert(of_others, longest, of_longest) for of_others, of_longest in parts))
+        if not abs(step) < last:
+            break
+        own, last = own - step, abs(step)
+    return Doubled(np.full(len(arcs), np.nan))
 
 
 def _arcs(sides: Real) -> Real:

@@ -10,13 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.correction import correct
-from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record, table
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import FigureBase
     from matplotlib.projections.polar import PolarAxes
+
+    from dalembert.arithmetic.doubled import Doubled
+    from dalembert.arithmetic.doubled_vectors import Vectors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -74,19 +76,48 @@ class Placement:
         return float(1 / abs(np.sin(other - one)))
 
     def error_estimate(self, quantity: str = "masses") -> Real:
-        """Return a bound of the rounding error of `masses` (n,), or of `total` or `error` (scalar), kg.
+        """Return the rounding error of `masses` (n,), or of `total` or `error` (scalar), kg.
 
-        Target and angles are taken as exact. Two positions share what the full ones leave over the sine between them;
-        each of the terms is rounded. Weights from stock are as they are; several on one position are a sum.
+        By what the same shares in 32 digits differ, target and angles taken as exact. Weights from stock are as they are.
         """
-        terms = abs(self.target) + float(self.masses.sum())
-        if quantity in ("total", "error"):
-            return np.asarray(4 * EPS * terms)
-        if quantity != "masses":
+        from fractions import Fraction
+
+        from dalembert.arithmetic.doubled import Doubled
+        from dalembert.arithmetic.doubled_vectors import Vectors, off
+
+        if quantity not in ("masses", "total", "error"):
             raise ValueError(f"'{quantity}': expected masses, total or error")
-        bound = np.zeros(len(self.masses))
-        bound[list(self.free)] = 4 * EPS * terms * self.condition_number
-        return bound
+        n, target, masses = len(self.angles), Vectors.of(self.target), Doubled(self.masses)
+        angles = [Fraction(angle) for angle in self.angles.tolist()]
+        arms = Vectors.polar(Doubled(np.ones(n)), angles, "rad", (n,))
+        exact = self.second_run(target, arms, masses)
+        if quantity == "masses":
+            return off(self.masses, exact)
+        total = (arms * exact).total()
+        return total.apart(self.total) if quantity == "total" else (total - target).apart(self.error)
+
+    def second_run(self, target: Vectors, arms: Vectors, masses: Doubled) -> Doubled:
+        """Return the masses (n,) in 32 digits: the free ones share what the others, as given, leave of the target."""
+        from dalembert.arithmetic.doubled import Doubled
+
+        free = list(self.free)
+        if not free:
+            return masses
+        others = np.ones(len(self.masses))
+        others[free] = 0.0
+        rest = target - (arms * (masses * others)).total()
+        one, other = arms[free[0]], arms[free[-1]]
+        if len(free) == 2:
+            across = (one.conj * other).y
+            shares = [(rest.conj * other).y / across, (one.conj * rest).y / across]
+        else:
+            shares = [(rest * one.conj).x]
+        high, low = masses.high.copy(), np.broadcast_to(masses.low, masses.high.shape).copy()
+        for k, share in zip(free, shares, strict=True):
+            # one that its limit holds stays there
+            if len(free) == 2 or abs(float(share.high) - high[k]) <= 1e-6 * abs(self.target):
+                high[k], low[k] = share.high, share.low
+        return Doubled(high, low)
 
 
 def place(target: complex, angles: ArrayLike, max_mass: ArrayLike | None = None) -> Placement:

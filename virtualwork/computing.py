@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from dalembert.arithmetic.engines.javascript import engine, written
+from dalembert.arithmetic.engines.javascript import engine, literal
 from dalembert.arithmetic.recorded import Number
 from dalembert.arithmetic.tape import Tape
 from dalembert.page import Page, Shown, packed
@@ -256,7 +256,7 @@ class Formulas:
         return len(self.written.recording.forces.case.contacts) if self._loaded else 0
 
     def _files(self) -> list[str]:
-        """The tables that stand beside the file."""
+        """The tables that the file names."""
         parts = (*self.mechanism.inputs, *self.mechanism.forces, *self.mechanism.torques)
         tables = [getattr(part, "history", None) for part in parts]
         return sorted({getattr(table, "name", "") for table in tables} - {""})
@@ -390,7 +390,8 @@ def computing_page(
         places, numbers = drawn_numbers(
             drawing, draw(formulas.written.mechanism, travel, cam_steps=1), formulas.written.mechanism
         )
-        tapes = ",\n".join(f"{key}: {written(tape)}" for key, tape in formulas.tapes(numbers).items())
+        # first: what is written for them says what the document has
+        tapes = literal(formulas.tapes(numbers))
         model = formulas.document() | {
             "quantities": quantities,
             "drawn": places,
@@ -400,7 +401,7 @@ def computing_page(
             "bare": dict(bare_units or {}),
             "first": list(map(float, poses.inputs[0] if first is None else first)),
         }
-        return f"{engine()}\nconst tapes = {{\n{tapes}\n}};\n", {"model": model}
+        return f"{engine()}\nconst tapes = {tapes};\n", {"model": model}
 
     return moving_page(m.name, [series, *others], computed=computed)
 

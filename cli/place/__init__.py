@@ -11,7 +11,7 @@ from cli.place.corrections import (
     read_corrections,
     read_drill,
     read_planes,
-    read_ratio,
+    read_radii,
     read_weights,
 )
 from cli.read import options
@@ -19,6 +19,8 @@ from cli.show.commands import ShowOptions
 from cli.show.output import command
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     from cli.show.result import Result
     from dalembert.results.way import Topic
 
@@ -87,7 +89,7 @@ def run(
     rotor's plane is placed by itself.
     """
     every = read_corrections(corrections, rotor, plane)
-    ratio = read_ratio(at_radius, to_radius)
+    radii = read_radii(at_radius, to_radius)
     drilled = read_drill(drill, density, drill_point, max_depth)
     in_stock, fixed = read_weights("--stock", stock), read_weights("--weights", weights)
     if in_stock is not None and drilled is not None:
@@ -106,7 +108,12 @@ def run(
     from cli.show.result import Result, Section, Sheet
     from dalembert.results.text import heading
 
-    request = Request(chosen, limit, in_stock, fixed, pieces, max_pieces, ratio, drilled, moved, remove)
+    def exact_places() -> list[Fraction]:
+        return options.exact_places(positions, blades, first, numbering)
+
+    request = Request(
+        chosen, limit, in_stock, fixed, pieces, max_pieces, radii, drilled, moved, remove, exact_places
+    )
     placings = [Placing(correction, request) for correction in every]
     alone = len(placings) == 1
     if not alone and show.plot is not None:

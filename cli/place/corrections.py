@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,6 +31,8 @@ class Drill(NamedTuple):
     point: float
     """Point angle, rad."""
     deepest: float | None
+    exact_point: Fraction
+    """In degrees, as it is written."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +46,19 @@ class Request:
     """Of fixed mass, to stand at any angle."""
     pieces: int
     max_pieces: int | None
-    ratio: float
-    """Radius of the corrections over that of the places."""
+    radii: tuple[float, float] | None
+    """Of the corrections and of the places."""
     drill: Drill | None
     planes: tuple[float, list[float]] | None
     """Where along the shaft the corrections are, and the planes they are carried over to, m."""
     remove: bool
+    exact_places: Callable[[], list[Fraction]]
+    """The places as they are written, in degrees; worked out on request."""
+
+    @property
+    def ratio(self) -> float:
+        """Radius of the corrections over that of the places."""
+        return 1.0 if self.radii is None else self.radii[0] / self.radii[1]
 
     @property
     def removes(self) -> bool:
@@ -168,12 +178,12 @@ def _both(one: str, value: object, other: str, second: object) -> None:
         raise options.bad(one if value is None else other, f"expected both {one} and {other}")
 
 
-def read_ratio(at_radius: str | None, to_radius: str | None) -> float:
-    """Read --at-radius and --to-radius as the one over the other."""
+def read_radii(at_radius: str | None, to_radius: str | None) -> tuple[float, float] | None:
+    """Read --at-radius and --to-radius."""
     at = options.quantity("--at-radius", at_radius, "length", positive=True)
     to = options.quantity("--to-radius", to_radius, "length", positive=True)
     _both("--at-radius", at, "--to-radius", to)
-    return 1.0 if at is None or to is None else at / to
+    return None if at is None or to is None else (at, to)
 
 
 def read_drill(
@@ -191,7 +201,9 @@ def read_drill(
         raise options.bad("--drill-point", "expected at most 180deg")
     if diameter is None or rho is None:
         return None
-    return Drill(diameter, rho, min(point, math.pi), deepest)
+    return Drill(
+        diameter, rho, min(point, math.pi), deepest, min(options.exact_degrees(drill_point), Fraction(180))
+    )
 
 
 def read_weights(flag: str, weights: str | None) -> list[float] | None:

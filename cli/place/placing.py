@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing import Placement, correct, drill_depth, place, place_from_stock, place_weights, transfer
+from balancing import Placement, drill_depth, place, place_from_stock, place_weights, transfer
 from cli.place.corrections import Correction, Drill, Request
-from cli.read.rounding import EPS, angle_error, size_error, vector_error
 from dalembert.angles import degrees, phasor
 from dalembert.errors import DataError
 from dalembert.units import from_si, to_si
@@ -64,7 +62,7 @@ class Placing:
         self.target = sum(map(complex, turned), 0j)
         if abs(self.target) <= 1e-15 * self._largest:
             self.target = 0j  # what rounding leaves of corrections that cancel
-        opposite = request.drill is not None and not request.remove
+        self.opposite = opposite = request.drill is not None and not request.remove
         self._goal = -self.target * request.ratio if opposite else self.target * request.ratio
         if self.target == 0:
             self.warnings.append("the corrections add up to nothing: there is nothing to place")
@@ -171,61 +169,6 @@ class Placing:
                 f"{self.text(placed.bound)}"
             )
         return np.degrees(placed.angles).tolist(), placed
-
-    # -- bounds of rounding errors -------------------------------------------------------------------------
-
-    @cached_property
-    def goal_errors(self) -> list[float]:
-        """Of the goals, in the shares' order."""
-        request, each = self.request, zip(self._sizes, self.of.vectors, strict=True)
-        wrong = float(sum(vector_error(size, v.angle, v.angle_unit) for size, v in each))
-        of_goal = (wrong + (len(self._sizes) + 4) * EPS * self._largest) * request.ratio
-        if request.planes is None:
-            return [of_goal]
-        at, planes = request.planes
-        # positions as written, and the lever's arms, are rounded too
-        over = correct([self._goal], [at], planes)
-        reach = float(np.abs([at, *planes]).max() / np.ptp(np.array(planes)))
-        bound = over.error_estimate() + float(over.amplification) * (
-            of_goal + 4 * EPS * reach * abs(self._goal)
-        )
-        return [float(x) for x in bound]
-
-    @cached_property
-    def mass_errors(self) -> list[tuple[float, float, float]]:
-        """Of each mass, of its angle (degrees) and of the depth of its hole."""
-        request = self.request
-        of_goal = dict(zip(map(id, self.shares), self.goal_errors, strict=True))
-        errors = []
-        for share, i, mass, angle, depth, _ in self.masses:
-            placed, wrong = share.placed, of_goal[id(share)]
-            if request.weights is not None:
-                bound, turn = EPS * mass, self._turn_error(share, i, wrong)
-            elif request.places is None:
-                bound = float(size_error(share.goal, wrong))
-                turn = float(angle_error(share.goal, wrong, angle))
-            else:
-                # a place as written is rounded, as a share of a turn, and takes the whole with it
-                of_arm = EPS * (2 + np.abs(np.radians(request.places)).max())
-                terms = abs(share.goal) + float(placed.masses.sum())
-                growth = placed.condition_number if i in placed.free else 0.0
-                bound = placed.error_estimate()[i] + growth * (wrong + of_arm * terms)
-                bound = float(size_error(placed.masses[i], bound))
-                turn = 2 * EPS * (360 + abs(request.places[i]))
-            deep = 0.0
-            if depth is not None and request.drill is not None:
-                # a depth grows no faster than the mass; the point's angle as written is rounded, times the radius
-                rounded = 8 * EPS * (depth + request.drill.diameter * request.drill.point)
-                deep = depth * bound / mass + rounded
-            errors.append((bound, turn, deep))
-        return errors
-
-    def _turn_error(self, share: Share, i: int, wrong: float) -> float:
-        """Bound the error of a weight's angle, degrees: the spread of the weights goes one way with the correction's size."""
-        size, weights = abs(share.goal), self.request.weights or ()
-        spread = [place_weights(max(size + step, 0.0), weights).angles[i] for step in (-wrong, 0.0, wrong)]
-        apart = float(np.degrees(np.ptp(spread))) if wrong < size else 360.0
-        return apart + float(angle_error(share.goal, wrong, 360.0)) + 16 * EPS * 360
 
 
 def _drilled(mass: float, drill: Drill | None) -> tuple[float | None, int | None]:

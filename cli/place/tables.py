@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,10 @@ from dalembert.units import from_si, to_si
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from cli.place.digits import Made, SecondRun
     from cli.place.placing import Placing
+    from dalembert.arithmetic.doubled import Doubled
+    from dalembert.arithmetic.doubled_vectors import Vectors
 
 
 METHOD = (
@@ -52,13 +56,32 @@ def _named(placings: Sequence[Placing], numbers: Iterable[int]) -> tuple[list[Co
 
 
 def _vector(
-    mass: str, angle: str, vectors: Sequence[complex], unit: str, at: tuple[str, str] = ("", "")
+    mass: str,
+    angle: str,
+    vectors: Sequence[complex],
+    unit: str,
+    at: tuple[str, str] = ("", ""),
+    exact: Callable[[], Vectors] | None = None,
 ) -> list[Column]:
     """Masses and their angles."""
+    size = None if exact is None else lambda: exact().size
+    turn = None if exact is None else lambda: exact().turned(vectors)
     return [
-        number(mass, "mass", [abs(vector) for vector in vectors], unit, place=at[0]),
-        number(angle, "angle", [degrees(vector) for vector in vectors], place=at[1]),
+        number(mass, "mass", [abs(vector) for vector in vectors], unit, place=at[0], exact=size),
+        number(angle, "angle", [degrees(vector) for vector in vectors], error=turn, place=at[1]),
     ]
+
+
+def second_runs(placings: Sequence[Placing]) -> Callable[[], list[SecondRun]]:
+    """The second runs of placements, worked out on the first request."""
+
+    @cache
+    def runs() -> list[SecondRun]:
+        from cli.place.digits import SecondRun
+
+        return [SecondRun(placing) for placing in placings]
+
+    return runs
 
 
 def masses(placings: Sequence[Placing]) -> Table:
@@ -67,19 +90,27 @@ def masses(placings: Sequence[Placing]) -> Table:
     every = [(k, mass) for k, placing in enumerate(placings) for mass in placing.masses]
     named, hidden = _named(placings, [k for k, _ in every])
 
-    def error(which: int) -> Callable[[], list[float]]:
-        return lambda: [bounds[which] for placing in placings for bounds in placing.mass_errors]
+    runs = second_runs(placings)
+
+    def exact(of: Callable[[Made], Doubled]) -> Callable[[], Doubled]:
+        def again() -> Doubled:
+            from cli.place.digits import column
+
+            return column(runs(), of)
+
+        return again
 
     columns = [
         *named,
         names("position", [str(m.place + 1) for _, m in every]),
-        number("angle", "angle", [m.angle for _, m in every], error=error(1)),
-        number("mass", "mass", [m.mass for _, m in every], unit, error(0)),
+        number("angle", "angle", [m.angle for _, m in every], exact=exact(lambda m: m.angle)),
+        number("mass", "mass", [m.mass for _, m in every], unit, exact=exact(lambda m: m.mass)),
     ]
     if request.planes is not None:
         z = number("z", "length", [m.share.z or 0.0 for _, m in every], "mm")
         columns.insert(len(named), z)
-    depth = number("drill_depth", "length", [m.depth or np.nan for _, m in every], "mm", error(2))
+    depths = [m.depth or np.nan for _, m in every]
+    depth = number("drill_depth", "length", depths, "mm", exact=exact(lambda m: m.depth))
     holes = [depth, names("holes", [m.holes for _, m in every])]
     keys = [column.name for column in (*named, *hidden)]
     if request.planes is None or named:
@@ -100,9 +131,17 @@ def corrections(placings: Sequence[Placing]) -> Table:
     target, error = [each.target for each in placings], [each.error for each in placings]
     whole = [max(abs(share.goal) for share in placing.shares) for placing in placings]
     missed = [abs(left) / size if size else 0.0 for left, size in zip(error, whole, strict=True)]
+
+    def targets() -> Vectors:
+        from cli.place.digits import goals
+
+        return goals(second_runs(placings)(), lambda run: [run.target])
+
     columns = [
         *named,
-        *_vector("correction_mass", "correction_angle", target, unit, ("target.mass", "target.angle")),
+        *_vector(
+            "correction_mass", "correction_angle", target, unit, ("target.mass", "target.angle"), targets
+        ),
         *_vector("error", "error_angle", error, unit),
         number("error_share", "number", missed, place=None),
         names("action", [placing.action for placing in placings]),
@@ -119,10 +158,18 @@ def planes(placings: Sequence[Placing]) -> Table:
     unit = placings[0].of.unit
     every = [(k, share) for k, placing in enumerate(placings) for share in placing.shares]
     named, _ = _named(placings, [k for k, _ in every])
+
+    def goals_again() -> Vectors:
+        from cli.place.digits import goals
+
+        return goals(second_runs(placings)(), lambda run: run.goals)
+
     columns = [
         *named,
         number("z", "length", [share.z or 0.0 for _, share in every], "mm"),
-        *_vector("correction_mass", "correction_angle", [share.goal for _, share in every], unit),
+        *_vector(
+            "correction_mass", "correction_angle", [share.goal for _, share in every], unit, exact=goals_again
+        ),
         *_vector("error", "error_angle", [share.error for _, share in every], unit),
     ]
     return Table(columns, [column.name for column in named])

@@ -13,6 +13,7 @@ from dalembert.errors import DataError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
+    from fractions import Fraction
 
     import numpy as np
     from numpy.typing import NDArray
@@ -162,6 +163,33 @@ def places(
         if len(turned) > 1 and other - one < 1e-7:
             raise bad("--positions", f"two positions at {one:g}deg")
     return chosen
+
+
+def exact_degrees(text: str) -> Fraction:
+    """An angle in degrees as it is written; of radians with fifty digits of π.
+
+    >>> exact_degrees("292.5deg")
+    Fraction(585, 2)
+    """
+    from fractions import Fraction
+
+    from dalembert.quantities import PI, decimals, exactly
+
+    parts = decimals(text, "angle")
+    assert parts is not None
+    return exactly(*parts) * 180 / Fraction(*PI)
+
+
+def exact_places(
+    positions: str | None, blades: int | None, first: str, numbering: str = "with"
+) -> list[Fraction]:
+    """Return the same angles as `places`, as they are written."""
+    from fractions import Fraction
+
+    if blades is None:
+        return [exact_degrees(part) for part in (positions or "").split(",")]
+    start, way = exact_degrees(first), -1 if numbering == "against" else 1
+    return [start + way * Fraction(360 * k, blades) for k in range(blades)]
 
 
 def plane_vector(flag: str, text: str) -> complex:

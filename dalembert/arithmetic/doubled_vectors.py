@@ -199,7 +199,7 @@ def doubled_array(exact: Iterable[Fraction], shape: tuple[int, ...]) -> Doubled:
 
 def off(value: ArrayLike, exact: Doubled, modulo: float = 0.0) -> Real:
     """Return by how much floats differ from doubled numbers; modulo a whole turn."""
-    difference = np.abs((exact - np.asarray(value, dtype=float)).value)
+    difference = exact - np.asarray(value, dtype=float)
     if modulo:
-        difference = np.minimum(difference, np.abs(modulo - difference))
-    return np.asarray(OWN * difference)
+        difference = difference - Doubled(np.rint(difference.high / modulo)) * modulo
+    return np.asarray(OWN * np.abs(difference.value))

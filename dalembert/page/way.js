@@ -28,7 +28,9 @@ function interpolated(nodes, values, at) {
 class Way {
   constructor(model, tapes) {
     this.model = model;
-    this.tapes = Object.fromEntries(Object.entries(tapes).map(([name, tape]) => [name, new Tape(tape)]));
+    const { lists, ...every } = tapes;
+    const whole = listed(lists);
+    this.tapes = Object.fromEntries(Object.entries(every).map(([name, tape]) => [name, new Tape(tape, whole)]));
     this.kinds = new Map(model.dimensions.map(([path, kind]) => [path, kind]));
     this.own = Object.fromEntries(model.dimensions.map(([path, , value]) => [path, value]));
     this.n = model.n;

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from dalembert.arithmetic.engines import compiled_code, run
-from dalembert.arithmetic.engines.javascript import engine, written
+from dalembert.arithmetic.engines.javascript import engine, literal, written
 from dalembert.arithmetic.recorded import RECORDED, Recorder
 from dalembert.arithmetic.tape import Tape
 from tests.node import needs_node, run_script
+from virtualwork.formulas.numbers import WRITTEN
 
 pytestmark = needs_node
 
@@ -164,3 +165,42 @@ def test_a_name_cannot_end_the_script() -> None:
     recorder = Recorder()
     tape = recorder.tape({"y": recorder.input("</script><script>") + 1.0})
     assert "<" not in written(tape)
+
+
+def chosen(knots: list[float], columns: list[list[float]]) -> Tape:
+    """One of each column, by where x lies between knots."""
+    recorder = Recorder()
+    x = recorder.input("x")
+    values = {f"{i}": WRITTEN.among(x, [-9e9, *knots], column) for i, column in enumerate(columns)}
+    return recorder.tape(values | {"x": x})
+
+
+def test_long_lists_of_constants_stand_once(tmp_path: Path) -> None:
+    """Beside each knot, at it, and of no number: as choices of choices; one tape's list is a part of the other's."""
+    rng = np.random.default_rng(4)
+    knots = np.sort(rng.uniform(-3, 3, 30)).tolist()
+    columns = rng.standard_normal((2, 31)).round(3)
+    first, second = chosen(knots, columns.tolist()), chosen(knots[5:25], columns[:, 5:26].tolist())
+    text = literal({"first": first, "second": second})
+    assert text.count(repr(knots[7])) == 1
+    places = [
+        *(f(k, s) for k in knots for f in (np.nextafter,) for s in (-9, 9)),
+        *knots,
+        np.nan,
+        99.0,
+        -99.0,
+    ]
+    script = (
+        f"{engine()}\nconst {{ lists: written, ...tapes }} = {text};\n"
+        "const lists = listed(written);\n"
+        "const x = Float64Array.from(given, Number);\n"
+        "answer(Object.values(tapes).map((tape) => new Tape(tape, lists)).map((tape) => [tape.run({ x }, x.length),"
+        " Array.from(x, (x) => tape.one({ x })), Array.from(x, (x) => tape.twice({ x }).map(([high]) => high))]));"
+    )
+    answers = run_script(script, tmp_path, places)
+    for tape, (lanes, one, twice) in zip((first, second), answers, strict=True):
+        expected = run(tape, {"x": np.array(places)}, "numpy")
+        rows = np.array([expected[name] for name in tape.names])
+        assert (np.isnan(rows).sum(axis=1) == [0, 0, 1]).all()
+        for found in (np.array(lanes, float), np.array(one, float).T, np.array(twice, float).T):
+            assert np.array_equal(found, rows, equal_nan=True)

@@ -14,6 +14,7 @@ import pytest
 
 from tests.computed_pages import machines
 from tests.node import needs_node
+from tests.stress.test_pages_agree import faults, tried
 from tests.virtualwork.test_cams import CASES, FACES, sliding, swinging
 from virtualwork import Mechanism
 from virtualwork.describe import DescriptionError
@@ -176,14 +177,19 @@ def test_random_profiles(tmp_path: Path, first_seed: int) -> None:
     assert apart([m for m in every if not narrow(m)], rng, 2, tmp_path) < 1e-12
 
 
-def test_a_table_of_lift(tmp_path: Path) -> None:
-    """A row every 5 degrees: the page of its forces stays below the limit."""
+@pytest.mark.parametrize("step", [5, pytest.param(1, marks=pytest.mark.slow)])
+def test_a_table_of_lift(step: int, tmp_path: Path) -> None:
+    """A row every 5 degrees, or every degree: the page of its forces stays below the limit, and is the program's."""
     text = files("cli").joinpath("examples/cam-valve/cam-valve.toml").read_text()
     law = re.compile(r"law = \[.*?\n\]", re.DOTALL)
     (tmp_path / "m.toml").write_text(law.sub('table = "lift.csv"', text))
-    lifts = [f"{t},{25 * (1 - math.cos(math.radians(t))) if t % 360 else 0.0!r}" for t in range(0, 361, 5)]
+    lifts = [f"{t},{25 * (1 - math.cos(math.radians(t))) if t % 360 else 0.0!r}" for t in range(0, 361, step)]
     (tmp_path / "lift.csv").write_text("\n".join(["angle_deg,lift_mm", *lifts]))
     m = Mechanism.from_toml(tmp_path / "m.toml")
     page = Motion(m.assembly, np.linspace(0, 2 * np.pi, 361), 3.0, 1.5).page(True).html
     assert "const tapes" in page
     assert len(page.encode()) <= LARGEST
+    if step == 1:
+        trial = tried("table", m, np.random.default_rng(1), 6, 0.1)
+        assert trial is not None
+        assert faults([trial], tmp_path, 1e-12) == []

@@ -134,7 +134,8 @@ def written_profile(m: Description, drive: CamDrive, piece: Number, share: Numbe
     def chosen(values: list[Number]) -> Number:
         return WRITTEN.among(piece, middles, values)
 
-    low, high = chosen(list(of.knots[:-1])), chosen(list(of.knots[1:]))
+    # both ends of a piece from one list
+    low, high = (WRITTEN.among(piece + i, [*middles, middles[-1] + 1], list(of.knots)) for i in (0.0, 1.0))
     angle = low + (high - low) * share
     touching = carried(m, drive, WRITTEN, placed(WRITTEN, of, angle, chosen))
     return center + touching.touch() * WRITTEN.exp(-(of.first + angle))

@@ -175,12 +175,29 @@ for (let n = 1; n < 32; n++) factorials.push(two.div(factorials[n - 1], [n, 0]))
 
 // --- tapes --------------------------------------------------------------------------------------------------------------
 const KINDS = ["add", "sub", "mul", "div", "neg", "abs", "binade", "sqrt", "sin", "cos", "atan2", "select"];
-const ARITY = [2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 2, 3];
+const ARITY = [2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 2, 3, 3];
+const PICK = 12; // of one number, and two lists by their numbers: the value in whose interval between knots it lies
+// `above(knot)` says whether it lies beyond; as in choices of choices what is no number lies before all
+function picked(above, knots, values) {
+  let [low, high] = [0, knots.length];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (above(knots[middle])) low = middle + 1;
+    else high = middle;
+  }
+  return values[low];
+}
+
+// lists of constants as javascript.py writes them: one may be a part of a longer one
+function listed(lists) {
+  const whole = (list) => (list.of === undefined ? list : whole(lists[list.of]).slice(list.from, list.to));
+  return lists.map(whole);
+}
 
 // A tape as javascript.py writes it: names of what enters, constants, operations one after the other, the places of the outputs.
 class Tape {
-  constructor({ enters, constants, operations, outputs }) {
-    Object.assign(this, { enters, constants, operations, outputs });
+  constructor({ enters, constants, operations, outputs }, lists = []) {
+    Object.assign(this, { enters, constants, operations, outputs, lists });
     const before = enters.length + constants.length;
     this.steps = [];
     for (let i = 0; i < operations.length; ) {
@@ -191,7 +208,7 @@ class Tape {
     this.size = before + this.steps.length;
     // where each number is read last: its room is free from there on
     this.last = new Int32Array(this.size).fill(-1);
-    for (const [s, [, , ...from]] of this.steps.entries()) for (const a of from) this.last[a] = s;
+    for (const [s, [kind, , ...from]] of this.steps.entries()) for (const a of kind === PICK ? from.slice(0, 1) : from) this.last[a] = s;
     for (const k of outputs) this.last[k] = this.steps.length;
     // sine and cosine of one angle are worked out together
     const first = new Map();
@@ -219,7 +236,7 @@ class Tape {
     const wide = n > 1;
     for (const [s, [kind, to, i, j, k]] of this.steps.entries()) {
       if (values[to] === undefined) {
-        const a = values[i], b = values[j], c = values[k];
+        const a = values[i], b = kind === PICK ? undefined : values[j], c = kind === PICK ? undefined : values[k];
         const many = wide && (a.length > 1 || b?.length > 1 || c?.length > 1);
         const r = (values[to] = room(many));
         const count = many ? n : 1;
@@ -246,10 +263,11 @@ class Tape {
             break;
           }
           case 10: for (let l = 0; l < count; l++) r[l] = atan2(a[l & p], b[l & q]); break;
+          case PICK: for (let l = 0; l < count; l++) r[l] = picked((knot) => a[l] > knot, this.lists[j], this.lists[k]); break;
           default: for (let l = 0; l < count; l++) r[l] = a[l & p] > 0 ? b[l & q] : c[l & m];
         }
       }
-      for (const from of [i, j, k]) {
+      for (const from of kind === PICK ? [i] : [i, j, k]) {
         if (from === undefined || this.last[from] !== s) continue;
         const x = values[from];
         if (x?.length > 1 && !shared.has(x)) free.push(x);
@@ -280,6 +298,7 @@ class Tape {
         case 8: v[k] = sincos(a)[0]; break;
         case 9: v[k] = sincos(a)[1]; break;
         case 10: v[k] = atan2(a, v[code[i + 2]]); break;
+        case PICK: v[k] = picked((knot) => a > knot, this.lists[code[i + 2]], this.lists[code[i + 3]]); break;
         default: v[k] = a > 0 ? v[code[i + 2]] : v[code[i + 3]];
       }
       i += 1 + ARITY[kind];
@@ -291,7 +310,12 @@ class Tape {
   twice(given) {
     const values = this.enters.map((name) => (typeof given[name] === "number" ? [given[name], 0] : given[name]));
     for (const x of this.constants) values.push([x, 0]);
-    for (const [kind, to, ...from] of this.steps) values[to] = two[KINDS[kind]](...from.map((k) => values[k]));
+    for (const [kind, to, ...from] of this.steps) {
+      if (kind === PICK) {
+        const at = values[from[0]];
+        values[to] = [picked((knot) => two.sub(at, [knot, 0])[0] > 0, this.lists[from[1]], this.lists[from[2]]), 0];
+      } else values[to] = two[KINDS[kind]](...from.map((k) => values[k]));
+    }
     return this.outputs.map((k) => values[k]);
   }
 }
