@@ -255,7 +255,7 @@ class Formulas:
         return recording.contacts if self._loaded else 0
 
     def _files(self) -> list[str]:
-        """The tables that stand beside the file."""
+        """The tables that the file names."""
         parts = (*self.mechanism.inputs, *self.mechanism.forces, *self.mechanism.torques)
         tables = [getattr(part, "history", None) for part in parts]
         return sorted({getattr(table, "name", "") for table in tables} - {""})

@@ -309,7 +309,7 @@ class Motion(Pictured):
 
         return least_squares(self, links)
 
-    # --- how it hangs on the dimensions ---------------------------------------------------------------------------
+    # --- sensitivities to the dimensions -------------------------------------------------------------------------
     @cached_property
     def sensitivities(self) -> Sensitivities:
         """Derivatives of all quantities to the numbers of the description."""

@@ -121,7 +121,9 @@ def rows(analysis: Analysis) -> list[tuple[Place, Row]]:
             )
             for of in ways
         ]
-        for i, (step, assembled) in enumerate(zip(analysis.inputs.steps, motion.assembled, strict=True)):
+        for i, (step, assembled) in enumerate(
+            zip(analysis.inputs.whole.steps, motion.assembled, strict=True)
+        ):
             head: Row = {"step": step}
             if several:
                 head["branch"] = str(assembly.number)

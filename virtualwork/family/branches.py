@@ -143,7 +143,7 @@ def meet_on_the_way(
     for here, some, q in _along(written, m, entering, n, low, high):
         count = len(result[here])
         for lever in _levers(written):
-            # what follows from a lever that turns far between two samples is told by none of them
+            # no sample shows what follows from a lever that turns far between two of them
             turn = np.exp(1j * _sampled(written, Angle(lever, 0), some, q, count))
             with np.errstate(invalid="ignore"):
                 result[here] |= (np.abs(np.diff(turn, axis=0)) > TURNED).any(axis=0)

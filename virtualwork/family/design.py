@@ -149,7 +149,7 @@ class Design:
         return self._differences(x, q, inputs_alone)
 
     def _evaluated(self, x: Reals, q: Reals, enters: tuple[str, ...] | None) -> tuple[Reals, bool]:
-        """The quantities, or their derivatives, from one run of a tape; and whether the branch is told so simply."""
+        """The quantities, or their derivatives, from one run of a tape; and whether the branch is certain so simply."""
         held = self._held if self._held is not None else {"at": self.mechanism.at[0]}
         again = self._ready(q, enters)
         rows, fine = again(self._moving | held | by_path(self.dimensions, x.tolist()))

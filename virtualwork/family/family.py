@@ -83,7 +83,7 @@ class Family:
                 i = int(np.argmin(np.isfinite(column)))
                 raise ValueError(f"{dimension.path}: found {column[i]} at {i}, expected finite numbers")
         self.dimensions = tuple(columns)
-        # a column beside the other: each is in one piece
+        # each column is in one piece
         self.values = np.array(list(columns.values())).T
 
     @property

@@ -20,7 +20,7 @@ from virtualwork.formulas.quantity import Quantity
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Where points, links and slides should be, one beside the other at the same inputs.
+    """Where points, links and slides should be, together at the same inputs.
 
     Attributes
     ----------

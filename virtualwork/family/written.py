@@ -34,7 +34,7 @@ from virtualwork.plan.steps import Group, Plan, geared, turns
 CHOICE = ("margin", "plus", "minus", "guessed", "sign")
 # radicand (a squared sine) below which a guess stands at a change point or a limit, or nearly so
 CLOSE = 1e-9
-# of two assemblies the nearer one is told from the farther if its squared distance is below this share
+# of two assemblies the nearer one is certain if its squared distance is below this share of the other's
 TOLD = 0.5
 # the radicand above which no change point is within two steps of `branches.STEP`: it grows with the square of the distance
 CLEAR = 0.2
@@ -177,7 +177,7 @@ class Written:
         return of.recorder.tape(outputs)
 
     def told(self, samples: int) -> Tape:
-        """The tape of how all closed forms close at the inputs of the guess, and whether that is told plainly.
+        """The tape of how all closed forms close at the inputs of the guess, and whether that is certain.
 
         `sign GROUP`; and `told`: positive where the guess is far from a change point and much nearer to one assembly, 2 where
         the radicands are far from zero there and at further inputs `way 0`, `way 1` …, so many. Where it is not told the
@@ -200,7 +200,7 @@ class Written:
         return recorder.tape(signs | {"told": told})
 
     def _plain(self, values: Mapping[str, Number]) -> list[Number]:
-        """What is positive where a choice is told plainly, and the description is no other than that of all."""
+        """What is positive where a choice is certain, and the description is no other than that of all."""
         plain = [values["allowed"]]
         for name in (group.name for group in self.closed):
             plus, minus = values[f"plus {name}"], values[f"minus {name}"]

@@ -89,7 +89,7 @@ class Coordinates:
     # --- how far from folding -----------------------------------------------------------------------------------
     @cached_property
     def _margins(self) -> Tape | None:
-        """The relative radicands of all loops, or what stands for them; None where there is none to look at."""
+        """The relative radicands of all loops, or what takes their place; None without loops."""
         a = self.equations.assembly
         groups = [g for g in a.plan.groups if g.kind != "PRP"]
         recording = self.equations.recording(False, False, False)

@@ -34,7 +34,7 @@ Rates = Callable[[Number, Numbers, Numbers], Numbers]
 
 
 class Stepped(NamedTuple):
-    """Changes of q and q̇, the work, the rates at the end, two errors of (q, q̇), and what stiffness is told from.
+    """Changes of q and q̇, the work, the rates at the end, two errors of (q, q̇), and what shows stiffness.
 
     `steep` is the squared change of the accelerations between two states at one time, `apart` that of the speeds.
     """

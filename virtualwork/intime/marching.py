@@ -47,8 +47,8 @@ Lanes = Mapping[str, Any]
 def body(k: int, passed: tuple[str, ...]) -> Tape:
     """A step of k inputs, tried, judged and taken or not, as the body of a loop.
 
-    States: `t`, `h` (of the next step), `grow`, `stiff`, `left`, `work`; `q0`, `v0`, `a0` and so on, `power`; what
-    rounding left over of q and q̇ (`lq0`, `lv0`); the largest speeds so far (`f0`). Constants: `end`, `span`,
+    States: `t`, `h` (of the next step), `grow`, `stiff`, `left`, `work`; `q0`, `v0`, `a0` and so on, `power`;
+    the rounding of earlier sums in q and q̇ (`lq0`, `lv0`); the largest speeds so far (`f0`). Constants: `end`, `span`,
     `tolerance`, and `scale0` and so on.
     """
     places, speeds, rates = names(k)

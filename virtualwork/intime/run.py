@@ -233,7 +233,7 @@ def simulate(
     until: Mapping[str, float] | None = None,
     progress: Callable[[float, float, int], None] | None = None,
 ) -> Run:
-    """Let go of the inputs; see `Mechanism.simulate`.
+    """Simulate; see `Mechanism.simulate`.
 
     `progress` is called after every step, or some, with the time reached, the last time and the number of the solution.
     """

@@ -101,7 +101,7 @@ class Runs:
         )
 
     def put(self, rows: Any, times: Reals, **columns: Reals) -> None:
-        """Take over what is found of some variants at their times (…, n), which may be less than those asked for."""
+        """Keep the results of some variants at their times (…, n), which may be less than those asked for."""
         n = times.shape[-1]
         for name, values in {"times": times, **columns}.items():
             of = getattr(self, name)
@@ -125,7 +125,7 @@ class Variants(Family):
         accuracy: float = 1e-9,
         until: Mapping[str, float] | None = None,
     ) -> Runs:
-        """Let go of the inputs of every variant; see `Mechanism.simulate`.
+        """Simulate every variant; see `Mechanism.simulate`.
 
         Parameters
         ----------
@@ -264,7 +264,7 @@ class _Lanes:
 
     # --- through time -----------------------------------------------------------------------------------------------
     def fill(self, runs: Runs, accuracy: float) -> Mask:
-        """Let go of all that can be; which variants must be done singly, (v,)."""
+        """Simulate all that can be simulated together; which variants must be done singly, (v,)."""
         alone = ~self.together
         rows, tolerance = np.flatnonzero(self.together), max(LEAST, FIRST * accuracy)
         nodes = self.way(rows, tolerance, alone)
@@ -382,7 +382,7 @@ class _Lanes:
         return ~Solver(Part(f.mechanism, f.dimensions, f.values, ends, rates), self.solver).together
 
     def _put(self, runs: Runs, rows: Rows, lanes: Rows, nodes: Nodes, t: Reals, error: Reals) -> None:
-        """Take over the states of some lanes at times (lanes, n), each from the node before; NaN where the time is."""
+        """Keep the states of some lanes at times (lanes, n), each from the node before; NaN where the time is."""
         rows, begin = rows[lanes], nodes.t[:, lanes]
         before = np.stack([(begin <= x).sum(axis=0) - 1 for x in t.T], axis=1)
         node = nodes.at((np.maximum(before, 0), lanes[:, None]))
