@@ -142,9 +142,8 @@ class Formulas:
             return "loops are singular in every pose"
         if {g.name: g.kind for g in self.written.plan.groups} != {g.name: g.kind for g in own.plan.groups}:
             return "its loops have a closed form for these numbers alone"
-        toothed = (m.racks or m.cams) and any(key.is_joint_force for key in keys)
-        if (toothed or (forces and m.friction)) and self.written.recording.forces.redundant:
-            return "the joint forces are statically redundant, and there are racks, cams or friction"
+        if forces and m.friction and self.written.recording.forces.redundant:
+            return "the joint forces are statically redundant, and there is friction"
         if forces:
             if any(load.axis == "time" for load in self.written.recording.tables) and self.poses.time is None:
                 return "a torque is given over the time, which the poses have not"

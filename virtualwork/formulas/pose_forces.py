@@ -194,6 +194,8 @@ class PoseForces:
     def system(self) -> dict[tuple[int, int | None], Number]:
         """The entries of A by row and column, those of b by row and None."""
         self.solve_places()
+        for touch in self.paths.touches.every:
+            self.solve(touch.targets, 0)
         entries: dict[tuple[int, int | None], Number] = {}
         for row, column, part in equations(self.joints, self.block):
             entries[row, column] = entries.get((row, column), 0.0) + bare(part)
