@@ -143,7 +143,7 @@ class Formulas:
         if {g.name: g.kind for g in self.written.plan.groups} != {g.name: g.kind for g in own.plan.groups}:
             return "its loops have a closed form for these numbers alone"
         if not self.written.recording.takes(keys):
-            return "the joint forces are statically redundant, and there are racks, cams or friction"
+            return "the joint forces are statically redundant, and there is friction"
         if forces:
             if any(load.axis == "time" for load in self.written.recording.tables) and self.poses.time is None:
                 return "a torque is given over the time, which the poses have not"

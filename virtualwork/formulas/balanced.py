@@ -12,11 +12,13 @@ from functools import cached_property
 from dalembert.arithmetic.recorded import Number, bare
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.block import Block
 from virtualwork.formulas.kinematics import Angle
+from virtualwork.formulas.numbers import plus
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import Recording
 from virtualwork.formulas.rubbing import Rubbing
-from virtualwork.formulas.statics import Column, equations, unknowns
+from virtualwork.formulas.statics import Column, equations, mesh_column, unknowns
 
 
 class Over(Quantity, kind="over"):
@@ -45,12 +47,8 @@ class Balanced(Rubbing):
         return bool(self.forces[0].order.redundant)
 
     def takes(self, quantities: Iterable[Quantity]) -> bool:
-        """Whether quantities can be written down: not where statics is redundant with friction, racks or cams."""
-        m = self.mechanism
-        toothed = bool(m.racks or m.cams)
-        concerned = any(
-            (m.friction and each.is_force) or (toothed and each.is_joint_force) for each in quantities
-        )
+        """Whether quantities can be written down: not forces where statics is redundant, with friction."""
+        concerned = bool(self.mechanism.friction) and any(each.is_force for each in quantities)
         return not (concerned and self.redundant)
 
     @cached_property
@@ -62,6 +60,8 @@ class Balanced(Rubbing):
     def system(self) -> dict[tuple[int, int | None], Number]:
         """The entries of A by row and column, those of b by row and None."""
         _, of, block = self.placed_forces()
+        for touch in of.paths.touches.every:
+            self.solve(touch.targets, 0)
         entries: dict[tuple[int, int | None], Number] = {}
         for row, column, part in equations(of, block):
             entries[row, column] = entries.get((row, column), 0.0) + bare(part)
@@ -75,7 +75,11 @@ class Balanced(Rubbing):
 
     def _bears(self, kind: str, key: str, body: str = "") -> Number:
         f = self.recorder.input(f"f {self.unknown_forces.index((kind, key, body))}")
-        return f * bare(self.mechanism.size) if kind in ("moment", "torque") else f
+        return f * bare(self.mechanism.size) if kind in ("moment", "gear", "torque") else f
+
+    def _tooth(self, _: Block, mesh: int) -> Number:
+        """The tooth force of a rack."""
+        return self._bears(*mesh_column(self.mechanism, mesh))
 
     def newton_euler(self, j: int) -> Number:
         if not self.redundant:
@@ -92,13 +96,25 @@ class Balanced(Rubbing):
             return (sign * self._bears("normal", joint)) * (1j * of.rail(block, at.guide))
         if body == GROUND:
             return -sum((self.joint_force(joint, other) for other in at.bodies if other != GROUND), 0j)
-        return self._bears("fx", joint, body) + 1j * self._bears("fy", joint, body)
+        force = self._bears("fx", joint, body) + 1j * self._bears("fy", joint, body)
+        return plus(force, of.borne(block, at, body, self._tooth))
 
     def joint_moment(self, joint: str, body: str) -> Number:
         if not self.redundant:
             return super().joint_moment(joint, body)
-        guide = self.forces[1].by_key[joint].guide
+        _, of, block = self.placed_forces()
+        guide = of.by_key[joint].guide
         if guide is None or not self.mechanism.guides[guide].is_slider:
             return None
-        on_link = self._bears("moment", joint)
+        on_link = plus(self._bears("moment", joint), of.beside(block, guide, self._tooth))
         return on_link if body == self.mechanism.guides[guide].link else -on_link
+
+    def contact(self, cam: int) -> Number:
+        if not self.redundant:
+            return super().contact(cam)
+        _, of, block = self.placed_forces()
+        self.solve(of.paths.touches.every[cam].targets, 0)
+        arm = self.mechanism.cam_drives[cam].guide is None
+        return of.contact(
+            block, cam, self._bears("contact", str(cam)) * (bare(self.mechanism.size) if arm else 1.0)
+        )

@@ -121,9 +121,7 @@ class Contact(Force, kind="contact"):
     cam: int
 
     def write(self, recording: Recording) -> Number:
-        _, of, block = recording.placed_forces()
-        recording.solve(of.paths.touches.every[self.cam].targets, 0)
-        return of.contact(block, self.cam)
+        return recording.contact(self.cam)
 
     def read(self, forces: Any) -> Any:
         return forces.contact(self.cam)

@@ -225,6 +225,12 @@ class Recording:
         guide = of.by_key[joint].guide
         return None if guide is None else of.guide_moment(block, guide, body)
 
+    def contact(self, cam: int) -> Number:
+        """How hard a cam, from 0, presses on its follower."""
+        _, of, block = self.placed_forces()
+        self.solve(of.paths.touches.every[cam].targets, 0)
+        return of.contact(block, cam)
+
     @cached_property
     def shaking(self) -> tuple[Number, Number]:
         """The shaking force and moment."""

@@ -114,6 +114,15 @@ def equations(of: JointForces, block: Block) -> Iterator[tuple[int, int | None, 
                 if body != GROUND:
                     arm = of.place(block, (f"guide:{mesh.guide}", body)) + 0j
                     yield from put(body, mesh_column(m, i), sign * rail, arm)
+    for touch in of.paths.touches.every:
+        # along the follower's coordinate, of an arm a torque over the size
+        here = touch.at(block.st)
+        push = here.unit() * (1.0 if touch.drive.guide is not None else size)
+        for body in links:
+            for sign in (sign for other, sign in of.paths.touches.on(body) if other is touch):
+                center = block.st.at(of.paths.case.path(body, m.rigid[body].center))
+                arm = touch.axis(block.st) - center + here.place()
+                yield from put(body, ("contact", str(touch.drive.number), ""), sign * push, arm)
     for j, entry in enumerate(m.inputs):
         if not entry.is_slide:
             yield from turn(str(entry.link), ("torque", str(j), ""), 1.0)
