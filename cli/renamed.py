@@ -44,6 +44,12 @@ MECHANISM = {
     "--newton": "dalembert mechanism FILE.toml --newton",
     "--order": "dalembert mechanism FILE.toml --order velocity",
 }
+FIELD = {
+    "--signal": "dalembert signal FILE.csv",
+    "--pulses": "dalembert signal FILE.csv --pulses N",
+    "--suggest-trial": "dalembert trial --rotor-mass MASS --speed SPEED --radius LENGTH",
+    "--planes": "dalembert trial --planes N",
+}
 COMMANDS = ("mechanism", "forces", "inspect", "equilibrium", "simulate", "tolerance", "fit")
 
 
@@ -53,5 +59,6 @@ def renamed(command: str, option: str) -> str | None:
     >>> renamed("mechanism", "--sweep")
     'dalembert mechanism: --sweep is now --over 0deg:360deg:1deg'
     """
-    new = EVERYWHERE.get(option) or (MECHANISM.get(option) if command in COMMANDS else None)
+    own = MECHANISM if command in COMMANDS else FIELD if command == "field" else {}
+    new = EVERYWHERE.get(option) or own.get(option)
     return None if new is None else f"dalembert {command}: {option} is now {new}"

@@ -103,8 +103,8 @@ def sleeping_threshold(transverse: ArrayLike, axial: ArrayLike, mgl: ArrayLike) 
     >>> float(sleeping_threshold(0.002, 0.0008, 0.1962))
     49.5227...
     """
-    I1, I3, a = (np.asarray(x, dtype=float) for x in (transverse, axial, mgl))
-    return np.asarray(2 * np.sqrt(np.maximum(a, 0.0) * I1) / I3)
+    I1, I3, a = map(as_array, (transverse, axial, mgl))
+    return as_array(2 * np.sqrt(np.maximum(a, 0.0) * I1) / I3)
 
 
 class _Cones(NamedTuple):

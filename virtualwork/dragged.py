@@ -83,13 +83,13 @@ def cams(own: Drawing, m: Description) -> list[dict[str, Any]]:
 
 def handles(m: Description) -> list[list[Any]]:
     """What can be dragged: the path of a point, its body, its name, and for a point in polar form the point it is counted from."""
-    found: list[list[Any]] = [[f"ground.{name}", "ground", name, None] for name in m.ground]
+    result: list[list[Any]] = [[f"ground.{name}", "ground", name, None] for name in m.ground]
     every = dimensions(m)
     for link, part in m.links.items():
         for point in part.points:
             for path in (f"links.{link}.{point}", f"links.{link}.points.{point}"):
                 if f"{path}.x" in every:
-                    found.append([path, link, point, None])
+                    result.append([path, link, point, None])
                 elif point in part.polar and f"{path}.length" in every:
-                    found.append([path, link, point, part.polar[point].origin])
-    return found
+                    result.append([path, link, point, part.polar[point].origin])
+    return result

@@ -160,7 +160,7 @@ class Mechanism(Description):
         accuracy: float = 1e-9,
         until: Mapping[str, float] | None = None,
     ) -> Run:
-        """Let go of the inputs: the motion under gravity, forces, torques, springs, dampers and friction.
+        """Simulate the motion under gravity, forces, torques, springs, dampers and friction.
 
         Virtual work with d'Alembert's forces is the equation of motion of the inputs; see `virtualwork.intime`.
 
@@ -188,7 +188,7 @@ class Mechanism(Description):
 
         Examples
         --------
-        A pendulum let go at rest from the side, after 1 s:
+        A pendulum released at rest from the side, after 1 s:
 
         >>> from virtualwork import Input, Link
         >>> pendulum = Mechanism({"O": 0j}, {"bob": Link({"O": 0j}, mass=1, center=1)}, inputs=Input(link="bob"),

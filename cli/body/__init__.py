@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from cli.read import options
@@ -31,6 +32,7 @@ What:
   acceleration X,Y,Z  Acceleration of the centre of mass, m/s².
   find NAME  Find this number: omega.y, the shaft's speed, or a part's, such as rod.ry.
   so_that QUANTITY=VALUE  What it is to give: momentum.x=2, bearing1_dynamic.size=20N.
+  only NAME,...  Only these: mass, inertia, principal_axes, momentum, bearing1.
 What: a robot:
   check_inertias  PARTS is a robot (URDF, SDF, MJCF): can bodies have its tensors?
 What: a shaft:
@@ -55,6 +57,7 @@ def run(
     acceleration: str | None = None,
     find: str | None = None,
     so_that: str | None = None,
+    only: str | None = None,
     shaft: str | None = None,
     axis: str | None = None,
     speed: str | None = None,
@@ -88,7 +91,7 @@ def run(
         shaft=_shaft(shaft, axis, speed, speed_rate, gravity, correct),
     )
     if check_inertias:
-        others = request != Request() or find or so_that
+        others = request != Request() or find or so_that or only
         if others or axis or gravity or speed or speed_rate or correct:
             raise options.bad("--check-inertias", "it is asked alone: expected no motion and no shaft")
         return _inertias(parts)
@@ -109,6 +112,8 @@ def run(
         moving, solution = search(read_table(parts), parts, request, *sought)
         bodies = [moving]
 
+    chosen = None if only is None else options.only(only, tables.names_of(bodies[0]))
+
     def figure() -> Figure:
         return tables.draw(bodies)
 
@@ -118,8 +123,8 @@ def run(
         return way(bodies)
 
     result = Result(
-        tables=tables.tables(bodies),
-        screen=lambda: tables.every(bodies, tables.quantities),
+        tables=tables.tables(bodies, chosen),
+        screen=lambda: tables.every(bodies, partial(tables.quantities, only=chosen)),
         figure=figure,
         way=way,
         method=tables.METHOD,

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cli.body.moving import AXES, Array, MovingBody
+from cli.body.moving import AXES, Array, CorrectionMass, MovingBody
 from cli.read.parts import SEVERAL
 from cli.show.picture import blank
 from dalembert.angles import degrees
@@ -33,13 +33,19 @@ DRAWN = 4
 
 
 class Entry(NamedTuple):
-    """A scalar or a vector, the errors of its components, and its place in JSON (None: nowhere)."""
+    """A scalar or a vector, the errors of its components, its place in JSON (None: nowhere), what it is a part of."""
 
     name: str
     dimension: str
-    value: ArrayLike
+    of: Callable[[], ArrayLike]
     error: Callable[[], ArrayLike]
     place: str | None = ""
+    owner: str = ""
+
+    @property
+    def value(self) -> ArrayLike:
+        """Its numbers, worked out now."""
+        return self.of()
 
     def column(self, lay: Callable[[list[float]], list[float | None]]) -> Column:
         """Return it as a column in which its numbers, and their errors, are laid so."""
@@ -63,26 +69,36 @@ class Entry(NamedTuple):
 
 
 def _entry(
-    b: MovingBody, name: str, dimension: str, of: Callable[[MovingBody], Any], place: str | None = ""
+    b: MovingBody,
+    name: str,
+    dimension: str,
+    of: Callable[[MovingBody], Any],
+    place: str | None = "",
+    owner: str = "",
 ) -> Entry:
     """A quantity: its error is what it differs by from the second run, in 32 digits."""
-    return Entry(name, dimension, of(b), lambda: of(b.second).off(of(b)), place)
+    return Entry(name, dimension, partial(of, b), lambda: of(b.second).off(of(b)), place, owner)
 
 
 def _of_body(b: MovingBody) -> Iterator[Entry]:
-    moments = b.body.principal
     yield _entry(b, "mass", "mass", lambda b: b.body.mass)
     yield _entry(b, "center", "length", lambda b: b.body.center)
-    for i, axis in enumerate("xyz"):
-        yield _entry(b, f"inertia_{axis}", "inertia", partial(_tensor_row, i), f"inertia.{i}")
-    yield Entry("principal", "inertia", moments.moments, lambda: b.principal_errors[0])
+    for i, letter in enumerate("xyz"):
+        yield _entry(b, f"inertia_{letter}", "inertia", partial(_tensor_row, i), f"inertia.{i}", "inertia")
+    yield Entry("principal", "inertia", lambda: b.body.principal.moments, lambda: b.principal_errors[0])
     for i in range(3):
-        place = f"principal_axes.{i}"
-        yield Entry(f"principal_axis_{i + 1}", "number", moments.axes[i], partial(_axis_error, b, i), place)
+        name, place = f"principal_axis_{i + 1}", f"principal_axes.{i}"
+        axis, error = partial(_axis, b, i), partial(_axis_error, b, i)
+        yield Entry(name, "number", axis, error, place, "principal_axes")
 
 
 def _tensor_row(i: int, b: MovingBody) -> Array:
     row: Array = b.body.inertia[i]
+    return row
+
+
+def _axis(b: MovingBody, i: int) -> Array:
+    row: Array = b.body.principal.axes[i]
     return row
 
 
@@ -107,11 +123,11 @@ def _of_shaft(b: MovingBody) -> Iterator[Entry]:
     """Forces of the bearings across the axis; the first takes the axial force."""
     for i in range(2):
         name = f"bearing{i + 1}"
-        yield _entry(b, f"{name}_static", "force", partial(_static, i), None)
-        yield _entry(b, f"{name}_dynamic", "force", partial(_dynamic, i), None)
+        yield _entry(b, f"{name}_static", "force", partial(_static, i), None, name)
+        yield _entry(b, f"{name}_dynamic", "force", partial(_dynamic, i), None, name)
         if b.correction is not None:
-            yield _entry(b, f"{name}_corrected", "force", partial(_corrected, i), None)
-    yield _entry(b, "drive_torque", "torque", lambda b: b.shaft.drive_torque, "shaft.drive_torque")
+            yield _entry(b, f"{name}_corrected", "force", partial(_corrected, i), None, name)
+    yield _entry(b, "drive_torque", "torque", lambda b: b.shaft.drive_torque, None)
 
 
 def _static(i: int, b: MovingBody) -> Array:
@@ -126,20 +142,41 @@ def _corrected(i: int, b: MovingBody) -> Array:
     return b.drawn(b.corrected[i])
 
 
-def _entries(b: MovingBody) -> list[Entry]:
+CORRECTIONS = "corrections"
+"""The name of the masses of correction planes, which have a row each."""
+Only: TypeAlias = Collection[str] | None
+"""The names of quantities, or of what they are parts of, that --only has; None: all. Nothing else is worked out."""
+
+
+def _entries(b: MovingBody, only: Only = None) -> list[Entry]:
     """Return what is shown, in the order in which it is shown."""
-    return [
+    every = [
         *_of_body(b),
         *(_of_motion(b) if b.moving else ()),
         *(_of_shaft(b) if b.request.shaft is not None else ()),
     ]
+    return [entry for entry in every if only is None or entry.name in only or entry.owner in only]
 
 
-def tables(bodies: Bodies) -> dict[str, Callable[[], Table]]:
+def _masses(b: MovingBody, only: Only) -> Sequence[CorrectionMass]:
+    return b.corrections if only is None or CORRECTIONS in only else ()
+
+
+def names_of(b: MovingBody) -> list[str]:
+    """What --only can name: the quantities, and what several of them are parts of."""
+    words = [word for entry in _entries(b) for word in (entry.owner, entry.name) if word]
+    return list(dict.fromkeys([*words, *([CORRECTIONS] if b.correction is not None else [])]))
+
+
+def tables(bodies: Bodies, only: Only = None) -> dict[str, Callable[[], Table]]:
     """The tables of a result, the CSV's first."""
-    made = {"body": axes, "document": of_document}
+    made: dict[str, Callable[[MovingBody], Table]] = {"body": partial(axes, only=only)}
+    made["document"] = of_document if only is None else partial(of_few, only=only)
     if bodies[0].request.shaft is not None:
-        made |= {"bearings": bearings, "corrections": corrections}
+        if only is None or any(entry.owner.startswith("bearing") for entry in _entries(bodies[0], only)):
+            made["bearings"] = bearings
+        if only is None or CORRECTIONS in only:
+            made["corrections"] = corrections
     return {name: partial(every, bodies, table) for name, table in made.items()}
 
 
@@ -150,9 +187,9 @@ def every(bodies: Bodies, table: Callable[[MovingBody], Table]) -> Table:
     return stacked([table(b) for b in bodies], SEVERAL, [b.parts.body for b in bodies], "bodies[]")
 
 
-def axes(b: MovingBody) -> Table:
+def axes(b: MovingBody, only: Only = None) -> Table:
     """A row for each axis, then one for each correction plane; scalars stand in the first row."""
-    masses = b.corrections
+    masses = _masses(b, only)
     below = len(masses)
 
     def in_rows(numbers: list[float]) -> list[float | None]:
@@ -162,7 +199,7 @@ def axes(b: MovingBody) -> Table:
         return [0.0, 0.0, 0.0, *(getattr(bound, name) for bound in b.correction_errors)]
 
     columns = [Column("axis", "", [*"xyz", *(c.plane for c in masses)])]
-    columns += [entry.column(in_rows) for entry in _entries(b)]
+    columns += [entry.column(in_rows) for entry in _entries(b, only)]
     units = {"z": "m", "radius": "m", "unbalance": "kg_m", "mass": "kg", "angle": "deg"}
     for name, unit in units.items() if masses else ():
         values = [None, None, None, *(getattr(c, name) for c in masses)]
@@ -171,7 +208,7 @@ def axes(b: MovingBody) -> Table:
     return Table(columns, keys=("axis",))
 
 
-def quantities(b: MovingBody) -> Table:
+def quantities(b: MovingBody, only: Only = None) -> Table:
     """The terminal's table: a row for each quantity, then mass and angle of each correction."""
 
     def in_cells(numbers: list[float]) -> list[float | None]:
@@ -180,12 +217,11 @@ def quantities(b: MovingBody) -> Table:
     def of_correction(i: int, name: str) -> float:
         return float(getattr(b.correction_errors[i], name))
 
-    entries = _entries(b)
-    for i, c in enumerate(b.corrections):
+    entries = _entries(b, only)
+    for i, c in enumerate(_masses(b, only)):
         for name in ("mass", "angle"):
-            entries.append(
-                Entry(f"plane {c.plane}: {name}", name, getattr(c, name), partial(of_correction, i, name))
-            )
+            value = partial(getattr, c, name)
+            entries.append(Entry(f"plane {c.plane}: {name}", name, value, partial(of_correction, i, name)))
     rows = [entry.column(in_cells) for entry in entries]
 
     def bounds(k: int) -> list[float]:
@@ -236,6 +272,15 @@ def of_document(b: MovingBody) -> Table:
         ]
         if b.letters != "xyz":
             columns.append(_one("axes", "number", b.shaft_axes, "shaft.axes"))
+    return Table([], place="", documented=columns)
+
+
+def of_few(b: MovingBody, only: Only) -> Table:
+    """The document of those that --only names, without the lists of the shaft."""
+    entries = _entries(b, only)
+    columns = [each for entry in entries if (each := entry.documented) is not None]
+    if any(entry.name == "drive_torque" for entry in entries):
+        columns.append(_one("drive_torque", "torque", float(b.shaft.drive_torque), "shaft.drive_torque"))
     return Table([], place="", documented=columns)
 
 

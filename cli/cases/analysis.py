@@ -92,13 +92,11 @@ class Analysis:
     @cached_property
     def own_order(self) -> int:
         """How high the rates go that the inputs have."""
-        highest = 0
-        for k, name in enumerate(("speed", "acceleration", "jerk"), 1):
-            if any(getattr(e, name) is not None for e in self.mechanism.inputs) or (
-                getattr(self.inputs, name, None) is not None
-            ):
-                highest = k
-        return highest
+        orders = self.inputs.orders
+        for k, name in enumerate(("jerk", "acceleration", "speed")):
+            if 3 - k in orders or any(getattr(e, name) is not None for e in self.mechanism.inputs):
+                return 3 - k
+        return 0
 
     @property
     def order(self) -> int:
@@ -141,7 +139,7 @@ class Analysis:
         """The motion of each assembly."""
         from virtualwork.motion import Motion
 
-        q = self.inputs
+        q = self.inputs.whole
         result = tuple(Motion(a, q.values, q.speed, q.acceleration) for a in self.assemblies)
         for motion in result:
             motion.poses.input_rest = q.rest
@@ -226,7 +224,7 @@ class Analysis:
         """Return the inputs of a pose as a sentence has them: 60°, 0.35 m; several with their names."""
         values = [
             f"{figures(float(value))}{'°' if key.endswith('_deg') else ' m'}"
-            for value, key in zip(self.inputs.shown[i], self.input_names.values(), strict=True)
+            for value, key in zip(self.inputs.whole.shown[i], self.input_names.values(), strict=True)
         ]
         if len(values) == 1:
             return values[0]
@@ -251,7 +249,7 @@ class Analysis:
     @cached_property
     def set_angles(self) -> dict[str, NDArray[np.float64]]:
         """The angles of the links that are driven against the ground, as they were requested, degrees."""
-        shown, inputs = self.inputs.shown, self.mechanism.inputs
+        shown, inputs = self.inputs.whole.shown, self.mechanism.inputs
         return {e.link: shown[:, j] for j, e in enumerate(inputs) if e.link and e.on == "ground"}
 
     # --- sizes ----------------------------------------------------------------------------------------------------

@@ -40,6 +40,18 @@ class Values(NamedTuple):
     si: Reals
 
 
+class Part(NamedTuple):
+    """Some rows of a grid."""
+
+    shown: Reals
+    """(rows, names): SI, but angles in degrees."""
+    si: Reals
+    labels: list[str]
+    """The names of the rows: those of a table, else their numbers from 1."""
+    time: Reals | None
+    """The times of a law of motion, s."""
+
+
 @dataclass(frozen=True, eq=False)
 class Axis:
     """Numbers that vary together: a range of one, or the rows of several.
@@ -290,23 +302,17 @@ class Grid:
         """How many there are."""
         return math.prod(axis.n for axis in self.axes)
 
-    def part(self, low: int, high: int) -> Values:
-        """The values from low to high, or to the last: (rows, names)."""
-        places: Any = np.arange(low, min(high, self.n))
-        each = np.unravel_index(places, [axis.n for axis in self.axes]) if len(self.axes) > 1 else [places]
-        parts = [axis.at(i) for axis, i in zip(self.axes, each, strict=True)]
-        return Values(*(np.concatenate([part[k] for part in parts], axis=1) for k in (0, 1)))
-
-    def labels(self, low: int, high: int) -> list[str]:
-        """The names of the rows: those of a table, else their numbers from 1."""
-        if len(self.axes) == 1 and self.axes[0].labels is not None:
-            return list(self.axes[0].labels[low:high])
-        return [str(i) for i in range(low + 1, min(high, self.n) + 1)]
-
-    def times(self, low: int, high: int) -> Reals | None:
-        """The times of a law of motion, s."""
-        time = self.axes[0].time if len(self.axes) == 1 else None
-        return None if time is None else time[low:high]
+    def part(self, low: int, high: int) -> Part:
+        """The rows from low to high, or to the last."""
+        axes, high = self.axes, min(high, self.n)
+        places: Any = np.arange(low, high)
+        each = np.unravel_index(places, [axis.n for axis in axes]) if len(axes) > 1 else [places]
+        parts = [axis.at(i) for axis, i in zip(axes, each, strict=True)]
+        shown, si = (np.concatenate(values, axis=1) for values in zip(*parts, strict=True))
+        # the names and times of the rows of a table, where nothing else varies
+        names, time = (axes[0].labels, axes[0].time) if len(axes) == 1 else (None, None)
+        labels = [str(i + 1) for i in range(low, high)] if names is None else list(names[low:high])
+        return Part(shown, si, labels, None if time is None else time[low:high])
 
 
 def grids(

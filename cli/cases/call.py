@@ -207,8 +207,9 @@ class Call:
 
     def check_names(self) -> None:
         """Refuse names that --only cannot find."""
-        with naming(self.request.file):
-            self.analysis().check_names()
+        if self.request.only is not None:
+            with naming(self.request.file):
+                self.analysis().check_names()
 
     def analysis(self) -> Analysis:
         """The mechanism itself over the inputs of the call."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -35,13 +35,20 @@ class Inputs:
     time: Reals | None = None
     """(n,) s, of a law of motion over time."""
 
-    # whether the values are listed one by one
-    listed = True
-
     @property
     def n(self) -> int:
         """How many poses."""
         return len(self.shown)
+
+    @property
+    def orders(self) -> set[int]:
+        """Of which orders there are rates."""
+        return {order for order, rate in enumerate((self.speed, self.acceleration), 1) if rate is not None}
+
+    @property
+    def whole(self) -> Inputs:
+        """All poses, listed."""
+        return self
 
     @property
     def span(self) -> tuple[float, float]:
@@ -84,7 +91,7 @@ def decimals(shown: Reals) -> Doubled:
     return Doubled(shown)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class InputGrid:
     """The inputs of a grid of axes; the other inputs stay where they are.
 
@@ -109,93 +116,40 @@ class InputGrid:
         return self.grid.n
 
     @property
-    def listed(self) -> bool:
-        """Whether the values are listed one by one."""
-        return not (len(self.grid.axes) == 1 and self.grid.axes[0].steps is not None)
+    def orders(self) -> set[int]:
+        """Of which orders there are rates."""
+        named = (*self.grid.names, *self.rates)
+        return {name.order for name in named if isinstance(name, Driven) and name.order}
 
     @property
     def span(self) -> tuple[float, float]:
         """The least and the largest value of the first input."""
-        if self.listed:
-            return self._whole.span
+        if len(self.grid.axes) > 1 or self.grid.axes[0].steps is None:
+            return self.whole.span
         ends = [float(self.part(i, i + 1).values[0, 0]) for i in (0, self.n - 1)]
         return min(ends), max(ends)
 
     def part(self, low: int, high: int) -> Inputs:
         """The poses from low to high, or to the last."""
-        high = min(high, self.n)
         moved = self.grid.part(low, high)
-        where = {name: i for i, name in enumerate(self.grid.names)}
-
-        def of(kind: Callable[[Values], Reals], j: int) -> Reals:
-            i = where.get(self.names[j])
-            return np.full(high - low, kind(self.held)[j]) if i is None else kind(moved)[:, i]
-
-        k = range(len(self.names))
-        shown, values = (np.stack([of(kind, j) for j in k], axis=1) for kind in (_shown, _si))
-        rates: list[Reals | None] = []
-        for order in (1, 2):
-            its = [name.rate(order) for name in self.names]
-            if not any(name in where or name in self.rates for name in its):
-                rates.append(None)
-                continue
-            columns = [
-                moved.si[:, where[name]] if name in where else np.full(high - low, self.rates.get(name, 0.0))
-                for name in its
-            ]
-            rates.append(np.stack(columns, axis=1))
-        labels, time = self.grid.labels(low, high), self.grid.times(low, high)
-        return Inputs(values, shown, rates[0], rates[1], labels, time)
+        n = len(moved.shown)
+        # what is held, and in its place what the grid moves
+        shown, values = (np.tile(held, (n, 1)) for held in self.held)
+        rates = {order: np.zeros((n, len(self.names))) for order in self.orders}
+        for name, rate in self.rates.items():
+            rates[name.order][:, name.j] = rate
+        for i, of in enumerate(self.grid.names):
+            assert isinstance(of, Driven)
+            if of.order:
+                rates[of.order][:, of.j] = moved.si[:, i]
+            else:
+                shown[:, of.j], values[:, of.j] = moved.shown[:, i], moved.si[:, i]
+        return Inputs(values, shown, rates.get(1), rates.get(2), moved.labels, moved.time)
 
     @cached_property
-    def _whole(self) -> Inputs:
+    def whole(self) -> Inputs:
+        """All poses, listed."""
         return self.part(0, self.n)
-
-    @property
-    def values(self) -> Reals:
-        """The inputs in SI, (n, k)."""
-        return self._whole.values
-
-    @property
-    def shown(self) -> Reals:
-        """The inputs as they are shown, degrees or metres, (n, k)."""
-        return self._whole.shown
-
-    def rest(self) -> Reals:
-        """What the inputs are exactly less the floats in SI, (n, k)."""
-        return self._whole.rest()
-
-    @property
-    def steps(self) -> list[str]:
-        """The poses' names."""
-        return self._whole.steps
-
-    @property
-    def speed(self) -> Reals | None:
-        """Their speeds, (n, k), where a table gives them."""
-        return self._whole.speed if self._has(1) else None
-
-    @property
-    def acceleration(self) -> Reals | None:
-        """Their accelerations, (n, k), where a table gives them."""
-        return self._whole.acceleration if self._has(2) else None
-
-    @property
-    def time(self) -> Reals | None:
-        """The times of a law of motion, s."""
-        return self.grid.times(0, self.n)
-
-    def _has(self, order: int) -> bool:
-        named = [name for name in (*self.grid.names, *self.rates) if isinstance(name, Driven)]
-        return any(name.order == order for name in named)
-
-
-def _shown(values: Values) -> Reals:
-    return values.shown
-
-
-def _si(values: Values) -> Reals:
-    return values.si
 
 
 def of_one(

@@ -323,7 +323,7 @@ def part_of(study: Study, shown: Rows) -> tuple[Any, Rows]:
 
     m, v = study.mechanism, len(shown)
     family = Family(m, study.in_si(shown))
-    own = study.inputs(m, None)
+    own = study.inputs(m, None).whole
     moved = {name.j for axis in study.moved.axes for name in axis.names} if study.moved is not None else set()  # type: ignore[union-attr]
     si, seen = own.values[None], own.shown[None]
     rates = family.rates(own.speed, own.acceleration)

@@ -68,8 +68,8 @@ def _computing(
         motion = Motion(
             assembly,
             start[0] + np.linspace(0.0, 2 * np.pi, SWEEP),
-            first.inputs.speed,
-            first.inputs.acceleration,
+            first.inputs.whole.speed,
+            first.inputs.whole.acceleration,
         )
     pairs = first.pairs if first.request.forces else []
     order = max(ORDERS, first.order)

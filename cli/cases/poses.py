@@ -56,7 +56,7 @@ def table(analysis: Analysis, computed: Sequence[Mapping[Quantity, Any]] = ()) -
     `computed`: what the poses of each assembly have computed already; there are no bounds of it.
     """
     wanted = analysis.tabled
-    n, shown, driven = analysis.inputs.n, analysis.inputs.shown, analysis.set_angles
+    n, shown, driven = analysis.inputs.n, analysis.inputs.whole.shown, analysis.set_angles
     every = computed or [solved(motion, keys_of(wanted)) for motion in analysis.motions]
     times = len(every)
     parts = [cells_of(wanted, each, n, driven) for each in every]
@@ -78,7 +78,7 @@ def table(analysis: Analysis, computed: Sequence[Mapping[Quantity, Any]] = ()) -
                 ]
         return [b for each in bounds for b in bounds_of(each)]  # type: ignore[arg-type]
 
-    columns = [Column("step", "", [*analysis.inputs.steps] * times)]
+    columns = [Column("step", "", [*analysis.inputs.whole.steps] * times)]
     if analysis.several:
         numbers = [str(assembly.number) for assembly in analysis.assemblies for _ in range(n)]
         columns.append(Column("branch", "", numbers))
@@ -120,7 +120,7 @@ def by_link(analysis: Analysis) -> Table:
     solved_here = solved(analysis.motions[0], keys_of(wanted))
     shown = cells_of(wanted, solved_here, analysis.inputs.n, analysis.set_angles)
     numbers = {each.path[1:]: values for each, values in shown.items()}
-    steps = analysis.inputs.steps
+    steps = analysis.inputs.whole.steps
     columns = [
         Column("step", "", [step for step in steps for _ in names]),
         Column("link", "", names * len(steps)),
@@ -175,7 +175,7 @@ def poses_of(
     n, driven, m = len(assembled), analysis.set_angles, analysis.mechanism
     shown = {
         e.name: {analysis.input_names[e.name]: values.tolist()}
-        for e, values in zip(m.inputs, analysis.inputs.shown.T, strict=True)
+        for e, values in zip(m.inputs, analysis.inputs.whole.shown.T, strict=True)
     }
     tree: Document = {**(next(iter(shown.values())) if len(m.inputs) == 1 else {"inputs": shown})}
     tree |= {"branch": [branch] * n, "assembled": assembled.tolist()}
@@ -189,7 +189,7 @@ def poses_of(
 
 def pose_head(analysis: Analysis, i: int) -> Document:
     """What names a pose in JSON: `input_deg`, or `inputs` of several."""
-    shown = analysis.inputs.shown[i].tolist()
+    shown = analysis.inputs.whole.shown[i].tolist()
     every = {
         e.name: {analysis.input_names[e.name]: value}
         for e, value in zip(analysis.mechanism.inputs, shown, strict=True)

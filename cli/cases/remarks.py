@@ -130,7 +130,7 @@ def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
 
     def note(bad: NDArray[np.bool_], what: str) -> None:
         if bad.any():
-            troubles.append((what, analysis.inputs.shown[bad, 0].tolist()))
+            troubles.append((what, analysis.inputs.whole.shown[bad, 0].tolist()))
 
     for motion in analysis.motions:
         d = motion.dynamics

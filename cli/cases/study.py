@@ -112,7 +112,7 @@ class PoseCase(Case):
                     assembly.track.cover(*q.span)
             block = replace(a, inputs=q.part(i, i + BLOCK), warnings=[], block_of=a)
             block.assemblies = (assembly,)
-            its = block.inputs
+            its = block.inputs.whole
             motion = Motion(assembly, its.values, its.speed, its.acceleration, block_of=q.n)
             motion.poses.input_rest = its.rest
             motion.poses.time = its.time

@@ -165,4 +165,4 @@ class Together:
         """The inputs of all variants, one after the other."""
         v, n = part.shape
         si, seen = (np.broadcast_to(x, (v, n, x.shape[2])).reshape(v * n, -1) for x in (part.inputs, shown))
-        return Inputs(si, seen, steps=list(self.analysis.inputs.steps) * v)
+        return Inputs(si, seen, steps=list(self.analysis.inputs.whole.steps) * v)

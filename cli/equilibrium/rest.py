@@ -51,7 +51,7 @@ class Rest(TableCase):
         """The positions."""
         spans = None
         if self.ranged:
-            values = self.analysis.inputs.values
+            values = self.analysis.inputs.whole.values
             spans = np.stack([values.min(axis=0), values.max(axis=0)], axis=1)
             if (spans[:, 0] == spans[:, 1]).any():
                 spans = None

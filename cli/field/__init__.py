@@ -61,18 +61,7 @@ Further options (docs/commands.md describes them):
   view  static-couple: the corrections of two planes as a static part and a couple.
   zone_class  Zone A to D of ISO 10816-3 for velocities: group 1 (above 300 kW) or 2 (15 to 300 kW), rigid or flexible support.
   workers N  Processes that solve many machines.
-Moved:
-  signal  Now dalembert signal.
-  pulses  Now dalembert signal.
-  suggest_trial  Now dalembert trial.
-  planes  Now dalembert trial.
 """
-MOVED = {
-    "signal": "dalembert signal FILE.csv",
-    "pulses": "dalembert signal FILE.csv --pulses N",
-    "suggest_trial": "dalembert trial --rotor-mass MASS --speed SPEED --radius LENGTH",
-    "planes": "dalembert trial --planes N",
-}
 
 
 @command(OPTIONS)
@@ -110,10 +99,6 @@ def run(
     columns: str | None = None,
     workers: Annotated[int, typer.Option(min=1)] = 1,
     page: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None,
-    signal: Annotated[str | None, typer.Option(hidden=True)] = None,
-    pulses: Annotated[str | None, typer.Option(hidden=True)] = None,
-    suggest_trial: Annotated[bool, typer.Option(hidden=True)] = False,
-    planes: Annotated[str | None, typer.Option(hidden=True)] = None,
 ) -> Result:
     """Balance rotors from measured vibration and trial masses (influence coefficients).
 
@@ -121,9 +106,6 @@ def run(
     trial_unbalance_*), trial_angle_deg, trial_kept (yes: it stays on). In the initial run the last four are empty. Phase
     and mass angle are counted in one sense. docs/field-balancing.md has more.
     """
-    old = {"signal": signal, "suggest_trial": suggest_trial, "pulses": pulses, "planes": planes}
-    for name in options.given(**old):
-        raise options.bad(name, f"is a command of its own: {MOVED[name[2:].replace('-', '_')]}")
     if columns is not None:
         from dalembert.tables.headers import rename_from
 
@@ -204,7 +186,7 @@ def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -
         return sheets(b, made)
 
     def figure() -> Figure:
-        from cli.field.picture import draw
+        from cli.field.report import draw
         from cli.field.rotor import each
 
         return draw(b, list(each(b, 3)))

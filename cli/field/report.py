@@ -1,14 +1,15 @@
-"""The report of a balancing in the field: before, after, what to trim, the verdict; a page for each rotor."""
+"""The report of a balancing in the field, two pages for each rotor, and its pictures: dials; of a fitted log its history."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.field import picture
+from balancing.picture import Vibration, vibration
 from cli.field.field_balancing import FieldBalancing
 from cli.field.rotor import Rotor, each
 from cli.field.rows import Rows, Tables, amplitude_unit, masses_text
@@ -16,11 +17,17 @@ from cli.field.tables import sense
 from cli.read.runs.runs import Complex
 from cli.read.tolerance import verdict_table
 from cli.show.bars import Bar, Bars
+from cli.show.picture import blank
 from cli.show.result import Section, Sheet
 from dalembert.angles import degrees
 from dalembert.results.columns import Column, Table
 from dalembert.results.text import with_uncertainty
 from dalembert.units import from_si
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from balancing.log_picture import History
 
 MOST = 24  # rotors of one report
 BARS = 6  # sensors of one page
@@ -35,8 +42,8 @@ def sheets(b: FieldBalancing, tables: Tables) -> Iterator[Sheet]:
     for rotor in each(b, MOST):
         title = f"Rotor {rotor.heading}" if rotor.heading else ""
         of = _Pages(rotor, made)
-        history = partial(picture.draw, b, [rotor]) if b.runs.fitted else None
-        yield Sheet(title, list(of.sections()), partial(picture.dials, b, [rotor], trims=of.trims))
+        history = partial(draw, b, [rotor]) if b.runs.fitted else None
+        yield Sheet(title, list(of.sections()), partial(dials, b, [rotor], trims=of.trims))
         yield Sheet(title, list(of.method()), history, dense=True)
     if len(b.runs.rotors) > MOST:
         yield Sheet("", [Section("Further rotors", [f"{len(b.runs.rotors) - MOST} are not shown here."])])
@@ -126,8 +133,8 @@ class _Pages:
         """Each sensor's vibration before and after as bars, with the limit where there is one."""
         unit, rows, channels = amplitude_unit(self.b), [], self.rotor.channels
         for s, channel in enumerate(channels[:BARS]):
-            for name, vibration in self.states().items():
-                size = float(np.abs(vibration[s]))
+            for name, vectors in self.states().items():
+                size = float(np.abs(vectors[s]))
                 if size == size:
                     label = f"{channel} {name}" if len(channels) > 1 else name
                     rows.append(Bar(label, size, f"{size:.3g} {unit}", name != "before"))
@@ -212,11 +219,11 @@ class _Pages:
         columns = Rows.of(self.b, ()).read(self.b, self.rotor.channels).shown
         columns = [column for column in columns if column.name != "rotor"]
         keys = [column.header for column in columns]
-        for name, vibration in states.items():
-            sizes = [float(f"{value:.4g}") for value in np.abs(vibration).tolist()]
+        for name, vectors in states.items():
+            sizes = [float(f"{value:.4g}") for value in np.abs(vectors).tolist()]
             columns.append(Column(name, self.unit, sizes))
             if not self.b.request.four_run:
-                shown = vibration.conj() if self.b.against else vibration
+                shown = vectors.conj() if self.b.against else vectors
                 phases = [round(float(degrees(v)), 2) % 360 if abs(v) > 0 else None for v in shown.tolist()]
                 columns.append(Column("phase", "deg", phases))
         return Table(columns, keys=keys)
@@ -277,4 +284,83 @@ def _convention(b: FieldBalancing) -> str:
     return (
         "Phases as the instrument shows them, counted against the sense of the mass angles; those of the influence "
         "coefficients and of the picture are counted in the sense of the mass angles."
+    )
+
+
+# -- pictures --------------------------------------------------------------------------------------------------
+def draw(b: FieldBalancing, rotors: Sequence[Rotor]) -> Figure:
+    """Draw for each rotor the vibration before and after, and the corrections; of a fit with all that it was found from."""
+    if not b.runs.fitted:
+        return dials(b, rotors)
+    from balancing.log_picture import log_history
+
+    return log_history([_history(b, rotor) for rotor in rotors], amplitude_unit(b), b.unit, blank())
+
+
+def dials(b: FieldBalancing, rotors: Sequence[Rotor], *, trims: bool = False) -> Figure:
+    """Draw for each rotor the vibration before and after, and the corrections, as dials; or what to add as it stands."""
+    figure = blank()
+    vibration([_rotor(b, rotor, trims) for rotor in rotors], amplitude_unit(b), b.unit, figure=figure)
+    return figure
+
+
+def _rotor(b: FieldBalancing, rotor: Rotor, trims: bool) -> Vibration:
+    solved, i = rotor.solved, rotor.i
+    fix, start = (solved.trim, 0 * solved.standing) if trims else (solved.corrections, solved.start)
+    places = b.request.places or ()
+    return Vibration(
+        rotor.heading,
+        [str(channel) for channel in rotor.channels],
+        solved.initial[i],
+        solved.residual[i],
+        solved.planes,
+        b.amount(fix[i]),
+        b.amount(start[i]),
+        places=np.radians(places).tolist(),
+        split=[_on_places(b, w) for w in fix[i].tolist()] if places else [],
+    )
+
+
+def _on_places(b: FieldBalancing, w: complex) -> list[float]:
+    """Return what of a correction goes on each of the places, in the unit of the trial masses."""
+    masses = [0.0] * len(b.request.places or ())
+    for name, _, mass in b.split(w):
+        masses[int(name) - 1] = float(b.amount(mass))
+    return masses
+
+
+def _history(b: FieldBalancing, rotor: Rotor) -> History:
+    from balancing import region_factor
+    from balancing.log_picture import History
+    from cli.field.logs import predicted, run_to_predict, suggested
+
+    solved, i, balance = rotor.solved, rotor.i, rotor.solved.fitted
+    spreads, prediction, masses = [], None, None
+    if solved.covariance is not None:
+        factors = region_factor(0.95, balance.degrees_of_freedom[i]).tolist()
+        covariances = solved.covariance[i] * b.amount(1.0) ** 2
+        spreads = list(zip(covariances, factors, strict=True))
+    if b.predict is not None:
+        on = np.broadcast_to(run_to_predict(b, solved.planes), solved.corrections.shape)
+        prediction = predicted(b, solved)[0][i], balance.vibration_spread(on, reading=True)
+    if b.request.suggest and (run := suggested(rotor)) is not None:
+        masses = np.asarray(b.amount(run.masses))
+    places = b.request.places or ()
+    return History(
+        rotor.heading,
+        i,
+        [str(channel) for channel in rotor.channels],
+        rotor.group.lines.of(i),
+        balance.fit,
+        rotor.group.chance[i],
+        solved.initial[i],
+        solved.residual[i],
+        balance.vibration_spread(solved.total),
+        solved.planes,
+        np.asarray(b.amount(solved.corrections[i])),
+        spreads,
+        prediction,
+        masses,
+        places,
+        [_on_places(b, complex(w)) for w in solved.corrections[i]] if places else [],
     )

@@ -106,7 +106,7 @@ class Forces(PoseStudy):
 
         if is_by_quantity(analysis):
             return curves(analysis)
-        several = len(analysis.inputs.shown) > 2 and analysis.motions[0].assembled.any()
+        several = len(analysis.inputs.whole.shown) > 2 and analysis.motions[0].assembled.any()
         return forces_drawn(analysis) if several else drawn(analysis)
 
     def result(self, case: Case) -> Result:

@@ -150,7 +150,7 @@ def _diagrams(bodies: list[FreeBody], i: int) -> Figure:
 
 def _pose(analysis: Analysis, i: int) -> list[Column]:
     """The columns that name a pose: its inputs, as they are shown and as JSON has them."""
-    shown = analysis.inputs.shown[i].tolist()
+    shown = analysis.inputs.whole.shown[i].tolist()
     inputs = analysis.mechanism.inputs
     if len(inputs) == 1:
         key = analysis.input_names[inputs[0].name]
@@ -167,7 +167,7 @@ def _equations(analysis: Analysis, motion: Motion, entries: list[list[Entry]], m
     """The balance of the first pose with its numbers."""
     lines = []
     if motion.n * len(analysis.motions) > 1:
-        lines.append(f"Pose {analysis.inputs.shown[0][0]:g}; the others in the same way.")
+        lines.append(f"Pose {analysis.inputs.whole.shown[0][0]:g}; the others in the same way.")
     if not moves:
         lines.append("The mechanism is at rest: the velocities are virtual, of a unit speed of the input.")
     for entry_list in entries:

@@ -67,12 +67,12 @@ def iterates(analysis: Analysis) -> dict[str, Table]:
     from virtualwork.study.newton_table import all_at_once
 
     assembly = analysis.assemblies[0]
-    solutions = [all_at_once(assembly, tuple(row)) for row in analysis.inputs.values.tolist()]
+    solutions = [all_at_once(assembly, tuple(row)) for row in analysis.inputs.whole.values.tolist()]
     first = solutions[0]
     away = [i for i, each in enumerate(solutions) if not each.closed or not each.difference < SAME]
     for i in away[:3]:
         why = "did not converge" if not solutions[i].closed else "found another assembly"
-        analysis.warnings.append(f"newton from the guess {why} at step {analysis.inputs.steps[i]}")
+        analysis.warnings.append(f"newton from the guess {why} at step {analysis.inputs.whole.steps[i]}")
     if len(away) > 3:
         analysis.warnings.append(
             f"newton from the guess missed the assembly at {len(away)} of {len(solutions)} poses"

@@ -190,7 +190,11 @@ def _root_table(analysis: Analysis, m: Any, group: Group, name: str, at: list[Gr
         for k, root in enumerate(its.roots, 1)
     ]
     inputs = [
-        Column(column.removesuffix(f"_{unit}"), unit, [float(analysis.inputs.shown[i][j]) for i, *_ in rows])
+        Column(
+            column.removesuffix(f"_{unit}"),
+            unit,
+            [float(analysis.inputs.whole.shown[i][j]) for i, *_ in rows],
+        )
         for j, column in enumerate(analysis.input_columns)
         for unit in (column.rpartition("_")[2],)
     ]
@@ -246,7 +250,7 @@ def _newton(analysis: Analysis, motion: Motion) -> Topic:
             )
             rows.append(
                 {
-                    **dict(zip(analysis.input_columns, analysis.inputs.shown[i].tolist(), strict=True)),
+                    **dict(zip(analysis.input_columns, analysis.inputs.whole.shown[i].tolist(), strict=True)),
                     "k": str(it.k), **unknowns, "f_m": float(np.linalg.norm(it.residual)),
                 }
             )  # fmt: skip

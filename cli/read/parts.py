@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cli.read.turning import TURNS, along, rotation_of, turned, vectors
 from dalembert.angles import cosine_sine
 from dalembert.errors import DataError, needs, quote
 from dalembert.hints import nearest
@@ -33,7 +34,6 @@ DENSITIES = {3: "density", 2: "area_density", 1: "linear_density"}
 TENSOR = "tensor"
 MESH = "mesh"
 POINT = "point"
-TURNS = ("rx", "ry", "rz")
 _NUMBERS = {
     "mass": "mass",
     "density": "density",
@@ -104,10 +104,10 @@ class _Unturned:
         zero = DoubledArray(np.zeros(len(self.index)))
         center = np.stack([cells.get(axis, zero) for axis in "xyz"], axis=-1)
         if "angle" in read:
-            turned = (shape == POINT) & np.isfinite(read["angle"].values[self.index])
+            by_angle = (shape == POINT) & np.isfinite(read["angle"].values[self.index])
             c, s = cosine_and_sine(read["angle"], self.index)
             polar = np.stack([cells["radius"] * c, cells["radius"] * s, center[:, 2]], axis=-1)
-            center = np.where(turned[:, None], polar, center)
+            center = np.where(by_angle[:, None], polar, center)
         mass = cells.get("mass", zero) + 0.0
         own = [cells.get(name, zero) for name in (*MOMENTS, *PRODUCTS)]
         inertia: Any = tensor(*own)
@@ -137,7 +137,7 @@ class _Unturned:
             for axis, name in enumerate(TURNS)
             if name in read
         ]
-        rotation = _turned(turns, _along(np.stack([cells.get(f"axis_{a}", zero) for a in "xyz"], axis=-1)))
+        rotation = turned(turns, along(np.stack([cells.get(f"axis_{a}", zero) for a in "xyz"], axis=-1)))
         return Body(mass, center, inertia).turned(rotation)
 
     def solids(self) -> list[Solid]:
@@ -181,7 +181,7 @@ def bodies_of(table: Table, path: str) -> list[Parts]:
     # row by row Python's numbers are faster; turns are no shape's
     columns = {key: column.tolist() for key, column in values.items() if key not in TURNS}
     labels = table.texts.get("part", [str(index + 1) for index in range(table.rows)])
-    centers = _vectors(values, *"xyz")
+    centers = vectors(values, *"xyz")
     folder = Path() if path == "-" else Path(path).parent
     names, body_of = table.numbered(SEVERAL)
     warnings: list[list[str]] = [[] for _ in names]
@@ -218,7 +218,7 @@ def bodies_of(table: Table, path: str) -> list[Parts]:
         index = kept[place]
         warnings[body_of[index]].append(_broken(table, index, labels[index], by))
         missing[body_of[index]] += by
-    rotation = _rotation(table, values)[kept]
+    rotation = rotation_of(table, values)[kept]
     result = []
     for number, name in enumerate(names):
         mine = np.flatnonzero(body_of[kept] == number)
@@ -411,56 +411,3 @@ def _mass(table: Table, index: int, shape: str, row: dict[str, float], dimension
     if mass == 0:
         raise table.wrong(index, key, "a mass that is not zero: this shape has no volume")
     return mass
-
-
-def _rotation(table: Table, values: dict[str, Array]) -> Array:
-    """How each part is turned, (k, 3, 3): its axis first, then about the fixed x, y and z; degrees are exact at quarter turns."""
-    if any(f"axis_{axis}" in values for axis in "xyz"):
-        axis = _vectors(values, *(f"axis_{a}" for a in "xyz"))
-        blank = np.all([np.isnan(values[f"axis_{a}"]) for a in "xyz" if f"axis_{a}" in values], axis=0)
-        zero = ~axis.any(axis=-1) & ~blank
-        if zero.any():
-            header = next(table.numbers[f"axis_{a}"].header for a in "zyx" if f"axis_{a}" in table.numbers)
-            index = int(np.argmax(zero))
-            raise table.error(index, header, "0", "an axis that is not zero in every component")
-    else:
-        axis = np.zeros((table.rows, 3))
-    turns = []
-    for number, name in enumerate(TURNS):
-        if name in table.numbers:
-            angle = table.numbers[name]
-            turns.append((number, *cosine_sine(np.nan_to_num(angle.values), angle.unit)))
-    return _turned(turns, _along(axis))
-
-
-def _vectors(values: dict[str, Array], *names: str) -> Array:
-    """Three columns as vectors (k, 3); what is blank is zero."""
-    rows = len(next(iter(values.values())))
-    return np.stack([np.nan_to_num(values.get(name, np.zeros(rows))) for name in names], axis=-1)
-
-
-def _turned(turns: Iterable[tuple[int, Any, Any]], turn: Array) -> Array:
-    """Turn further about fixed axes: the number of each, cosines and sines (k,)."""
-    for axis, c, s in turns:
-        zero = np.zeros_like(c)
-        rows = [[zero, zero, zero] for _ in range(3)]
-        p, q = (axis + 1) % 3, (axis + 2) % 3
-        rows[axis][axis] = zero + 1.0
-        rows[p][p] = rows[q][q] = c
-        rows[p][q], rows[q][p] = -s, s
-        turn = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2) @ turn
-    return turn
-
-
-def _along(axis: Array) -> Array:
-    """The shortest turn that brings z onto each part's axis (k, 3), (k, 3, 3); about x where the axis is -z; none where it is blank."""
-    axis = np.where((axis == 0).all(axis=-1)[:, None], [0.0, 0.0, 1.0], axis)
-    size = np.sqrt(np.square(axis).sum(axis=-1))
-    x, y, z = (axis / size[:, None]).T
-    across = x * x + y * y
-    # 1/(1 + z), by the other quotient where z is near -1
-    k = np.where(z >= 0, 1 / (1 + np.abs(z)), (1 + np.abs(z)) / np.where(across > 0, across, 1.0))
-    rows = [[1 - k * x * x, -k * x * y, x], [-k * x * y, 1 - k * y * y, y], [-x, -y, z]]
-    turn = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-    reverse = (across == 0) & (z < 0)
-    return np.where(reverse[:, None, None], np.diag([1.0, -1.0, -1.0]), turn)

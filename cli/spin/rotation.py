@@ -264,50 +264,58 @@ class Rotation:
     @cached_property
     def period(self) -> float | None:
         """The period of ω in body axes; None where it is constant, or not periodic."""
-        g = self.body
-        if g.torque is not None or g.mgl is not None:
-            return None
-        return finite(float(FreeBody(g.inertia, g.omega).period))
+        return finite(float(_period(self.body))) if self._free else None
 
     def cones(self) -> dict[str, float | None] | None:
         """Return the cones of a free symmetric body."""
-        g = self.body
-        if g.torque is not None or g.mgl is not None:
+        if self._pole is None:
             return None
-        moments, axes = principal(g.inertia)
-        low, middle, high = moments.tolist()
-        oblate, prolate = middle - low <= EQUAL * high, high - middle <= EQUAL * high
-        if oblate == prolate:  # a sphere, or three different moments
-            return None
-        pole = 2 if oblate else 0
-        order = [(pole + 1) % 3, (pole + 2) % 3, pole]
-        result = cones_of(moments[order[0]], moments[pole], (axes @ g.omega)[order])
-        return {
-            "space_half_angle_deg": float(np.degrees(result.space)),
-            "body_half_angle_deg": float(np.degrees(result.body)),
-            "precession_rad_s": float(result.precession),
-            "spin_rad_s": float(result.spin),
-        }
+        return {name: float(value) for name, value in _cones(self.body, self._pole).items()}
 
     def steady(self) -> dict[str, float | None] | None:
         """Return the rates of steady precession of a top at its tilt at time zero."""
-        g = self.body
-        if g.mgl is None or self.round_moments is None:
+        if self.body.mgl is None or self.round_moments is None:
             return None
-        across, _, along = self.round_moments
-        w, x, y, z = g.attitude
-        tilt = 2 * np.arctan2(np.hypot(x, y), np.hypot(w, z))
-        rates = steady_of(across, along, g.mgl, tilt, g.omega[2])
-        return {
-            "slow_rad_s": finite(float(rates.slow)),
-            "fast_rad_s": finite(float(rates.fast)),
-            "sleeping_threshold_rad_s": finite(float(threshold_of(across, along, g.mgl))) if along else None,
-        }
+        rates = _steady(self.body, self.round_moments)
+        if not self.round_moments[2]:
+            return {name: finite(float(rates[name])) for name in ("slow_rad_s", "fast_rad_s")} | {
+                "sleeping_threshold_rad_s": None
+            }
+        return {name: finite(float(value)) for name, value in rates.items()}
 
     @property
     def nutation_period(self) -> float | None:
         """The period of nutation of a top; None of any other body."""
         return finite(float(self.states.top.nutation_period)) if isinstance(self.states, TopState) else None
+
+    @property
+    def _free(self) -> bool:
+        return self.body.torque is None and self.body.mgl is None
+
+    @cached_property
+    def _pole(self) -> int | None:
+        """Which principal axis is that of a free body of revolution; None of a sphere, or of three different moments."""
+        if not self._free:
+            return None
+        low, middle, high = principal(self.body.inertia).moments.tolist()
+        oblate, prolate = middle - low <= EQUAL * high, high - middle <= EQUAL * high
+        return None if oblate == prolate else 2 if oblate else 0
+
+    def constant_error(self, name: str, value: float) -> Array:
+        """The error of a period, or of a number of cones or of steady precession, by computing twice."""
+        exact: Any = self._exact_constants[name]
+        off: Array = exact.off(value)
+        return np.atleast_1d(np.where(np.isnan(off), np.inf, off))
+
+    @cached_property
+    def _exact_constants(self) -> dict[str, Any]:
+        body: Any = self.body.exact()
+        if self._free:
+            cones = {} if self._pole is None else _cones(body, self._pole)
+            return {"period": _period(body), **cones}
+        moments = body.inertia if body.inertia.ndim == 1 else np.diagonal(body.inertia)
+        nutation = self._exact[0].top.nutation_period if isinstance(self.states, TopState) else None
+        return {"nutation_period": nutation, **_steady(body, _round(moments))}
 
     def errors(self, of: str) -> Array:
         """The errors of a quantity of the states by computing twice, of an integration of its method too."""
@@ -336,6 +344,34 @@ class Rotation:
         moments = I if I.ndim == 1 else np.diagonal(I)
         each = [_round(moments), *([moments[[0, 0, 2]]] if (moments[0] != moments[1]).any() else [])]
         return [Top(about, mgl, body.omega, body.attitude).at(time) for about in each]
+
+
+def _period(g: TurningBody) -> Any:
+    return FreeBody(g.inertia, g.omega).period
+
+
+def _cones(g: TurningBody, pole: int) -> dict[str, Any]:
+    """The cones of a free body of revolution, of floats or of doubled numbers."""
+    moments, axes = principal(g.inertia)
+    order = [(pole + 1) % 3, (pole + 2) % 3, pole]
+    result = cones_of(moments[order[0]], moments[pole], (axes @ g.omega)[order])
+    return {
+        "space_half_angle_deg": np.degrees(result.space),
+        "body_half_angle_deg": np.degrees(result.body),
+        "precession_rad_s": result.precession,
+        "spin_rad_s": result.spin,
+    }
+
+
+def _steady(g: TurningBody, moments: Array) -> dict[str, Any]:
+    """The rates of steady precession of a top with moments (3,), of floats or of doubled numbers."""
+    mgl: Any = g.mgl
+    w, x, y, z = g.attitude
+    tilt = 2 * np.arctan2(np.hypot(x, y), np.hypot(w, z))
+    rates = steady_of(moments[0], moments[2], mgl, tilt, g.omega[2])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        threshold = threshold_of(moments[0], moments[2], mgl)
+    return {"slow_rad_s": rates.slow, "fast_rad_s": rates.fast, "sleeping_threshold_rad_s": threshold}
 
 
 def _round(I: Array) -> Array:

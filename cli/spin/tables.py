@@ -65,8 +65,9 @@ def constants(r: Rotation, only: Collection[str] = QUANTITIES) -> Table:
     columns: list[Column] = []
     absent: list[Column] = []
 
-    def one(name: str, dimension: str, value: float | None, place: str) -> None:
-        column = number(name, dimension, [np.nan if value is None else value], place=place)
+    def one(name: str, dimension: str, value: float | None, place: str, key: str = "") -> None:
+        error = partial(r.constant_error, key, value) if key and value is not None else None
+        column = number(name, dimension, [np.nan if value is None else value], error=error, place=place)
         (absent if value is None else columns).append(column)
 
     if "drift" in only:
@@ -74,14 +75,14 @@ def constants(r: Rotation, only: Collection[str] = QUANTITIES) -> Table:
             one(f"drift_of_{of}", "number", value, f"drift.{of}")
     for name in ("period", "nutation_period"):
         if name in only:
-            one(name, "time", getattr(r, name), name)
+            one(name, "time", getattr(r, name), name, name)
     for name in ("cones", "steady"):
         if name not in only:
             continue
         rates = getattr(r, name)()
         for key, value in (rates or {}).items():
             base, dimension = (key[:-4], "angle") if key.endswith("_deg") else (key[:-6], "speed")
-            one(base, dimension, value, f"{name}.{base}")
+            one(base, dimension, value, f"{name}.{base}", key)
         if rates is None:
             absent.append(names(name, [None]))
     return Table(columns, place="", documented=absent)

@@ -95,7 +95,7 @@ class Tolerances(TableCase):
     @cached_property
     def drawn(self) -> tuple[dict[str, Drawn], float]:
         """From drawn mechanisms, by header; and which share of them is assembled in every pose."""
-        m, motion, q = self.analysis.mechanism, self.analysis.motions[0], self.analysis.inputs
+        m, motion, q = self.analysis.mechanism, self.analysis.motions[0], self.analysis.inputs.whole
         numbers = drawn_numbers(m, self.limits, self.draws, self.study.seed, self.study.distribution)
         nominal = dict(zip(self.keys, motion.sensitivities.values(self.keys), strict=True))
         parts: dict[str, list[Drawn]] = {number.header: [] for number in self.numbers}
@@ -146,7 +146,7 @@ class Tolerances(TableCase):
             apart[~(linear > 1e-9 * np.nanmax(linear, initial=0.0))] = 0.0
             if np.nanmax(apart, initial=0.0) > sampling + APART:
                 i = int(np.nanargmax(apart))
-                shown = self.analysis.inputs.shown[i, 0]
+                shown = self.analysis.inputs.whole.shown[i, 0]
                 lines.append(
                     f"{header}: linear estimate unreliable at input {shown:g} {self.analysis.unit}: standard deviation "
                     f"{linear[i]:.6g}, but {its.sd[i]:.6g} from the drawn mechanisms"
@@ -375,7 +375,7 @@ def _paths(axes: Axes, tolerances: Tolerances, points: list[Point]) -> None:
 def _over_input(axes: Axes, tolerances: Tolerances, header: str) -> None:
     """A number over the input, with its worst case."""
     base = next(c for c in tolerances.table().columns if c.header == header)
-    q = tolerances.analysis.inputs.shown[:, 0]
+    q = tolerances.analysis.inputs.whole.shown[:, 0]
     values = np.array([np.nan if v is None else float(v) for v in base.values])
     worst = tolerances.linear[header].worst
     axes.fill_between(q, values - worst, values + worst, color="C0", alpha=0.3, lw=0)

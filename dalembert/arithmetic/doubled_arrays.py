@@ -27,6 +27,10 @@ ROUNDING = 2.0**-98
 """Relative size of what some operations on doubled numbers round off."""
 
 
+HIDDEN = 2.0**-103
+"""Relative size of what two floats cannot hold of a number."""
+
+
 class DoubledArray(NDArrayOperatorsMixin):
     """high + low, two arrays of one shape: some 32 digits each.
 
@@ -71,8 +75,9 @@ class DoubledArray(NDArrayOperatorsMixin):
         return np.asarray(self.high + self.low)
 
     def off(self, value: ArrayLike) -> Array:
-        """Return by how much floats differ from these."""
-        return np.asarray(OWN * np.abs((self - np.asarray(value, dtype=float)).value))
+        """Return by how much floats differ from these, and what 32 digits do not tell."""
+        difference = np.abs((self - np.asarray(value, dtype=float)).value)
+        return np.asarray(OWN * difference + HIDDEN * np.abs(self.high))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -332,6 +337,7 @@ _UFUNCS: dict[Any, Callable[..., Any]] = {
     np.arcsinh: lambda x: np.copysign(logarithm(np.abs(x) + np.sqrt(x * x + 1.0)), x),
     np.cosh: lambda x: (exponential(x) + exponential(-x)) / 2.0,
     np.tanh: lambda x: np.copysign(1.0 - 2.0 / (exponential(np.abs(x) * 2.0) + 1.0), x),
+    np.degrees: lambda x: x * 180.0 / math.pi,
     np.rint: _rint,
     # of whole numbers
     np.fmod: lambda x, y: DoubledArray(np.fmod(x.high, y.high)),

@@ -33,8 +33,6 @@ from dalembert.arithmetic.tape import Kind, Operation, Tape, reached
 UNIT_ROUNDOFF = 2.0**-53
 CONSTANT = 1.0
 """A constant such as 0.4 errs by one rounding."""
-# lanes up to which a sweep on numbers costs less than writing it down; a tape has to be compiled besides
-FEW = 4096
 
 ROUNDINGS: Mapping[str, float] = {
     "add": 1.0,

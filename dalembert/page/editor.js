@@ -38,12 +38,14 @@ function errorAt(column, i) {
   if (!state.rows || "input" in column || "zero" in column) return 0;
   if (errors[0] !== state || errors[1] !== i) errors = [state, i, Number.isFinite(state.closed[i]) ? machine.errors(state, i) : null];
   const found = errors[2];
-  if (!found) return undefined;
+  if (!found) return NaN;
   return (found[column.row] + (column.less === undefined ? 0 : found[column.less])) / (column.si ?? 1);
 }
 function fillHeld(cell, k, i, every) {
   const x = k === null ? NaN : whole.columns[k].values[i];
-  const error = k === null ? 0 : errorAt(whole.columns[k], i);
+  // a number in another unit than SI is rounded once more
+  const once = k !== null && (whole.columns[k].si ?? 1) !== 1 ? Math.abs(x) * Number.EPSILON : 0;
+  const error = k === null ? 0 : errorAt(whole.columns[k], i) + once;
   if (k === null) cell.textContent = "";
   else if (!every) cell.textContent = short(Number(held(x, error) === "–" ? NaN : held(x, error)));
   else if (error === 0) fill(cell, exact(x));

@@ -35,7 +35,7 @@ const plain = (text) => String(Number(text));
 // a number with those digits alone that two computations agree on
 function held(x, error) {
   if (!Number.isFinite(x)) return "–";
-  if (x === 0 || !(error > 0)) return error === undefined ? short(x) : exact(x);
+  if (x === 0 || !(error > 0)) return Number.isNaN(error) ? short(x) : exact(x);
   const digits = Math.min(17, Math.floor(Math.log10(Math.abs(x) / error)));
   if (digits < 1) return error < 1e-9 ? "0" : "–";
   return digits > 15 ? exact(x) : exact(Number(x.toPrecision(digits)));

@@ -10,7 +10,9 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from benchmarks.truth.rotation import taylor
+from benchmarks.truth.rotation import period_of, taylor
+from cli.spin.rotation import Rotation, read_body
+from cli.spin.tables import constants
 
 F = Fraction
 
@@ -224,3 +226,36 @@ def test_a_body_of_parts_hands_its_error_on(dalembert, tmp_path) -> None:
     for axis, true in zip("xyz", w, strict=True):
         holds(found[f"omega_{axis}_rad_s"][0], true)
         assert 3 <= digits(found[f"omega_{axis}_rad_s"][0]) <= 9
+
+
+def test_what_is_constant_in_a_rotation_has_its_error_too(tmp_path) -> None:
+    (tmp_path / "b.toml").write_text("inertia = [1.1, 2.3, 3.1]\nomega = [0.3, 0.4, 2.3]\n")
+    (tmp_path / "t.toml").write_text(
+        "inertia = [0.002, 0.002, 0.0008]\nomega = [0, 0, 60.1]\nattitude = [3, 4, 0, 0]\ntop.mgl = 0.1962\n"
+    )
+
+    def of(name: str) -> dict[str, tuple[float, float]]:
+        rotation = Rotation(read_body(str(tmp_path / name)), np.array([1.0]), None, "DOP853")
+        columns = [column for column in constants(rotation).columns if column.error is not None]
+        return {column.name: (column.values[0], float(column.error()[0])) for column in columns}
+
+    value, error = of("b.toml")["period"]
+    true = period_of([F("1.1"), F("2.3"), F("3.1")], [F("0.3"), F("0.4"), F("2.3")])
+    assert abs(F(value) - true) <= F(error) <= F("1.02") * abs(F(value) - true)
+    # upright less 2·arctan(4/3): its cosine is -7/25
+    I1, I3, a, w, c = F("0.002"), F("0.0008"), F("0.1962"), F("60.1"), F(-7, 25)
+    with mp.workdps(50):
+        B = mp.mpf((I3 * w).numerator) / (I3 * w).denominator
+        D = (I3 * w) ** 2 - 4 * I1 * a * c
+        root = mp.sqrt(mp.mpf(D.numerator) / D.denominator)
+        double = 2 * I1 * c
+        rates = {
+            "fast": (B + root) * double.denominator / double.numerator,
+            "slow": 2 * mp.mpf(a.numerator) / a.denominator / (B + root),
+        }
+        found = of("t.toml")
+        for name, exact in rates.items():
+            value, error = found[name]
+            off = abs(mp.mpf(value) - exact)
+            assert off <= error <= 1.02 * off
+        assert found["nutation_period"][1] < 1e-15

@@ -1,4 +1,4 @@
-"""--only of `inspect` and `spin`: nothing but the quantities that are named is computed."""
+"""--only of `inspect`, `spin` and `body`: nothing but the quantities that are named is computed."""
 
 from __future__ import annotations
 
@@ -96,3 +96,57 @@ def test_inspect_refuses_a_name_that_is_none(dalembert, tmp_path) -> None:
     done = dalembert("inspect", "m.toml", "--only", "nix")
     assert done.returncode == 1
     assert "no link or point is named 'nix'" in done.stderr
+
+
+PARTS = """part,shape,mass_kg,x_mm,y_mm,z_mm,length_mm,axis_x,axis_y,axis_z
+rod,rod,2,30,10,100,200,1,0,1
+ball,point,0.5,-40,20,300,,,,
+"""
+SHAFT = ("--shaft", "0mm:400mm", "--speed", "600rpm", "--correct", "A:50mm:20mm", "--correct", "B:350mm:20mm")
+
+
+def test_a_body_shows_what_is_named_with_the_same_numbers(dalembert, tmp_path) -> None:
+    (tmp_path / "parts.csv").write_text(PARTS)
+
+    def columns(*options: str) -> dict[str, list[str]]:
+        done = dalembert("body", "parts.csv", *SHAFT, *options)
+        assert done.returncode == 0, done.stderr
+        rows = [line.split(",") for line in done.stdout.splitlines()]
+        return {name: list(cells) for name, *cells in zip(*rows, strict=True)}
+
+    every = columns()
+    for only, names in (
+        ("mass,energy", {"mass_kg", "energy_J"}),
+        ("inertia", {"inertia_x_kg_m2", "inertia_y_kg_m2", "inertia_z_kg_m2"}),
+        ("momentum", {"momentum_kg_m2_s"}),
+        ("bearing2", {"bearing2_static_N", "bearing2_dynamic_N", "bearing2_corrected_N"}),
+        ("corrections", {name for name in every if name.startswith("correction_")}),
+    ):
+        shown = columns("--only", only)
+        assert shown.keys() - {"axis"} == names
+        assert all(every[name][: len(cells)] == cells for name, cells in shown.items())
+    done = dalembert("body", "parts.csv", *SHAFT, "--only", "momentum,drive_torque,bearing1", "--json")
+    document = json.loads(done.stdout)
+    assert document.keys() == {"momentum_kg_m2_s", "shaft", "warnings"}
+    assert document["shaft"].keys() == {"drive_torque_N_m", "bearings"}
+    whole = json.loads(dalembert("body", "parts.csv", *SHAFT, "--json").stdout)
+    assert document["momentum_kg_m2_s"] == whole["momentum_kg_m2_s"]
+    assert document["shaft"]["bearings"] == whole["shaft"]["bearings"]
+    assert document["shaft"]["drive_torque_N_m"] == whole["shaft"]["drive_torque_N_m"]
+    done = dalembert("body", "parts.csv", "--only", "bearing1")
+    assert done.returncode == 2
+    assert "expected mass, center, inertia" in done.stderr
+
+
+def test_principal_axes_are_not_computed_for_a_momentum(tmp_path, monkeypatch) -> None:
+    from cli.body import tables as of_body
+    from cli.body.moving import MovingBody, Request
+    from cli.read.parts import read_bodies
+    from rigidbody3d import Body
+
+    (tmp_path / "parts.csv").write_text(PARTS)
+    body = MovingBody(read_bodies(str(tmp_path / "parts.csv"))[0], Request(omega=(0.0, 1.0, 2.0)))
+    monkeypatch.setattr(Body, "principal", property(lambda _: pytest.fail("not requested")))
+    assert len(of_body.axes(body, {"momentum"}).cells) == 2
+    with pytest.raises(pytest.fail.Exception):
+        of_body.axes(body, {"principal_axes"})

@@ -495,11 +495,10 @@ def test_a_sheet_and_a_tolerance(dalembert: Dalembert, tmp_path: Path, browser: 
     assert done.returncode == 0, done.stderr
     page = Computing(browser, tmp_path / "f.html")
     names = [name for name in page("return dalembert.names") if name.startswith("initial/")]
-    (tmp_path / "first.csv").write_text(page("return dalembert.csv()"))
     first = {name: page.get(name) for name in names if name.endswith("amplitude")}
     verdicts = set()
-    for share in (1.0, 0.3, 0.1, 0.03, 0.01):
-        page.put(**{name.replace(".", "__"): share * x for name, x in first.items()})
+    for share in (1.0, 0.03):
+        page.put(**{name: share * x for name, x in first.items()})
         for row in rows_of_a_sheet(page, tmp_path, dalembert, *words):
             said = f"Plane {row['plane']}: no trim is needed, the vibration is within the limit and the unbalance is within the tolerance."
             assert (said not in page.text("answers")) == row["needed"]
@@ -508,6 +507,7 @@ def test_a_sheet_and_a_tolerance(dalembert: Dalembert, tmp_path: Path, browser: 
     assert page.faults() == []
 
 
+@pytest.mark.slow
 def test_places_that_do_not_reach_a_trim(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
     """Two holes a third of a turn apart reach what lies between them; of the rest the nearer one takes what it can."""
     file = EXAMPLES / "fan-one-plane" / "fan.csv"

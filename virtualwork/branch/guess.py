@@ -121,7 +121,7 @@ class _Chooser:
             s = np.linalg.svd(jacobian, compute_uv=False)
         except np.linalg.LinAlgError:
             raise AssemblyError(
-                "the lengths of the links differ too much to tell the mechanism's mobility"
+                "the lengths of the links differ too much to determine the mechanism's mobility"
             ) from None
         inputs = self.m.inputs
         left = 3 * len(self.m.links) - int((s > 1e-9 * s[0]).sum())
@@ -220,7 +220,7 @@ class _Chooser:
         return solutions
 
     def _beside(self, group: Group, apart: float) -> State:
-        """What a group depends on, with the one input as far beside the guess, rad or m."""
+        """What a group depends on, with the one input so far from the guess, rad or m."""
         st = State([self.m.at[0] + apart])
         chosen = self._made(Choice)
         chosen.run_untracked(chosen.before(group), st)

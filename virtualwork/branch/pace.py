@@ -98,7 +98,7 @@ class Pace:
                 if group.kind in ("PRP", "Newton"):
                     continue
                 if any(isinstance(step, Group) and step.kind == "Newton" for step in before):
-                    # without a closed form there are no arms to tell how far it goes
+                    # without a closed form there are no arms that show how far it goes
                     return self.assembly.mechanism.size
                 self.assembly.run_untracked([*before, group], st)
                 case = self.assembly.case(group)

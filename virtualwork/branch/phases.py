@@ -47,18 +47,18 @@ class Phases:
 
     def _turn(self, step: Turn, st: State) -> Turn:
         """Of several open constants all but the last are those of the guessed angles."""
-        angle, known = step.angle, self.constants
+        angle, constants = step.angle, self.constants
         for i, _ in angle.gears[:-1]:
-            if i not in known:
-                known[i] = self._guessed_constant(i, st)
+            if i not in constants:
+                constants[i] = self._guessed_constant(i, st)
         for i, p in angle.gears[-1:]:
             rest = st.whole(angle)
-            if i not in known and rest is not None:
-                rest = self.number(rest) + sum(k * known[g] for g, k in angle.gears[:-1])
-                known[i] = (self._guessed(step.body) - rest) / self.number(p)
-            if i not in known:
-                known[i] = self._guessed_constant(i, st)
-        return closed_turn(step, known)
+            if i not in constants and rest is not None:
+                rest = self.number(rest) + sum(k * constants[g] for g, k in angle.gears[:-1])
+                constants[i] = (self._guessed(step.body) - rest) / self.number(p)
+            if i not in constants:
+                constants[i] = self._guessed_constant(i, st)
+        return closed_turn(step, constants)
 
     def _guessed_constant(self, gear: int, st: State) -> Number:
         """Σ c·x of a gear, a belt or a rack: of what is placed, and of the guess for the others."""

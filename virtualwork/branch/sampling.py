@@ -126,7 +126,7 @@ def turns_far(ratios: Reals, rows: Complexes) -> NDArray[np.bool_]:
 
 
 def moves_far(kind: str, ratios: Reals, rows: Complexes) -> NDArray[np.bool_]:
-    """Between which samples a loop moves too far to tell what its radicand does.
+    """Between which samples a loop moves too far to show what its radicand does.
 
     Parameters
     ----------

@@ -142,7 +142,7 @@ class Track:
             self._look_back(low, high)
 
     def _go_on(self, side: int, way: float = 0.0) -> None:
-        """Look through one turn more, or take over all the turns of a way where every group repeats itself."""
+        """Look through one turn more, or copy all the turns of a way where every group repeats itself."""
         loops = [g for g in self.plan.groups if g.kind != "PRP"]
         repeats = all(g.name in self.noted.seen for g in loops)
         more = self.length * (max(1, int(np.ceil(way / self.length))) if repeats else 1)

@@ -71,9 +71,9 @@ def chosen(
             result[name][rest] = sign
     if one and not (at_once and clear.all()):
         rest = np.flatnonzero(decided & ~clear if at_once else decided)
-        known = _of(with_signs(numbers, result), rest)
+        entering = _of(with_signs(numbers, result), rest)
         first, last = (end if len(end) == 1 else end[rest] for end in (low, high))
-        decided[rest] = ~meet_on_the_way(written, m, known, len(rest), first, last)
+        decided[rest] = ~meet_on_the_way(written, m, entering, len(rest), first, last)
     return result, decided
 
 
@@ -104,25 +104,25 @@ def signs(
     chosen = {g.name: np.broadcast_to(choice[f"sign {g.name}"], n) + 0.0 for g in written.closed}
     if len(m.inputs) == 1 and any(each.any() for each in opens.values()):
         # one that is assembled next to the guess is chosen by how it stands there
-        known = with_signs(numbers, chosen)
+        entering = with_signs(numbers, chosen)
         step = BESIDE * (m.size if m.inputs[0].is_slide else 1.0)
         for side in (step, -step):
             for name, open_ in opens.items():
-                depth = _sampled(written, Margin(name), known, np.array([[m.at[0] + side]]), n)
+                depth = _sampled(written, Margin(name), entering, np.array([[m.at[0] + side]]), n)
                 decided &= ~(open_ & (depth[0] >= 0))
     return chosen, decided
 
 
-def at_guess(written: Written, m: Description, given: Mapping[str, Any], n: int) -> dict[str, Reals]:
+def at_guess(written: Written, m: Description, numbers: Mapping[str, Any], n: int) -> dict[str, Reals]:
     """The radicand of each closed form of each variant at the input of the guess, (n,), by the group's name."""
     with np.errstate(all="ignore"):
-        result = run(written.choice, {**given, **_inputs(m)})
+        result = run(written.choice, {**numbers, **_inputs(m)})
     return {g.name: np.broadcast_to(result[f"margin {g.name}"], n) for g in written.closed}
 
 
-def with_signs(given: Mapping[str, Any], signs: Mapping[str, Any]) -> dict[str, Any]:
+def with_signs(numbers: Mapping[str, Any], signs: Mapping[str, Any]) -> dict[str, Any]:
     """What is known of variants: their dimensions, and the sign of each closed form by the group's name."""
-    return {**given, **{f"sign {name}": sign for name, sign in signs.items()}}
+    return {**numbers, **{f"sign {name}": sign for name, sign in signs.items()}}
 
 
 def _inputs(m: Description) -> dict[str, float]:
@@ -130,7 +130,7 @@ def _inputs(m: Description) -> dict[str, float]:
 
 
 def meet_on_the_way(
-    written: Written, m: Description, known: Mapping[str, Any], n: int, low: Reals, high: Reals
+    written: Written, m: Description, entering: Mapping[str, Any], n: int, low: Reals, high: Reals
 ) -> Mask:
     """Which variants may have a change point over their inputs from low to high, (n,) or (1,) each.
 
@@ -140,10 +140,10 @@ def meet_on_the_way(
     result = np.zeros(n, dtype=bool)
     if not written.closed:
         return result
-    for here, some, q in _along(written, m, known, n, low, high):
+    for here, some, q in _along(written, m, entering, n, low, high):
         count = len(result[here])
         for lever in _levers(written):
-            # what follows from a lever that turns far between two samples is told by none of them
+            # no sample shows what follows from a lever that turns far between two of them
             turn = np.exp(1j * _sampled(written, Angle(lever, 0), some, q, count))
             with np.errstate(invalid="ignore"):
                 result[here] |= (np.abs(np.diff(turn, axis=0)) > TURNED).any(axis=0)
@@ -161,7 +161,7 @@ def meet_on_the_way(
 def stays_within(
     written: Written,
     m: Description,
-    known: Mapping[str, Any],
+    entering: Mapping[str, Any],
     key: Quantity,
     bound: float,
     n: int,
@@ -170,7 +170,7 @@ def stays_within(
 ) -> Mask:
     """Of which variants a quantity is no larger than a bound over their inputs from low to high, (n,) or (1,)."""
     result = np.ones(n, dtype=bool)
-    for here, some, q in _along(written, m, known, n, low, high):
+    for here, some, q in _along(written, m, entering, n, low, high):
         result[here] = (np.abs(_sampled(written, key, some, q, len(result[here]))) < bound).all(axis=0)
     return result
 
@@ -195,7 +195,7 @@ def _levers(written: Written) -> list[str]:
 
 
 def _along(
-    written: Written, m: Description, known: Mapping[str, Any], n: int, low: Reals, high: Reals
+    written: Written, m: Description, entering: Mapping[str, Any], n: int, low: Reals, high: Reals
 ) -> Iterator[tuple[slice, dict[str, Any], Reals]]:
     """Some variants at a time, what is known of them, and inputs on their way, (samples, variants or 1)."""
     count = _count(written, m, low, high)
@@ -203,7 +203,7 @@ def _along(
     for a in range(0, n, each):
         here = slice(a, min(a + each, n))
         first, last = (end if len(end) == 1 else end[here] for end in (low, high))
-        yield here, _of(known, here), _way(m, first, last, count)
+        yield here, _of(entering, here), _way(m, first, last, count)
 
 
 def _count(written: Written, m: Description, low: Reals, high: Reals) -> int:
@@ -218,35 +218,35 @@ def _way(m: Description, low: Reals, high: Reals, count: int) -> Reals:
     return np.linspace(low, np.minimum(high, low + (np.inf if m.inputs[0].is_slide else 2 * np.pi)), count)
 
 
-def _of(known: Mapping[str, Any], rows: Any) -> dict[str, Any]:
+def _of(entering: Mapping[str, Any], rows: Any) -> dict[str, Any]:
     """What is known of some variants."""
-    return {name: values[rows] if np.ndim(values) else values for name, values in known.items()}
+    return {name: values[rows] if np.ndim(values) else values for name, values in entering.items()}
 
 
-def _across(known: Mapping[str, Any]) -> dict[str, Any]:
+def _across(entering: Mapping[str, Any]) -> dict[str, Any]:
     """What is known of each variant, as the rows of a grid."""
-    return {name: values[:, None] if np.ndim(values) else values for name, values in known.items()}
+    return {name: values[:, None] if np.ndim(values) else values for name, values in entering.items()}
 
 
-def _sampled(written: Written, key: Quantity, known: Mapping[str, Any], q: Reals, n: int) -> Reals:
+def _sampled(written: Written, key: Quantity, entering: Mapping[str, Any], q: Reals, n: int) -> Reals:
     """A quantity at inputs (samples, n or 1): (samples, n)."""
     tape = written.tape([key])
     shape = len(q), n
-    across = {name: values[None] if np.ndim(values) else values for name, values in known.items()}
+    across = {name: values[None] if np.ndim(values) else values for name, values in entering.items()}
     with np.errstate(all="ignore"):
         return run_grid(tape, across | {"q0": q}, shape)[0]
 
 
-def _meets(known: Mapping[str, Any], q: Reals, radicand: Callable[..., Reals], n: int) -> Mask:
+def _meets(entering: Mapping[str, Any], q: Reals, radicand: Callable[..., Reals], n: int) -> Mask:
     """Where a dip of the radicand, which is followed down, goes to zero."""
-    depth = radicand(known, q, n)
+    depth = radicand(entering, q, n)
     inner = depth[1:-1]
     dips = (inner <= depth[:-2]) & (inner <= depth[2:]) & (inner < DIP) & (inner > 0)
     meets: Mask = np.asarray((np.abs(depth[[0, -1]]) < MEETS).any(axis=0))
     places, lanes = np.nonzero(dips)
     if not len(lanes):
         return meets
-    here = {name: values if np.ndim(values) == 0 else values[lanes] for name, values in known.items()}
+    here = {name: values if np.ndim(values) == 0 else values[lanes] for name, values in entering.items()}
     of = lanes if q.shape[1] > 1 else np.zeros_like(lanes)
     centre, half = q[places + 1, of], q[1, of] - q[0, of]
     every = np.arange(len(lanes))

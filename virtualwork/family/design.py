@@ -26,7 +26,7 @@ from virtualwork.family.part import Part, Solver, assembled, parts
 from virtualwork.family.written import Written
 from virtualwork.formulas.forces import Effort
 from virtualwork.formulas.kinematics import Angle, Point, Slide
-from virtualwork.formulas.lanes import Lanes, over_blocks
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.loops import Transmission
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.quantity import Quantity
@@ -124,10 +124,10 @@ class Design:
         """
         x, q = np.asarray(numbers, dtype=float), np.asarray(inputs, dtype=float)
         if self._first.written is not None:
-            found, fine = self._evaluated(x, q, None)
+            rows, fine = self._evaluated(x, q, None)
             if fine or self._goes(x, q):
                 self.evaluations += 1
-                return found if np.isfinite(found).all() else np.where(np.isfinite(found), found, np.nan)
+                return rows if np.isfinite(rows).all() else np.where(np.isfinite(rows), rows, np.nan)
             # a dip that has to be looked into tells of this design what its signs do not
             self._chosen = x.tobytes(), None
         self.evaluations += 1
@@ -141,19 +141,19 @@ class Design:
         x, q = np.asarray(numbers, dtype=float), np.asarray(inputs, dtype=float)
         enters = ("q0",) if inputs_alone else (*self._paths, "q0")
         if self._first.written is not None and self._chosen != (x.tobytes(), None):
-            found, fine = self._evaluated(x, q, enters)
+            slopes, fine = self._evaluated(x, q, enters)
             if fine or self._known(x) is not None:
-                return found.reshape(self.rows, len(enters), len(q)).transpose(0, 2, 1)
+                return slopes.reshape(self.rows, len(enters), len(q)).transpose(0, 2, 1)
         if self._alone.written is not None:
             return self._alone.slopes(x, q, enters)
         return self._differences(x, q, inputs_alone)
 
     def _evaluated(self, x: Reals, q: Reals, enters: tuple[str, ...] | None) -> tuple[Reals, bool]:
-        """The quantities, or their derivatives, from one run of a tape; and whether the branch is told so simply."""
-        known = self._held if self._held is not None else {"at": self.mechanism.at[0]}
+        """The quantities, or their derivatives, from one run of a tape; and whether the branch is certain so simply."""
+        held = self._held if self._held is not None else {"at": self.mechanism.at[0]}
         again = self._ready(q, enters)
-        found, fine = again(self._moving | known | by_path(self.dimensions, x.tolist()))
-        return found[:, : len(q)], fine
+        rows, fine = again(self._moving | held | by_path(self.dimensions, x.tolist()))
+        return rows[:, : len(q)], fine
 
     def _ready(self, q: Reals, enters: tuple[str, ...] | None) -> Repeated:
         """What works out one design after another at some inputs; the last ones' is kept."""
@@ -178,17 +178,19 @@ class Design:
         written, m = self._first.written, self.mechanism
         if written is None:
             return None
-        known = by_path(self.dimensions, x.tolist())
-        found, told = signs(written, m, known, 1)
-        return with_signs(known, {name: float(sign[0]) for name, sign in found.items()}) if told[0] else None
+        numbers = by_path(self.dimensions, x.tolist())
+        chosen, plain = signs(written, m, numbers, 1)
+        return (
+            with_signs(numbers, {name: float(sign[0]) for name, sign in chosen.items()}) if plain[0] else None
+        )
 
     def _goes(self, x: Reals, q: Reals) -> bool:
         """Whether a design goes by its signs: the guess tells them, and no other branch is met on the way to the poses."""
-        known, written = self._known(x), self._first.written
-        if known is None or written is None:
+        entering, written = self._known(x), self._first.written
+        if entering is None or written is None:
             return False
         low, high = self._ends(q)
-        return not meet_on_the_way(written, self.mechanism, known, 1, np.array([low]), np.array([high]))[0]
+        return not meet_on_the_way(written, self.mechanism, entering, 1, np.array([low]), np.array([high]))[0]
 
     def _ends(self, q: Reals) -> tuple[float, float]:
         """The least and the largest of the guess's input and these."""
@@ -287,7 +289,7 @@ class Alone:
         if any(isinstance(key, Transmission) for key in self.keys):
             # sines that are on the tape alone
             return self._rows(self.written, x, poses)
-        return table(over_blocks(poses, key) for key in self.keys)
+        return table(poses.values(self.keys))
 
     def _rows(self, written: Written | None, x: Reals, poses: Lanes) -> Reals:
         """What is asked for, from the tape."""
@@ -295,11 +297,11 @@ class Alone:
         if written is None:
             return np.full((len(of), poses.n), np.nan)
         tape = written.tape(self.keys)
-        given = by_path(self.dimensions, x.tolist())
-        rest = [name for name in tape.inputs if name not in given]
+        numbers = by_path(self.dimensions, x.tolist())
+        rest = [name for name in tape.inputs if name not in numbers]
         with np.errstate(all="ignore"):
-            found = run(tape, given | poses.entering(rest))
-        return np.array([np.broadcast_to(found[name], poses.n) for name in of])
+            outputs = run(tape, numbers | poses.entering(rest))
+        return np.array([np.broadcast_to(outputs[name], poses.n) for name in of])
 
     def slopes(self, x: Reals, q: Reals, enters: tuple[str, ...]) -> Reals:
         """Its derivatives to dimensions by their paths, and to the input `q0`, (rows, n, len(enters))."""
@@ -310,16 +312,16 @@ class Alone:
             return out
         assert self.written is not None
         tape = self.written.slopes(self.keys, enters)
-        given = by_path(self.dimensions, x.tolist())
-        rest = [name for name in tape.inputs if name not in given]
+        numbers = by_path(self.dimensions, x.tolist())
+        rest = [name for name in tape.inputs if name not in numbers]
         assert self._last is not None
         assert self._last[1] is not None
         with np.errstate(all="ignore"):
-            found = run(tape, given | poses.entering(rest))
+            outputs = run(tape, numbers | poses.entering(rest))
         for row, name in enumerate(of):
             for column, to in enumerate(enters):
                 # what does not depend on it has no row
-                out[row, :, column] = found.get(f"d({name})/d({to})", 0.0)
+                out[row, :, column] = outputs.get(f"d({name})/d({to})", 0.0)
         out[:, ~poses.assembled] = np.nan
         return out
 
@@ -357,14 +359,14 @@ def place_key(m: Description, name: str) -> Quantity:
         return Effort(0)
     points = {point: body for body, named in m.bodies.items() for point in named}
     guides = {guide.point: i for i, guide in enumerate(m.guides)}
-    for word, what, known in (
+    for word, what, names in (
         ("points", "point", points),
         ("links", "link", m.links),
         ("slides", "slot or slider", guides),
     ):
         if kind == word or (not kind and word == "points"):
-            if of not in known:
-                raise DescriptionError(f"no {what} is named '{of}'{nearest(of, known)}")
+            if of not in names:
+                raise DescriptionError(f"no {what} is named '{of}'{nearest(of, names)}")
             if word == "points":
                 return Point(points[of], 0j, of, 0)
             return Angle(of, 0) if word == "links" else Slide(guides[of], 0)

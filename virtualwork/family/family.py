@@ -65,16 +65,16 @@ class Family:
                 f"vary: expected numbers by their paths, such as {{'{next(iter(paths), 'path')}': [...]}}, found {numbers!r}"
             )
         columns: dict[Dimension, Reals] = {}
-        for path, given in numbers.items():
-            found = named(mechanism, path, paths)
-            column = np.asarray(given)
-            if np.iscomplexobj(column) and len(found) == 2:
+        for path, values in numbers.items():
+            components = named(mechanism, path, paths)
+            column = np.asarray(values)
+            if np.iscomplexobj(column) and len(components) == 2:
                 column = np.stack([column.real, column.imag], axis=-1)
             column = real_array(path, column)
-            if column.ndim != len(found) or (len(found) == 2 and column.shape[1:] != (2,)):
-                shape = "(v,)" if len(found) == 1 else "(v, 2)"
+            if column.ndim != len(components) or (len(components) == 2 and column.shape[1:] != (2,)):
+                shape = "(v,)" if len(components) == 1 else "(v, 2)"
                 raise ValueError(f"{path}: expected shape {shape}, found {column.shape}")
-            columns |= zip(found, [column] if len(found) == 1 else column.T, strict=True)
+            columns |= zip(components, [column] if len(components) == 1 else column.T, strict=True)
         sizes = {len(column) for column in columns.values()}
         if len(sizes) != 1:
             raise ValueError(f"expected as many values of each dimension, found {sorted(sizes)}")
@@ -83,7 +83,7 @@ class Family:
                 i = int(np.argmin(np.isfinite(column)))
                 raise ValueError(f"{dimension.path}: found {column[i]} at {i}, expected finite numbers")
         self.dimensions = tuple(columns)
-        # a column beside the other: each is in one piece
+        # each column is in one piece
         self.values = np.array(list(columns.values())).T
 
     @property
@@ -144,11 +144,11 @@ class Family:
     @cached_property
     def _own(self) -> dict[tuple[int | str, int | str], tuple[int | None, float]]:
         """Of each input's value and rates the place among what is varied, or None; and the description's own number."""
-        known = dimensions(self.mechanism)
+        every = dimensions(self.mechanism)
         places = {d.path: i for i, d in enumerate(self.dimensions)}
         return {
             (d.where[1], d.where[2]): (places.get(d.path), float(value(self.mechanism, d.path).real))
-            for d in known.values()
+            for d in every.values()
             if d.where[0] == "inputs"
         }
 
@@ -164,10 +164,10 @@ class Family:
             raise ValueError(f"angle: expected shape (n, {k}) for {k} inputs, found {q.shape}")
         return q.reshape(1, -1, k)
 
-    def rates(self, *given: ArrayLike | None) -> list[list[Number]]:
+    def rates(self, *requested: ArrayLike | None) -> list[list[Number]]:
         """Speed, acceleration, jerk of each input: a number, or an array that broadcasts to (v, n)."""
         rates: list[list[Number]] = []
-        for rate, name in zip((*given, None), ("speed", "acceleration", "jerk"), strict=True):
+        for rate, name in zip((*requested, None), ("speed", "acceleration", "jerk"), strict=True):
             if rate is None:
                 own = self._of_inputs(name)
                 rates.append(

@@ -95,9 +95,9 @@ class _Problem(Generic[D]):
             raise ValueError("target: expected one or more")
         forces = any(key.is_force for aim in self.aims for key in aim.keys)
         forces = forces or any(bound.name.startswith("effort.") for bound in keep)
-        found = _free(m, free, forces)
-        self.dimensions = tuple(found)
-        self.low, self.high = np.array(list(found.values()), dtype=float).T
+        ranges = _free(m, free, forces)
+        self.dimensions = tuple(ranges)
+        self.low, self.high = np.array(list(ranges.values()), dtype=float).T
         self.designs = [Design(m, self.dimensions, aim.keys) for aim in self.aims]
         self.bounds = Bounds(m, self.dimensions, keep) if keep else None
 
@@ -110,11 +110,11 @@ class _Problem(Generic[D]):
     @property
     def sweep(self) -> tuple[float, float]:
         """Over which bounds are kept: from the first to the last input of the targets; a whole turn where one is free."""
-        given = [aim.inputs for aim in self.aims if aim.inputs is not None]
-        if len(given) < len(self.aims):
+        inputs = [aim.inputs for aim in self.aims if aim.inputs is not None]
+        if len(inputs) < len(self.aims):
             at, m = self.m.at[0], self.m
             return (at - 2 * m.size, at + 2 * m.size) if m.inputs[0].is_slide else (at, at + 2 * np.pi)
-        every = np.concatenate(given)
+        every = np.concatenate(inputs)
         return float(every.min()), float(every.max())
 
     def judged(self, x: Reals) -> tuple[Kept, ...]:
@@ -169,8 +169,8 @@ class _Problem(Generic[D]):
                 cost += [each.min(axis=0).sum() for each in away]
         order = np.argsort(cost, kind="stable")
         if all(table is None for table in swept):
-            given = tuple(aim.inputs for aim in self.aims if aim.inputs is not None)
-            return [(starts[i], given) for i in order[: ROUNDS[0][0]]]
+            inputs = tuple(aim.inputs for aim in self.aims if aim.inputs is not None)
+            return [(starts[i], inputs) for i in order[: ROUNDS[0][0]]]
         result: list[tuple[float, tuple[Reals, tuple[Reals, ...]]]] = []
         for i in order[:ORDERED]:
             ways = [
@@ -223,9 +223,9 @@ class _Problem(Generic[D]):
             )
         return replace(there[0], others=tuple(there[1:]))
 
-    def _unmet(self, found: Sequence[_Refined], starts: int) -> str:
+    def _unmet(self, refined: Sequence[_Refined], starts: int) -> str:
         """Which bounds no start keeps, and how far the nearest comes."""
-        nearest = min(found, key=lambda each: sum(not kept.met for kept in each.kept))
+        nearest = min(refined, key=lambda each: sum(not kept.met for kept in each.kept))
         lines = []
         for each in nearest.kept:
             if not each.met:
@@ -239,10 +239,10 @@ class _Problem(Generic[D]):
                 )
         return f"fit: no start of {starts} within the bounds keeps {' and '.join(lines)}"
 
-    def _distinct(self, found: Sequence[_Refined]) -> list[_Refined]:
+    def _distinct(self, refined: Sequence[_Refined]) -> list[_Refined]:
         """The best of each place in the space of dimensions, the best first."""
         kept: list[_Refined] = []
-        for each in sorted(found, key=lambda e: (not e.keeps, e.cost)):
+        for each in sorted(refined, key=lambda e: (not e.keeps, e.cost)):
             if all(np.abs(each.x - other.x).max() > SAME for other in kept):
                 kept.append(each)
         return kept
@@ -256,17 +256,17 @@ class _Problem(Generic[D]):
         before = self.evaluations
         begins = np.abs(self.residuals(x, inputs)).max() < AWAY
         held = self.hold(x)
-        found, at = self._descended(x, inputs, steps)
+        end, at = self._descended(x, inputs, steps)
         if held:
-            there = self.residuals(found, at)
+            there = self.residuals(end, at)
             self.hold(None)
             # on the way to the poses there is a change point, or the guess means another assembly there
-            if begins and np.abs(self.residuals(found, at) - there).max() > SAME:
-                found, at = self._descended(x, inputs, steps)
-        off = self.residuals(found, at)
+            if begins and np.abs(self.residuals(end, at) - there).max() > SAME:
+                end, at = self._descended(x, inputs, steps)
+        off = self.residuals(end, at)
         largest = float(np.abs(off).max())
-        cost, kept = float(off @ off) / 2, self.judged(found)
-        return _Refined(found, tuple(at), cost, largest, self.evaluations - before, kept)
+        cost, kept = float(off @ off) / 2, self.judged(end)
+        return _Refined(end, tuple(at), cost, largest, self.evaluations - before, kept)
 
     def _descended(self, x: Reals, inputs: Sequence[Reals], steps: int) -> tuple[Reals, Sequence[Reals]]:
         width = self.high - self.low
@@ -309,12 +309,12 @@ class _Problem(Generic[D]):
         )
         return np.asarray(result.x)
 
-    def _fit(self, found: _Refined, starts: int, evaluations: int) -> Fit[D] | None:
+    def _fit(self, refined: _Refined, starts: int, evaluations: int) -> Fit[D] | None:
         """A solution as it is handed out; None where it cannot be assembled at every row."""
-        values = self.values(found.x)
+        values = self.values(refined.x)
         reached: list[Reached] = []
         inputs: list[Reals] = []
-        for aim, design, q in zip(self.aims, self.designs, found.inputs, strict=True):
+        for aim, design, q in zip(self.aims, self.designs, refined.inputs, strict=True):
             table = design(values, q)
             if aim.inputs is None and not self.m.inputs[0].is_slide:
                 # the same poses within a turn, where a turn brings them back
@@ -329,7 +329,7 @@ class _Problem(Generic[D]):
         mechanism = changed(self.m, by_path(self.dimensions, values.tolist()))
         remarks = tuple(self._remarks(values, inputs))
         fit = Fit(mechanism, self.m, self.dimensions, values, tuple(reached), starts, evaluations, remarks)
-        return replace(fit, kept=found.kept)
+        return replace(fit, kept=refined.kept)
 
     def _remarks(self, values: Reals, inputs: Sequence[Reals]) -> list[str]:
         """What is to be said of a solution."""
@@ -375,10 +375,10 @@ def _cost(squared: Reals) -> Reals:
 def _free(
     m: Description, free: Mapping[str, tuple[float, float]], forces: bool
 ) -> dict[Dimension, tuple[float, float]]:
-    known = dimensions(m)
+    every = dimensions(m)
     result: dict[Dimension, tuple[float, float]] = {}
     for path, (low, high) in free.items():
-        (dimension, *both) = named(m, path, known)
+        (dimension, *both) = named(m, path, every)
         if both:
             raise DescriptionError(f"'{path}' names two numbers: expected {dimension.path} or {both[0].path}")
         of, last = dimension.where[0], dimension.where[-1]

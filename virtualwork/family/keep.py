@@ -146,8 +146,8 @@ class Bounds:
             return self.m.size
         return max(abs(self._limits[i]), 1e-300) if key.is_force and self._limits[i] else 1.0
 
-    def _margin(self, i: int, key: Quantity, found: Reals) -> Reals:
-        apart = found - self._limits[i]
+    def _margin(self, i: int, key: Quantity, numbers: Reals) -> Reals:
+        apart = numbers - self._limits[i]
         if key.is_angle:
             apart = apart - 2 * np.pi * np.round(apart / (2 * np.pi))
         return np.asarray((-apart if self.bounds[i].least is None else apart) / self._unit(i, key))

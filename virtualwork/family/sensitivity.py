@@ -71,10 +71,10 @@ class Sensitivities:
         self._refuse(keys, written)
         enters = self._entering(every)
         tape = written.slopes(tuple(keys), tuple(enters))
-        given = self._given(tape, every)
+        entering = self._given(tape, every)
         with np.errstate(all="ignore"):
-            found = run(tape, given)
-        slopes = [[key.of_rows(found, self.poses.n, to=name) for name in enters] for key in keys]
+            outputs = run(tape, entering)
+        slopes = [[key.of_rows(outputs, self.poses.n, to=name) for name in enters] for key in keys]
         nowhere = ~self.poses.assembled
         if nowhere.any():
             for slope in (slope for row in slopes for slope in row):
@@ -112,16 +112,16 @@ class Sensitivities:
         steps = [limit * (1 + GOLDEN * i % 1) for i, limit in enumerate(limits.values(), 1)]
         tape = self._formulas(every).along(tuple(keys), tuple(zip(self._entering(every), steps, strict=True)))
         rows = there[np.unique(np.linspace(0, len(there) - 1, LOOKED_AT).astype(int))]
-        given = {
+        entering = {
             name: np.asarray(value, dtype=float)[rows] if np.ndim(value) else np.full(len(rows), value)
             for name, value in self._given(tape, every).items()
         }
-        off = {f"off {name}": OFF * np.abs(value) for name, value in given.items()}
+        off = {f"off {name}": OFF * np.abs(value) for name, value in entering.items()}
         parts = [name for key in keys for name in key.names]
-        errors = {name: f"off {name}" for name in given}
-        found = bounds_of_few(tape, given | off, errors, parts, CONSTANT)
+        errors = {name: f"off {name}" for name in entering}
+        bounds = bounds_of_few(tape, entering | off, errors, parts, CONSTANT)
         with np.errstate(invalid="ignore"):
-            varies = {name: bool(np.any(np.abs(found[name]) > found[f"error({name})"])) for name in parts}
+            varies = {name: bool(np.any(np.abs(bounds[name]) > bounds[f"error({name})"])) for name in parts}
         return [tuple(varies[name] for name in key.names) for key in keys]
 
     def values(self, keys: Sequence[Quantity]) -> list[Any]:
@@ -152,5 +152,5 @@ class Sensitivities:
         if any(key.is_force for key in keys):
             if m.friction:
                 raise MechanismError("sensitivity: forces with friction are not differentiated")
-            if any(key.is_joint_force for key in keys) and written.recording.forces[0].order.redundant:
+            if any(key.is_joint_force for key in keys) and written.recording.forces.redundant:
                 raise MechanismError("sensitivity: redundant joint forces are not differentiated")

@@ -20,7 +20,7 @@ from virtualwork.formulas.quantity import Quantity
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Where points, links and slides should be, one beside the other at the same inputs.
+    """Where points, links and slides should be, together at the same inputs.
 
     Attributes
     ----------
@@ -145,13 +145,13 @@ class Aim:
     def __len__(self) -> int:
         return int(self.wanted.shape[1])
 
-    def apart(self, found: Reals) -> Reals:
+    def apart(self, reached: Reals) -> Reals:
         """How far it is off, weighted, (rows, ..., n): lengths in sizes of the mechanism, angles in rad."""
-        return self._off(found, self.wanted, self.scale)
+        return self._off(reached, self.wanted, self.scale)
 
-    def from_each(self, found: Reals) -> Reals:
+    def from_each(self, reached: Reals) -> Reals:
         """Σ (weighted distance)² of every pose of (rows, ..., poses) from every row of the target, (..., poses, n)."""
-        off = self._off(found[..., None], self.wanted[:, None, :], self.scale[:, None, :])
+        off = self._off(reached[..., None], self.wanted[:, None, :], self.scale[:, None, :])
         return np.asarray((off**2).sum(axis=0))
 
     def _off(self, values: Reals, wanted: Reals, scale: Reals) -> Reals:
@@ -163,14 +163,14 @@ class Aim:
             apart = np.where(beside(self.angle), _round_turn(apart), apart)
         return np.asarray(apart * beside(scale))
 
-    def reached(self, found: Reals, inputs: Reals) -> tuple[Reached, ...]:
+    def reached(self, rows: Reals, inputs: Reals) -> tuple[Reached, ...]:
         """What a design does, (rows, n)."""
         out, row = [], 0
         for name, key in zip(self.names, self.keys, strict=True):
             if key.is_vector:
-                values, target = (each[row] + 1j * each[row + 1] for each in (found, self.wanted))
+                values, target = (each[row] + 1j * each[row + 1] for each in (rows, self.wanted))
             else:
-                values, target = found[row], self.wanted[row]
+                values, target = rows[row], self.wanted[row]
             out.append(Reached(name, key.kind, inputs, values, target))
             row += 2 if key.is_vector else 1
         return tuple(out)
@@ -192,9 +192,9 @@ def _largest(m: Description, wanted: Reals, inputs: ArrayLike | None) -> float:
     return float(there.max())
 
 
-def _rows(name: str, is_point: bool, given: ArrayLike, n: int | None) -> Reals:
+def _rows(name: str, is_point: bool, table: ArrayLike, n: int | None) -> Reals:
     """The numbers of one quantity, (1 or 2, n)."""
-    result = np.asarray(given)
+    result = np.asarray(table)
     if is_point:
         if np.iscomplexobj(result):
             result = np.stack([result.real, result.imag], axis=-1)

@@ -61,7 +61,7 @@ def spread(slopes: Sequence[Reals], limits: Sequence[float]) -> Spread:
     return Spread(moved.sum(axis=0), np.sqrt(total), shares)
 
 
-def limits(m: Description, given: Mapping[str, float]) -> dict[Dimension, float]:
+def limits(m: Description, requested: Mapping[str, float]) -> dict[Dimension, float]:
     """The limits of single numbers, of tolerances by path: that of a point holds for both coordinates.
 
     Raises
@@ -69,10 +69,10 @@ def limits(m: Description, given: Mapping[str, float]) -> dict[Dimension, float]
     DescriptionError
         Where a path names no number.
     """
-    known = dimensions(m)
+    every = dimensions(m)
     limits: dict[Dimension, float] = {}
-    for path, limit in given.items():
-        limits |= dict.fromkeys(named(m, path, known), limit)
+    for path, limit in requested.items():
+        limits |= dict.fromkeys(named(m, path, every), limit)
     return limits
 
 

@@ -34,7 +34,7 @@ from virtualwork.plan.steps import Group, Plan, geared, turns
 CHOICE = ("margin", "plus", "minus", "guessed", "sign")
 # radicand (a squared sine) below which a guess stands at a change point or a limit, or nearly so
 CLOSE = 1e-9
-# of two assemblies the nearer one is told from the farther if its squared distance is below this share
+# of two assemblies the nearer one is certain if its squared distance is below this share of the other's
 TOLD = 0.5
 # the radicand above which no change point is within two steps of `branches.STEP`: it grows with the square of the distance
 CLEAR = 0.2
@@ -58,8 +58,6 @@ class Written:
         Whether the sign of every closed form enters too (`sign GROUP`), as each variant has its own.
     settled : bool
         See `Recording`.
-    recording : type
-        That, or one that writes down more.
     """
 
     def __init__(
@@ -69,7 +67,6 @@ class Written:
         moves: tuple[bool, ...],
         own_signs: bool,
         settled: bool = True,
-        recording: type[Recording] = Recording,
     ) -> None:
         recorder = Recorder()
         # that of the recording
@@ -93,7 +90,7 @@ class Written:
         # two slides have one solution: their sign is that of any
         signs = {g.name: assembly.signs.get(g.name, 1) for g in self.plan.groups if g.kind != "Newton"}
         turning = [g.name for g in self.closed] if own_signs else assembly.turning_over
-        self.recording = recording(
+        self.recording = Recording(
             self.mechanism, self.plan, signs, moves, turning, winding, settled, recorder
         )
         self._tapes: dict[tuple[Any, ...], Tape] = {}
@@ -177,7 +174,7 @@ class Written:
         return of.recorder.tape(outputs)
 
     def told(self, samples: int) -> Tape:
-        """The tape of how all closed forms close at the inputs of the guess, and whether that is told plainly.
+        """The tape of how all closed forms close at the inputs of the guess, and whether that is certain.
 
         `sign GROUP`; and `told`: positive where the guess is far from a change point and much nearer to one assembly, 2 where
         the radicands are far from zero there and at further inputs `way 0`, `way 1` …, so many. Where it is not told the
@@ -200,7 +197,7 @@ class Written:
         return recorder.tape(signs | {"told": told})
 
     def _plain(self, values: Mapping[str, Number]) -> list[Number]:
-        """What is positive where a choice is told plainly, and the description is no other than that of all."""
+        """What is positive where a choice is certain, and the description is no other than that of all."""
         plain = [values["allowed"]]
         for name in (group.name for group in self.closed):
             plus, minus = values[f"plus {name}"], values[f"minus {name}"]

@@ -44,13 +44,13 @@ def balanced(arms: Reals, p: Complexes, q: Complexes) -> Reals | None:
     phi, share, step = np.zeros(len(arms)), 0.0, FIRST
     while share < 1.0:
         ahead = min(1.0, share + step)
-        found = _followed(phi, ahead * arms, p, q)
-        if found is None:
+        followed = _followed(phi, ahead * arms, p, q)
+        if followed is None:
             step = 0.5 * step
             if step < LEAST:
                 return None
             continue
-        phi, share, step = found, ahead, 2.0 * step
+        phi, share, step = followed, ahead, 2.0 * step
     return phi
 
 

@@ -70,7 +70,7 @@ def longer(h: Number, wanted: Number, before: Number, grow: Number) -> Number:
 
 
 def added(x: Number, low: Number, d: Number) -> tuple[Number, Number]:
-    """x + d with what rounding left over before (Kahan), and what it leaves now."""
+    """x + d with the rounding of earlier sums (Kahan), and the rounding of this one."""
     d = d + low
     total = x + d
     return total, d - (total - x)

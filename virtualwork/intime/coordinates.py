@@ -89,7 +89,7 @@ class Coordinates:
     # --- how far from folding -----------------------------------------------------------------------------------
     @cached_property
     def _margins(self) -> Tape | None:
-        """The relative radicands of all loops, or what stands for them; None where there is none to look at."""
+        """The relative radicands of all loops, or what takes their place; None without loops."""
         a = self.equations.assembly
         groups = [g for g in a.plan.groups if g.kind != "PRP"]
         recording = self.equations.recording(False, False, False)
@@ -111,10 +111,10 @@ class Coordinates:
         """Whether no loop folds at any of many places, (n, k); False where that takes more than the tape."""
         if self._margins is None:
             return True
-        given = {f"q{j}": q[:, j] for j in range(q.shape[1])}
-        if not given.keys() >= set(self._margins.inputs):
+        entering = {f"q{j}": q[:, j] for j in range(q.shape[1])}
+        if not entering.keys() >= set(self._margins.inputs):
             return False
-        return bool(len(q) == 0 or (run(self._margins, given).table >= FOLDING).all())
+        return bool(len(q) == 0 or (run(self._margins, entering).table >= FOLDING).all())
 
     def margin(self, q: Floats) -> float:
         """How far every loop is from folding: the least relative radicand, 1 at a right angle."""
@@ -166,9 +166,9 @@ class Coordinates:
             except MechanismError:
                 # the link cannot be a coordinate: others are
                 continue
-            found = opened(assembly, at)
-            if found > most:
-                best, most = (assembly, entries, at), found
+            opening = opened(assembly, at)
+            if opening > most:
+                best, most = (assembly, entries, at), opening
         if best is None:
             return None
         assembly, entries, at = best
@@ -219,14 +219,14 @@ def measured(motion: Motion, entry: Input, order: int) -> Reals:
 
 def opened(assembly: Assembly, at: Floats) -> float:
     """How far every loop is from folding at the inputs of the guess: as `Coordinates.margin`."""
-    st, found = assembly.state(tuple(at)), [1.0]
+    st, margins = assembly.state(tuple(at)), [1.0]
     for g in assembly.plan.groups:
         if g.kind == "Newton":
             rows = [[part(c) for c in row] for row in columns(g, st) for part in PARTS]
-            found.append(float(np.ravel(regularity(rows))[0]) ** 2)
+            margins.append(float(np.ravel(regularity(rows))[0]) ** 2)
         elif g.kind != "PRP":
-            found.append(float(np.ravel(st.margin[g.name])[0]))
-    return min(x if x == x else 0.0 for x in found)
+            margins.append(float(np.ravel(st.margin[g.name])[0]))
+    return min(x if x == x else 0.0 for x in margins)
 
 
 @dataclass

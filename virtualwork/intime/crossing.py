@@ -94,10 +94,10 @@ class Crossing:
         poses too far off interpolation misses, for what is smooth here has an end (a limit, a fast turn) not far away;
         from poses too near they have lost their digits.
         """
-        known, ends = self.values(f), (self.at - self.inner, self.at + self.inner)
-        pairs = [(f(q), self.interpolated(known, q)) for q in ends]
+        nodes, ends = self.values(f), (self.at - self.inner, self.at + self.inner)
+        pairs = [(f(q), self.interpolated(nodes, q)) for q in ends]
         sizes = [
-            max(map(abs, of)) for of in zip(least, *known, *(values for values, _ in pairs), strict=True)
+            max(map(abs, of)) for of in zip(least, *nodes, *(values for values, _ in pairs), strict=True)
         ]
         apart = [[abs(x - y) for x, y in zip(*pair, strict=True)] for pair in pairs]
         # NaN is the worst

@@ -89,7 +89,7 @@ def _pieces(g: Reals) -> tuple[Any, ...]:
 
 
 def events(
-    rates: Tape, given: Mapping[str, Any], nodes: Nodes, levels: Levels, sides: Mapping[int, Reals]
+    rates: Tape, entering: Mapping[str, Any], nodes: Nodes, levels: Levels, sides: Mapping[int, Reals]
 ) -> tuple[Reals, Mask]:
     """When each lane first meets a level, (lanes,) s, NaN where it does not; and in which lanes that is not sure.
 
@@ -97,7 +97,7 @@ def events(
     ----------
     rates : Tape
         The accelerations.
-    given : mapping of name to array (lanes,)
+    entering : mapping of name to array (lanes,)
         What further enters them.
     nodes : Nodes (rounds, lanes)
     levels : mapping of an input's number to its level
@@ -118,7 +118,7 @@ def events(
         here, after = nodes.at((begin, lane)), nodes.at((begin + 1, lane))
         whole = after.t - here.t
         h = guess = zero(g[begin, lane], low[first], high[first]) * whole
-        some = {name: x[lane] for name, x in given.items()}
+        some = {name: x[lane] for name, x in entering.items()}
         # Newton's method over the method's own steps
         for _ in range(NEWTONS):
             dq, dv, _ = over(rates, some, here, h)

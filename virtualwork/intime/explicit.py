@@ -34,7 +34,7 @@ Rates = Callable[[Number, Numbers, Numbers], Numbers]
 
 
 class Stepped(NamedTuple):
-    """Changes of q and q̇, the work, the rates at the end, two errors of (q, q̇), and what stiffness is told from.
+    """Changes of q and q̇, the work, the rates at the end, two errors of (q, q̇), and what shows stiffness.
 
     `steep` is the squared change of the accelerations between two states at one time, `apart` that of the speeds.
     """
@@ -66,8 +66,8 @@ def stages(
     for c, row in zip(AT, STAGES, strict=True):
         there = [x + h * combined(row, s) for x, s in zip(q, speeds, strict=True)]
         place = [x + h * combined(row, s) for x, s in zip(v, others, strict=False)]
-        found = f(t + c * h, there, place)
-        for s, x in zip((*speeds, *others), (*place, *found), strict=True):
+        slopes = f(t + c * h, there, place)
+        for s, x in zip((*speeds, *others), (*place, *slopes), strict=True):
             s.append(x)
     return speeds, others, place
 
@@ -193,8 +193,8 @@ def _function(k: int, passed: tuple[str, ...]) -> tuple[Callable[..., Any], Call
     written = Written(k, passed)
     done = written.step(written.enter("h"))
     parts = zip(("dq", "dv", "rate", "third", "fifth"), (*done[:2], *done[3:6]), strict=True)
-    found = {f"{name}{j}": x for name, values in parts for j, x in enumerate(values)}
-    tape = written.tape(found | {"work": done.work, "steep": done.steep, "apart": done.apart})
+    entering = {f"{name}{j}": x for name, values in parts for j, x in enumerate(values)}
+    tape = written.tape(entering | {"work": done.work, "steep": done.steep, "apart": done.apart})
     places, speeds, rates = names(k)
     every = ["t", "h", *places, *speeds, *rates]
     wanted = [every.index(name) for name in tape.inputs if name in every]

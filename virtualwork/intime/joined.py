@@ -38,17 +38,17 @@ class Joined:
         """Call what was asked of every part."""
         return self._joined([of(*args, **keywords) for _, of in self._parts])
 
-    def _joined(self, found: list[Any]) -> Any:
-        first = found[0]
+    def _joined(self, answers: list[Any]) -> Any:
+        first = answers[0]
         if isinstance(first, np.ndarray):
             out = np.empty((self._n, *first.shape[1:]), first.dtype)
-            for (rows, _), part in zip(self._parts, found, strict=True):
+            for (rows, _), part in zip(self._parts, answers, strict=True):
                 out[rows] = part
             return out
         if isinstance(first, (tuple, list)) and all(isinstance(part, np.ndarray) for part in first):
-            return type(first)(self._joined(list(parts)) for parts in zip(*found, strict=True))
+            return type(first)(self._joined(list(parts)) for parts in zip(*answers, strict=True))
         if isinstance(first, dict):
-            return {key: self._joined([part[key] for part in found]) for key in first}
+            return {key: self._joined([part[key] for part in answers]) for key in first}
         if first is None or isinstance(first, (bool, str, float, list)):
             return first
-        return Joined([(rows, of) for (rows, _), of in zip(self._parts, found, strict=True)], self._n)
+        return Joined([(rows, of) for (rows, _), of in zip(self._parts, answers, strict=True)], self._n)

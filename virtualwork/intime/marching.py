@@ -47,8 +47,8 @@ Lanes = Mapping[str, Any]
 def body(k: int, passed: tuple[str, ...]) -> Tape:
     """A step of k inputs, tried, judged and taken or not, as the body of a loop.
 
-    States: `t`, `h` (of the next step), `grow`, `stiff`, `left`, `work`; `q0`, `v0`, `a0` and so on, `power`; what
-    rounding left over of q and q̇ (`lq0`, `lv0`); the largest speeds so far (`f0`). Constants: `end`, `span`,
+    States: `t`, `h` (of the next step), `grow`, `stiff`, `left`, `work`; `q0`, `v0`, `a0` and so on, `power`;
+    the rounding of earlier sums in q and q̇ (`lq0`, `lv0`); the largest speeds so far (`f0`). Constants: `end`, `span`,
     `tolerance`, and `scale0` and so on.
     """
     places, speeds, rates = names(k)
@@ -190,25 +190,25 @@ class March(NamedTuple):
         return self.state["stiff"] >= STIFF
 
 
-def march(k: int, rates: Tape, given: Lanes, state: Lanes, capacity: int = ROUNDS) -> March:
+def march(k: int, rates: Tape, numbers: Lanes, state: Lanes, capacity: int = ROUNDS) -> March:
     """Do steps in every lane, at most `capacity`.
 
     Parameters
     ----------
     rates : Tape
-    given, state : mapping of name to float or array (n,)
-        See `body`; what further enters the rates is given.
+    numbers, state : mapping of name to float or array (n,)
+        See `body`; `numbers`: what further enters the rates.
     """
-    found, kept = rounds.run(loop(k, rates), given, state, capacity)
-    return March(_nodes(k, np.stack(list(kept.values()), axis=1)), found)
+    last, kept = rounds.run(loop(k, rates), numbers, state, capacity)
+    return March(_nodes(k, np.stack(list(kept.values()), axis=1)), last)
 
 
-def follow(k: int, rates: Tape, given: Lanes, state: Lanes, times: Reals) -> March:
+def follow(k: int, rates: Tape, numbers: Lanes, state: Lanes, times: Reals) -> March:
     """Steps that end at given times, (rounds, n)."""
     steps = again(k, rates)
     begin = {name: state[name] for name in steps.states}
-    found, kept = rounds.run(steps, given, begin, len(times), fed={"next": times})
-    return March(_nodes(k, np.stack(list(kept.values()), axis=1)), {**state, **found})
+    last, kept = rounds.run(steps, numbers, begin, len(times), fed={"next": times})
+    return March(_nodes(k, np.stack(list(kept.values()), axis=1)), {**state, **last})
 
 
 def beginning(
@@ -227,11 +227,11 @@ def beginning(
     return result | low
 
 
-def over(rates: Tape, given: Lanes, node: Nodes, h: Reals) -> tuple[Reals, Reals, Reals]:
+def over(rates: Tape, numbers: Lanes, node: Nodes, h: Reals) -> tuple[Reals, Reals, Reals]:
     """Changes of q and q̇ (n, k) and the work (n,) over one step of a length of its own from each of n states; NaN where there is none."""
     k, end = node.k, node.t + h
     # any error will do
-    whole = {**given, "end": end, "span": 0.0, "tolerance": 1e100} | {f"scale{j}": 1.0 for j in range(k)}
+    whole = {**numbers, "end": end, "span": 0.0, "tolerance": 1e100} | {f"scale{j}": 1.0 for j in range(k)}
     state = beginning(node, h) | {"work": 0.0}
     result = march(k, rates, whole, state, 1).nodes.at(0)
     there = result.t == end

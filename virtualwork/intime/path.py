@@ -181,9 +181,9 @@ class Path:
         q, v = self.nodes.q, self.nodes.v
         if self.coordinates.own:
             return q
-        found, speed, _ = self.coordinates.states(q, v, v, np.zeros_like(q))
+        places, speed, _ = self.coordinates.states(q, v, v, np.zeros_like(q))
         turning = np.array([not e.is_slide for e in self.coordinates.inputs])
-        return np.asarray(self.first + followed(found, speed, self.nodes.t, turning))
+        return np.asarray(self.first + followed(places, speed, self.nodes.t, turning))
 
     def states(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
         """The inputs, their speeds and accelerations (n, k), and the work (n,)."""

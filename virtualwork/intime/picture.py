@@ -64,8 +64,8 @@ def draw(course: Course, m: Description, figure: FigureBase | None = None) -> ND
                 Curve(n if len(m.inputs) > 1 else "", values[:, j])
                 for n, j in zip(names, members, strict=True)
             ]
-            said = f"{what} of {names[0]}" if len(m.inputs) == 1 else what
-            ends.append(panel(axes, course.t, lines, said, of))
+            label = f"{what} of {names[0]}" if len(m.inputs) == 1 else what
+            ends.append(panel(axes, course.t, lines, label, of))
     ends.append(_energy(rows[-1], course))
     rows[-1].set_xlabel("t, s")
     beside = right.subplots()

@@ -233,7 +233,7 @@ def simulate(
     until: Mapping[str, float] | None = None,
     progress: Callable[[float, float, int], None] | None = None,
 ) -> Run:
-    """Let go of the inputs; see `Mechanism.simulate`.
+    """Simulate; see `Mechanism.simulate`.
 
     `progress` is called after every step, or some, with the time reached, the last time and the number of the solution.
     """
@@ -357,12 +357,12 @@ def _refuse_lost_energy(fine: Travel, error: float) -> None:
 
 def _own(assembly: Assembly) -> Coordinates:
     """The inputs as coordinates and their equations, written down once."""
-    found: Coordinates | None = assembly.recordings.get("in time")
-    if found is None:
+    coordinates: Coordinates | None = assembly.recordings.get("in time")
+    if coordinates is None:
         m = assembly.mechanism
-        found = Coordinates((Rubbing if m.friction else Equations)(assembly), m.inputs)
-        assembly.recordings["in time"] = found
-    return found
+        coordinates = Coordinates((Rubbing if m.friction else Equations)(assembly), m.inputs)
+        assembly.recordings["in time"] = coordinates
+    return coordinates
 
 
 def drift(energy: Reals, work: Reals) -> Reals:
@@ -384,13 +384,13 @@ def rising(times: ArrayLike) -> Reals:
 
 
 def _state(
-    name: str, given: ArrayLike | None, own: Sequence[float | None], home: Sequence[float], k: int
+    name: str, requested: ArrayLike | None, own: Sequence[float | None], home: Sequence[float], k: int
 ) -> Floats:
-    if given is None:
+    if requested is None:
         return [float(at if value is None else value) for value, at in zip(own, home, strict=True)]
-    value = np.asarray(given, dtype=float)
+    value = np.asarray(requested, dtype=float)
     if value.ndim > 1 or (value.ndim == 1 and len(value) != k) or not np.isfinite(value).all():
-        raise ValueError(f"{name}: expected {k} finite number{'s' if k > 1 else ''}, found {given!r}")
+        raise ValueError(f"{name}: expected {k} finite number{'s' if k > 1 else ''}, found {requested!r}")
     return np.broadcast_to(value, (k,)).tolist()  # type: ignore[no-any-return]
 
 
@@ -417,32 +417,32 @@ def not_met(until: Iterable[str], last: float) -> str:
 
 
 def _said(
-    run: Run, accuracy: float, worst: float, until: Mapping[str, float] | None, asked: Reals
+    run: Run, accuracy: float, worst: float, until: Mapping[str, float] | None, requested: Reals
 ) -> list[str]:
     """What must be said of the answer."""
-    found = []
+    warnings = []
     if run.fine.ended == "end" and until:
-        found.append(not_met(until, float(asked[-1])))
+        warnings.append(not_met(until, float(requested[-1])))
     if run.fine.ended == "budget":
-        found.append(f"ends at {run.fine.end:.9g} s, after {MOST} steps: a lower accuracy takes fewer")
+        warnings.append(f"ends at {run.fine.end:.9g} s, after {MOST} steps: a lower accuracy takes fewer")
     elif run.fine.ended not in ("end", "until"):
-        found.append(f"ends at {run.fine.end:.9g} s: {run.fine.ended}")
+        warnings.append(f"ends at {run.fine.end:.9g} s: {run.fine.ended}")
     undecided = run.fine.undecided
     if undecided is not None:
-        found.append(
+        warnings.append(
             f"at {undecided:.9g} s it rests at a change point, from where more than one motion leads on: that of the "
             "guess's branch is followed"
         )
     if run.unknown.any():
-        found.append(
+        warnings.append(
             f"no digit is known from {run.t[np.argmax(run.unknown)]:.6g} s on: the motion makes any error grow, "
             "and beyond rounding it grows past the answer"
         )
     elif worst > accuracy:
-        found.append(f"accuracy {accuracy:g} is beyond rounding here: {worst:.1e} is reached")
+        warnings.append(f"accuracy {accuracy:g} is beyond rounding here: {worst:.1e} is reached")
     drives = run.assembly.mechanism.cam_drives
     if drives:
         from virtualwork.intime.contacts import contacts_lost
 
-        found += contacts_lost(run.fine, drives)
-    return found
+        warnings += contacts_lost(run.fine, drives)
+    return warnings

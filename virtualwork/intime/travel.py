@@ -154,8 +154,8 @@ class Travel:
         out = [np.empty((len(times), k)) for _ in range(3)]
         work = np.empty(len(times))
         for leg, rows in self._parts(times):
-            *found, work[rows] = leg.states(times[rows])
-            for whole, part in zip(out, found, strict=True):
+            *parts, work[rows] = leg.states(times[rows])
+            for whole, part in zip(out, parts, strict=True):
                 whole[rows] = part
         return out[0], out[1], out[2], work
 

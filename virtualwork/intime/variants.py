@@ -100,10 +100,10 @@ class Runs:
             Part(f.mechanism, f.dimensions, f.values, self.angle, [*rates, [0.0] * len(rates[0])])
         )
 
-    def put(self, rows: Any, times: Reals, **found: Reals) -> None:
-        """Take over what is found of some variants at their times (…, n), which may be less than those asked for."""
+    def put(self, rows: Any, times: Reals, **columns: Reals) -> None:
+        """Keep the results of some variants at their times (…, n), which may be less than those asked for."""
         n = times.shape[-1]
-        for name, values in {"times": times, **found}.items():
+        for name, values in {"times": times, **columns}.items():
             of = getattr(self, name)
             of[rows, n:] = np.nan
             of[rows, :n] = values
@@ -125,7 +125,7 @@ class Variants(Family):
         accuracy: float = 1e-9,
         until: Mapping[str, float] | None = None,
     ) -> Runs:
-        """Let go of the inputs of every variant; see `Mechanism.simulate`.
+        """Simulate every variant; see `Mechanism.simulate`.
 
         Parameters
         ----------
@@ -164,8 +164,8 @@ class Variants(Family):
             raise ValueError(f"accuracy: found {accuracy:g}, expected a number between 0 and 1")
         k = len(self.mechanism.inputs)
         q, v = (
-            np.stack(self.own(name), axis=-1) if given is None else _starts(what, given, len(self), k)
-            for what, name, given in (("angle", "value", angle), ("speed", "speed", speed))
+            np.stack(self.own(name), axis=-1) if start is None else _starts(what, start, len(self), k)
+            for what, name, start in (("angle", "value", angle), ("speed", "speed", speed))
         )
         levels = levels_of(self.mechanism.inputs, until)
         runs = Runs.of(self, t)
@@ -189,8 +189,8 @@ class Variants(Family):
         return runs
 
 
-def _starts(name: str, given: ArrayLike, v: int, k: int) -> Reals:
-    value = np.asarray(given, dtype=float)
+def _starts(name: str, start: ArrayLike, v: int, k: int) -> Reals:
+    value = np.asarray(start, dtype=float)
     if not np.isfinite(value).all() or value.shape not in ((), (k,), (v, k)):
         raise ValueError(
             f"{name}: expected a number, or shape ({k},) or ({v}, {k}), all finite; found {value.shape}"
@@ -233,8 +233,8 @@ class _Lanes:
         if solver.written is None or not solver.together.any():
             return None
         family.alike = solver
-        given = {d.path: family.values[:, i] for i, d in enumerate(family.dimensions)}
-        given |= {f"sign {name}": sign for name, sign in solver.signs.items()}
+        entering = {d.path: family.values[:, i] for i, d in enumerate(family.dimensions)}
+        entering |= {f"sign {name}": sign for name, sign in solver.signs.items()}
         if family.tapes is None:
             try:
                 family.tapes = motion_of(solver.written.recording, k)
@@ -243,14 +243,14 @@ class _Lanes:
                 return None
         rates, energy = family.tapes
         places, speeds, _ = names(k)
-        if not {*places, *speeds, *given}.issuperset(rates.inputs):
+        if not {*places, *speeds, *entering}.issuperset(rates.inputs):
             return None
         scale = np.ones((len(q), k))
         slides = [j for j, e in enumerate(m.inputs) if e.is_slide]
         if slides:
             scale[:, slides] = np.array([family[i].size for i in range(len(q))])[:, None]
         return cls(
-            family, solver, solver.written, rates, energy, given, solver.together, t, q, v, scale, levels
+            family, solver, solver.written, rates, energy, entering, solver.together, t, q, v, scale, levels
         )
 
     @property
@@ -264,7 +264,7 @@ class _Lanes:
 
     # --- through time -----------------------------------------------------------------------------------------------
     def fill(self, runs: Runs, accuracy: float) -> Mask:
-        """Let go of all that can be; which variants must be done singly, (v,)."""
+        """Simulate all that can be simulated together; which variants must be done singly, (v,)."""
         alone = ~self.together
         rows, tolerance = np.flatnonzero(self.together), max(LEAST, FIRST * accuracy)
         nodes = self.way(rows, tolerance, alone)
@@ -299,8 +299,8 @@ class _Lanes:
         """
         t, n = self.t, len(rows)
         end, span = float(t[-1]), float(t[-1] - t[0])
-        given = self.some(rows) | {"tolerance": tolerance, "end": end, "span": span}
-        given |= {f"scale{j}": self.scale[rows, j] for j in range(self.k)}
+        entering = self.some(rows) | {"tolerance": tolerance, "end": end, "span": span}
+        entering |= {f"scale{j}": self.scale[rows, j] for j in range(self.k)}
         q, v, scale = self.q[rows], self.v[rows], self.scale[rows].T
         slopes = self._run(self.rates, rows, q, v)
         first = Nodes(np.column_stack([np.full(n, t[0]), q, v, slopes, np.zeros(n)]), self.k)
@@ -311,12 +311,12 @@ class _Lanes:
         parts = [first.at(None)]
         taken = 0
         while state["left"].max() > 0 and taken < MOST:
-            found, state = march(self.k, self.rates, given, state, SOON if taken < 4 * SOON else LATER)
-            parts.append(found)
-            taken += len(found.t)
+            marched, state = march(self.k, self.rates, entering, state, SOON if taken < 4 * SOON else LATER)
+            parts.append(marched)
+            taken += len(marched.t)
             if self.levels:
                 # one step beyond the event is enough
-                hits = passed(parts[-2].then(found), self.levels, ways)[:-1].any(axis=0)
+                hits = passed(parts[-2].then(marched), self.levels, ways)[:-1].any(axis=0)
                 state["left"] = np.where(hits, 0.0, state["left"])
         whole = parts[0].then(*parts[1:])
         hits = passed(whole, self.levels, ways)
@@ -382,7 +382,7 @@ class _Lanes:
         return ~Solver(Part(f.mechanism, f.dimensions, f.values, ends, rates), self.solver).together
 
     def _put(self, runs: Runs, rows: Rows, lanes: Rows, nodes: Nodes, t: Reals, error: Reals) -> None:
-        """Take over the states of some lanes at times (lanes, n), each from the node before; NaN where the time is."""
+        """Keep the states of some lanes at times (lanes, n), each from the node before; NaN where the time is."""
         rows, begin = rows[lanes], nodes.t[:, lanes]
         before = np.stack([(begin <= x).sum(axis=0) - 1 for x in t.T], axis=1)
         node = nodes.at((np.maximum(before, 0), lanes[:, None]))
@@ -399,13 +399,13 @@ class _Lanes:
             self._run(tape, every, q, v).reshape(*t.shape, len(tape.names))
             for tape in (self.rates, self.energy)
         )
-        found = node.q, node.v, slopes[..., :-1], error, energy[..., 0], node.work
-        runs.put(rows, t, **dict(zip(FOUND, found, strict=True)))
+        columns = node.q, node.v, slopes[..., :-1], error, energy[..., 0], node.work
+        runs.put(rows, t, **dict(zip(FOUND, columns, strict=True)))
 
     def _run(self, tape: Tape, rows: Rows, q: Reals, v: Reals | None = None) -> Reals:
         """A tape's outputs (n, outputs) in states (n, k) of variants."""
-        given = self.some(rows) | {f"q{j}": x for j, x in enumerate(q.T)}
-        given |= {} if v is None else {f"v{j}": x for j, x in enumerate(v.T)}
+        entering = self.some(rows) | {f"q{j}": x for j, x in enumerate(q.T)}
+        entering |= {} if v is None else {f"v{j}": x for j, x in enumerate(v.T)}
         with np.errstate(all="ignore"):
-            result = run(tape, given)
+            result = run(tape, entering)
         return np.stack([np.broadcast_to(result[name], len(rows)) for name in tape.names], axis=-1)

@@ -189,11 +189,11 @@ class Check:
             else tuple(map(self.assembly.reach.in_period, self.input_limits))
         )
 
-    def _distinct(self, found: list[float]) -> tuple[float, ...]:
+    def _distinct(self, inputs: list[float]) -> tuple[float, ...]:
         if self.assembly.reach.period is None:
-            return tuple(sorted(found))
+            return tuple(sorted(inputs))
         unique: list[float] = []
-        for q in sorted(map(self.assembly.reach.in_period, found)):
+        for q in sorted(map(self.assembly.reach.in_period, inputs)):
             if not unique or q - unique[-1] > 1e-8:
                 unique.append(q)
         return tuple(unique)
