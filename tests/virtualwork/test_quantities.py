@@ -11,8 +11,7 @@ from mpmath import mp
 from virtualwork import Input, Link, Mechanism, TorsionSpring
 from virtualwork.digits.exact import Gap
 from virtualwork.family.part import Assembled
-from virtualwork.formulas.balanced import Over
-from virtualwork.formulas.forces import Effort, JointForce, NewtonEuler, Reaction, Shaking
+from virtualwork.formulas.forces import Effort, JointForce, NewtonEuler, Over, Reaction, Shaking
 from virtualwork.formulas.kinematics import Angle, AnglePartial, Point, PointPartial, Slide, Turn
 from virtualwork.formulas.loops import Closed, Margin, Size
 from virtualwork.formulas.quantity import NOTHING, Quantity

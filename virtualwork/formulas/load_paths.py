@@ -364,7 +364,7 @@ class Solved(Quantity):
 
     def form(self, block: Block) -> tuple[float, Number]:
         group = self.group
-        block.setting.formed.add(group.name)
+        block.names.add(group.name)
         loads = [load.value(block) for load in self.paths.on_group(self.group)]
         if group.name in block.st.folded:
             # singular in every pose: it may be under stress without any load
@@ -411,7 +411,7 @@ class SideForce(Quantity):
 
     def form(self, block: Block) -> tuple[float, Number]:
         joint, body = self.side
-        block.setting.formed.add(f"{joint} on {body}")
+        block.names.add(f"{joint} on {body}")
         return 1.0, self.paths.balance(self.side).value(block)
 
     def reads(self) -> Iterable[Quantity | None]:

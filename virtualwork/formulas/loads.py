@@ -180,6 +180,11 @@ class Tabled(Load):
     link_axes: bool = False
     axis: str = "input"
 
+    def alike(self, other: Tabled) -> bool:
+        """Whether another load gives the same force everywhere."""
+        mine, its = ((x.kind, x.body, x.path, x.periodic, x.link_axes, x.axis) for x in (self, other))
+        return mine == its and self.table is other.table
+
     def _in_cycle(self, q: Number) -> tuple[Reals, Complexes, Reals]:
         at, force = (np.array(column) for column in zip(*self.table, strict=True))
         q = np.asarray(q, dtype=float)
@@ -189,7 +194,7 @@ class Tabled(Load):
         return at, force, q
 
     def place_in(self, block: Block) -> Number:
-        """What the table is over, at the poses of a block.
+        """What the table is over, at a pose.
 
         Raises
         ------
@@ -219,12 +224,12 @@ class Tabled(Load):
         first = self.table[0][0]
         return first + (angle - first) % (2 * np.pi)
 
-    def over(self, q: Number, many: bool) -> Number:
+    def over(self, q: Number) -> Number:
         """The force at places of the table, in the axes that it is given in; NaN outside."""
         at, force, q = self._in_cycle(q)
         outside = (q < at[0]) | (q > at[-1])
         values = np.where(outside, np.nan, np.interp(q, at, force.real) + 1j * np.interp(q, at, force.imag))
-        return values if many else complex(values)
+        return values if values.ndim else complex(values)
 
     def form(self, block: Block) -> Number:
         result = block.table(self)
@@ -244,7 +249,7 @@ class Tabled(Load):
         at, force, q = self._in_cycle(self.place_in(block))
         place = np.clip(np.searchsorted(at, q, side="right") - 1, 0, len(at) - 2)
         slopes: NDArray[Any] = np.diff(force)[place] / np.diff(at)[place]
-        return slopes if block.st.many else complex(slopes)
+        return slopes if np.ndim(slopes) else complex(slopes)
 
     def turned(self, block: Block, rates: Rates) -> Number:
         """Its derivative over the input, in ground axes."""

@@ -310,6 +310,15 @@ class One:
         """The value in whose interval x lies."""
         return values[min(max(bisect(knots, x) - 1, 0), len(values) - 1)]
 
+    def system(self, rows: list[list[float]], right: list[float]) -> list[float]:
+        """Solve rows·x = right; NaN where the rows are parallel to rounding."""
+        matrix = np.array(rows)
+        # the volume of the rows over the product of their lengths (Hadamard): a slide's row has a unit of its own
+        lengths = float(np.sqrt((matrix * matrix).sum(axis=1)).prod())
+        if not abs(np.linalg.det(matrix)) > 1e-14 * lengths:
+            return [math.nan] * len(right)
+        return np.linalg.solve(matrix, right).tolist()  # type: ignore[no-any-return]
+
     join, angle = complex, staticmethod(cmath.phase)
     solve, transposed = staticmethod(solve_columns), staticmethod(solve_transposed)
 
