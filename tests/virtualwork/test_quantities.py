@@ -11,7 +11,7 @@ from mpmath import mp
 from virtualwork import Input, Link, Mechanism, TorsionSpring
 from virtualwork.digits.exact import Gap
 from virtualwork.family.part import Assembled
-from virtualwork.formulas.forces import Effort, JointForce, NewtonEuler, Over, Reaction, Shaking
+from virtualwork.formulas.forces import Effort, Force, JointForce, NewtonEuler, Over, Reaction, Shaking
 from virtualwork.formulas.kinematics import Angle, AnglePartial, Point, PointPartial, Slide, Turn
 from virtualwork.formulas.loops import Closed, Margin, Size
 from virtualwork.formulas.quantity import NOTHING, Quantity
@@ -31,6 +31,7 @@ def test_every_kind_has_its_own_name_and_formula() -> None:
     for kind in every:
         # whether a pose is assembled is no number of the tape
         assert kind.write is not Quantity.write or kind is Assembled
+        assert not issubclass(kind, Force) or kind.form is not Force.form
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,7 @@ class Dynamics:
     def _alone(self, key: Force) -> Any:
         """A force of one pose."""
         try:
-            value = self.scene.forces.value(key)
+            value = key.value(self.scene.forces)
             if isinstance(key, Effort | Generalized) and self._too_fast(key.input):
                 value = np.nan
         except (ZeroDivisionError, OverflowError):

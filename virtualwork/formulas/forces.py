@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from virtualwork.describe.description import Description
 from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.numbers import Number
 from virtualwork.formulas.quantity import Quantity, Recording
-from virtualwork.plan.steps import joints
+from virtualwork.plan.steps import joints, joints_at
+
+if TYPE_CHECKING:
+    from virtualwork.formulas.pose_forces import PoseForces
 
 
 class Force(Quantity):
-    """A quantity that the loads have a part in; `pose_forces` has its formula, a method of the name of its kind."""
+    """A quantity that the loads have a part in."""
 
     is_force = True
     is_rubbed: ClassVar[bool] = True
@@ -24,7 +27,18 @@ class Force(Quantity):
         return super().steps(recording)[0], recording.forces.case.targets()[1]
 
     def write(self, recording: Recording) -> Number:
-        return recording.forces.value(self)
+        return self.value(recording.forces)
+
+    def value(self, forces: PoseForces) -> Number:
+        """Its value over one pose, formed once; 0 where it is zero throughout."""
+        if self not in forces.formed:
+            value = self.form(forces)
+            forces.formed[self] = 0.0 if value is None else value
+        return forces.formed[self]
+
+    def form(self, forces: PoseForces) -> Number:
+        """Its formula over one pose; None is zero."""
+        raise NotImplementedError
 
     def read(self, forces: Any) -> Any:
         """Its values, (n,), of `dynamics.Dynamics`, or the estimates of their errors."""
@@ -45,6 +59,9 @@ class Effort(Force, kind="effort"):
 
     input: int
 
+    def form(self, forces: PoseForces) -> Number:
+        return forces.effort(self.input)
+
     def read(self, forces: Any) -> Any:
         return forces.effort[:, self.input]
 
@@ -53,6 +70,9 @@ class Generalized(Force, kind="generalized"):
     """The effort as if every motor sat on the body that its angle is measured from."""
 
     input: int
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.generalized(self.input)
 
     def read(self, forces: Any) -> Any:
         return forces.generalized[:, self.input]
@@ -63,6 +83,9 @@ class NewtonEuler(Force, kind="newton-euler"):
 
     is_joint_force = True
     input: int
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.newton_euler(self.input)
 
     def read(self, forces: Any) -> Any:
         return forces.newton_euler[:, self.input]
@@ -75,6 +98,9 @@ class JointForce(Force, kind="force"):
     joint: str
     body: str
 
+    def form(self, forces: PoseForces) -> Number:
+        return forces.force(self.joint, self.body)
+
     def read(self, forces: Any) -> Any:
         return forces.joint_force(forces.by_key[self.joint], self.body)
 
@@ -85,6 +111,9 @@ class JointMoment(Force, kind="moment"):
     is_joint_force = True
     joint: str
     body: str
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.moment(self.joint, self.body)
 
     def read(self, forces: Any) -> Any:
         return forces.joint_moment(forces.by_key[self.joint], self.body)
@@ -97,6 +126,10 @@ class Reaction(Force, kind="reaction"):
     name: str
     body: str
 
+    def form(self, forces: PoseForces) -> Number:
+        here = joints_at(forces.joints.joints, self.name, self.body)
+        return sum((JointForce(joint.key, self.body).value(forces) for joint in here), 0.0)
+
     def read(self, forces: Any) -> Any:
         return forces.at_joint(self.name, self.body)
 
@@ -106,6 +139,9 @@ class Contact(Force, kind="contact"):
 
     is_joint_force = True
     cam: int
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.contact(self.cam)
 
     def read(self, forces: Any) -> Any:
         return forces.contact(self.cam)
@@ -117,6 +153,9 @@ class Shaking(Force, kind="shaking"):
     is_rubbed = False
     is_vector = True
 
+    def form(self, forces: PoseForces) -> Number:
+        return forces.shaking()[0]
+
     def read(self, forces: Any) -> Any:
         force = forces.shaking[0]
         return force if force.ndim == 1 else force[:, 0] + 1j * force[:, 1]
@@ -126,6 +165,9 @@ class ShakingMoment(Force, kind="shaking moment"):
     """The shaking moment about the ground's origin, N·m."""
 
     is_rubbed = False
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.shaking()[1]
 
     def read(self, forces: Any) -> Any:
         return forces.shaking[1]
@@ -137,6 +179,9 @@ class Applied(Force, kind="applied"):
     is_vector = True
     link: str
 
+    def form(self, forces: PoseForces) -> Number:
+        return forces.applied(self.link)[0]
+
     def read(self, forces: Any) -> Any:
         return forces.applied(self.link)[0]
 
@@ -145,6 +190,9 @@ class AppliedMoment(Force, kind="applied moment"):
     """The moment of the same about the centre of mass, N·m."""
 
     link: str
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.applied(self.link)[1]
 
     def read(self, forces: Any) -> Any:
         return forces.applied(self.link)[1]
@@ -156,6 +204,9 @@ class LoadTorque(Force, kind="load torque"):
 
     is_rubbed = False
     number: int
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.case.loads[self.number].form(forces.block)
 
 
 class Load(LoadTorque, kind="load"):
@@ -171,6 +222,9 @@ class LoadPlace(Force, kind="load at"):
     is_vector = True
     number: int
 
+    def form(self, forces: PoseForces) -> Number:
+        return forces.load_place(self.number)
+
 
 class Rail(Force, kind="rail"):
     """The unit vector along a guide, in which an input drives."""
@@ -178,6 +232,9 @@ class Rail(Force, kind="rail"):
     is_rubbed = False
     is_vector = is_joint_force = True
     guide: int
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.rail(self.guide)
 
 
 # --- what is solved outside of a tape ----------------------------------------------------------------------------------
@@ -187,12 +244,18 @@ class Bearing(Force, kind="bearing"):
     is_vector = is_joint_force = True
     contact: int
 
+    def form(self, forces: PoseForces) -> Number:
+        return forces.bearing(self.contact)
+
 
 class RubbingRate(Force, kind="rubbing"):
     """The rate at which a contact slides: rad/s of a pin, m/s of a guide."""
 
     is_rubbed = False
     contact: int
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.rubbing_rate(self.contact)
 
 
 class Entry(Force, kind="entry"):
@@ -201,6 +264,9 @@ class Entry(Force, kind="entry"):
     is_joint_force = True
     row: int
     column: int | None
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.system[self.row, self.column]
 
 
 class Over(Quantity, kind="over"):

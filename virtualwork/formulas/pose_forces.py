@@ -16,18 +16,16 @@ from dalembert.arithmetic.recorded import bare
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import generalized_force
-from virtualwork.formulas.forces import JointForce
 from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.numbers import Number, dot, minus, plus
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.reactions import JointForces
 from virtualwork.formulas.resultants import applied_loads, reduced, resultant, shaking_loads
 from virtualwork.formulas.statics import Column, equations, mesh_column, unknowns
-from virtualwork.plan.steps import joints_at
 
 
 class PoseForces:
-    """The forces of a pose; each method but the first few is a kind of `forces.Force`.
+    """The forces of a pose, as the kinds of `forces.Force` read them.
 
     Attributes
     ----------
@@ -35,6 +33,7 @@ class PoseForces:
     joints : JointForces
     block : Block
         The pose as the loads see it.
+    formed : dict of quantity to its value
 
     Parameters
     ----------
@@ -57,7 +56,7 @@ class PoseForces:
         self.paths, self.case, self.mechanism = paths, paths.case, paths.mechanism
         self.block, self.solve, self.system_of, self.enter = block, solve, system, enter
         self.joints = JointForces(paths)
-        self._known: dict[Quantity, Number] = {}
+        self.formed: dict[Quantity, Number] = {}
         block.drive = self.effort
         solve(*self.case.targets())
         if self.case.contacts:
@@ -70,14 +69,6 @@ class PoseForces:
     def redundant(self) -> bool:
         """Whether statics cannot give every joint force, so that unknown ones enter."""
         return bool(self.joints.redundant)
-
-    def value(self, key: Quantity) -> Number:
-        """A force by its key, formed once; 0 where it is zero throughout."""
-        if key not in self._known:
-            kind, *of = key
-            value = getattr(self, kind.replace("-", "_").replace(" ", "_"))(*of)
-            self._known[key] = 0.0 if value is None else value
-        return self._known[key]
 
     def solve_places(self) -> None:
         """Write down what the places of all joints depend on."""
@@ -114,27 +105,16 @@ class PoseForces:
         self.solve_places()
         return self.joints.effort(self.block, j)
 
-    def shaking(self, part: int = 0) -> Number:
-        return resultant(shaking_loads(self.case.loads), self.block)[part]
-
-    def shaking_moment(self) -> Number:
-        return self.shaking(1)
+    def shaking(self) -> tuple[Number, Number]:
+        return resultant(shaking_loads(self.case.loads), self.block)
 
     # --- loads ------------------------------------------------------------------------------------------------------
-    def applied(self, link: str, part: int = 0) -> Number:
+    def applied(self, link: str) -> tuple[Number, Number]:
         self.solve([f"angle:{link}"], 0)
         loads = applied_loads(self.case.everything, link)
-        return reduced(loads, self.block, self.mechanism.rigid[link].center)[part]
+        return reduced(loads, self.block, self.mechanism.rigid[link].center)
 
-    def applied_moment(self, link: str) -> Number:
-        return self.applied(link, 1)
-
-    def load(self, number: int) -> Number:
-        return self.case.loads[number].form(self.block)
-
-    load_torque = load
-
-    def load_at(self, number: int) -> Number:
+    def load_place(self, number: int) -> Number:
         path = self.case.loads[number].path
         assert path is not None
         self.solve_places()
@@ -159,10 +139,6 @@ class PoseForces:
             return -sum((self.force(joint, other) for other in at.bodies if other != GROUND), 0j)
         force = self._bears("fx", joint, body) + 1j * self._bears("fy", joint, body)
         return plus(force, of.borne(block, at, body, self._tooth))
-
-    def reaction(self, joint: str, body: str) -> Number:
-        each = joints_at(self.joints.joints, joint, body)
-        return sum((self.value(JointForce(j.key, body)) for j in each), 0.0)
 
     def moment(self, joint: str, body: str) -> Number:
         self.solve_places()
@@ -201,9 +177,6 @@ class PoseForces:
             entries[row, column] = entries.get((row, column), 0.0) + bare(part)
         return entries
 
-    def entry(self, row: int, column: int | None) -> Number:
-        return self.system[row, column]
-
     def _bears(self, kind: str, key: str, body: str = "") -> Number:
         f = self.enter(f"f {self.unknowns.index((kind, key, body))}")
         turns = kind == "contact" and self.mechanism.cam_drives[int(key)].guide is None
@@ -225,7 +198,7 @@ class PoseForces:
             return force
         return dot(force, 1j * self.joints.rail(self.block, joint.guide))
 
-    def rubbing(self, n: int) -> Number:
+    def rubbing_rate(self, n: int) -> Number:
         self.solve_places()
         joint, body, other, *_ = self.case.contacts[n]
         if joint.guide is not None:
