@@ -31,7 +31,7 @@ class Forces(Dynamics):
     def error_estimate(self) -> ForceErrors:
         """Return estimates of the rounding errors of all forces, under the names of these.
 
-        Each is the difference to a second run in 32 digits. With joint friction there are none: infinite.
+        Each is the difference to a second run in 32 digits.
 
         Examples
         --------

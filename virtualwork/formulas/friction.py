@@ -2,7 +2,7 @@
 
 A contact that bears the force R = P + Qφ resists its slide with φ = −a·|R|, with a = μ r of a pin, μ of a guide, by the sense of
 its rate (Norton, Design of Machinery, §11.9 names the model; the exchange starts without friction). Where it does not settle so,
-the friction is followed from none on (`locking`). What was found is put right by Newton's method on the forces themselves, for in
+the friction is followed from none on (`locking`). The result is corrected by Newton's method on the forces themselves, for in
 P + Qφ the two may cancel.
 """
 
@@ -81,8 +81,8 @@ def _exchanged(arms: Reals, free: Complexes, per: Complexes) -> tuple[Reals, int
         close = np.asarray(~(changed & there))
         phi = after
     for i in np.flatnonzero(~close).tolist():
-        found = balanced(arms[:, i], free[:, i], per[:, :, i].T)
-        phi[:, i] = np.nan if found is None else found
+        followed = balanced(arms[:, i], free[:, i], per[:, :, i].T)
+        phi[:, i] = np.nan if followed is None else followed
     phi[:, ~there] = np.nan
     return phi + _step(phi, free + np.einsum("kn,kmn->mn", phi, per), per, arms), count
 

@@ -308,14 +308,14 @@ class Solving(Poses):
             right = values[len(loops) * len(each) :]
             with np.errstate(all="ignore"):
                 if group in self.branch.folded:
-                    found = solve_determined(cols, right)
+                    rates = solve_determined(cols, right)
                 elif of.kind == "Newton":
-                    found = solve_columns(cols, right)
+                    rates = solve_columns(cols, right)
                 else:
-                    found = crossed(cols[0], right[0], 1 / cross(*cols[0]))
+                    rates = crossed(cols[0], right[0], 1 / cross(*cols[0]))
                 if group not in self.branch.folded:
-                    found = passed(self.branch.passage, of, self.inputs[:, 0], cols, order, found)
-            self._entered[name] = found
+                    rates = passed(self.branch.passage, of, self.inputs[:, 0], cols, order, rates)
+            self._entered[name] = rates
         return self._entered[name]  # type: ignore[no-any-return]
 
     def _angle(self, body: str) -> Reals:
