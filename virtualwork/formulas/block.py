@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 
 from dalembert.arithmetic.varied import rotation
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND, TorsionSpring
-from virtualwork.formulas.numbers import Complexes, Number, Reals, plus, times
+from virtualwork.formulas.numbers import Complexes, ForceKind, Number, Reals, plus, times
 from virtualwork.formulas.poses import Poses, alone
 from virtualwork.formulas.positions import Samples, State, follow, unwound, whole
 from virtualwork.formulas.rates import Rates
@@ -175,6 +175,7 @@ class Block:
 
     def __init__(self, setting: Shared, st: State, along: Rates | None, by: list[Rates]) -> None:
         self.setting, self.st, self.along, self.by = setting, st, along, by
+        self.kind = cast(ForceKind, st.kind)
         self.one = len(by) == 1
         self.rates = setting.rates if self.one else (None, None)
         self.friction: dict[int, Number] = {}

@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dalembert.dataclass import dataclass, field
 from virtualwork.describe import DescriptionError
@@ -182,8 +181,7 @@ class Tabled(Load):
 
     def alike(self, other: Tabled) -> bool:
         """Whether another load gives the same force everywhere."""
-        mine, its = ((x.kind, x.body, x.path, x.periodic, x.link_axes, x.axis) for x in (self, other))
-        return mine == its and self.table is other.table
+        return vars(self) | {"table": id(self.table)} == vars(other) | {"table": id(other.table)}
 
     def _in_cycle(self, q: Number) -> tuple[Reals, Complexes, Reals]:
         at, force = (np.array(column) for column in zip(*self.table, strict=True))
@@ -215,8 +213,8 @@ class Tabled(Load):
     def timed(self, time: Number) -> Number:
         """The time; refused where the poses have none."""
         if time is None:
-            what = f"the torque on {self.body} is given over the time"
-            raise DescriptionError(f"{what}: only a motion in time has it")
+            what = f"the torque on {self.body} is given over the time: only a motion in time has it"
+            raise DescriptionError(what)
         return time
 
     def in_turn(self, angle: Number) -> Number:
@@ -248,8 +246,7 @@ class Tabled(Load):
         """The slope of the table."""
         at, force, q = self._in_cycle(self.place_in(block))
         place = np.clip(np.searchsorted(at, q, side="right") - 1, 0, len(at) - 2)
-        slopes: NDArray[Any] = np.diff(force)[place] / np.diff(at)[place]
-        return slopes if np.ndim(slopes) else complex(slopes)
+        return complex(np.diff(force)[place] / np.diff(at)[place])
 
     def turned(self, block: Block, rates: Rates) -> Number:
         """Its derivative over the input, in ground axes."""
@@ -311,9 +308,8 @@ class SpringEnd(SpringSide):
 
     def _inverse(self, block: Block, d: Number) -> Number:
         """1/l; NaN where the spring has no length, and its pull no direction."""
-        kind = block.st.kind
-        least = TOGETHER * block.setting.mechanism.size
-        return kind.inverse(kind.sqrt(d.real * d.real + d.imag * d.imag), least)
+        length = block.kind.sqrt(d.real * d.real + d.imag * d.imag)
+        return block.kind.inverse(length, TOGETHER * block.setting.mechanism.size)
 
     def stretch(self, block: Block) -> Number:
         return abs(self._between(block.position)) - self.spring.free_length

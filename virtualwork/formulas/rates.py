@@ -104,10 +104,6 @@ class Rates:
             v = _plus(v, self._term(t, k))
         return v
 
-    def slim(self) -> None:
-        """Forget what is cheaper to form again than to keep over a long sweep."""
-        self._turn, self._normal, self._columns, self._inverse = {}, {}, {}, {}
-
     def advance(self, steps: Iterable[Step], k: int) -> None:
         """Carry steps on to derivatives of order k; the lower orders are known."""
         for step in steps:
