@@ -237,7 +237,7 @@ class Correction:
         True
         """
         from balancing.second_run import HIDDEN
-        from dalembert.arithmetic.doubled import Doubled
+        from dalembert.arithmetic.doubled import PI, Doubled
         from dalembert.arithmetic.doubled_vectors import Vectors, off
 
         second = self.exact if exact is None else exact
@@ -268,7 +268,7 @@ class Correction:
             radius = np.asarray(at, dtype=float)
             return np.asarray(off(self.mass(radius), true.size / radius) + HIDDEN * self._terms / radius)
         if quantity == "angle":
-            turn = off(self.angle, true.angle, 2 * np.pi)
+            turn = off(self.angle, true.angle, PI * 2.0)
             return np.where(bound < np.abs(self.unbalance), turn, np.where(bound > 0, np.pi, 0.0))
         raise ValueError(
             f"'{quantity}': expected unbalance, static, couple, mass, angle, residual_static or residual_couple"

@@ -12,7 +12,6 @@ from tests.node import needs_node
 from tests.virtualwork.test_friction_that_does_not_settle import rocker_driven
 from virtualwork import Mechanism
 from virtualwork.describe.dimensions import changed
-from virtualwork.formulas.lanes import over_blocks
 from virtualwork.motion import Motion
 from virtualwork.quantities import Component, forces
 
@@ -83,7 +82,7 @@ def faults(seed: int, folder: Path) -> tuple[list[str], int, int]:
         moving, locked = moving + int(moves.sum()), locked + int((motion.assembled & ~moves).sum())
         right = []
         for each in every.values():
-            z = np.ravel(over_blocks(motion.poses, each.key, motion.dynamics))
+            z = np.ravel(motion.value(each.key))
             right.append(z.imag if each.imaginary else z.real)
         page_has, program = np.array(rows, dtype=float), np.array(right, dtype=float)
         size = np.nanmax(np.abs(program), axis=0, initial=1e-30)

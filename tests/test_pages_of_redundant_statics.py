@@ -13,7 +13,6 @@ from tests.node import needs_node
 from tests.virtualwork.test_redundant_statics import parallelogram
 from virtualwork import Mechanism
 from virtualwork.describe.dimensions import changed, dimensions, value
-from virtualwork.formulas.lanes import over_blocks
 from virtualwork.motion import Motion
 from virtualwork.quantities import Component, forces
 
@@ -35,7 +34,7 @@ def compare(rows: Any, motion: Motion, every: dict[str, Component]) -> None:
     """Hold the curves of a page against the program's."""
     right = []
     for each in every.values():
-        z = np.ravel(over_blocks(motion.poses, each.key, motion.dynamics))
+        z = np.ravel(motion.value(each.key))
         right.append(z.imag if each.imaginary else z.real)
     found, expected = np.array(rows, dtype=float), np.array(right, dtype=float)
     assert found.shape == expected.shape

@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     )
     from virtualwork.family.keep import Bound
     from virtualwork.family.target import Target
-    from virtualwork.formulas.effort import ledger
     from virtualwork.mechanism import Mechanism, equilibria
     from virtualwork.motion import Motion
     from virtualwork.study import counterweights
     from virtualwork.study.check import Check, grashof_class
     from virtualwork.study.cycle import Cycle
     from virtualwork.study.equilibrium import Equilibria, Equilibrium
+    from virtualwork.study.ledger import ledger
     from virtualwork.textbook.combinations import (
         block_on_bar,
         crank_rod_piston,
@@ -94,7 +94,7 @@ __all__ = [
 _ROOMS = {
     "virtualwork.describe": "AssemblyError DescriptionError MechanismError MobilityError",
     "virtualwork.describe.parts": "GROUND Belt Cam Force Friction Gear Guess Guide Input Link Motor Rack Segment Spring Torque TorsionSpring",
-    "virtualwork.formulas.effort": "ledger",
+    "virtualwork.study.ledger": "ledger",
     "virtualwork.mechanism": "Mechanism equilibria",
     "virtualwork.motion": "Motion",
     "virtualwork.study": "counterweights",

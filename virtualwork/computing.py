@@ -30,11 +30,11 @@ from virtualwork.dragged import cams, drawn_numbers, handles, profiles
 from virtualwork.drawing import Drawing, draw
 from virtualwork.family.written import Written
 from virtualwork.forces import Forces
-from virtualwork.formulas.balanced import Balanced, Over
-from virtualwork.formulas.forces import Effort
+from virtualwork.formulas.forces import Effort, Over
 from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.loops import Closed, Margin, Twist
+from virtualwork.formulas.pose_forces import PoseForces
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.rubbing import Rub, Slip
@@ -62,7 +62,7 @@ class Computed(Series):
         if not self.forces:
             return {}
         assert self.of is not None
-        paths, reactions, _ = self.of.written.recording.forces
+        forces = self.of.written.recording.forces
         order = list(self.mechanism.bodies)
         loose = [
             {
@@ -79,7 +79,7 @@ class Computed(Series):
                     for part in every
                 ],
             }
-            for link, every in parts(self.mechanism, paths.case, reactions.joints).items()
+            for link, every in parts(self.mechanism, forces.case, forces.joints.joints).items()
         ]
         return {"loose": loose}
 
@@ -129,7 +129,7 @@ class Formulas:
         """The formulas with the dimensions as inputs."""
         fixed = [d for d in self.dimensions.values() if d.where[0] != "inputs"]
         moves = (True, True, self.order > ORDERS)
-        return Written(self.assembly, fixed, moves, True, settled=False, recording=Balanced)
+        return Written(self.assembly, fixed, moves, True, settled=False)
 
     def refused(self, keys: Sequence[Quantity]) -> str:
         """Say why a page cannot compute these quantities; empty where it can."""
@@ -142,7 +142,7 @@ class Formulas:
             return "loops are singular in every pose"
         if {g.name: g.kind for g in self.written.plan.groups} != {g.name: g.kind for g in own.plan.groups}:
             return "its loops have a closed form for these numbers alone"
-        if not self.written.recording.takes(keys):
+        if forces and m.friction and self.written.recording.forces.redundant:
             return "the joint forces are statically redundant, and there is friction"
         if forces:
             if any(load.axis == "time" for load in self.written.recording.tables) and self.poses.time is None:
@@ -192,7 +192,9 @@ class Formulas:
         }
         found |= profiles(written.mechanism, written.recording.recorder)
         if self._bears:
-            found["statics"] = self._bears.statics
+            system = self._bears.system.items()
+            entries = {f"{row} {column}": value for (row, column), value in system}
+            found["statics"] = written.recording.recorder.tape(entries)
         if self._rubs:
             names = [f"friction {n}" for n in range(self._rubs)]
             rubs = [Rub(n) for n in range(self._rubs)]
@@ -250,9 +252,7 @@ class Formulas:
     @property
     def _rubs(self) -> int:
         """How many contacts have friction, where forces are among the quantities."""
-        recording = self.written.recording
-        assert isinstance(recording, Balanced)
-        return recording.contacts if self._loaded else 0
+        return len(self.written.recording.forces.case.contacts) if self._loaded else 0
 
     def _files(self) -> list[str]:
         """The tables that the file names."""
@@ -261,16 +261,16 @@ class Formulas:
         return sorted({getattr(table, "name", "") for table in tables} - {""})
 
     @property
-    def _bears(self) -> Balanced | None:
-        """The formulas, where joint forces are among the quantities and statics alone is redundant."""
-        recording = self.written.recording
-        assert isinstance(recording, Balanced)
-        return recording if any(key.is_joint_force for key in self.keys) and recording.redundant else None
+    def _bears(self) -> PoseForces | None:
+        """The forces, where those of joints are among the quantities and statics alone is redundant."""
+        carried = any(key.is_joint_force for key in self.keys)
+        forces = self.written.recording.forces if carried else None
+        return forces if forces is not None and forces.redundant else None
 
     @staticmethod
-    def _statics(of: Balanced) -> dict[str, Any]:
+    def _statics(of: PoseForces) -> dict[str, Any]:
         """Where the entries of the equations of all links stand: (row, column) each, the last column that of b."""
-        count = len(of.unknown_forces)
+        count = len(of.unknowns)
         places = [[row, count if column is None else column] for row, column in of.system]
         return {"count": count, "rows": 1 + max(row for row, _ in places), "places": places}
 

@@ -17,9 +17,10 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError
 from virtualwork.formulas.forces import Effort, Reaction, Shaking, ShakingMoment
 from virtualwork.formulas.kinematics import Angle, Point, Slide
-from virtualwork.formulas.lanes import Lanes, Ready, ready, recorded, taped
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import xy
 from virtualwork.formulas.quantity import Quantity
+from virtualwork.formulas.tapes import Ready, ready, recorded, taped
 
 POINT = ("position", "velocity", "acceleration", "jerk")
 LINK = ("angle", "omega", "alpha", "jerk")
@@ -128,7 +129,7 @@ def key_of(assembly: Assembly, name: str) -> Quantity:
         inputs = {entry.name: j for j, entry in enumerate(m.inputs)}
         return Effort(inputs[known(of[0], inputs, "input")] if of else 0)
     if kind == "reactions" and len(of) == 2:
-        forces = recorded(assembly, (True, True, False)).forces[1]
+        forces = recorded(assembly, (True, True, False)).forces.joints
         there = {joint.name: joint for joint in forces.joints if of[1] in joint.bodies}
         return Reaction(known(of[0], there, f"joint of {of[1]}"), of[1])
     if name == "shaking.force":

@@ -211,7 +211,7 @@ class Motion(Pictured):
         """Estimates of the rounding errors of this motion, each formed when first asked for."""
         from virtualwork.digits.estimates import Estimates
 
-        return Estimates(self.poses, self.values, lambda: self.dynamics)
+        return Estimates(self.poses, self.values)
 
     def error_estimates(self, *names: str) -> dict[str, Reals]:
         """Return estimates (n,) of the rounding errors of several quantities, as `error_estimate` gives them one by one.

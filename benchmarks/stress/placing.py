@@ -69,12 +69,15 @@ def _placed(rng: np.random.Generator) -> Pairs:
             value = (rest * mp.conj(arms[i])).real
             cap = mp.inf if limit is None else mp.mpf(limit)
             true[i] = max(min(value, cap), mp.mpf(0))
-        total = mp.fsum(m * arm for m, arm in zip(map(mp.mpf, found.masses.tolist()), arms, strict=True))
-        return pairs(found.masses.tolist(), true, found.error_estimate()) + pairs(
+        total = mp.fsum(m * arm for m, arm in zip(true, arms, strict=True))
+        # what the truth itself is rounded by
+        own = float((abs(goal) + mp.fsum(true)) * mp.mpf(10) ** (20 - DIGITS))
+        each = pairs(found.masses.tolist(), true, found.error_estimate()) + pairs(
             [found.total, found.error],
             [total, total - goal],
             [found.error_estimate("total"), found.error_estimate("error")],
         )
+        return [(error if error > own else 0.0, bound) for error, bound in each]
 
 
 # --- the commands' own digits ---
@@ -137,7 +140,10 @@ def _wrapped(rng: np.random.Generator) -> Pairs:
         off = (mp.mpf(angle) - mp.degrees(mp.arg(w))) % 360
         return [
             *pairs([size], [abs(w)], bound["mass_g"]),
-            (float(min(off, 360 - off)), float(bound["angle_deg"][0])),
+            (
+                float(mp.chop(min(off, 360 - off), tol=mp.mpf(10) ** (20 - DIGITS))),
+                float(bound["angle_deg"][0]),
+            ),
             (0.0 if 0 <= angle < 360 else 1.0, 1e-300),
         ]
 

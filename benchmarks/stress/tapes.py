@@ -17,8 +17,8 @@ from virtualwork.describe import MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.formulas.forces import Effort, JointForce, NewtonEuler, Shaking, ShakingMoment
 from virtualwork.formulas.kinematics import Angle, Point, Slide
-from virtualwork.formulas.lanes import taped
 from virtualwork.formulas.quantity import Quantity
+from virtualwork.formulas.tapes import taped
 from virtualwork.motion import Motion
 
 if TYPE_CHECKING:

@@ -212,7 +212,7 @@ class _Groups:
         """Fit a group, in the sense of the phase that its runs show."""
         readings, masses, prior = group.readings, group.masses, None
         if self.sisters is not None:
-            prior = self.sisters.known(self.runs.rotors[group.rotors[0]], group.channels, self.runs)
+            prior = self.sisters.before(self.runs.rotors[group.rotors[0]], group.channels, self.runs)
         fit = self._fitted(readings, masses, prior)
         if prior is None or determined(masses, np.isfinite(readings)).all():
             fit, group.lines.senses = _sense(

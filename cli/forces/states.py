@@ -209,8 +209,8 @@ def _marks(motion: Motion, field: int | None) -> list[Mark]:
             continue
         i = next(i for i, g in enumerate(m.guides) if g.point == entry.slider)
         g = m.guides[i]
-        reactions = motion.dynamics.reactions
-        (rail,) = reactions.over(partial(reactions.rail, guide=i), kind=complex)
+        forces = motion.dynamics
+        (rail,) = forces.scene.over([partial(forces.reactions.rail, guide=i)], complex)
         through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
         slide = motion.slide(g.point).position
         for link, sign in ((g.link, 1.0), (g.on, -1.0)):

@@ -251,7 +251,7 @@ def operations(analysis: Analysis) -> Table:
 
 def working(analysis: Analysis) -> Table:
     """Of each load whether it does work at each input, and which kinds of loads there are none of."""
-    from virtualwork.formulas.effort import ledger
+    from virtualwork.study.ledger import ledger
 
     motion = analysis.motions[0]
     if not motion.assembled.all():

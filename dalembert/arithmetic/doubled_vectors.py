@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.angles import degrees
-from dalembert.arithmetic.doubled import PI, Doubled, settled
+from dalembert.arithmetic.doubled import PI, Doubled, doubled, settled
 from dalembert.arithmetic.doubled_functions import DOUBLED
 
 Real = NDArray[np.float64]
@@ -197,9 +197,10 @@ def doubled_array(exact: Iterable[Fraction], shape: tuple[int, ...]) -> Doubled:
     return Doubled(high.reshape(shape), low.reshape(shape))
 
 
-def off(value: ArrayLike, exact: Doubled, modulo: float = 0.0) -> Real:
-    """Return by how much floats differ from doubled numbers; modulo a whole turn."""
+def off(value: ArrayLike, exact: Doubled, turn: float | Doubled = 0.0) -> Real:
+    """Return by how much floats differ from doubled numbers; of angles by what but whole turns."""
     difference = exact - np.asarray(value, dtype=float)
-    if modulo:
-        difference = difference - Doubled(np.rint(difference.high / modulo)) * modulo
+    whole = doubled(turn)
+    if whole.high:
+        difference = difference - Doubled(np.rint(difference.high / whole.high)) * whole
     return np.asarray(OWN * np.abs(difference.value))

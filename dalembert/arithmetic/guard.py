@@ -64,7 +64,7 @@ def alone(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S, P],
 
 def unlocked(method: Callable[P, R]) -> Callable[P, R]:
     """Let any thread into a method of a guarded class at any time: it changes nothing but what takes the lock itself."""
-    method.__dict__["unlocked"] = True
+    method.unlocked = True  # type: ignore[attr-defined]
     return method
 
 

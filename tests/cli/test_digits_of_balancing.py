@@ -446,3 +446,80 @@ def test_blades_that_are_filled(dalembert: Dalembert) -> None:
         ):
             text = next(row["mass_oz"] for row in placed if row["position"] == name)
             holds(text, true, 12)
+
+
+def phased(size: str, degrees: str, lag: bool) -> Any:
+    """A reading; of an instrument whose phase lags its angle counts the other way."""
+    v = vector(size, degrees)
+    return mp.conj(v) if lag else v
+
+
+@pytest.mark.parametrize("lag", [False, True])
+def test_stored_coefficients_and_run_out(lag: bool, dalembert: Dalembert, tmp_path: Path) -> None:
+    """Coefficients per gram in mil, run-out in mil, readings in µm, two of them of one sensor."""
+    stored = [
+        ("1", "A", "0.31", "31.7"),
+        ("1", "B", "0.17", "201.3"),
+        ("2", "A", "0.11", "3"),
+        ("2", "B", "0.29", "77.7"),
+    ]
+    lines = [f"{sensor},{plane},{size},{turn},mil" for sensor, plane, size, turn in stored]
+    head = "sensor,plane,magnitude_per_g,phase_deg,amplitude_unit"
+    (tmp_path / "c.csv").write_text("\n".join([head, *lines]) + "\n")
+    (tmp_path / "r.csv").write_text("sensor,amplitude_mil,phase_deg\n1,0.3,12.3\n2,0.1,100.1\n")
+    text = "run,sensor,amplitude_um,phase_deg\n0,1,80.1,31.3\n0,1,80.3,31.1\n0,2,33.3,211.7\n"
+    options = ["--influence", "c.csv", "--runout", "r.csv", *(["--phase-lag"] if lag else [])]
+    both = rows(dalembert("field", "-", *options, "--digits", stdin=text))
+    with mp.workdps(50):
+        mil = mp.mpf("25.4")
+        a = mp.matrix(2, 2)
+        for sensor, plane, size, turn in stored:
+            a[int(sensor) - 1, "AB".index(plane)] = vector(size, turn) * mil
+        first = (phased("80.1", "31.3", lag) + phased("80.3", "31.1", lag)) / 2 - phased(
+            "0.3", "12.3", lag
+        ) * mil
+        second = phased("33.3", "211.7", lag) - phased("0.1", "100.1", lag) * mil
+        for row, w in zip(both, mp.lu_solve(a, -mp.matrix([first, second])), strict=True):
+            check(row, w, 13)
+
+
+def test_several_masses_in_a_run_and_the_trim(dalembert: Dalembert) -> None:
+    """Masses joined by ';', two of them in one plane, and one that stays on: correction and trim."""
+    read = {"0": [("80.1", "31.3"), ("41.7", "200.1")], "1": [("60.3", "71.1"), ("33.3", "150.7")]}
+    read["2"] = [("71.9", "11.7"), ("55.1", "222.2")]
+    cells = {"0": ",,,", "1": "A;A,3.1;0.7,11.3;71.9,yes", "2": "B;A,2.3;0.9,101.3;3.3,"}
+    lines = [f"{run},{s + 1},{v[0]},{v[1]},{cells[run]}" for run in read for s, v in enumerate(read[run])]
+    text = "\n".join([HEAD + ",trial_kept", *lines]) + "\n"
+    both = rows(dalembert("field", "-", "--digits", stdin=text))
+    with mp.workdps(50):
+        kept = vector("3.1", "11.3") + vector("0.7", "71.9")
+        on = mp.matrix([[kept, 0], [kept + vector("0.9", "3.3"), vector("2.3", "101.3")]])
+        v = {run: mp.matrix([vector(*one) for one in read[run]]) for run in read}
+        a = mp.matrix(2, 2)
+        for s in range(2):
+            x = mp.lu_solve(on, mp.matrix([v["1"][s] - v["0"][s], v["2"][s] - v["0"][s]]))
+            a[s, 0], a[s, 1] = x[0], x[1]
+        w = mp.lu_solve(a, -v["0"])
+        for p, row in enumerate(both):
+            check(row, w[p], 12)
+            trim = w[p] - on[1, p]
+            holds(row["trim_mass_g"], abs(trim), 12)
+            holds(row["trim_angle_deg"], mp.degrees(mp.arg(trim)) % 360, 12, 360)
+
+
+def test_masses_on_top_of_earlier_ones(dalembert: Dalembert) -> None:
+    """A log whose column ref puts a mass on top of an earlier run's, its angle counted from there."""
+    log = [
+        ("80.1", "31.3", "", "", "-1"),
+        ("60.3", "71.1", "3.1", "11.3", "-1"),
+        ("71.9", "11.7", "2.3", "101.9", "2"),
+    ]
+    head = "sensor,amplitude_um,phase_deg,mass_g,angle_deg,ref"
+    text = "\n".join([head, *(",".join(["1", *one]) for one in log)]) + "\n"
+    (row,) = rows(dalembert("field", "-", "--digits", stdin=text))
+    with mp.workdps(50):
+        first = vector("3.1", "11.3")
+        on = [mp.mpf(0), first, first + vector("2.3", "101.9") * vector("1", "11.3")]
+        a = mp.matrix([[1, w] for w in on])
+        x = mp.lu_solve(a.H * a, a.H * mp.matrix([vector(one[0], one[1]) for one in log]))
+        check(row, -x[0] / x[1], 12)

@@ -25,7 +25,7 @@ from dalembert.arithmetic.rounding import rounding_bounds
 from virtualwork import Mechanism
 from virtualwork.describe import MechanismError
 from virtualwork.formulas.kinematics import Angle
-from virtualwork.formulas.lanes import taped
+from virtualwork.formulas.tapes import taped
 
 ANSWERS = json.loads(
     (Path(__file__).parents[1] / "data" / "answers_of_0_1_0.json").read_text(encoding="utf-8")

@@ -18,7 +18,6 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.computing import ORDERS
 from virtualwork.describe import MechanismError
 from virtualwork.describe.dimensions import changed, dimensions, value
-from virtualwork.formulas.lanes import over_blocks
 from virtualwork.motion import Motion
 from virtualwork.quantities import Component, forces, places
 
@@ -117,10 +116,7 @@ def regular(m: Mechanism) -> bool:
 
 def number(motion: Motion, each: Component) -> float:
     """One quantity of one pose, SI and radians."""
-    if each.key.is_force:
-        z = np.ravel(over_blocks(motion.poses, each.key, motion.dynamics))[0]
-    else:
-        z = np.ravel(motion.value(each.key))[0]
+    z = np.ravel(motion.value(each.key))[0]
     x = float(z.imag if each.imaginary else z.real)
     return x % (2 * math.pi) if each.link else x
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from virtualwork import Gear, Guess, Input, Link, Mechanism, Motor, Spring, Torque, TorsionSpring
-from virtualwork.formulas.effort import ledger
+from virtualwork.study.ledger import ledger
 
 G = 9.81
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from virtualwork import DescriptionError, Friction, Guess, Guide, Input, Link, Mechanism, Torque
-from virtualwork.formulas.effort import ledger
+from virtualwork.study.ledger import ledger
 
 G = 9.81
 

@@ -1,4 +1,4 @@
-"""Quantities from the tape beside those over blocks of poses: worked examples, change points, ends, threads, names."""
+"""Quantities from the tape beside those of each pose by the formulas on floats: worked examples, change points, ends, threads, names."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import pytest
 from benchmarks.stress.tapes import dimension, every_key, sizes
 from benchmarks.stress.topologies import generate
 from dalembert.arithmetic.engines import run
+from tests.virtualwork.pose_by_pose import pose_by_pose
 from virtualwork import Mechanism
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.formulas.forces import Effort
 from virtualwork.formulas.kinematics import Angle
-from virtualwork.formulas.lanes import over_blocks
 
 EXAMPLES = {
     f"{path.parent.name}/{path.name}": path
@@ -47,15 +47,16 @@ def compare(m, monkeypatch, engine, share=1.0) -> None:
     each = {key: alone.values([key])[0] for key in keys[::-1]}
     monkeypatch.delenv("DALEMBERT_ENGINE")
 
-    truths = [over_blocks(motion.poses, key, motion.dynamics) for key in keys]
+    rows = np.arange(0, motion.n, 6)
+    truths = pose_by_pose(motion, keys, rows)
     largest = sizes(m, keys, truths)
     # a condition κ makes κ^(order + 1) of a rounding
-    condition = np.where(np.isfinite(motion.condition), motion.condition, 1.0)
+    condition = np.where(np.isfinite(motion.condition), motion.condition, 1.0)[rows]
     for key, value, true in zip(keys, found, truths, strict=True):
         if engine == "numpy" and alone.takes(keys):
             # the same operations on the same numbers
             assert np.array_equal(each[key], value, equal_nan=True), key
-        for one in (value, each[key]):
+        for one in (value[rows], each[key][rows]):
             assert (np.isnan(one) == np.isnan(true)).all(), key
             close = np.abs(one - true) <= 4e-15 * np.maximum(condition, 1.0) ** 3 * largest[dimension(key)]
             assert (close | np.isnan(true)).all(), key

@@ -11,8 +11,7 @@ from mpmath import mp
 from virtualwork import Input, Link, Mechanism, TorsionSpring
 from virtualwork.digits.exact import Gap
 from virtualwork.family.part import Assembled
-from virtualwork.formulas.balanced import Over
-from virtualwork.formulas.forces import Effort, JointForce, NewtonEuler, Reaction, Shaking
+from virtualwork.formulas.forces import Effort, Force, JointForce, NewtonEuler, Over, Reaction, Shaking
 from virtualwork.formulas.kinematics import Angle, AnglePartial, Point, PointPartial, Slide, Turn
 from virtualwork.formulas.loops import Closed, Margin, Size
 from virtualwork.formulas.quantity import NOTHING, Quantity
@@ -32,6 +31,7 @@ def test_every_kind_has_its_own_name_and_formula() -> None:
     for kind in every:
         # whether a pose is assembled is no number of the tape
         assert kind.write is not Quantity.write or kind is Assembled
+        assert not issubclass(kind, Force) or kind.form is not Force.form
 
 
 @pytest.mark.parametrize(
@@ -80,6 +80,8 @@ def test_fields_orders_and_what_is_nothing() -> None:
     assert not NOTHING
     with pytest.raises(AttributeError):
         point.order = 1  # type: ignore[misc]
+    with pytest.raises(TypeError):
+        Angle("crank")  # type: ignore[call-arg]
 
 
 def test_the_error_of_what_acts_on_a_link() -> None:

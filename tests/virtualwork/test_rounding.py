@@ -35,7 +35,7 @@ from virtualwork import (
 from virtualwork.digits.estimates import Estimates
 from virtualwork.forces import Forces
 from virtualwork.formulas.forces import Effort, Shaking
-from virtualwork.formulas.lanes import taped
+from virtualwork.formulas.tapes import taped
 
 EXAMPLES = files("cli") / "examples"
 
@@ -398,9 +398,7 @@ def test_every_engine_has_the_same_estimates(name: str, monkeypatch: pytest.Monk
     found = {}
     for engine in ("python", "numpy", "llvm"):
         monkeypatch.setenv("DALEMBERT_ENGINE", engine)
-        estimates = Estimates(
-            motion.poses, lambda keys: [values[key] for key in keys], lambda: motion.dynamics
-        )
+        estimates = Estimates(motion.poses, lambda keys: [values[key] for key in keys])
         estimates.together(keys)
         found[engine] = [estimates.of(key) for key in keys]
     for key, *each in zip(keys, *found.values(), strict=True):

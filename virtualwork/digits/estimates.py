@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,13 +27,10 @@ from dalembert.arithmetic.engines.doubled import OWN, estimated
 from dalembert.arithmetic.guard import guarded
 from virtualwork.digits.second_run import Found, SecondRun, answer, apart, parts
 from virtualwork.formulas.kinematics import Turn
-from virtualwork.formulas.lanes import Lanes, over_blocks
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.loops import Margin
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.quantity import Quantity
-
-if TYPE_CHECKING:
-    from virtualwork.formulas.dynamics import Dynamics
 
 # a radicand, relative, that rounding may reach, and the share of it that rounding takes
 NEAR, DOUBTED = 1e-12, 0.1
@@ -54,17 +51,12 @@ class Estimates:
     poses : Lanes
     values : function of keys, optional
         Gives the quantities as they were handed out, (n,) each; default those of the poses.
-    dynamics : function, optional
-        Gives the forces as they were handed out.
     """
 
-    def __init__(
-        self, poses: Lanes, values: Values | None = None, dynamics: Callable[[], Dynamics] | None = None
-    ) -> None:
+    def __init__(self, poses: Lanes, values: Values | None = None) -> None:
         self.poses, self.n, self.lock = poses, poses.n, poses.lock
         self.branch = poses.branch
-        self._values = values or (lambda keys: [over_blocks(poses, key) for key in keys])
-        self._dynamics = dynamics
+        self._values = values or poses.values
         self._known: dict[Quantity, Reals] = {}
         # of each group, once it was looked at, the poses whose assembly rounding may have exchanged
         self._undecided: dict[str, NDArray[np.bool_]] = {}
@@ -115,7 +107,7 @@ class Estimates:
     @cached_property
     def second(self) -> SecondRun:
         """The poses in 32 digits."""
-        return SecondRun(self.poses, dynamics=self._dynamics)
+        return SecondRun(self.poses)
 
     def _lost(self, key: Quantity) -> bool:
         """Whether a quantity has no second run: a rate where the speed is not determined."""
@@ -134,14 +126,10 @@ class Estimates:
             found[group.name] = np.zeros(self.n, dtype=bool)
             if group.name in self.second.exact.folded or not np.any(np.abs(exact) < NEAR):
                 continue
-            self.poses.solve(self.poses.plan.writes(group), 0)
-            off = np.abs(self._margin(group.name) - exact) > DOUBTED * np.abs(exact)
+            (margin,) = self.poses.taped([Margin(group.name)])
+            off = np.abs(margin - exact) > DOUBTED * np.abs(exact)
             found[group.name] = (np.abs(exact) < NEAR) & off & ~self._close_to_change
         return found
-
-    def _margin(self, group: str) -> Reals:
-        """The radicand of a closed form in the first run, relative, (n,)."""
-        return self.poses.over(lambda _, st: st.margin[group])  # type: ignore[no-any-return]
 
     # --- change points ----------------------------------------------------------------------------------------------
     @cached_property

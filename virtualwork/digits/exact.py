@@ -10,9 +10,7 @@ Further inputs of the tape
 `links.crank.B.x`    a dimension, by its path
 `guess crank`        an angle of the guess, and `at 0`, an input there: of gears, belts and racks, whose constant is that of the guess
 `phase 0`            the constant of one of these that the guess fixes by way of other links
-`friction 0`         of the first contact: the torque of a pin, the force along a guide
-`slip 0`             which way it slips, ±1
-`f 0`                the first unknown of redundant statics
+`slip 0`             which way the first contact slips, ±1
 """
 
 from __future__ import annotations
@@ -29,14 +27,12 @@ from dalembert.arithmetic.recorded import Number, Recorder, bare, lifted
 from dalembert.arithmetic.varied import Precise, Varied
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, dimensions, value
-from virtualwork.formulas.lanes import Turning
 from virtualwork.formulas.newton import gaps, unknowns
 from virtualwork.formulas.numbers import Written
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import Recording
-from virtualwork.formulas.rubbing import Rubbing
-from virtualwork.formulas.statics import equations
+from virtualwork.formulas.tapes import Turning
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, turns
 
@@ -136,7 +132,7 @@ class Numbers:
 
 
 @guarded
-class Exact(Rubbing):
+class Exact(Recording):
     """The formulas of an assembly, with its numbers as inputs.
 
     Parameters
@@ -195,10 +191,8 @@ class Exact(Rubbing):
     @cached_property
     def balances(self) -> dict[int, Number]:
         """What the unknown forces that enter leave of every equation."""
-        _, of, block = self.placed_forces()
         left: dict[int, Number] = {}
-        for row, column, part in equations(of, block):
-            part = bare(part)
+        for (row, column), part in self.forces.system.items():
             if column is not None:
                 part = part * self.recorder.input(f"f {column}")
             left[row] = left.get(row, 0.0) + part

@@ -1,11 +1,7 @@
 """Estimates of the rounding errors of forces: effort, joint forces, shaking force.
 
-Each is that of a quantity on the tape (`virtualwork.digits.estimates`), but for joint forces where statics is
-redundant. Those solve the equilibrium of all links, A f + b = 0, by singular values: what the computed f leave there in
-32 digits, A⁺ times that, is what they are off by, one step of iterative refinement (N. J. Higham, Accuracy and
-Stability of Numerical Algorithms, 2nd ed., §12.1).
-
-With joint friction, loads and forces are exchanged in 32 digits until neither changes, and enter that balance so.
+Each is that of a quantity on the tape (`virtualwork.digits.estimates`). With joint friction, loads and forces are exchanged in 32
+digits until neither changes; where statics is redundant, the unknown forces are refined in 32 digits (`second_run`).
 """
 
 from __future__ import annotations
@@ -16,13 +12,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from dalembert.arithmetic.doubled import Doubled
-from dalembert.arithmetic.engines.doubled import OWN
-from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.guard import guarded
-from virtualwork.describe.parts import GROUND
 from virtualwork.digits.estimates import Estimates
-from virtualwork.digits.exact import Balance
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.forces import (
     Applied,
@@ -37,12 +28,10 @@ from virtualwork.formulas.forces import (
     Shaking,
     ShakingMoment,
 )
-from virtualwork.formulas.kinematics import Turn
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.quantity import Quantity
-from virtualwork.formulas.statics import NULL, Column
-from virtualwork.plan.steps import Joint, joints_at
+from virtualwork.plan.steps import Joint
 
 
 @guarded
@@ -54,7 +43,7 @@ class ForceErrors:
         self.mechanism = dynamics.poses.mechanism
         # forces that are asked for estimates are those of a motion
         self._poses = cast(Lanes, dynamics.poses)
-        self.estimates = Estimates(self._poses, self._values, lambda: dynamics)
+        self.estimates = Estimates(self._poses, self._values)
 
     @property
     def by_key(self) -> Mapping[str, Joint]:
@@ -68,16 +57,14 @@ class ForceErrors:
     def together(self, reactions: Iterable[Quantity] | None = None) -> None:
         """Form the estimates of some joints' forces, or of all: they have most of the second run in common."""
         if reactions is not None:
-            if self._redundant is None:
-                self.estimates.together(reactions)
+            self.estimates.together(reactions)
             return
         inputs, joints = range(len(self.mechanism.inputs)), self.dynamics.reactions.joints
         keys: list[Quantity] = [Shaking(), ShakingMoment(), *(Effort(j) for j in inputs)]
-        if self._redundant is None:
-            keys += [NewtonEuler(j) for j in inputs]
-            sides = [(joint, body) for joint in joints for body in joint.bodies]
-            keys += [JointForce(joint.key, body) for joint, body in sides]
-            keys += [JointMoment(joint.key, body) for joint, body in sides if self._holds(joint)]
+        keys += [NewtonEuler(j) for j in inputs]
+        sides = [(joint, body) for joint in joints for body in joint.bodies]
+        keys += [JointForce(joint.key, body) for joint, body in sides]
+        keys += [JointMoment(joint.key, body) for joint, body in sides if self._holds(joint)]
         self.estimates.together(keys)
 
     def _holds(self, joint: Joint) -> bool:
@@ -105,49 +92,23 @@ class ForceErrors:
     @cached_property
     def newton_euler(self) -> Reals:
         """Of `Dynamics.newton_euler`, (n, k)."""
-        if self._redundant is None:
-            return self._each(NewtonEuler)
-        kinds = ["force" if entry.is_slide else "torque" for entry in self.mechanism.inputs]
-        return np.stack([self._of((kind, str(j), "")) for j, kind in enumerate(kinds)], axis=1)
+        return self._each(NewtonEuler)
 
     def joint_force(self, joint: Joint, body: str) -> Reals:
         """Of `Dynamics.joint_force`, (n,): the length of the error."""
-        if self._redundant is None:
-            return self.estimates.of(JointForce(joint.key, body))
-        if joint.guide is None:
-            if body == GROUND:
-                others = [self.joint_force(joint, other) for other in joint.bodies if other != GROUND]
-                return np.asarray(sum(others))
-            return np.hypot(self._of(("fx", joint.key, body)), self._of(("fy", joint.key, body)))
-        # along the rail's normal, whose direction rounds too
-        assert self.dynamics.statics is not None
-        normal: Column = ("normal", joint.key, "")
-        turned = self.estimates.of(Turn(self.mechanism.guides[joint.guide].on))
-        along = self._rubbing(joint)
-        return np.asarray(
-            self._of(normal) + along + (turned + EPS) * np.abs(self.dynamics.statics.get(normal))
-        )
+        return self.estimates.of(JointForce(joint.key, body))
 
     def contact(self, cam: int) -> Reals:
-        """Of `Dynamics.contact`, (n,); infinite where statics is redundant."""
-        return self.estimates.of(Contact(cam)) if self._redundant is None else np.full(self.n, np.inf)
+        """Of `Dynamics.contact`, (n,)."""
+        return self.estimates.of(Contact(cam))
 
     def joint_moment(self, joint: Joint, body: str) -> Reals:
         """Of `Dynamics.joint_moment`, (n,)."""
-        if not self._holds(joint):
-            return np.zeros(self.n)
-        if self._redundant is None:
-            return self.estimates.of(JointMoment(joint.key, body))
-        if joint.guide is None:
-            return self._rubbing(joint)
-        return self._of(("moment", joint.key, ""))
+        return self.estimates.of(JointMoment(joint.key, body)) if self._holds(joint) else np.zeros(self.n)
 
     def reaction(self, joint: str, on: str) -> Reals:
         """Of `Dynamics.reaction`, (n,): the length of the error."""
-        if self._redundant is None:
-            return self.estimates.of(Reaction(joint, on))
-        here = joints_at(self.dynamics.reactions.joints, joint, on)
-        return np.asarray(sum(self.joint_force(found, on) for found in here))
+        return self.estimates.of(Reaction(joint, on))
 
     at_joint = reaction
 
@@ -161,41 +122,3 @@ class ForceErrors:
         """Of `Dynamics.applied`: the length of the force's error (n,), and the moment's (n,)."""
         self.estimates.together([Applied(link), AppliedMoment(link)])
         return self.estimates.of(Applied(link)), self.estimates.of(AppliedMoment(link))
-
-    def _rubbing(self, joint: Joint) -> Reals:
-        """Of a joint's friction, (n,): the torque of a pin, the force along a guide."""
-        contacts = self.dynamics.scene.case.contacts
-        numbers = [n for n, (rubbing, *_) in enumerate(contacts) if rubbing == joint]
-        return np.asarray(sum((self.estimates.second.friction_error(n) for n in numbers), np.zeros(self.n)))
-
-    # --- redundant statics ------------------------------------------------------------------------------------------
-    @cached_property
-    def _redundant(self) -> tuple[list[Column], Reals] | None:
-        """The unknown forces of all links and their estimates, (n, unknowns); torques divided by the size."""
-        statics = self.dynamics.statics
-        if statics is None:
-            return None
-        value, least = statics.solved[0], statics.least[0]
-        if np.isnan(value).all():
-            return statics.unknowns, np.full(value.shape, np.nan)
-        # what statics does not determine has a part in the balance too
-        known = {f"f {i}": Doubled(column) for i, column in enumerate(np.nan_to_num(least).T)}
-        keys: list[Quantity] = [Balance(row) for row in range(statics.rows)]
-        left = self.estimates.second.doubled(keys, known)
-        rest = np.stack([np.broadcast_to(left[key][0].value, self.n) for key in keys], axis=1)
-        off = np.full(value.shape, np.inf)
-        system = statics.system()[0]
-        good = np.isfinite(system).all(axis=(1, 2)) & np.isfinite(rest).all(axis=1)
-        back = np.linalg.pinv(system[good], rcond=NULL)
-        off[good] = OWN * np.abs(back @ rest[good][..., None])[..., 0]
-        return statics.unknowns, off
-
-    def _of(self, unknown: Column) -> Reals:
-        """One of the unknowns of redundant statics, (n,)."""
-        assert self._redundant is not None
-        assert self.dynamics.statics is not None
-        names, errors = self._redundant
-        scaled = unknown[0] in ("moment", "gear", "torque")
-        own = 0.5 * EPS * np.abs(self.dynamics.statics.get(unknown)) if scaled else 0.0
-        scale = self.mechanism.size if scaled else 1.0
-        return np.asarray(scale * errors[:, names.index(unknown)] + own)

@@ -8,9 +8,10 @@ until it fits the forces that these bear.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,20 +21,17 @@ from dalembert.arithmetic.engines.doubled import TURN, Answer, compared, run
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.guard import guarded
 from virtualwork.describe.dimensions import dimensions
-from virtualwork.digits.exact import Exact, Gap, Unknown
+from virtualwork.digits.exact import Balance, Exact, Gap, Unknown
 from virtualwork.formulas.kinematics import Angle
-from virtualwork.formulas.lanes import Lanes, taped
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.loads import Tabled
-from virtualwork.formulas.numbers import Reals, dot
+from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import NAMES
 from virtualwork.formulas.rubbing import Rub
+from virtualwork.formulas.statics import NULL
+from virtualwork.formulas.tapes import taped
 from virtualwork.plan.steps import Group
-
-if TYPE_CHECKING:
-    from virtualwork.formulas.block import Block
-    from virtualwork.formulas.dynamics import Dynamics
-    from virtualwork.formulas.reactions import Reactions
 
 # steps of Newton's method in 32 digits at most, and a step, of 1 rad or the size, that is the last
 STEPS, SMALL = 8, 2.0**-60
@@ -41,6 +39,7 @@ STEPS, SMALL = 8, 2.0**-60
 SETTLED, NUDGE = 2.0**-72, 2.0**-40
 
 Found = dict[Quantity, list[Doubled]]
+NONE: Mapping[str, Doubled] = MappingProxyType({})
 
 
 @guarded
@@ -53,11 +52,8 @@ class SecondRun:
         What the inputs are exactly, less the floats.
     """
 
-    def __init__(
-        self, poses: Lanes, rest: Reals | None = None, dynamics: Callable[[], Dynamics] | None = None
-    ) -> None:
+    def __init__(self, poses: Lanes, rest: Reals | None = None) -> None:
         self.poses, self.n, self.lock = poses, poses.n, poses.lock
-        self._dynamics = dynamics
         self.branch = poses.branch
         self.rest = self._rest() if rest is None else rest
         self._solutions: dict[str, Doubled] = {}
@@ -93,9 +89,7 @@ class SecondRun:
 
     def some(self, which: NDArray[np.bool_]) -> SecondRun:
         """Some of the poses."""
-        some = self.poses.some(which)
-        some.time = None if self.poses.time is None else np.asarray(self.poses.time)[which]
-        return SecondRun(some, self.rest[which])
+        return SecondRun(self.poses.some(which), self.rest[which])
 
     def sign(self, group: str) -> Doubled:
         """The sign of a closed form."""
@@ -118,7 +112,7 @@ class SecondRun:
         """
         tape = taped(self.branch, self.exact, tuple(keys))
         changed = dict(changed or {})
-        found = run(tape, self.entering(name for name in tape.inputs if name not in changed) | changed)
+        found = run(tape, self.entering(tape.inputs, changed))
         zero = Doubled(0.0)
         return {key: [found.get(name, zero) for name in key.names] for key in keys}
 
@@ -131,7 +125,7 @@ class SecondRun:
         """Estimates (n,) of the errors of quantities as they were handed out, (n,) each; and other quantities as `doubled`."""
         tape = taped(self.branch, self.exact, (*values, *others))
         changed = dict(changed or {})
-        entering = self.entering(name for name in tape.inputs if name not in changed) | changed
+        entering = self.entering(tape.inputs, changed)
         answers = {answer(key): parts(key, value) for key, value in values.items()}
         estimates, found = compared(tape, entering, answers)
         zero = Doubled(0.0)
@@ -178,18 +172,24 @@ class SecondRun:
         return moved
 
     # --- what enters ------------------------------------------------------------------------------------------------
-    def entering(self, inputs: Iterable[str]) -> dict[str, Any]:
-        """The inputs of a tape, by their names."""
-        found: dict[str, Any] = {}
-        others = []
+    def entering(self, inputs: Iterable[str], changed: Mapping[str, Doubled] = NONE) -> dict[str, Any]:
+        """The inputs of a tape, by their names; `changed` ones in place of their own numbers."""
+        found: dict[str, Any] = dict(changed)
+        others: list[str] = []
+        unknown: list[Doubled] = []
         for name in inputs:
             kind, _, of = name.partition(" ")
+            if name in found:
+                continue
             if name in self.exact.known:
                 found[name] = self.exact.known[name]
             elif kind == "x":
                 found[name] = self._unknown(*of.rsplit(" ", 1))
             elif kind in ("friction", "slip"):
                 found[name] = self._rubbing(name)
+            elif kind == "f":
+                unknown = unknown or self._unknown_forces(changed)
+                found[name] = unknown[int(of)]
             elif kind == "table":
                 number, part = of.split()
                 found[name] = self._table(int(number))[part == "y"]
@@ -220,9 +220,8 @@ class SecondRun:
                 keys += [Unknown(g.name, k) for k in range(len(g.angles) + len(g.slides))]
                 if g.name == group:
                     break
-            self._solve(
-                [key for key in keys if f"x {key.group} {key.number}" not in self._solutions] or keys, group
-            )
+            new = [key for key in keys if f"x {key.group} {key.number}" not in self._solutions]
+            self._solve(new or keys, group)
         return self._solutions[f"x {group} {i}"]
 
     def _solve(self, keys: Sequence[Unknown], group: str) -> None:
@@ -241,6 +240,27 @@ class SecondRun:
                 self._solutions[name] = new
             if not steps > SMALL * max(1.0, self.poses.mechanism.size):
                 break
+
+    # --- redundant statics ------------------------------------------------------------------------------------------
+    def _unknown_forces(self, changed: Mapping[str, Doubled]) -> list[Doubled]:
+        """The unknown forces of all links, A f + b = 0, with `changed` inputs; NaN where statics does not determine them.
+
+        What the f of the first run leave there in 32 digits, A⁺ times that, is what they are off by: one step of iterative
+        refinement (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., §12.1).
+        """
+        statics = self.poses.statics
+        value, least = statics.solved[0], np.nan_to_num(statics.least[0])
+        # what statics does not determine has a part in the balance too
+        known = {f"f {i}": Doubled(column) for i, column in enumerate(least.T)}
+        keys: list[Quantity] = [Balance(row) for row in range(statics.rows)]
+        left = self.doubled(keys, {**changed, **known})
+        rest = np.stack([np.broadcast_to(left[key][0].value, self.n) for key in keys], axis=1)
+        off = np.full(value.shape, np.nan)
+        system = statics.system[0]
+        good = np.isfinite(system).all(axis=(1, 2)) & np.isfinite(rest).all(axis=1)
+        off[good] = (np.linalg.pinv(system[good], rcond=NULL) @ rest[good][..., None])[..., 0]
+        off[np.isnan(value)] = np.nan
+        return [Doubled(f) - by for f, by in zip(least.T, off.T, strict=True)]
 
     # --- friction ---------------------------------------------------------------------------------------------------
     def _rubbing(self, name: str) -> Doubled:
@@ -284,25 +304,10 @@ class SecondRun:
         slopes[~there] = np.eye(len(names))
         return slopes
 
-    def friction_error(self, n: int) -> Reals:
-        """What the friction of the n-th contact was off by in the first run, (n,)."""
-        exact = self._rubbing(f"friction {n}")
-        first = self._first_friction[n]
-        return np.asarray(np.abs((first - exact.high) - exact.low))
-
     @cached_property
-    def _first_friction(self) -> list[Any]:
-        """The friction of each contact in the first run, (n,)."""
-        dynamics = self._dynamics() if self._dynamics is not None else self._own_dynamics()
-        contacts = range(len(dynamics.scene.case.contacts))
-        forms = [partial(_friction_of, dynamics.reactions, n) for n in contacts]
-        return dynamics.reactions.over(*forms)
-
-    def _own_dynamics(self) -> Dynamics:
-        # a dozen files, loaded where there are forces
-        from virtualwork.formulas.dynamics import Dynamics
-
-        return Dynamics(self.poses)
+    def _first_friction(self) -> Reals:
+        """The friction of each contact in the first run, (c, n)."""
+        return self.poses.friction
 
     def _table(self, number: int) -> tuple[Doubled, Doubled]:
         """What a table gives, linear between its rows."""
@@ -341,15 +346,6 @@ def _shortest(group: Group, size: float) -> float:
     terms = (t for closure in group.closures for t in closure.terms)
     arms = (abs(complex(t.z)) for t in terms if t.body in group.members and t.slide is None)
     return min((arm for arm in arms if arm), default=size)
-
-
-def _friction_of(reactions: Reactions, n: int, block: Block) -> Any:
-    """The friction of a contact over a block: the torque of a pin, the force along a guide."""
-    joint = reactions.paths.case.contacts[n][0]
-    value = block.friction.get(n)
-    if value is None or joint.guide is None:
-        return value
-    return dot(value, reactions.rail(block, joint.guide))
 
 
 def answer(key: Quantity) -> Answer:

@@ -26,7 +26,7 @@ from virtualwork.family.part import Part, Solver, assembled, parts
 from virtualwork.family.written import Written
 from virtualwork.formulas.forces import Effort
 from virtualwork.formulas.kinematics import Angle, Point, Slide
-from virtualwork.formulas.lanes import Lanes, over_blocks
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.loops import Transmission
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.quantity import Quantity
@@ -289,7 +289,7 @@ class Alone:
         if any(isinstance(key, Transmission) for key in self.keys):
             # sines that are on the tape alone
             return self._rows(self.written, x, poses)
-        return table(over_blocks(poses, key) for key in self.keys)
+        return table(poses.values(self.keys))
 
     def _rows(self, written: Written | None, x: Reals, poses: Lanes) -> Reals:
         """What is asked for, from the tape."""

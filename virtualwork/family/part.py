@@ -22,8 +22,7 @@ from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, by_path, changed
 from virtualwork.family.branches import at_guess, chosen, stays_within, with_signs
 from virtualwork.family.written import Written
-from virtualwork.formulas.dynamics import Dynamics
-from virtualwork.formulas.lanes import Lanes, over_blocks
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.loops import Closed, Twist
 from virtualwork.formulas.numbers import Number, Reals, leave_out
 from virtualwork.formulas.quantity import Quantity
@@ -336,7 +335,7 @@ class Solver:
             assert self.written is not None
             table = self.written.recording.tables[int(number)]
             q = self.part.inputs[:, :, 0]
-            force = np.asarray(table.over(q.ravel(), True)).reshape(q.shape)
+            force = np.asarray(table.over(q.ravel())).reshape(q.shape)
             value = force.real if part == "x" else force.imag
             return value[rows] if len(value) > 1 else value
         j = int(name[1:])
@@ -365,14 +364,11 @@ class Solver:
             self._poses[i] = poses
         poses = self._poses[i]
         if poses is not None:
-            # one for all: friction and the order of joint forces are worked out once
-            forces = Dynamics(poses)
+            asked = [key for key in keys if key != ASSEMBLED]
             with np.errstate(all="ignore"):
+                found = dict(zip(asked, poses.values(asked), strict=True))
                 for key, values in zip(keys, out, strict=True):
-                    if key == ASSEMBLED:
-                        values[i] = np.where(poses.assembled, 0.0, np.nan)
-                    else:
-                        values[i] = over_blocks(poses, key, forces)
+                    values[i] = np.where(poses.assembled, 0.0, np.nan) if key == ASSEMBLED else found[key]
 
 
 def room(keys: Sequence[Quantity], v: int, n: int) -> list[NDArray[Any]]:

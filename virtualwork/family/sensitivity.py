@@ -152,5 +152,5 @@ class Sensitivities:
         if any(key.is_force for key in keys):
             if m.friction:
                 raise MechanismError("sensitivity: forces with friction are not differentiated")
-            if any(key.is_joint_force for key in keys) and written.recording.forces[0].order.redundant:
+            if any(key.is_joint_force for key in keys) and written.recording.forces.redundant:
                 raise MechanismError("sensitivity: redundant joint forces are not differentiated")

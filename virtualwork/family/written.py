@@ -58,8 +58,6 @@ class Written:
         Whether the sign of every closed form enters too (`sign GROUP`), as each variant has its own.
     settled : bool
         See `Recording`.
-    recording : type
-        That, or one that writes down more.
     """
 
     def __init__(
@@ -69,7 +67,6 @@ class Written:
         moves: tuple[bool, ...],
         own_signs: bool,
         settled: bool = True,
-        recording: type[Recording] = Recording,
     ) -> None:
         recorder = Recorder()
         # that of the recording
@@ -93,7 +90,7 @@ class Written:
         # two slides have one solution: their sign is that of any
         signs = {g.name: assembly.signs.get(g.name, 1) for g in self.plan.groups if g.kind != "Newton"}
         turning = [g.name for g in self.closed] if own_signs else assembly.turning_over
-        self.recording = recording(
+        self.recording = Recording(
             self.mechanism, self.plan, signs, moves, turning, winding, settled, recorder
         )
         self._tapes: dict[tuple[Any, ...], Tape] = {}

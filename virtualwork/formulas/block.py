@@ -1,22 +1,21 @@
-"""A block of poses as the loads see it: where points lie, how far they move, what has been formed there already.
+"""A pose as the loads see it: where points lie, how far they move, what has been formed there already.
 
-Whatever depends on loads, a load's value or a quantity made of several, is formed once in a block, when it is first
-asked for.
+Whatever depends on loads, a load's value or a quantity made of several, is formed once, when it is first asked for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 
 from dalembert.arithmetic.varied import rotation
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND, TorsionSpring
-from virtualwork.formulas.numbers import Complexes, Number, Reals, plus, times
-from virtualwork.formulas.poses import Poses, part
+from virtualwork.formulas.numbers import Complexes, ForceKind, Number, Reals, plus, times
+from virtualwork.formulas.poses import Poses, alone
 from virtualwork.formulas.positions import Samples, State, follow, unwound, whole
 from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.winding import counted
@@ -24,27 +23,19 @@ from virtualwork.plan.steps import Path, Plan
 
 
 class Shared:
-    """What all blocks share.
-
-    Attributes
-    ----------
-    formed : set of str
-        The names of the joint forces formed so far.
-    drive : array (n, k), or None
-        The effort at each input by virtual work, as motors that other links carry need it.
-    """
+    """What a pose does not say of itself: rates of the inputs, the time, how far torsion springs are wound."""
 
     def __init__(self, mechanism: Description, plan: Plan) -> None:
         self.mechanism, self.plan = mechanism, plan
-        self.formed: set[str] = set()
-        self.drive: Reals | None = None
 
-    def rates(self, rows: slice, many: bool) -> tuple[Number, Number]:
-        """q̇ and q̈ of the one input over a block, None where zero."""
+    @property
+    def rates(self) -> tuple[Number, Number]:
+        """q̇ and q̈ of the one input, None where zero."""
         raise NotImplementedError
 
-    def time(self, rows: slice, many: bool) -> Number:
-        """The time over a block; None where the poses have none."""
+    @property
+    def time(self) -> Number:
+        """The time; None where there is none."""
         return None
 
     def wound(self, spring: TorsionSpring, st: State, within: Number) -> Number:
@@ -72,7 +63,7 @@ class Shared:
 
 
 class Setting(Shared):
-    """What the blocks of a scene share: the poses, whether they move, how far torsion springs are wound."""
+    """That of poses; at rest nothing moves, whatever the rates of the inputs."""
 
     def __init__(self, poses: Poses, at_rest: bool) -> None:
         super().__init__(poses.mechanism, poses.plan)
@@ -84,17 +75,16 @@ class Setting(Shared):
         """Whether anything moves at all: a speed or an acceleration that is not zero."""
         return not self.at_rest and any(np.any(rate) for rates in self.poses.rates[:2] for rate in rates)
 
-    def rates(self, rows: slice, many: bool) -> tuple[Number, Number]:
-        """q̇ and q̈ of the one input over a block, None where zero."""
+    @property
+    def rates(self) -> tuple[Number, Number]:
         if self.at_rest:
             return None, None
         speed, acceleration, _ = self.poses.rates
-        return part(speed[0], rows, many), part(acceleration[0], rows, many)
+        return alone(speed[0]), alone(acceleration[0])
 
-    def time(self, rows: slice, many: bool) -> Number:
-        """The time over a block; None where the poses have none."""
-        time = self.poses.time
-        return None if time is None else time[rows] if many else float(time[0])
+    @property
+    def time(self) -> Number:
+        return None if self.poses.time is None else float(self.poses.time[0])
 
     def wound(self, spring: TorsionSpring, st: State, within: Number) -> Number:
         """A torsion spring's twist with its whole turns, from what lies within half a turn of free.
@@ -146,39 +136,52 @@ class Setting(Shared):
 
 
 class Formed(Protocol):
-    """Something that a block forms once: a load, or a quantity made of loads."""
+    """Something that is formed once: a load, or a quantity made of loads."""
 
     @property
     def lasts(self) -> bool:
-        """Whether it is kept over a long sweep, for others that ask later."""
+        """Whether a motion keeps it for others that ask later."""
 
     def form(self, block: Block) -> Any:
-        """Its value over a block."""
+        """Its value."""
 
 
 class Table(Protocol):
     """A load given by a table."""
 
     def place_in(self, block: Block) -> Number:
-        """What the table is over, at the poses of a block."""
+        """What the table is over, at a pose."""
 
-    def over(self, q: Number, many: bool) -> Number:
+    def over(self, q: Number) -> Number:
         """What the table gives there."""
+
+    def alike(self, other: Any) -> bool:
+        """Whether another load gives the same force everywhere."""
 
 
 class Block:
-    """A block of poses as the loads see it: positions, velocity coefficients, velocities, accelerations.
+    """A pose as the loads see it: positions, velocity coefficients, velocities, accelerations.
 
     A derivative that is identically zero is None.
+
+    Attributes
+    ----------
+    drive : function
+        The torque of an input's motor, by virtual work.
+    friction : dict of a contact's number to its friction
     """
 
-    def __init__(self, setting: Shared, rows: slice, st: State, along: Rates | None, by: list[Rates]) -> None:
-        self.setting, self.rows, self.st, self.along, self.by = setting, rows, st, along, by
+    drive: Callable[[int], Number]
+
+    def __init__(self, setting: Shared, st: State, along: Rates | None, by: list[Rates]) -> None:
+        self.setting, self.st, self.along, self.by = setting, st, along, by
+        self.kind = cast(ForceKind, st.kind)
         self.one = len(by) == 1
-        self.rates = setting.rates(rows, st.many) if self.one else (None, None)
-        # the friction of each pair that rubs, from the last iterate of its reaction
+        self.rates = setting.rates if self.one else (None, None)
         self.friction: dict[int, Number] = {}
         self.kept: dict[Formed, Any] = {}
+        # the names of the joint forces formed so far
+        self.names: set[str] = set()
 
     def formed(self, what: Formed) -> Any:
         """The value of a load or a quantity, formed once."""
@@ -186,24 +189,14 @@ class Block:
             self.kept[what] = what.form(self)
         return self.kept[what]
 
-    def drive(self, j: int) -> Number:
-        """The torque of input j's motor, by virtual work."""
-        assert self.setting.drive is not None
-        torque = self.setting.drive[:, j]
-        return torque[self.rows] if self.st.many else float(torque[0])
-
     def table(self, load: Table) -> Number:
         """What a table gives."""
-        return load.over(load.place_in(self), self.st.many)
+        return load.over(load.place_in(self))
 
     @property
     def time(self) -> Number:
-        """The time; None where the poses have none."""
-        return self.setting.time(self.rows, self.st.many)
-
-    def forget(self, *, lasting: bool = False) -> None:
-        """Drop the arrays, or all but those that others will ask for."""
-        self.kept = {what: value for what, value in self.kept.items() if lasting and what.lasts}
+        """The time; None where the pose has none."""
+        return self.setting.time
 
     def second(self, derivative: Callable[[Rates, int], Number]) -> tuple[float, Number]:
         """ẍ = K q̈ + L q̇² of what has the derivatives K, L over the input: a factor and an array."""

@@ -2,34 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cached_property, partial
-from typing import Any, Protocol, TypeVar
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.arithmetic.guard import guarded
-from virtualwork.formulas.block import Block
-from virtualwork.formulas.effort import effort, generalized
 from virtualwork.formulas.forces import (
+    Applied,
+    AppliedMoment,
+    Contact,
     Effort,
     Force,
+    Generalized,
     JointForce,
     JointMoment,
     NewtonEuler,
+    Reaction,
     Shaking,
     ShakingMoment,
 )
-from virtualwork.formulas.numbers import TOGETHER, Complexes, Number, Reals, leave_out, xy
+from virtualwork.formulas.numbers import TOGETHER, Complexes, Reals, leave_out, xy
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.reactions import Reactions, settle
-from virtualwork.formulas.resultants import applied_loads, reduced, resultant, shaking_loads
+from virtualwork.formulas.reactions import JointForces
 from virtualwork.formulas.scene import Scene
 from virtualwork.formulas.statics import Statics
-from virtualwork.plan.steps import Joint, joints_at
+from virtualwork.plan.steps import Joint
 
-V = TypeVar("V", Reals, Complexes)
+# a link that turns so many times as fast as the input: at a dead point to rounding, no number is left
+FAST = 1e13
 
 
 @guarded
@@ -40,54 +43,67 @@ class Dynamics:
     ----------
     scene : Scene
         The loads.
-    friction_iterations : int
-        How often friction and reactions were exchanged; 0 without friction.
 
     Parameters
     ----------
     poses : Poses
-    taped : bool
-        Whether the forces come from the tape of the poses, where it has them; else they are formed over blocks.
     """
 
-    def __init__(self, poses: Poses, *, taped: bool = True) -> None:
-        self.poses, self.lock, self.taped = poses, poses.lock, taped
+    def __init__(self, poses: Poses) -> None:
+        self.poses, self.lock = poses, poses.lock
         self.scene = Scene(poses)
-        self._effort: Reals | None = None
-        self._euler: Reals | None = None
-        self._forces: dict[tuple[str, str], Complexes] = {}
+        self._known: dict[Force, Any] = {}
 
-    def _from_tape(self, *quantities: Force) -> list[Any] | None:
-        """Forces, (n,) each; None where they are formed over blocks."""
-        return self.poses.taped(quantities) if self.taped else None
+    def values(self, keys: Sequence[Force]) -> list[Any]:
+        """Forces (n,) each: of many poses from the tape, of one by the formulas on floats."""
+        new = [key for key in keys if key not in self._known]
+        taped = [key for key in new if self._on_tape(key)]
+        self._known |= zip(taped, self.poses.taped(taped), strict=True)
+        for key in new:
+            if key not in self._known:
+                self._known[key] = self._alone(key)
+        return [self._known[key] for key in keys]
 
-    @cached_property
-    def over_blocks(self) -> Dynamics:
-        """The same forces formed over blocks throughout, as sums over the loads are."""
-        return Dynamics(self.poses, taped=False) if self.taped else self
+    def value(self, key: Force) -> Any:
+        """A force by its key, (n,)."""
+        return self.values([key])[0]
 
-    @cached_property
-    def _settled(self) -> tuple[int, NDArray[np.bool_]]:
-        if not self.scene.friction:
-            return 0, np.ones(self.poses.n, dtype=bool)
-        return settle(self.scene)
+    def _on_tape(self, key: Force) -> bool:
+        return self.scene.on_tape or (key.is_joint_force and self.reactions.redundant)
+
+    def _alone(self, key: Force) -> Any:
+        """A force of one pose."""
+        try:
+            value = key.value(self.scene.forces)
+            if isinstance(key, Effort | Generalized) and self._too_fast(key.input):
+                value = np.nan
+        except (ZeroDivisionError, OverflowError):
+            return self.poses.taped([key])[0]
+        # no −0
+        result = np.array([value], complex if key.is_vector else float) + 0.0
+        if not self.poses.assembled.all():
+            leave_out(result, ~self.poses.assembled)
+        return result
+
+    def _too_fast(self, j: int) -> bool:
+        m, by = self.poses.mechanism, self.scene.forces.block.by[j]
+        reach = m.size if m.inputs[j].is_slide else 1.0
+        rates = (by.angle.get(body) for group in self.poses.plan.groups for body in group.angles)
+        return any(rate and rate[0] is not None and not abs(rate[0]) * reach < FAST for rate in rates)
+
+    def _each(self, kind: type[Effort | Generalized | NewtonEuler]) -> Reals:
+        """A quantity of every input, (n, k)."""
+        return np.stack(self.values([kind(j) for j in range(len(self.poses.mechanism.inputs))]), axis=1)
 
     @property
     def friction_iterations(self) -> int:
-        """How often friction and reactions were exchanged until they agreed."""
-        return self._settled[0]
+        """How often friction and reactions were exchanged until they agreed; 0 without friction."""
+        return self.poses.friction_iterations if self.scene.friction else 0
 
     @property
     def locked(self) -> NDArray[np.bool_]:
         """(n,): poses in which friction locks the mechanism: no reaction balances its own friction."""
-        return ~self._settled[1]
-
-    def _moving(self, values: V) -> V:
-        """Values that depend on friction, without those of poses in which it locks the mechanism."""
-        if self.scene.friction:
-            values = values.copy()
-            leave_out(values, self.locked)
-        return values
+        return self.poses.locked if self.scene.friction else np.zeros(self.poses.n, dtype=bool)
 
     @cached_property
     def without_length(self) -> dict[int, NDArray[np.bool_]]:
@@ -101,121 +117,56 @@ class Dynamics:
                     found[number] = meet
         return found
 
-    @property
+    @cached_property
     def effort(self) -> Reals:
         """The effort at each input by virtual work, (n, k)."""
-        if self._effort is None:
-            found = self._from_tape(*(Effort(j) for j in range(len(self.poses.mechanism.inputs))))
-            self._effort = None if found is None else np.stack(found, axis=1)
-        if self._effort is None:
-            # friction settles first: the loads depend on it
-            _ = self._settled
-            self._effort = self._moving(effort(self.scene))
-        return self._effort
+        return self._each(Effort)
 
     @property
     def generalized(self) -> Reals:
         """What balances the loads at each input, (n, k): the effort, but for motors that sit on another body than `on`."""
-        _ = self._settled
-        return self._moving(generalized(self.scene))
+        return self._each(Generalized)
 
     @cached_property
-    def reactions(self) -> Reactions:
-        """The joint forces, each formed when asked for."""
-        _ = self._settled
-        return Reactions(self.scene)
+    def reactions(self) -> JointForces:
+        """The joints, and how their forces follow from each other."""
+        return JointForces(self.scene.paths)
 
     @property
     def by_key(self) -> Mapping[str, Joint]:
         """The joints by their keys."""
         return self.reactions.by_key
 
-    @cached_property
+    @property
     def statics(self) -> Statics | None:
         """All equilibrium equations at once, where the constraints are redundant; else None."""
-        if not self.reactions.redundant:
-            return None
-        return Statics(self.reactions)
+        result: Statics | None = self.poses.statics if self.reactions.redundant else None
+        return result
 
-    @property
+    @cached_property
     def newton_euler(self) -> Reals:
         """The effort at each input by Newton and Euler, (n, k): ΣM = 0 of the driven link with its joint forces."""
-        if self._euler is None:
-            found = self._from_tape(*(NewtonEuler(j) for j in range(len(self.poses.mechanism.inputs))))
-            self._euler = None if found is None else np.stack(found, axis=1)
-        if self._euler is None:
-            r, inputs = self.reactions, self.poses.mechanism.inputs
-            if self.statics is not None:
-                found = [
-                    self.statics.get(("force" if entry.is_slide else "torque", str(j), ""))
-                    for j, entry in enumerate(inputs)
-                ]
-            else:
-                found = r.over(*(partial(r.effort, j=j) for j in range(len(inputs))))
-            self._euler = self._moving(np.stack(found, axis=1))
-        return self._euler
+        return self._each(NewtonEuler)
 
     def joint_force(self, joint: Joint, body: str) -> Complexes:
         """The force of a joint on one of its bodies, (n,) complex; NaN where statics does not determine it."""
-        key = joint.key, body
-        if key not in self._forces:
-            found = self._from_tape(JointForce(*key))
-            if found is not None:
-                self._forces[key] = found[0]
-            elif self.statics is not None:
-                self._forces[key] = self.statics.joint_force(joint, body)
-            else:
-                form = partial(self.reactions.joint_force, joint=joint, body=body)
-                (self._forces[key],) = self.reactions.over(form, kind=complex)
-            self._forces[key] = self._moving(self._forces[key])
-        return self._forces[key]
+        return np.asarray(self.value(JointForce(joint.key, body)))
 
     def joint_moment(self, joint: Joint, body: str) -> Reals:
         """The moment of a joint on one of its bodies about the joint's point, (n,): a guide's, or a pin's friction."""
-        found = self._from_tape(JointMoment(joint.key, body))
-        if found is not None:
-            return np.asarray(found[0])
-        r = self.reactions
-        result = np.zeros(self.poses.n)
-        if joint.guide is not None:
-            g = self.poses.mechanism.guides[joint.guide]
-            if self.statics is None:
-                (result,) = r.over(partial(r.guide_moment, guide=joint.guide, body=body))
-            elif g.is_slider:
-                value = self.statics.guide_moment(joint)
-                result = value if body == g.link else -value
-        for load in self.scene.friction:
-            if load.path is None and load.joint == joint.key and load.body == body:
-                result = result + r.over(load.form)[0]
-        return self._moving(result)
+        return np.asarray(self.value(JointMoment(joint.key, body)))
 
     def contact(self, cam: int) -> Reals:
         """How hard a cam (from 0) presses on its follower along the normal, (n,); below zero it would have to pull."""
-        statics, r = self.statics, self.reactions
-        if statics is None:
-            return self._moving(r.over(lambda block: r.contact(block, cam))[0])
-        drive = self.poses.mechanism.cam_drives[cam]
-        unit = 1.0 if drive.guide is not None else self.poses.mechanism.size
-        push = statics.get(("contact", str(cam), "")) * unit
-
-        def form(block: Block) -> Number:
-            here = push[block.rows]
-            return r.contact(block, cam, here if block.st.many else float(here[0]))
-
-        return self._moving(r.over(form)[0])
+        return np.asarray(self.value(Contact(cam)))
 
     def reaction(self, joint: str, on: str) -> Reals:
-        """The force of all others on a link at a joint, (n, 2)."""
+        """The force of all others on a link at a joint, (n, 2): of a pin and of a guide, where both are of that name."""
         return xy(self.at_joint(joint, on))
 
     def at_joint(self, joint: str, on: str) -> Complexes:
-        """The same, (n,) complex: of a pin and of a guide, where both are of that name."""
-        total, *others = (
-            self.joint_force(found, on) for found in joints_at(self.reactions.joints, joint, on)
-        )
-        for force in others:
-            total = total + force
-        return total
+        """The same, (n,) complex."""
+        return np.asarray(self.value(Reaction(joint, on)))
 
     @cached_property
     def shaking(self) -> tuple[Reals, Reals]:
@@ -224,39 +175,13 @@ class Dynamics:
         All that the moving links do to the ground through joints, springs and the drive's own reaction: by
         d'Alembert the sum of their weights, applied loads and inertia loads. No reaction is formed for it.
         """
-        taped = self._from_tape(Shaking(), ShakingMoment())
-        if taped is not None:
-            return xy(taped[0]), taped[1]
-        n = self.poses.n
-        force, moment = np.zeros(n, complex), np.zeros(n)
-        loads = shaking_loads(self.scene.loads)
-
-        def work(block: Block) -> None:
-            f, m = resultant(loads, block)
-            if f is not None:
-                force[block.rows] = f
-            if m is not None:
-                moment[block.rows] = m
-
-        self.scene.each((), work)
-        out = ~self.poses.assembled
-        if self.scene.lost is not None:
-            out = out | self.scene.lost
-        leave_out(force, out)
-        leave_out(moment, out)
+        force, moment = self.values([Shaking(), ShakingMoment()])
         return xy(force), moment
 
     def applied(self, link: str) -> tuple[Complexes, Reals]:
         """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""
-        _ = self._settled
-        n = self.poses.n
-        force, moment = np.zeros(n, complex), np.zeros(n)
-        loads = applied_loads(self.scene.case.everything, link)
-        for block in self.scene.blocks([f"angle:{link}"]) if loads else ():
-            f, m = reduced(loads, block, self.scene.rigid[link].center)
-            force[block.rows] += 0.0 if f is None else f
-            moment[block.rows] += 0.0 if m is None else m
-        return self._moving(force), self._moving(moment)
+        force, moment = self.values([Applied(link), AppliedMoment(link)])
+        return force, moment
 
 
 class Moving(Protocol):

@@ -3,22 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from virtualwork.describe.description import Description
+from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.numbers import Number
 from virtualwork.formulas.quantity import Quantity, Recording
 from virtualwork.plan.steps import joints, joints_at
+
+if TYPE_CHECKING:
+    from virtualwork.formulas.pose_forces import PoseForces
 
 
 class Force(Quantity):
     """A quantity that the loads have a part in."""
 
     is_force = True
+    is_rubbed: ClassVar[bool] = True
+    """Whether the friction of joints may have a part in it."""
 
     def steps(self, recording: Recording) -> tuple[tuple[Any, ...], int]:
         """The steps that it depends on, as often differentiated as the loads need."""
-        return super().steps(recording)[0], recording.forces[0].case.targets()[1]
+        return super().steps(recording)[0], recording.forces.case.targets()[1]
+
+    def write(self, recording: Recording) -> Number:
+        return self.value(recording.forces)
+
+    def value(self, forces: PoseForces) -> Number:
+        """Its value over one pose, formed once; 0 where it is zero throughout."""
+        if self not in forces.formed:
+            value = self.form(forces)
+            forces.formed[self] = 0.0 if value is None else value
+        return forces.formed[self]
+
+    def form(self, forces: PoseForces) -> Number:
+        """Its formula over one pose; None is zero."""
+        raise NotImplementedError
 
     def read(self, forces: Any) -> Any:
         """Its values, (n,), of `dynamics.Dynamics`, or the estimates of their errors."""
@@ -39,8 +59,8 @@ class Effort(Force, kind="effort"):
 
     input: int
 
-    def write(self, recording: Recording) -> Number:
-        return recording.efforts[self.input]
+    def form(self, forces: PoseForces) -> Number:
+        return forces.effort(self.input)
 
     def read(self, forces: Any) -> Any:
         return forces.effort[:, self.input]
@@ -51,8 +71,8 @@ class Generalized(Force, kind="generalized"):
 
     input: int
 
-    def write(self, recording: Recording) -> Number:
-        return recording.generalized(self.input)
+    def form(self, forces: PoseForces) -> Number:
+        return forces.generalized(self.input)
 
     def read(self, forces: Any) -> Any:
         return forces.generalized[:, self.input]
@@ -64,8 +84,8 @@ class NewtonEuler(Force, kind="newton-euler"):
     is_joint_force = True
     input: int
 
-    def write(self, recording: Recording) -> Number:
-        return recording.newton_euler(self.input)
+    def form(self, forces: PoseForces) -> Number:
+        return forces.newton_euler(self.input)
 
     def read(self, forces: Any) -> Any:
         return forces.newton_euler[:, self.input]
@@ -78,8 +98,8 @@ class JointForce(Force, kind="force"):
     joint: str
     body: str
 
-    def write(self, recording: Recording) -> Number:
-        return recording.joint_force(self.joint, self.body)
+    def form(self, forces: PoseForces) -> Number:
+        return forces.force(self.joint, self.body)
 
     def read(self, forces: Any) -> Any:
         return forces.joint_force(forces.by_key[self.joint], self.body)
@@ -92,8 +112,8 @@ class JointMoment(Force, kind="moment"):
     joint: str
     body: str
 
-    def write(self, recording: Recording) -> Number:
-        return recording.joint_moment(self.joint, self.body)
+    def form(self, forces: PoseForces) -> Number:
+        return forces.moment(self.joint, self.body)
 
     def read(self, forces: Any) -> Any:
         return forces.joint_moment(forces.by_key[self.joint], self.body)
@@ -106,9 +126,9 @@ class Reaction(Force, kind="reaction"):
     name: str
     body: str
 
-    def write(self, recording: Recording) -> Number:
-        here = joints_at(recording.forces[1].joints, self.name, self.body)
-        return sum((recording.value(JointForce(joint.key, self.body)) for joint in here), 0.0)
+    def form(self, forces: PoseForces) -> Number:
+        here = joints_at(forces.joints.joints, self.name, self.body)
+        return sum((JointForce(joint.key, self.body).value(forces) for joint in here), 0.0)
 
     def read(self, forces: Any) -> Any:
         return forces.at_joint(self.name, self.body)
@@ -120,8 +140,8 @@ class Contact(Force, kind="contact"):
     is_joint_force = True
     cam: int
 
-    def write(self, recording: Recording) -> Number:
-        return recording.contact(self.cam)
+    def form(self, forces: PoseForces) -> Number:
+        return forces.contact(self.cam)
 
     def read(self, forces: Any) -> Any:
         return forces.contact(self.cam)
@@ -130,10 +150,11 @@ class Contact(Force, kind="contact"):
 class Shaking(Force, kind="shaking"):
     """The shaking force on the ground, N."""
 
+    is_rubbed = False
     is_vector = True
 
-    def write(self, recording: Recording) -> Number:
-        return recording.shaking[0]
+    def form(self, forces: PoseForces) -> Number:
+        return forces.shaking()[0]
 
     def read(self, forces: Any) -> Any:
         force = forces.shaking[0]
@@ -143,8 +164,10 @@ class Shaking(Force, kind="shaking"):
 class ShakingMoment(Force, kind="shaking moment"):
     """The shaking moment about the ground's origin, N·m."""
 
-    def write(self, recording: Recording) -> Number:
-        return recording.shaking[1]
+    is_rubbed = False
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.shaking()[1]
 
     def read(self, forces: Any) -> Any:
         return forces.shaking[1]
@@ -156,8 +179,8 @@ class Applied(Force, kind="applied"):
     is_vector = True
     link: str
 
-    def write(self, recording: Recording) -> Number:
-        return recording.applied(self.link)[0]
+    def form(self, forces: PoseForces) -> Number:
+        return forces.applied(self.link)[0]
 
     def read(self, forces: Any) -> Any:
         return forces.applied(self.link)[0]
@@ -168,8 +191,8 @@ class AppliedMoment(Force, kind="applied moment"):
 
     link: str
 
-    def write(self, recording: Recording) -> Number:
-        return recording.applied(self.link)[1]
+    def form(self, forces: PoseForces) -> Number:
+        return forces.applied(self.link)[1]
 
     def read(self, forces: Any) -> Any:
         return forces.applied(self.link)[1]
@@ -179,11 +202,11 @@ class AppliedMoment(Force, kind="applied moment"):
 class LoadTorque(Force, kind="load torque"):
     """A torque of the load case, by its number, N·m."""
 
+    is_rubbed = False
     number: int
 
-    def write(self, recording: Recording) -> Number:
-        paths, _, block = recording.placed_forces()
-        return paths.case.loads[self.number].form(block)
+    def form(self, forces: PoseForces) -> Number:
+        return forces.case.loads[self.number].form(forces.block)
 
 
 class Load(LoadTorque, kind="load"):
@@ -195,22 +218,69 @@ class Load(LoadTorque, kind="load"):
 class LoadPlace(Force, kind="load at"):
     """Where a force of the load case acts, m."""
 
+    is_rubbed = False
     is_vector = True
     number: int
 
-    def write(self, recording: Recording) -> Number:
-        paths, _, block = recording.placed_forces()
-        path = paths.case.loads[self.number].path
-        assert path is not None
-        return block.position(path)
+    def form(self, forces: PoseForces) -> Number:
+        return forces.load_place(self.number)
 
 
 class Rail(Force, kind="rail"):
     """The unit vector along a guide, in which an input drives."""
 
+    is_rubbed = False
     is_vector = is_joint_force = True
     guide: int
 
+    def form(self, forces: PoseForces) -> Number:
+        return forces.rail(self.guide)
+
+
+# --- what is solved outside of a tape ----------------------------------------------------------------------------------
+class Bearing(Force, kind="bearing"):
+    """The force that a contact with friction bears, N: of a pin complex, of a guide along its normal."""
+
+    is_vector = is_joint_force = True
+    contact: int
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.bearing(self.contact)
+
+
+class RubbingRate(Force, kind="rubbing"):
+    """The rate at which a contact slides: rad/s of a pin, m/s of a guide."""
+
+    is_rubbed = False
+    contact: int
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.rubbing_rate(self.contact)
+
+
+class Entry(Force, kind="entry"):
+    """An entry of the equations of all links, A f + b = 0 (`statics`): of A, or of b (column None)."""
+
+    is_joint_force = True
+    row: int
+    column: int | None
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.system[self.row, self.column]
+
+
+class Over(Quantity, kind="over"):
+    """What the table of a load, by its number, is over; an angle of unknown turns in (−π, π]."""
+
+    number: int
+
     def write(self, recording: Recording) -> Number:
-        _, of, block = recording.placed_forces()
-        return of.rail(block, self.guide)
+        load = recording.tables[self.number]
+        if load.axis == "time":
+            return recording.recorder.input("time")
+        if load.axis == "input":
+            return recording.st.inputs[0]
+        angle = recording.plan.angles[load.body]
+        if load.axis == "angle" and not angle.bases:
+            return recording.st.affine(angle)
+        return recording.value(Angle(load.body, int(load.axis == "speed")))

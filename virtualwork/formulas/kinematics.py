@@ -1,4 +1,4 @@
-"""The quantities of positions and of their rates: the same formulas over a recorded pose and over blocks of poses."""
+"""The quantities of positions and of their rates: the same formulas of a recorded pose and of one on floats."""
 
 from __future__ import annotations
 

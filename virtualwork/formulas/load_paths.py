@@ -364,7 +364,7 @@ class Solved(Quantity):
 
     def form(self, block: Block) -> tuple[float, Number]:
         group = self.group
-        block.setting.formed.add(group.name)
+        block.names.add(group.name)
         loads = [load.value(block) for load in self.paths.on_group(self.group)]
         if group.name in block.st.folded:
             # singular in every pose: it may be under stress without any load
@@ -374,10 +374,10 @@ class Solved(Quantity):
             return 1.0, [None] * len(group.closures)
         cols = block.by[0].columns(group)
         if group.kind == "Newton":
-            return 1.0, block.st.kind.transposed(cols, loads)
+            return 1.0, block.kind.transposed(cols, loads)
         (c1, c2), (q1, q2) = cols[0], loads
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            inverse = block.st.kind.regular(block.by[0].inverse(group), c1, c2)
+            inverse = block.kind.regular(block.by[0].inverse(group), c1, c2)
             # λ = i (c2 q1 − c1 q2)/(c1 × c2)
             if q1 is None:
                 total = c1 * (q2 * -inverse)
@@ -411,7 +411,7 @@ class SideForce(Quantity):
 
     def form(self, block: Block) -> tuple[float, Number]:
         joint, body = self.side
-        block.setting.formed.add(f"{joint} on {body}")
+        block.names.add(f"{joint} on {body}")
         return 1.0, self.paths.balance(self.side).value(block)
 
     def reads(self) -> Iterable[Quantity | None]:

@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dalembert.dataclass import dataclass, field
 from virtualwork.describe import DescriptionError
@@ -180,6 +179,10 @@ class Tabled(Load):
     link_axes: bool = False
     axis: str = "input"
 
+    def alike(self, other: Tabled) -> bool:
+        """Whether another load gives the same force everywhere."""
+        return vars(self) | {"table": id(self.table)} == vars(other) | {"table": id(other.table)}
+
     def _in_cycle(self, q: Number) -> tuple[Reals, Complexes, Reals]:
         at, force = (np.array(column) for column in zip(*self.table, strict=True))
         q = np.asarray(q, dtype=float)
@@ -189,7 +192,7 @@ class Tabled(Load):
         return at, force, q
 
     def place_in(self, block: Block) -> Number:
-        """What the table is over, at the poses of a block.
+        """What the table is over, at a pose.
 
         Raises
         ------
@@ -210,8 +213,8 @@ class Tabled(Load):
     def timed(self, time: Number) -> Number:
         """The time; refused where the poses have none."""
         if time is None:
-            what = f"the torque on {self.body} is given over the time"
-            raise DescriptionError(f"{what}: only a motion in time has it")
+            what = f"the torque on {self.body} is given over the time: only a motion in time has it"
+            raise DescriptionError(what)
         return time
 
     def in_turn(self, angle: Number) -> Number:
@@ -219,12 +222,12 @@ class Tabled(Load):
         first = self.table[0][0]
         return first + (angle - first) % (2 * np.pi)
 
-    def over(self, q: Number, many: bool) -> Number:
+    def over(self, q: Number) -> Number:
         """The force at places of the table, in the axes that it is given in; NaN outside."""
         at, force, q = self._in_cycle(q)
         outside = (q < at[0]) | (q > at[-1])
         values = np.where(outside, np.nan, np.interp(q, at, force.real) + 1j * np.interp(q, at, force.imag))
-        return values if many else complex(values)
+        return values if values.ndim else complex(values)
 
     def form(self, block: Block) -> Number:
         result = block.table(self)
@@ -243,8 +246,7 @@ class Tabled(Load):
         """The slope of the table."""
         at, force, q = self._in_cycle(self.place_in(block))
         place = np.clip(np.searchsorted(at, q, side="right") - 1, 0, len(at) - 2)
-        slopes: NDArray[Any] = np.diff(force)[place] / np.diff(at)[place]
-        return slopes if block.st.many else complex(slopes)
+        return complex(np.diff(force)[place] / np.diff(at)[place])
 
     def turned(self, block: Block, rates: Rates) -> Number:
         """Its derivative over the input, in ground axes."""
@@ -306,9 +308,8 @@ class SpringEnd(SpringSide):
 
     def _inverse(self, block: Block, d: Number) -> Number:
         """1/l; NaN where the spring has no length, and its pull no direction."""
-        kind = block.st.kind
-        least = TOGETHER * block.setting.mechanism.size
-        return kind.inverse(kind.sqrt(d.real * d.real + d.imag * d.imag), least)
+        length = block.kind.sqrt(d.real * d.real + d.imag * d.imag)
+        return block.kind.inverse(length, TOGETHER * block.setting.mechanism.size)
 
     def stretch(self, block: Block) -> Number:
         return abs(self._between(block.position)) - self.spring.free_length

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dalembert.arithmetic.recorded import RECORDED, bare
 from dalembert.arithmetic.systems import regularity
 from virtualwork.formulas.newton import unknowns
-from virtualwork.formulas.numbers import PARTS, WRITTEN, Number
+from virtualwork.formulas.numbers import PARTS, WRITTEN, Number, cross
 from virtualwork.formulas.positions import columns
 from virtualwork.formulas.quantity import Quantity, Recording
 
@@ -44,7 +44,9 @@ class Margin(Everywhere, kind="margin"):
     group: str
 
     def write(self, recording: Recording) -> Number:
-        return recording.st.margin[recording.solved(self.group).name]
+        of = recording.solved(self.group)
+        # of a group that enters nothing else is known
+        return 0.0 if recording.enters(of) else recording.st.margin[of.name]
 
 
 class Transmission(Everywhere, kind="transmission"):
@@ -57,6 +59,10 @@ class Transmission(Everywhere, kind="transmission"):
 
     def write(self, recording: Recording) -> Number:
         of = recording.solved(self.group)
+        if recording.enters(of):
+            (c1, c2), *_ = columns(of, recording.st)
+            across = cross(c1, c2)
+            return across * across / ((c1.conjugate() * c1).real * (c2.conjugate() * c2).real)
         margin: Number = recording.st.margin[of.name]
         if of.kind != "RPR":
             return margin

@@ -264,12 +264,6 @@ class Kind(Protocol):
     def angle(self, z: Number) -> Number:
         """The angle of a complex number, in (−π, π]."""
 
-    def regular(self, inverse: Number, c1: Number, c2: Number) -> Number:
-        """1/(c1 × c2); NaN where two columns are parallel to rounding, for the joint forces have no value there."""
-
-    def inverse(self, length: Number, least: float) -> Number:
-        """1/length; NaN of one that is not above the least, which has no direction."""
-
     def select(self, test: Number, positive: Number, otherwise: Number) -> Number:
         """The second where the first is positive, else the third."""
 
@@ -278,6 +272,16 @@ class Kind(Protocol):
 
     def solve(self, cols: list[list[Number]], right: list[Number]) -> list[Number]:
         """Solve Σ column·x + right = 0, complex, for the real unknowns x of a group."""
+
+
+class ForceKind(Kind, Protocol):
+    """The operations that forces need too: of one pose, or of recorded numbers."""
+
+    def regular(self, inverse: Number, c1: Number, c2: Number) -> Number:
+        """1/(c1 × c2); NaN where two columns are parallel to rounding, for the joint forces have no value there."""
+
+    def inverse(self, length: Number, least: float) -> Number:
+        """1/length; NaN of one that is not above the least, which has no direction."""
 
     def transposed(self, cols: list[list[Number]], loads: list[Number]) -> list[Number]:
         """Solve Σ_c λ_c·column_c + load = 0 for the complex λ of a group's loops; NaN where they have no value."""
@@ -310,6 +314,15 @@ class One:
         """The value in whose interval x lies."""
         return values[min(max(bisect(knots, x) - 1, 0), len(values) - 1)]
 
+    def system(self, rows: list[list[float]], right: list[float]) -> list[float]:
+        """Solve rows·x = right; NaN where the rows are parallel to rounding."""
+        matrix = np.array(rows)
+        # the volume of the rows over the product of their lengths (Hadamard): a slide's row has a unit of its own
+        lengths = float(np.sqrt((matrix * matrix).sum(axis=1)).prod())
+        if not abs(np.linalg.det(matrix)) > 1e-14 * lengths:
+            return [math.nan] * len(right)
+        return np.linalg.solve(matrix, right).tolist()  # type: ignore[no-any-return]
+
     join, angle = complex, staticmethod(cmath.phase)
     solve, transposed = staticmethod(solve_columns), staticmethod(solve_transposed)
 
@@ -318,7 +331,7 @@ class Many:
     """Arrays over poses; what is the same in all of them may be a Python number."""
 
     sqrt, angle = staticmethod(np.sqrt), staticmethod(np.angle)
-    solve, transposed = staticmethod(solve_columns), staticmethod(solve_transposed)
+    solve = staticmethod(solve_columns)
 
     def exp(self, angle: Number) -> Number:
         """e^{i·angle}."""
@@ -336,18 +349,6 @@ class Many:
         z.imag = im
         return z
 
-    def regular(self, inverse: Number, c1: Number, c2: Number) -> Number:
-        """1/(c1 × c2), or NaN."""
-        # the norms over the block are above the largest entry: in most blocks they say that no pose is near
-        bound = np.vdot(inverse, inverse).real * np.vdot(c1, c1).real * np.vdot(c2, c2).real
-        if bound < 1 / PARALLEL**2:
-            return inverse
-        return np.where(np.abs(inverse) * (np.abs(c1) * np.abs(c2)) < 1 / PARALLEL, inverse, np.nan)
-
-    def inverse(self, length: Number, least: float) -> Number:
-        """1/length, or NaN."""
-        return 1 / np.where(length > least, length, np.nan)
-
     def select(self, test: Number, positive: Number, otherwise: Number) -> Number:
         """One of two."""
         return np.where(test > 0, positive, otherwise)
@@ -363,10 +364,8 @@ class Folded:
     """A kind for two assemblies that meet in every pose: the root is zero, and its noise is left out."""
 
     def __init__(self, kind: Kind) -> None:
-        self.exp, self.join, self.regular = kind.exp, kind.join, kind.regular
-        self.angle, self.inverse = kind.angle, kind.inverse
-        self.select, self.among = kind.select, kind.among
-        self.solve, self.transposed = kind.solve, kind.transposed
+        self.exp, self.join, self.angle = kind.exp, kind.join, kind.angle
+        self.select, self.among, self.solve = kind.select, kind.among, kind.solve
 
     def sqrt(self, x: Number) -> Number:
         """Zero."""

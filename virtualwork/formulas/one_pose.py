@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from dalembert.dataclass import dataclass, field
-from virtualwork.formulas.lanes import OFTEN, Ready, Turning, ready
+from virtualwork.formulas.lanes import OFTEN
 from virtualwork.formulas.quantity import Quantity
+from virtualwork.formulas.tapes import Ready, Turning, ready
 
 
 @dataclass

@@ -1,8 +1,8 @@
-"""Poses: blocks of them, each solved as far as it is asked, and never twice.
+"""Poses: where an assembly stands at given inputs, and of one pose all derivatives, solved as far as asked, and never twice.
 
-Poses run in blocks small enough to stay in cache; a block keeps what it has solved. With one input, derivatives are
-taken once with respect to the input (the velocity coefficients K = dx/dq, L = d²x/dq², M = d³x/dq³), so that
-ẋ = K·q̇,  ẍ = K·q̈ + L·q̇²,  x⃛ = K·q⃛ + 3L·q̇·q̈ + M·q̇³.  With several inputs they are taken along the inputs' rates.
+With one input, derivatives are taken once with respect to the input (the velocity coefficients K = dx/dq, L = d²x/dq²,
+M = d³x/dq³), so that ẋ = K·q̇,  ẍ = K·q̈ + L·q̇²,  x⃛ = K·q⃛ + 3L·q̇·q̈ + M·q̇³.  With several inputs they are taken along
+the inputs' rates. Derivatives of many poses come from the tape (`lanes`).
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ class Poses:
         self._solved: list[tuple[Step, int]] = []
         self._done: set[tuple[int, int, int]] = set()
         self._blocks: list[State] | None = None
-        self._along: dict[int, list[Rates]] = {}
+        self._along: dict[int, Rates] = {}
 
     def _given(self, name: str, value: ArrayLike | None, own: list[float | None]) -> list[Number]:
         """One rate of the inputs, a scalar or (n,) array for each input."""
@@ -172,12 +172,14 @@ class Poses:
         def of(rate: Number) -> Number:
             return rate[which] if np.ndim(rate) else rate
 
-        return self.again(self.inputs[which], [[of(rate) for rate in rates] for rates in self.rates])
+        some = self.again(self.inputs[which], [[of(rate) for rate in rates] for rates in self.rates])
+        some.time = None if self.time is None else np.asarray(self.time)[which]
+        return some
 
     @cached_property
     def assembled(self) -> NDArray[np.bool_]:
         """(n,) bool: which poses can be assembled."""
-        self.solve([key for g in self.plan.groups for key in self.plan.writes(g)], 0)
+        self.solve([key for g in self.plan.groups for key in self.plan.writes(g)])
         whole = np.ones(self.n, dtype=bool)
         for rows, st in self.rows():
             for g in self.plan.groups:
@@ -196,7 +198,7 @@ class Poses:
         _, group = self.branch.merged
         if group is None:
             return np.where(self.assembled, 1.0, np.nan)
-        self.solve([key for s in self.plan.steps for key in self.plan.writes(s)], 0)
+        self.solve([key for s in self.plan.steps for key in self.plan.writes(s)])
         size = self.mechanism.size
         whole = np.empty(self.n)
         for rows, st in self.rows():
@@ -237,74 +239,75 @@ class Poses:
         for i, st in enumerate(self.states()):
             yield slice(i * BLOCK, min((i + 1) * BLOCK, self.n)), st
 
-    def solve(
-        self,
-        targets: Iterable[str],
-        order: int,
-        which: int = -1,
-        then: Callable[[int], None] | None = None,
-    ) -> list[Rates]:
-        """Work out the targets' derivatives up to an order; `which`: along the motion (−1), or for input j alone.
-
-        `then` is called with each block's number while the block is still in cache, and what it forms is forgotten.
-        """
+    def _steps(self, targets: Iterable[str]) -> tuple[Step, ...]:
+        """The steps that targets depend on."""
         wanted = tuple(targets)
         steps = self._known_steps.get(wanted)
         if steps is None:
             steps = self._known_steps[wanted] = self.plan.needed(wanted)
-        missing: list[tuple[int, list[Step]]] = []
-        for k in range(order + 1):
-            key = which if k else -2
-            new = [s for s in steps if (id(s), k, key) not in self._done]
-            if new:
-                missing.append((k, new))
-                self._done.update((id(s), k, key) for s in new)
-                self._solved += [(s, k) for s in new]
-        if not missing and then is None:
-            return self._along.get(which, [])
+        return steps
+
+    def _new(self, steps: Iterable[Step], k: int, which: int) -> list[Step]:
+        """The steps that are not yet carried on to an order."""
+        return [step for step in steps if (id(step), k, which) not in self._done]
+
+    def _note(self, steps: Iterable[Step], k: int, which: int) -> None:
+        for step in steps:
+            self._done.add((id(step), k, which))
+            self._solved.append((step, k))
+
+    def solve(self, targets: Iterable[str]) -> None:
+        """Work out the targets' positions."""
+        new = self._new(self._steps(targets), 0, -2)
+        if not new:
+            return
         states = self.states()
-        if order and which not in self._along:
-            self._along[which] = [self._rates_of(st, i, which) for i, st in enumerate(states)]
-        many = len(states) > 1
         with np.errstate(all="ignore"):
             for i, st in enumerate(states):
                 try:
-                    self._advance(i, which, missing)
+                    run(new, st, self._close, self._plain)
                 except (ZeroDivisionError, OverflowError):
                     # one pose on Python numbers at a singular place: the same again on arrays
                     states[i] = State([np.array([q]) for q in st.inputs], many=True)
-                    for w in self._along:
-                        self._along[w] = [self._rates_of(s, b, w) for b, s in enumerate(states)]
-                    for step, k in self._solved:
-                        for w in list(self._along) if k else [-2]:
-                            if (id(step), k, w) in self._done:
-                                self._advance(i, w, [(k, [step])])
-                if then is not None:
-                    then(i)
-                if many and order:
-                    self._along[which][i].slim()
-        return self._along.get(which, [])
+                    run(
+                        [*(step for step, k in self._solved if not k), *new],
+                        states[i],
+                        self._close,
+                        self._plain,
+                    )
+        self._note(new, 0, -2)
 
-    @property
-    def along_input(self) -> list[Rates]:
-        """The derivatives over the one input, block by block, as far as they are solved."""
-        return self._along[-1]
+    def advance(self, targets: Iterable[str], order: int, which: int = -1) -> None:
+        """Work out the derivatives of one pose: along the motion (−1), or over input `which` alone.
 
-    def _advance(self, i: int, which: int, missing: list[tuple[int, list[Step]]]) -> None:
-        for k, steps in missing:
-            if k == 0:
-                run(steps, self.states()[i], self._close, self._plain)
+        Raises
+        ------
+        ZeroDivisionError
+            At a singular pose, whose derivatives come from the tape.
+        """
+        steps = self._steps(targets)
+        self.solve(targets)
+        if self.states()[0].many:
+            raise ZeroDivisionError
+        with np.errstate(all="ignore"):
+            for k in range(1, order + 1):
+                new = self._new(steps, k, which)
+                if new:
+                    self.along(which).advance(new, k)
+                    self._note(new, k, which)
+
+    def along(self, which: int = -1) -> Rates:
+        """The derivatives of one pose along the motion, or over one input, as far as they are worked out."""
+        if which not in self._along:
+            (st,), k = self.states(), self.inputs.shape[1]
+            if k == 1:
+                rates = Rates(self.plan, st, [[1.0]], self.branch.passage)
+            elif which >= 0:
+                rates = Rates(self.plan, st, [[1.0] if j == which else [] for j in range(k)])
             else:
-                self._along[which][i].advance(steps, k)
-
-    def _rates_of(self, st: State, block: int, which: int) -> Rates:
-        k = self.inputs.shape[1]
-        if k == 1:
-            return Rates(self.plan, st, [[1.0]], self.branch.passage)
-        if which >= 0:
-            return Rates(self.plan, st, [[1.0] if j == which else [] for j in range(k)])
-        rows = slice(block * BLOCK, (block + 1) * BLOCK)
-        return Rates(self.plan, st, [[part(rate[j], rows, st.many) for rate in self.rates] for j in range(k)])
+                rates = Rates(self.plan, st, [[alone(rate[j]) for rate in self.rates] for j in range(k)])
+            self._along[which] = rates
+        return self._along[which]
 
     # --- over all poses -----------------------------------------------------------------------------------------
     def join(self, parts: list[Number], kind: type) -> Any:
@@ -317,22 +320,9 @@ class Poses:
             [np.broadcast_to(np.asarray(p, dtype=kind), size) for p, size in zip(parts, sizes, strict=True)]
         )
 
-    def over(self, form: Callable[[int, State], Number], kind: type = float) -> Any:
-        """What a form gives of each block, as one array (n,); None is zero."""
-        values = (form(i, st) for i, st in enumerate(self.states()))
-        return self.join([0.0 if v is None else v for v in values], kind)
-
-    def in_time(self, order: int, get: Callable[[int, int], Number], kind: type = float) -> Any:
-        """Chain rule from derivatives with respect to the one input to derivatives in time."""
-        if self.inputs.shape[1] > 1:
-            return self.over(lambda i, st: get(i, order), kind)
-        rates = [rate[0] for rate in self.rates]
-
-        def form(i: int, st: State) -> Number:
-            rows = slice(i * BLOCK, (i + 1) * BLOCK)
-            return chain_rule(order, partial(get, i), [part(x, rows, st.many) for x in rates])
-
-        return self.over(form, kind)
+    def over(self, form: Callable[[State], Number], kind: type = float) -> Any:
+        """What a form gives of each block, as one array (n,)."""
+        return self.join([form(st) for st in self.states()], kind)
 
     # --- quantities -------------------------------------------------------------------------------------------
     def rate(self, j: int, order: int) -> Reals:
@@ -340,36 +330,61 @@ class Poses:
         return np.broadcast_to(np.asarray(self.rates[order - 1][j], dtype=float), (self.n,))
 
     def values(self, quantities: Sequence[Quantity]) -> list[Any]:
-        """Quantities, (n,) each."""
-        return self.by_blocks(quantities)
+        """Quantities (n,) each."""
+        raise NotImplementedError
 
-    def taped(self, quantities: Sequence[Quantity]) -> list[Any] | None:
-        """Quantities from the tape; None where there is none."""
-        return None
+    def taped(self, quantities: Sequence[Quantity]) -> list[Any]:
+        """Quantities from the tape, of one pose too."""
+        raise NotImplementedError
 
-    def by_blocks(self, quantities: Sequence[Quantity]) -> list[Any]:
-        """Quantities of motion by the formulas over blocks, (n,) each; what they depend on is solved in one pass."""
-        wanted: dict[tuple[int, int], dict[str, None]] = {}
-        kinematic = []
-        for quantity in quantities:
-            if not isinstance(quantity, Kinematic):
-                raise KeyError(quantity)
-            which = quantity.input if isinstance(quantity, Partial) and self.inputs.shape[1] > 1 else -1
-            kinematic.append((quantity, (quantity.order, which)))
-            wanted.setdefault((quantity.order, which), {}).update(dict.fromkeys(quantity.targets(self)))
-        rates = {of: self.solve(targets, *of) for of, targets in wanted.items()}
-        return [self._formed(quantity, rates[of]) for quantity, of in kinematic]
+    @property
+    def recording(self) -> Any:
+        """The formulas, written down."""
+        raise NotImplementedError
 
-    def _formed(self, of: Kinematic, rates: list[Rates]) -> Any:
-        number = complex if of.is_vector else float
-        if of.order == 0:
-            return self.over(lambda _, st: of.place(self, st), number)
-        if not rates:
-            # nothing moves it
-            return np.zeros(self.n, number)
-        if isinstance(of, Partial):
-            return self.over(lambda i, _: of.rate(self, rates[i], of.order), number)
-        return self.in_time(of.order, lambda i, k: of.rate(self, rates[i], k), number)
+    @property
+    def friction_iterations(self) -> int:
+        """How often friction and joint forces were exchanged until they agreed."""
+        raise NotImplementedError
+
+    @property
+    def locked(self) -> NDArray[np.bool_]:
+        """(n,): poses in which friction locks the mechanism."""
+        raise NotImplementedError
+
+    @property
+    def statics(self) -> Any:
+        """All equilibrium equations at once, where the constraints are redundant."""
+        raise NotImplementedError
+
+    def formed(
+        self, forms: Sequence[Callable[[Any], Number]], kind: type, targets: Iterable[str] = ()
+    ) -> list[Any]:
+        """What forms make of the pose as the loads see it, from a tape, (n,) each."""
+        raise NotImplementedError
+
+    def by_floats(self, quantities: Sequence[Quantity]) -> list[Any]:
+        """Quantities of the motion of one pose, by the formulas as they stand, (1,) each."""
+        result: list[Any] = []
+        for of in quantities:
+            if not isinstance(of, Kinematic):
+                raise KeyError(of)
+            targets = tuple(of.targets(self))
+            self.solve(targets)
+            value = self._derivative(of, targets) if of.order else of.place(self, self.states()[0])
+            result.append(
+                np.array(0.0 if value is None else value, complex if of.is_vector else float).reshape(1)
+            )
+        return result
+
+    def _derivative(self, of: Kinematic, targets: tuple[str, ...]) -> Number:
+        several = self.inputs.shape[1] > 1
+        which = of.input if isinstance(of, Partial) and several else -1
+        self.advance(targets, of.order, which)
+        rates = self.along(which)
+        if several or isinstance(of, Partial):
+            return of.rate(self, rates, of.order)
+        return chain_rule(of.order, partial(of.rate, self, rates), [alone(rate[0]) for rate in self.rates])
 
     def angle(self, body: str, order: int = 0) -> Reals:
         """A link's angle, (n,) rad, or its ω, α or angular jerk."""
@@ -379,18 +394,7 @@ class Poses:
         """Position (order 0) or a time derivative of any point of a body, x + iy, (n,)."""
         return self.values((Point(body, z, node, order),))[0]  # type: ignore[no-any-return]
 
-    def columns(self, group: Group) -> list[list[Complexes]]:
-        """The Jacobian of one Assur group: for each of its loops, the column of each of its unknowns, (n,) complex."""
-        rates = self.solve([*self.plan.writes(group), *self.plan.reads(group)], 1)
-        blocks = [r.columns(group) for r in rates]
-        return [
-            [self.join([b[i][j] for b in blocks], complex) for j in range(len(blocks[0][i]))]
-            for i in range(len(group.closures))
-        ]
 
-
-def part(rate: Number, rows: slice, many: bool) -> Number:
-    """A rate of an input, a number or (n,), over a block of poses; None where it is zero throughout."""
-    if isinstance(rate, float):
-        return rate or None
-    return rate[rows] if many else float(rate[0])
+def alone(rate: Number) -> Number:
+    """A rate of an input of one pose, a number or (1,); None where it is zero."""
+    return (rate if isinstance(rate, float) else float(rate[0])) or None

@@ -104,10 +104,6 @@ class Rates:
             v = _plus(v, self._term(t, k))
         return v
 
-    def slim(self) -> None:
-        """Forget what is cheaper to form again than to keep over a long sweep."""
-        self._turn, self._normal, self._columns, self._inverse = {}, {}, {}, {}
-
     def advance(self, steps: Iterable[Step], k: int) -> None:
         """Carry steps on to derivatives of order k; the lower orders are known."""
         for step in steps:
@@ -204,20 +200,13 @@ class Rates:
         right = self.right_side(group, k)
         cols = self.columns(group)
         if group.name in self.st.folded:
-            self.write(group, k, solve_determined(cols, right))
-            return
-        if group.kind != "Newton":
-            (c1, c2), w = cols[0], right[0]
-            inverse = self.inverse(group)
-            x: list[Number] = [cross(c2, w) * inverse, cross(w, c1) * inverse]
+            x = solve_determined(cols, right)
+        elif group.kind != "Newton":
+            x = crossed(cols[0], right[0], self.inverse(group))
         else:
             x = self.st.kind.solve(cols, right)
-            if self.passage is not None:
-                bad = singular_poses(cols, np.size(self.st.inputs[0]))
-                if bad.any():
-                    x = self.passage.bridge_rates(group, self.st.inputs[0], k, x, bad)
-        if self.passage is not None and self.passage.changes:
-            x = self.passage.mend_rates(group, self.st.inputs[0], k, x)
+        if group.name not in self.st.folded:
+            x = passed(self.passage, group, self.st.inputs[0], cols, k, x)
         self.write(group, k, x)
 
     def write(self, group: Group, k: int, x: list[Number]) -> None:
@@ -234,6 +223,25 @@ class Rates:
             _put(self.slide, g, k, value)
         for tie in group.ties:
             self._write_tied(tie, k)
+
+
+def crossed(columns: Sequence[Number], right: Number, inverse: Number) -> list[Number]:
+    """The two unknowns' derivatives of a loop with a closed form: x₁·c₁ + x₂·c₂ + w = 0, with 1/(c₁ × c₂)."""
+    c1, c2 = columns
+    return [cross(c2, right) * inverse, cross(right, c1) * inverse]
+
+
+def passed(
+    passage: Passage | None, group: Group, q: Number, cols: list[list[Number]], k: int, x: list[Number]
+) -> list[Number]:
+    """The k-th derivatives of a group's unknowns, where its Jacobian vanishes though the branch goes on as the passage has them."""
+    if passage is None:
+        return x
+    if group.kind == "Newton":
+        singular = singular_poses(cols, np.size(q))
+        if singular.any():
+            x = passage.bridge_rates(group, q, k, x, singular)
+    return passage.mend_rates(group, q, k, x) if passage.changes else x
 
 
 def _put(store: dict[Any, list[Number]], key: Any, k: int, value: Number) -> None:

@@ -1,46 +1,25 @@
-"""Joint forces by Newton and Euler over the poses of a motion, each formed when it is asked for.
+"""Joint forces by Newton and Euler, each formed when it is asked for.
 
-How they follow from each other is worked out once for a mechanism (`load_paths`); here the combinations become arrays.
-
-Coulomb friction in pins and guides are loads that depend on the reactions they change, found by iteration (`settle`). A
-pin of radius r with the reaction R resists its relative turning with μ r |R|; a guide resists sliding with μ |N|, N normal
-to it (Norton, Design of Machinery, §11.9 names the model; the iteration starts without friction). Where nothing slides
-there is no friction: its value at rest is not determined, only bounded.
+How they follow from each other is worked out once for a mechanism (`load_paths`); here the combinations become numbers of a pose.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable
 
-import numpy as np
-from numpy.typing import NDArray
-
-from dalembert.arithmetic.guard import guarded
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
-from virtualwork.formulas.effort import effort
 from virtualwork.formulas.load_paths import LoadPaths
-from virtualwork.formulas.locking import balanced
-from virtualwork.formulas.numbers import Number, dot, leave_out, minus, plus, times
-from virtualwork.formulas.positions import BLOCK
-from virtualwork.formulas.scene import Scene
+from virtualwork.formulas.numbers import Number, dot, minus, plus, times
 from virtualwork.plan.joint_forces import Side
 from virtualwork.plan.steps import Joint
 
-# iterations of friction; each gains a factor of some μ r / l
-LIMIT = 200
-# relative change at which a pose has converged
-CLOSE = 1e-14
-
 
 class JointForces:
-    """The joint forces over one block of poses."""
+    """The joint forces of a pose."""
 
-    def __init__(self, paths: LoadPaths, formed: set[str]) -> None:
+    def __init__(self, paths: LoadPaths) -> None:
         self.paths = paths
-        # the names of what has been formed, for `dalembert inspect` and the tests
-        self.formed = formed
         self.order = paths.order
         self.plan, self.mechanism = paths.plan, paths.mechanism
         self.joints, self.by_key = self.order.joints, self.order.by_key
@@ -61,7 +40,7 @@ class JointForces:
     def on_side(self, block: Block, side: Side) -> Number:
         """The force of a joint on a body, complex; None where it is zero throughout."""
         joint, body = side
-        self.formed.add(f"{joint} on {body}")
+        block.names.add(f"{joint} on {body}")
         return self.paths.value(block, self.paths.side(side))
 
     def place(self, block: Block, side: Side) -> Number:
@@ -72,7 +51,7 @@ class JointForces:
         return (z if guide is None else z + direction * block.st.slide[guide]) * block.st.turn[body]
 
     def joint_force(self, block: Block, joint: Joint, body: str) -> Number:
-        """The force of a joint on a body over a block, without the force of an input that drives it."""
+        """The force of a joint on a body, without the force of an input that drives it."""
         value = self.on_side(block, (joint.key, body))
         guide = joint.guide
         if guide is not None and value is not None and self.is_pushed(guide):
@@ -157,7 +136,7 @@ class JointForces:
         return d if on == GROUND else d * block.st.turn[on]
 
     def guide_moment(self, block: Block, guide: int, body: str) -> Number:
-        """The moment a guide puts on one of its bodies about its point, over a block."""
+        """The moment a guide puts on one of its bodies about its point,."""
         g = self.mechanism.guides[guide]
         if not g.is_slider:
             return None
@@ -190,139 +169,3 @@ class JointForces:
         for mesh in self.order.racks.get(guide, ()):
             value = minus(value, self.tooth(block, mesh))
         return value
-
-
-@guarded
-class Reactions(JointForces):
-    """The joint forces over all poses of a scene, each formed on the first request."""
-
-    def __init__(self, scene: Scene) -> None:
-        super().__init__(scene.paths, scene.formed)
-        self.scene, self.lock = scene, scene.lock
-
-    def blocks(self) -> list[Block]:
-        """The scene's blocks, with what all joints' places depend on."""
-        self._drive()
-        return self.scene.blocks(self.scene.case.places)
-
-    def _drive(self) -> None:
-        """Form the efforts of carried motors over all poses, before the blocks are solved one by one."""
-        if self.scene.case.carried and self.scene.setting.drive is None:
-            self.scene.setting.drive = effort(self.scene)
-
-    def over(self, *forms: Callable[[Block], Number], kind: type = float) -> list[Any]:
-        """Quantities over all blocks, formed block by block together; NaN where a pose is not assembled."""
-        self._drive()
-        n = self.scene.poses.n
-        result: list[Any] = [np.empty(n, dtype=kind) for _ in forms]
-
-        def work(block: Block) -> None:
-            for out, form in zip(result, forms, strict=True):
-                value = form(block)
-                out[block.rows] = 0.0 if value is None else value
-            if n > BLOCK:
-                # over a long sweep what the quantities were made of is not kept
-                block.forget(lasting=True)
-
-        self.scene.each(self.scene.case.places, work)
-        if self.scene.lost is not None:
-            for out in result:
-                leave_out(out, self.scene.lost)
-        return result
-
-
-def settle(scene: Scene) -> tuple[int, NDArray[np.bool_]]:
-    """Iterate friction and reactions until neither changes; where they do not settle so, follow them from no friction on.
-
-    Returns
-    -------
-    iterations : int
-    converged : array (n,) of bool
-        Where False the joints lock: no motion at this speed and coefficient is in equilibrium.
-    """
-    n = scene.poses.n
-    converged = np.zeros(n, dtype=bool)
-    count = 0
-    reactions = Reactions(scene)
-    while count < LIMIT:
-        count += 1
-        converged[:] = True
-        _anew(reactions)
-        for block in reactions.blocks():
-            change: Number = 0.0
-            scale: Number = 0.0
-            fresh: dict[int, Number] = {}
-            for number, force, along, arm in _rubbing(reactions, block):
-                value = times(-arm * abs(force), along)
-                fresh[number] = value
-                before = block.friction.get(number, 0.0)
-                change = np.maximum(change, abs(value - before) / np.where(value == 0, 1.0, abs(value)))
-                scale = np.maximum(scale, abs(value))
-            block.friction.clear()
-            block.friction.update(fresh)
-            converged[block.rows] = ~(change > CLOSE * 8) & np.isfinite(scale)
-        if (converged | ~scene.poses.assembled).all():
-            break
-    for block in reactions.blocks():
-        rows = np.flatnonzero(~converged[block.rows] & scene.poses.assembled[block.rows])
-        if len(rows):
-            converged[block.rows] |= _follow(reactions, block, rows, len(converged[block.rows]))
-    _anew(reactions)
-    scene.formed.clear()
-    return count, converged
-
-
-def _rubbing(reactions: Reactions, block: Block) -> Iterator[tuple[int, Number, Number, Number]]:
-    """Of each contact that slides over a block: its number, the force that it bears, along what it rubs, and its friction over the force with the sign of its rate.
-
-    A pin's force is complex and it rubs as a torque, 1; a guide's is the normal one, and it rubs along its rail.
-    """
-    for number, (joint, body, other, coefficient, radius) in enumerate(reactions.scene.case.contacts):
-        force = reactions.on_side(block, (joint.key, body))
-        force = plus(force, reactions.borne(block, joint, body))
-        if force is None:
-            continue
-        if joint.guide is None:
-            along, arm = 1.0, coefficient * radius
-            rate = minus(block.omega(body), block.omega(other))
-        else:
-            along, arm = reactions.rail(block, joint.guide), coefficient
-            force, rate = dot(force, 1j * along), block.slide_rate(joint.guide)
-        if rate is not None:
-            yield number, force, along, arm * np.sign(rate)
-
-
-def _follow(reactions: Reactions, block: Block, rows: NDArray[np.intp], n: int) -> NDArray[np.bool_]:
-    """Put the friction of some of a block's n poses that did not settle; which of all could be found, (n,)."""
-    contacts = [number for number, *_ in _rubbing(reactions, block)]
-    alongs = {number: along for number, _, along, _ in _rubbing(reactions, block)}
-    arms = np.array([np.broadcast_to(arm, n) for *_, arm in _rubbing(reactions, block)])
-    before = dict(block.friction)
-
-    def forces(friction: dict[int, Number]) -> Any:
-        block.friction.clear()
-        block.friction.update(friction)
-        _anew(reactions)
-        every = {number: force for number, force, *_ in _rubbing(reactions, block)}
-        return np.array([np.broadcast_to(every[number], n) for number in contacts], dtype=complex)
-
-    p = forces({})
-    q = np.array([forces({number: alongs[number] * np.ones(n)}) - p for number in contacts])
-    solved = np.zeros(n, dtype=bool)
-    friction = np.zeros((len(contacts), n))
-    for i in rows.tolist():
-        phi = balanced(arms[:, i], p[:, i], q[:, :, i].T)
-        if phi is not None:
-            friction[:, i], solved[i] = phi, True
-    for k, number in enumerate(contacts):
-        before[number] = np.where(solved, friction[k] * alongs[number], before.get(number, 0.0))
-    block.friction.clear()
-    block.friction.update(before)
-    return solved
-
-
-def _anew(reactions: Reactions) -> None:
-    """Forget what was formed with the friction before."""
-    reactions.scene.setting.drive = None
-    for block in reactions.scene.blocks(reactions.scene.case.places):
-        block.forget()

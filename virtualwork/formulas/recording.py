@@ -35,10 +35,8 @@ from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan
 
 if TYPE_CHECKING:
-    from virtualwork.formulas.block import Block
-    from virtualwork.formulas.load_paths import LoadPaths
     from virtualwork.formulas.loads import Tabled
-    from virtualwork.formulas.reactions import JointForces
+    from virtualwork.formulas.pose_forces import PoseForces
 
 # sin² of a transmission angle below which a force may have no digit left
 NEAR = 1e-18
@@ -94,13 +92,13 @@ class Recording:
             for name, there in zip(NAMES[1:], moves, strict=True)
         ]
         self.cases = {g.name: Case(g, bare) for g in plan.groups if g.kind != "Newton"}
-        self.by = [Rates(plan, self.st, [[1.0] if i == j else [] for i in range(k)]) for j in range(k)]
+        self.by = [self.rates_of(j, [[1.0] if i == j else [] for i in range(k)]) for j in range(k)]
         given = [[rate[j] for rate in self.rates] for j in range(k)]
         # in time, with several inputs
-        self.together = Rates(plan, self.st, given) if k > 1 else None
+        self.together = self.rates_of(k, given) if k > 1 else None
         self._done: set[tuple[int, int, int]] = set()
         self._values: dict[Quantity, Number] = {}
-        self._forces: tuple[LoadPaths, JointForces, Block] | None = None
+        self._forces: PoseForces | None = None
         # how far the loops of groups without a closed form are from closing as they enter, m
         self.open_loops: dict[str, Number] = {}
 
@@ -108,6 +106,10 @@ class Recording:
     def lock(self) -> Lock:
         """That of the recorder, into which motions of one assembly, and variants, write."""
         return own_lock(self.recorder)
+
+    def rates_of(self, way: int, given: list[list[Number]]) -> Rates:
+        """The derivatives over an input, or in time with several inputs (`way` is their count), before any is written down."""
+        return Rates(self.plan, self.st, given)
 
     # --- solving ------------------------------------------------------------------------------------------------
     def enters(self, group: Group) -> bool:
@@ -176,7 +178,7 @@ class Recording:
 
     # --- forces ---------------------------------------------------------------------------------------------------
     @property
-    def forces(self) -> tuple[LoadPaths, JointForces, Block]:
+    def forces(self) -> PoseForces:
         """The loads over the recorded pose, with everything solved that they depend on."""
         if self._forces is None:
             # a dozen files: a motion without forces does not load them
@@ -185,67 +187,10 @@ class Recording:
             self._forces = forces_of(self)
         return self._forces
 
-    def placed_forces(self) -> tuple[LoadPaths, JointForces, Block]:
-        """The forces, with everything solved that the places of all joints depend on."""
-        case = self.forces[0].case
-        self.solve(*case.targets(case.places))
-        return self.forces
-
     @cached_property
     def tables(self) -> list[Tabled]:
         """The loads that tables give, in the order in which their forces enter."""
-        return self.forces[0].case.tables
-
-    @cached_property
-    def efforts(self) -> list[Number]:
-        """The effort at each input by virtual work."""
-        from virtualwork.formulas.recorded_forces import efforts
-
-        return efforts(self)
-
-    def generalized(self, j: int) -> Number:
-        """The effort at input j as if every motor sat on the body that its angle is measured from."""
-        from virtualwork.formulas.recorded_forces import generalized
-
-        return generalized(self, j)
-
-    def newton_euler(self, j: int) -> Number:
-        """The effort at input j by Newton and Euler."""
-        _, of, block = self.placed_forces()
-        return of.effort(block, j)
-
-    def joint_force(self, joint: str, body: str) -> Number:
-        """The force of a joint, by its key, on a body."""
-        _, of, block = self.placed_forces()
-        return of.joint_force(block, of.by_key[joint], body)
-
-    def joint_moment(self, joint: str, body: str) -> Number:
-        """The moment of a joint, by its key, on a body; None where it has none."""
-        _, of, block = self.placed_forces()
-        guide = of.by_key[joint].guide
-        return None if guide is None else of.guide_moment(block, guide, body)
-
-    def contact(self, cam: int) -> Number:
-        """How hard a cam, from 0, presses on its follower."""
-        _, of, block = self.placed_forces()
-        self.solve(of.paths.touches.every[cam].targets, 0)
-        return of.contact(block, cam)
-
-    @cached_property
-    def shaking(self) -> tuple[Number, Number]:
-        """The shaking force and moment."""
-        from virtualwork.formulas.resultants import resultant, shaking_loads
-
-        paths, _, block = self.forces
-        return resultant(shaking_loads(paths.case.loads), block)
-
-    def applied(self, link: str) -> tuple[Number, Number]:
-        """What acts on a link but its weight and inertia, reduced to its centre of mass."""
-        from virtualwork.formulas.resultants import applied_loads, reduced
-
-        self.solve([f"angle:{link}"], 0)
-        paths, _, block = self.forces
-        return reduced(applied_loads(paths.case.loads, link), block, self.mechanism.rigid[link].center)
+        return self.forces.case.tables
 
     # --- quantities -----------------------------------------------------------------------------------------------
     def value(self, quantity: Quantity) -> Number:
@@ -262,7 +207,7 @@ class Recording:
             return True
         if self.mechanism.friction:
             return False
-        return not (any(each.is_joint_force for each in forces) and self.forces[0].order.redundant)
+        return not (any(each.is_joint_force for each in forces) and self.forces.redundant)
 
     def tape(self, quantities: Iterable[Quantity], more: Mapping[str, Number] | None = None) -> Tape:
         """The tape of quantities: outputs are called by their `names`; and of `more` numbers by name."""
@@ -283,7 +228,7 @@ class Recording:
         """What is written down that much depends on: directions, slides, and of forces what blocks keep too."""
         yield from (*self.st.turn.values(), *self.st.slide.values())
         if self._forces:
-            yield from (value[1] for of, value in self._forces[2].kept.items() if of.lasts)
+            yield from (value[1] for of, value in self._forces.block.kept.items() if of.lasts)
 
     @cached_property
     def loops(self) -> Group | None:

@@ -1,12 +1,12 @@
-"""The loads of a mechanism over poses: blocks of them, solved as far as the loads ask."""
+"""The loads of a mechanism at its poses: what acts, and the forces as far as they are asked for."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dalembert.arithmetic.guard import guarded
 from virtualwork.describe.parts import Rigid
@@ -14,14 +14,15 @@ from virtualwork.formulas.block import Block, Setting
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.loads import FrictionLoad, Load
+from virtualwork.formulas.numbers import ONE, Number, leave_out
+from virtualwork.formulas.pose_forces import PoseForces
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.positions import BLOCK
 from virtualwork.formulas.rates import Rates
 
 
 @guarded
 class Scene:
-    """The loads of a mechanism over its poses.
+    """The loads of a mechanism at its poses.
 
     Attributes
     ----------
@@ -30,21 +31,18 @@ class Scene:
         What acts, the same for all motions of an assembly.
     moves : bool
         Whether anything moves at all.
-    formed : set of str
-        The names of the joint forces formed so far.
     """
 
     def __init__(self, poses: Poses, *, at_rest: bool = False) -> None:
         self.poses, self.lock = poses, poses.lock
         self.mechanism, self.plan = poses.mechanism, poses.plan
         self.setting = Setting(poses, at_rest)
-        self.moves, self.formed = self.setting.moves, self.setting.formed
+        self.moves = self.setting.moves
         prepared = poses.branch.prepared
         with self.lock:
             if self.moves not in prepared:
                 prepared[self.moves] = LoadCase(self.mechanism, self.plan, self.moves)
         self.case: LoadCase = prepared[self.moves]
-        self._blocks: dict[tuple[str, ...], list[Block]] = {}
 
     @cached_property
     def paths(self) -> LoadPaths:
@@ -70,48 +68,68 @@ class Scene:
         """Mass properties of every link."""
         return self.mechanism.rigid
 
-    # --- solving ----------------------------------------------------------------------------------------------
-    def blocks(self, keys: Iterable[str] = ()) -> list[Block]:
-        """The blocks of poses, with everything solved that the loads and `keys` depend on."""
-        targets, order = self.case.targets(keys)
-        if targets in self._blocks:
-            return self._blocks[targets]
-        k = len(self.mechanism.inputs)
-        if k == 1:
-            return self._made(targets, [self.poses.solve(targets, order)], None)
-        by = [self.poses.solve(targets, 1, j) for j in range(k)]
-        return self._made(targets, by, self.poses.solve(targets, order) if self.moves else None)
-
-    def _made(
-        self, targets: tuple[str, ...], by: list[list[Rates]], along: list[Rates] | None
-    ) -> list[Block]:
-        result = [
-            Block(self.setting, rows, st, None if along is None else along[i], [rates[i] for rates in by])
-            for i, (rows, st) in enumerate(self.poses.rows())
-        ]
-        for old in self._blocks.values():
-            for block, before in zip(result, old, strict=True):
-                block.kept, block.friction = before.kept, before.friction
-        self._blocks = {targets: result}
-        return result
-
-    def each(self, keys: Iterable[str], form: Callable[[Block], None]) -> None:
-        """Form something over every block; of a single input while the block is still in cache from its solution."""
-        targets, order = self.case.targets(keys)
-        if len(self.mechanism.inputs) > 1 or targets in self._blocks or self.poses.n <= BLOCK:
-            for block in self.blocks(keys):
-                form(block)
-            return
-
-        def then(i: int) -> None:
-            if targets not in self._blocks:
-                self._made(targets, [self.poses.along_input], None)
-            form(self._blocks[targets][i])
-
-        self.poses.solve(targets, order, then=then)
+    @property
+    def on_tape(self) -> bool:
+        """Whether forces come from the tape: of many poses, and where friction is to be found."""
+        return self.poses.many or bool(self.case.contacts)
 
     @cached_property
-    def lost(self) -> NDArray[np.bool_] | None:
-        """(n,): the poses that are not assembled; None where all are."""
-        there = self.poses.assembled
-        return None if there.all() else ~there
+    def forces(self) -> PoseForces:
+        """The forces of the one pose, by the formulas as they stand.
+
+        Raises
+        ------
+        ZeroDivisionError
+            At a singular pose, whose forces come from the tape.
+        """
+        k = len(self.mechanism.inputs)
+        by = [self.poses.along(j if k > 1 else -1) for j in range(k)]
+        block = Block(self.setting, by[0].st, self.poses.along() if k > 1 and self.moves else None, by)
+        return PoseForces(self.paths, block, self._solve, ONE.system, _outside)
+
+    @property
+    def block(self) -> Block:
+        """The pose as the loads see it: of floats, or written down."""
+        block: Block = (self.poses.recording.forces if self.on_tape else self.forces).block
+        return block
+
+    def along(self, targets: Iterable[str]) -> Rates | None:
+        """The derivatives of one pose to the second order along its rates; None at a singular pose."""
+        try:
+            self.poses.advance(tuple(targets), 2)
+        except (ZeroDivisionError, OverflowError):
+            return None
+        return self.poses.along()
+
+    def _solve(self, targets: Iterable[str], order: int) -> None:
+        k, wanted = len(self.mechanism.inputs), tuple(targets)
+        for j in range(k) if k > 1 else ():
+            self.poses.advance(wanted, 1, j)
+        if k == 1 or self.moves:
+            self.poses.advance(wanted, order)
+
+    def over(
+        self, forms: Sequence[Callable[[Block], Number]], kind: type, targets: Iterable[str] = ()
+    ) -> list[Any]:
+        """What forms make of the pose as the loads see it, (n,) each; NaN where a pose is not assembled.
+
+        `targets`: what they depend on beyond the loads and the places of all joints.
+        """
+        wanted = tuple(targets)
+        if self.on_tape:
+            return self.poses.formed(forms, kind, wanted)
+        try:
+            self.forces.solve_places()
+            self._solve(wanted, 1)
+            values = [form(self.forces.block) for form in forms]
+        except (ZeroDivisionError, OverflowError):
+            return self.poses.formed(forms, kind, wanted)
+        result: list[Any] = [np.array([0.0 if value is None else value], kind) for value in values]
+        if not self.poses.assembled.all():
+            for value in result:
+                leave_out(value, ~self.poses.assembled)
+        return result
+
+
+def _outside(name: str) -> Number:
+    raise LookupError(name)

@@ -8,19 +8,19 @@ least norm.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.guard import guarded
+from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.numbers import Number, Reals, cross, imaginary_part, real_part
-from virtualwork.formulas.reactions import JointForces, Reactions
+from virtualwork.formulas.reactions import JointForces
 from virtualwork.plan.steps import Joint
 
 # ("fx" or "fy", joint, body), ("normal", joint, ""), ("moment", joint, ""), ("gear", number, ""), ...
@@ -144,32 +144,28 @@ class Statics:
     Attributes
     ----------
     unknowns : list of columns
-    value : array (n, unknowns), NaN where statics does not determine it
-    null : array (n, unknowns, unknowns)
-        Rows that span the states of self-stress; zero rows else.
+    system : arrays (n, equations, unknowns), (n, equations)
+        A and b; moments and torques are divided by the size.
     """
 
-    def __init__(self, reactions: Reactions) -> None:
-        self.reactions, self.lock = reactions, reactions.lock
-        self.mechanism = reactions.scene.mechanism
-        self.n = reactions.scene.poses.n
-        self.unknowns = unknowns(reactions)
+    def __init__(
+        self, joints: JointForces, entries: Mapping[tuple[int, int | None], Any], n: int, lock: Lock
+    ) -> None:
+        self.joints, self.n, self.lock = joints, n, lock
+        self.mechanism = joints.mechanism
+        self.unknowns = unknowns(joints)
+        a, b = np.zeros((n, self.rows, len(self.unknowns))), np.zeros((n, self.rows))
+        for (row, column), value in entries.items():
+            if column is None:
+                b[:, row] = value
+            else:
+                a[:, row, column] = value
+        self.system: tuple[Reals, Reals] = a, b
 
     @cached_property
     def rows(self) -> int:
         """How many equations: three for each link, two for each pin that is not on the ground."""
-        return 3 * len(self.mechanism.links) + 2 * len(_free_pins(self.reactions))
-
-    def system(self) -> tuple[Reals, Reals]:
-        """A (n, equations, unknowns) and b (n, equations); moments and torques are divided by the size."""
-        a, b = np.zeros((self.n, self.rows, len(self.unknowns))), np.zeros((self.n, self.rows))
-        for block in self.reactions.blocks():
-            for row, column, value in equations(self.reactions, block):
-                if column is None:
-                    b[block.rows, row] += value
-                else:
-                    a[block.rows, row, column] += value
-        return a, b
+        return 3 * len(self.mechanism.links) + 2 * len(_free_pins(self.joints))
 
     @cached_property
     def solved(self) -> tuple[Reals, Reals]:
@@ -182,7 +178,7 @@ class Statics:
     @cached_property
     def least(self) -> tuple[Reals, Reals, NDArray[np.bool_]]:
         """Of all solutions the least (n, u), the null vectors (n, u, u), and where there is none after all, (n,)."""
-        a, b = self.system()
+        a, b = self.system
         u = len(self.unknowns)
         good: Any = np.isfinite(a).all(axis=(1, 2)) & np.isfinite(b).all(axis=1)
         value, null = np.full((self.n, u), np.nan), np.zeros((self.n, u, u))
@@ -204,46 +200,6 @@ class Statics:
         value[good], null[good] = x, free
         return value, null, impossible
 
-    def get(self, unknown: Any) -> Reals:
-        """One unknown over the poses; torques in N·m."""
-        value = self.solved[0][:, self.unknowns.index(unknown)]
-        return value * self.mechanism.size if unknown[0] in ("moment", "gear", "torque") else value
-
-    def joint_force(self, joint: Joint, body: str) -> NDArray[np.complex128]:
-        """The force of a joint on a body, (n,) complex."""
-        r = self.reactions
-        if joint.guide is None:
-            if body == GROUND:
-                others = [self.joint_force(joint, other) for other in joint.bodies if other != GROUND]
-                return np.asarray(-sum(others))
-            force = self.get(("fx", joint.key, body)) + 1j * self.get(("fy", joint.key, body))
-            return np.asarray(force + self._with_teeth(lambda block: r.borne(block, joint, body, self.tooth)))
-
-        rail, rub = r.over(
-            lambda block: r.rail(block, joint.guide),
-            lambda block: r.rubbed(block, joint, body),
-            kind=complex,
-        )
-        sign = 1.0 if body == self.mechanism.guides[joint.guide].link else -1.0
-        return np.asarray(sign * self.get(("normal", joint.key, "")) * 1j * rail + rub)
-
-    def guide_moment(self, joint: Joint) -> Reals:
-        """The moment of a slider's guide on its link, (n,)."""
-        assert joint.guide is not None
-        guide = joint.guide
-        beside = self._with_teeth(lambda block: self.reactions.beside(block, guide, self.tooth))
-        return np.asarray(self.get(("moment", joint.key, "")) + beside.real)
-
-    def tooth(self, block: Block, mesh: int) -> Number:
-        """The tooth force of a rack over a block."""
-        value = self.get(mesh_column(self.mechanism, mesh))[block.rows]
-        return value if block.st.many else float(value[0])
-
-    def _with_teeth(self, form: Callable[[Block], Number]) -> NDArray[np.complex128]:
-        if not self.reactions.order.racks:
-            return np.zeros(self.n, complex)
-        return np.asarray(self.reactions.over(form, kind=complex)[0])
-
     def undetermined(self) -> list[str]:
         """Which joint forces no statics determines, and which of their sums it does."""
         _, null = self.solved
@@ -251,7 +207,7 @@ class Statics:
         free = [i for i in range(len(self.unknowns)) if size[i] > 1e-7]
         if not free:
             return []
-        names = {joint.key: joint.name for joint in self.reactions.joints}
+        names = {joint.key: joint.name for joint in self.joints.joints}
 
         def label(unknown: Any) -> str:
             kind, key, body = unknown
@@ -265,7 +221,7 @@ class Statics:
                 return f"the tooth force of {self.mechanism.meshes[int(key)].label}"
             return f"the {kind} of {'input' if kind in ('force', 'torque') else 'gear'} {int(key) + 1}"
 
-        by_key = self.reactions.by_key
+        by_key = self.joints.by_key
 
         def at(axis: str, body: str, joined: bool) -> list[int]:
             """The open forces of an axis on a body, or of the joints it is `joined` by."""

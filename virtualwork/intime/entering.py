@@ -12,8 +12,8 @@ from dalembert.arithmetic.engines import floats
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.formulas.block import Setting
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.newton import unknowns
-from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.positions import State, principal, unwound
 from virtualwork.formulas.winding import NODES
 from virtualwork.intime.watch import Floats, Value
@@ -145,7 +145,7 @@ class Placed:
             span = self.assembly.track.length
             ends = np.tile(self.assembly.mechanism.at, (2, 1))
             ends[:, 0] = min(low, q - span), max(high, q + span)
-            self._wound = *ends[:, 0].tolist(), Setting(Poses(self.assembly, ends), False)
+            self._wound = *ends[:, 0].tolist(), Setting(Lanes(self.assembly, ends), False)
         return self._wound[2]
 
 

@@ -25,15 +25,14 @@ from dalembert.arithmetic.engines import floats, run
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
-from virtualwork.formulas.effort import effort
+from virtualwork.formulas.forces import Effort
 from virtualwork.formulas.kinematics import Angle
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.newton import unknowns
 from virtualwork.formulas.numbers import Reals
-from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.recording import Recording
-from virtualwork.formulas.scene import Scene
 from virtualwork.intime.crossing import OTHER, Crossing, crossings, narrowed, nearest
 from virtualwork.intime.entering import Placed
 from virtualwork.intime.powers import motion_of, state_names
@@ -169,9 +168,9 @@ class Equations:
         k = self.k
         with np.errstate(all="ignore"):
             unit = np.vstack([np.zeros(k), np.eye(k)])
-            poses = Poses(self.assembly, np.tile(q, (k + 1, 1)), np.tile(v, (k + 1, 1)), unit)
+            poses = Lanes(self.assembly, np.tile(q, (k + 1, 1)), np.tile(v, (k + 1, 1)), unit)
             poses.time = np.full(k + 1, t)
-            result = effort(Scene(poses)).reshape(k + 1, k)
+            result = np.stack(poses.taped([Effort(j) for j in range(k)]), axis=1)
         return (result[1:] - result[0]).T, result[0]
 
     def watches(self) -> list[Watch]:

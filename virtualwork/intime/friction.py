@@ -28,8 +28,8 @@ from dalembert.arithmetic.recorded import Number
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe import MechanismError
 from virtualwork.formulas.block import Block
-from virtualwork.formulas.forces import JointForce
-from virtualwork.formulas.numbers import Reals, dot, minus, plus
+from virtualwork.formulas.forces import Bearing, RubbingRate
+from virtualwork.formulas.numbers import Reals, minus
 from virtualwork.intime.equations import Equations, Lost
 from virtualwork.intime.powers import motion_of
 from virtualwork.intime.sliding import Mode, Values
@@ -84,8 +84,8 @@ class Rubbing(Equations):
     @cached_property
     def _contacts(self) -> tuple[bool, list[Any]]:
         """Whether joint forces are not determined, and the pairs that rub."""
-        paths, of, _ = self.recording(True, True, False).forces
-        return of.redundant, paths.case.contacts
+        forces = self.recording(True, True, False).forces
+        return forces.redundant, forces.case.contacts
 
     @cached_property
     def arms(self) -> list[float]:
@@ -114,22 +114,15 @@ class Rubbing(Equations):
     @cached_property
     def _recorded(self) -> tuple[Tape, Tape]:
         recording = self.recording(True, True, False)
-        paths, of, block = recording.forces
+        block, contacts = recording.forces.block, recording.forces.case.contacts
         rubs = [f"friction {n}" for n in range(len(self.arms))]
-        for n, (joint, *_) in enumerate(paths.case.contacts):
-            rub = recording.recorder.input(rubs[n])
-            block.friction[n] = rub if joint.guide is None else rub * of.rail(block, joint.guide)
         result: dict[str, Number] = {}
-        for n, (joint, body, other, *_) in enumerate(paths.case.contacts):
-            recording.value(JointForce(joint.key, body))
-            force = of.on_side(block, (joint.key, body))
+        for n, (joint, body, other, *_) in enumerate(contacts):
+            force, rate = recording.value(Bearing(n)), recording.value(RubbingRate(n))
             if joint.guide is None:
-                force = plus(force, of.borne(block, joint, body))
-                rate = minus(block.omega(body), block.omega(other))
                 slip = minus(block.alpha(body), block.alpha(other))
             else:
-                force = dot(force, 1j * of.rail(block, joint.guide))
-                rate, slip = block.slide_rate(joint.guide), _second(block, joint.guide)
+                slip = _second(block, joint.guide)
             for name, value in zip(QUANTITIES, (force.real, force.imag, slip, rate), strict=True):
                 result[f"{name} {n}"] = 0.0 if value is None else value
         return motion_of(recording, self.k, rubs, result)

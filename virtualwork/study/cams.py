@@ -13,9 +13,9 @@ from virtualwork.describe.cams import CamDrive
 from virtualwork.describe.description import Description
 from virtualwork.describe.laws import TURN
 from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.lifts import lift, located, on_piece
 from virtualwork.formulas.numbers import ONE, Reals
-from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.profiles import FINE, profile
 from virtualwork.formulas.touches import Touching, carried
 
@@ -184,7 +184,7 @@ def lift_off(assembly: Assembly, cam: int, span: tuple[float, float] | None = No
     q = np.linspace(low, high, SAMPLES + 1)
 
     def contact(at: Reals, speed: float) -> Reals:
-        poses = Poses(assembly, at, speed, 0.0)
+        poses = Lanes(assembly, at, speed, 0.0)
         return np.asarray(Dynamics(poses).contact(cam))
 
     def limit(at: Reals, unit: float) -> Reals:

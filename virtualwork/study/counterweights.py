@@ -13,8 +13,9 @@ import numpy as np
 from virtualwork.describe import AssemblyError, DescriptionError
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.block import Block
 from virtualwork.formulas.dynamics import Moving
-from virtualwork.formulas.numbers import Complexes
+from virtualwork.formulas.numbers import Complexes, Number, plus
 
 
 def pivot(mechanism: Description, link: str) -> complex:
@@ -59,13 +60,15 @@ def least_squares(motion: Moving, links: Sequence[str]) -> tuple[dict[str, compl
     scene, poses = motion.dynamics.scene, motion.dynamics.poses
     if not scene.moves:
         raise DescriptionError("counterweights: the speed is zero: expected a motion that shakes")
-    before = np.zeros(poses.n, complex)
-    for block in scene.blocks():
-        for load in scene.loads:
-            if load.kind == "inertia force":
-                value = block.formed(load)
-                if value is not None:
-                    before[block.rows] += value
+    inertia = [load for load in scene.loads if load.kind == "inertia force"]
+
+    def shaken(block: Block) -> Number:
+        total: Number = None
+        for load in inertia:
+            total = plus(total, block.formed(load))
+        return total
+
+    (before,) = scene.over([shaken], complex)
     columns = []
     for link in links:
         z = pivot(poses.mechanism, link)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.branch.limits import TURNS
 from virtualwork.digits.forces import ForceErrors
+from virtualwork.formulas.block import Block
 from virtualwork.formulas.dynamics import Dynamics, Moving
 from virtualwork.formulas.loads import OWN
 from virtualwork.formulas.numbers import Number, Reals, minus, plus
@@ -329,26 +329,28 @@ class Cycle:
     def energy(self) -> tuple[Reals, Reals]:
         """Kinetic energy and potential of weights and springs at each pose, (n,) J."""
         scene = self.motion.dynamics.scene
-        kinetic, potential = np.zeros(self.poses.n), np.zeros(self.poses.n)
         centers = {body: scene.case.path(body, r.center) for body, r in scene.rigid.items() if r.mass}
         keys: set[str] = set()
         for path in centers.values():
             keys |= path_reads(path)
-        for block in scene.blocks(sorted(keys)):
-            total: Any = None
+
+        def kinetic(block: Block) -> Number:
+            total: Number = None
             for body, r in scene.rigid.items():
                 if body in centers and (v := block.velocity(centers[body])) is not None:
                     total = plus(total, 0.5 * r.mass * (v.real * v.real + v.imag * v.imag))
                 if r.inertia and (w := block.omega(body)) is not None:
                     total = plus(total, 0.5 * r.inertia * w * w)
-            if total is not None:
-                kinetic[block.rows] = total
+            return total
+
+        def potential(block: Block) -> Number:
+            total: Number = None
             for load in scene.loads:
-                if load.stores:
-                    value = load.potential(block)
-                    if value is not None:
-                        potential[block.rows] += value
-        return kinetic, potential
+                total = plus(total, load.potential(block) if load.stores else None)
+            return total
+
+        moving, stored = scene.over([kinetic, potential], float, sorted(keys))
+        return moving, stored
 
     @property
     def closure(self) -> float | None:
@@ -361,14 +363,15 @@ class Cycle:
         if not self.timed and (np.any(acceleration) or np.ndim(speed)):
             return None
         scene = self.motion.dynamics.scene
-        total = self.effort.copy()
-        for block in scene.blocks():
+
+        def work(block: Block) -> Number:
+            total: Number = None
             for load in scene.case.everything:
-                if load.kind in OWN:
-                    continue
-                value = minus(load.power(block, 0), load.elastic(block))
-                if value is not None:
-                    total[block.rows] += value
+                if load.kind not in OWN:
+                    total = plus(total, minus(load.power(block, 0), load.elastic(block)))
+            return total
+
+        total = self.effort + scene.over([work], float)[0]
         kinetic, potential = self.energy
         gain = (kinetic[-1] - kinetic[0]) + (potential[-1] - potential[0])
         return self.integral(np.asarray(total * self._pace)) - float(gain)

@@ -11,6 +11,7 @@ V″ a μ = M a (Meriam & Kraige, Dynamics, §8/5; Lagrange).
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations, product
@@ -22,9 +23,10 @@ from numpy.typing import ArrayLike, NDArray
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.parts import GROUND
 from virtualwork.digits.forces import ForceErrors
+from virtualwork.formulas.block import Block
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.lanes import Lanes
-from virtualwork.formulas.numbers import EPS, Number, Reals
+from virtualwork.formulas.numbers import EPS, Number, Reals, plus
 from virtualwork.formulas.scene import Scene
 from virtualwork.plan.steps import path_reads
 
@@ -141,32 +143,34 @@ class Rest:
 
     def force(self) -> tuple[Reals, Reals]:
         """Q and the sum of the sizes of its terms, each (n, k)."""
-        n = len(self.inputs)
-        total, size = np.zeros((n, self.k)), np.zeros((n, self.k))
-        for block in self.scene.blocks():
-            for j in range(self.k):
-                for load in self.scene.loads:
-                    value = load.power(block, j)
-                    if value is not None:
-                        total[block.rows, j] += value
-                        size[block.rows, j] += np.abs(value)
-        total[np.logical_not(self.poses.assembled)] = np.nan
-        return total, size
+
+        def forms(j: int) -> Iterator[Callable[[Block], Number]]:
+            for sized in (False, True):
+
+                def form(block: Block, sized: bool = sized) -> Number:
+                    total: Number = None
+                    for load in self.scene.loads:
+                        value = load.power(block, j)
+                        total = plus(total, value if value is None or not sized else abs(value))
+                    return total
+
+                yield form
+
+        each = self.scene.over([form for j in range(self.k) for form in forms(j)], float)
+        return np.stack(each[0::2], axis=1), np.stack(each[1::2], axis=1)
 
     def along(self, direction: Reals) -> Reals:
         """∂Q/∂q along a direction in the inputs, times the direction: d²(work), (n,)."""
-        scene = self.scene
-        if self.k > 1:
-            still: list[Number] = [0.0] * self.k
-            scene = Scene(self.poses.again(self.inputs, [direction.tolist(), still, still]), at_rest=True)
-        reads = set().union(*(load.reads() for load in scene.loads)) - {f"angle:{GROUND}"}
-        rates = scene.poses.solve(tuple(sorted(reads)), 2)
+        still: list[Number] = [0.0] * self.k
         total = np.zeros(len(self.inputs))
-        for i, block in enumerate(scene.blocks()):
+        for i in range(len(self.inputs)):
+            way = [direction.tolist(), still, still] if self.k > 1 else None
+            scene = Scene(self.poses.again(self.inputs[i : i + 1], way), at_rest=True)
+            reads = set().union(*(load.reads() for load in scene.loads)) - {f"angle:{GROUND}"}
+            rates = scene.along(sorted(reads))
             for load in scene.loads:
-                value = load.second(block, rates[i])
-                if value is not None:
-                    total[block.rows] += value
+                value = None if rates is None else load.second(scene.block, rates)
+                total[i] += np.nan if rates is None else value or 0.0
         return total * (direction[0] ** 2 if self.k == 1 else 1.0)
 
     def hessian(self) -> Reals:
@@ -199,14 +203,16 @@ class Rest:
 
     def potential(self) -> Reals:
         """V, (n,) J; NaN where a load has no potential."""
-        total = np.zeros(len(self.inputs))
         keys = {key for load in self.scene.loads if load.path is not None for key in path_reads(load.path)}
-        for block in self.scene.blocks(sorted(keys)):
+
+        def stored(block: Block) -> Number:
+            total: Number = None
             for load in self.scene.loads:
-                value = load.potential(block)
-                if value is not None:
-                    total[block.rows] += value
-        return total
+                total = plus(total, load.potential(block))
+            return total
+
+        (result,) = self.scene.over([stored], float, sorted(keys))
+        return np.asarray(result)
 
 
 def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int = SAMPLES) -> Equilibria:

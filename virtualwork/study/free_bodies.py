@@ -146,7 +146,7 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
     """
     m, poses = dynamics.poses.mechanism, dynamics.poses
     effort = dynamics.effort
-    over = dynamics.reactions.over
+    over = dynamics.scene.over
     result = {
         body: FreeBody(
             body,
@@ -163,10 +163,10 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
             continue
         name = SHORT.get(load.kind, load.kind)
         if load.path is None:
-            (torque,) = over(load.form)
+            (torque,) = over([load.form], float)
             result[load.body].torques.append(Torque(name, load.kind, torque))
         else:
-            (force,) = over(load.form, kind=complex)
+            (force,) = over([load.form], complex)
             at = poses.point(load.body, load.place)
             result[load.body].forces.append(Force(name, load.kind, at, force))
     for joint in dynamics.reactions.joints:
@@ -183,7 +183,8 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
             if np.any(np.nan_to_num(moment)):
                 result[body].torques.append(Torque(name, "joint moment", moment))
     for number, touch in enumerate(dynamics.reactions.paths.touches.every):
-        way, at = over(partial(_normal, touch=touch), partial(_touching, touch=touch), kind=complex)
+        forms = partial(_normal, touch=touch), partial(_touching, touch=touch)
+        way, at = over(forms, complex, touch.targets)
         force = dynamics.contact(number) * way
         for body, other, sign in (
             (touch.body, touch.drive.cam.cam, 1.0),
@@ -201,7 +202,7 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
             continue
         i = m.guide_of(entry)
         g = m.guides[i]
-        (rail,) = over(partial(dynamics.reactions.rail, guide=i), kind=complex)
+        (rail,) = over([partial(dynamics.reactions.rail, guide=i)], complex)
         at = _block(dynamics, i)
         for body, sign in ((g.link, 1.0), (g.on, -1.0)):
             if body != GROUND:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from virtualwork.formulas.block import Block
     from virtualwork.formulas.loads import Load
     from virtualwork.formulas.numbers import Complexes, Number, Reals
+    from virtualwork.formulas.scene import Scene
 
 
 class Item(NamedTuple):
@@ -70,16 +71,14 @@ def items(dynamics: Dynamics, unit: int | None = None) -> list[Item]:
     unknown [9.81] works
     joint force [0.] at rest
     """
-    # all terms by the same sums: their powers add up to zero but for these sums' own rounding
-    dynamics = dynamics.over_blocks
     effort = dynamics.effort
     result = [_applied(dynamics, load, unit) for load in dynamics.scene.case.everything]
     return [*result, *_drives(dynamics, effort, unit), *_joints(dynamics, unit)]
 
 
 def _over(dynamics: Dynamics, kind: type, *forms: Callable[[Block], Number]) -> list[Any]:
-    """Arrays (n,) of what is formed block by block; zero where it is identically zero."""
-    return dynamics.reactions.over(*forms, kind=kind)
+    """Arrays (n,) of what forms make of a pose; zero where it is identically zero."""
+    return dynamics.scene.over(forms, kind)
 
 
 def _turning(block: Block, body: str, unit: int | None) -> Number:
@@ -163,3 +162,51 @@ def _joints(dynamics: Dynamics, unit: int | None) -> Iterator[Item]:
             (rail,) = _over(dynamics, complex, partial(dynamics.reactions.rail, guide=joint.guide))
             force = force - (force * np.conj(rail)).real * rail
         yield Item(on, "joint force", force, rate, False, joint.name, workless)
+
+
+def ledger(scene: Scene, j: int = 0) -> tuple[dict[str, Reals], list[str], list[str]]:
+    """Each load's virtual work for a unit of input j, which loads do none, and which are absent.
+
+    Returns
+    -------
+    works : dict of load name to (n,), N·m (or N for a slide)
+    workless : list of str
+        Loads that act where nothing can move: they were left out.
+    absent : list of str
+        Kinds of loads that the scene does not have, and why.
+    """
+    done: dict[str, Reals] = {}
+    workless: list[str] = []
+    block, working = scene.block, list["Load"]()
+    for load in scene.case.everything:
+        if load.power(block, j) is not None:
+            working.append(load)
+        elif load.displacement(block, j) is None and load.name not in workless and load.carries:
+            workless.append(load.name)
+    each = scene.over([partial(load.power, j=j) for load in working], float)
+    for load, value in zip(working, each, strict=True):
+        done[load.name] = done.get(load.name, 0.0) + value
+    return done, [name for name in workless if name not in done], absent(scene)
+
+
+def absent(scene: Scene) -> list[str]:
+    """Which terms of eq. (5) the scene does not have, and why: they are never formed."""
+    m, found = scene.mechanism, []
+    massless = [body for body, r in scene.rigid.items() if not r.mass]
+    if massless:
+        found.append(f"{', '.join(massless)}: no weight and no inertia force, for there is no mass")
+    flat = [body for body, r in scene.rigid.items() if r.mass and not r.inertia]
+    if flat:
+        found.append(f"{', '.join(flat)}: no inertia torque, for there is no inertia")
+    if not m.gravity:
+        found.append("no weights: gravity is zero")
+    if not scene.moves:
+        found.append("no inertia loads, no damping, no friction: speed and acceleration are zero")
+    for what, entries in (
+        ("applied forces", m.forces),
+        ("applied torques", m.torques),
+        ("springs", m.springs),
+    ):
+        if not entries:
+            found.append(f"no {what} in the file")
+    return found

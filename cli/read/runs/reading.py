@@ -142,10 +142,10 @@ class _Reading:
                 f"{table.file}: no column trial_mass_kg (or trial_mass_g, trial_unbalance_g_mm …): expected trial masses, "
                 f"or stored coefficients by --influence {table.told}"
             )
-        known = self.stored.unit if self.stored else self.sisters.unit if self.sisters else "kg"
-        size = sizes[0] if sizes else Cells("", known, [""] * table.rows)
+        per_unit = self.stored.unit if self.stored else self.sisters.unit if self.sisters else "kg"
+        size = sizes[0] if sizes else Cells("", per_unit, [""] * table.rows)
         names, rotor = table.numbered("rotor", "1")
-        unit = known if self.stored else size.unit
+        unit = per_unit if self.stored else size.unit
         self.runs = Runs(table, names, unit, fitted, max_mass=layout.max_mass, runout=layout.runout)
         self.masses = MassColumns(table, size, self.runs.per, fitted, rotor)
         if self.sisters is not None and self.sisters.unit not in UNITS[self.runs.per]:

@@ -308,8 +308,8 @@ class Sisters:
                 )
         return first
 
-    def known(self, rotor: str, channels: Sequence[Channel], runs: Runs) -> Before:
-        """Return what is known of a rotor in these channels."""
+    def before(self, rotor: str, channels: Sequence[Channel], runs: Runs) -> Before:
+        """Return the stored coefficients of a rotor in these channels."""
         key = (self.key(rotor), *channels)
         if key not in self._known:
             self._known[key] = self._pooled(rotor, channels, runs)

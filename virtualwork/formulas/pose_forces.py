@@ -1,0 +1,206 @@
+"""The forces of one pose: effort by virtual work, joint forces, sums of loads; of floats, or of recorded numbers.
+
+What a tape does not solve enters it. The friction of each contact (`friction 0`, `friction 1` …: the torque of a pin, the force
+along a guide) is exchanged for the forces that the contacts bear until the two fit (`friction`). A system whose rank is not known,
+as where statics is redundant, is solved outside (`statics`): the entries of A and b are on the tape, and the joint forces by
+unknowns that enter, with A f + b = 0 (`f 0`, `f 1` …; torques divided by the size).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import cached_property
+from typing import Any
+
+from dalembert.arithmetic.recorded import bare
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.block import Block
+from virtualwork.formulas.effort import generalized_force
+from virtualwork.formulas.load_paths import LoadPaths
+from virtualwork.formulas.numbers import Number, dot, minus, plus
+from virtualwork.formulas.quantity import Quantity
+from virtualwork.formulas.reactions import JointForces
+from virtualwork.formulas.resultants import applied_loads, reduced, resultant, shaking_loads
+from virtualwork.formulas.statics import Column, equations, mesh_column, unknowns
+
+
+class PoseForces:
+    """The forces of a pose, as the kinds of `forces.Force` read them.
+
+    Attributes
+    ----------
+    paths : LoadPaths
+    joints : JointForces
+    block : Block
+        The pose as the loads see it.
+    formed : dict of quantity to its value
+
+    Parameters
+    ----------
+    solve : function
+        Works out what targets depend on, to an order of derivatives.
+    system : function
+        Solves rows·x = right.
+    enter : function
+        A number that enters, by its name.
+    """
+
+    def __init__(
+        self,
+        paths: LoadPaths,
+        block: Block,
+        solve: Callable[[Iterable[str], int], None],
+        system: Callable[[list[list[Number]], list[Number]], list[Number]],
+        enter: Callable[[str], Number],
+    ) -> None:
+        self.paths, self.case, self.mechanism = paths, paths.case, paths.mechanism
+        self.block, self.solve, self.system_of, self.enter = block, solve, system, enter
+        self.joints = JointForces(paths)
+        self.formed: dict[Quantity, Number] = {}
+        block.drive = self.effort
+        solve(*self.case.targets())
+        if self.case.contacts:
+            self.solve_places()
+        for n, (joint, *_) in enumerate(self.case.contacts):
+            rub = enter(f"friction {n}")
+            block.friction[n] = rub if joint.guide is None else rub * self.joints.rail(block, joint.guide)
+
+    @property
+    def redundant(self) -> bool:
+        """Whether statics cannot give every joint force, so that unknown ones enter."""
+        return bool(self.joints.redundant)
+
+    def solve_places(self) -> None:
+        """Write down what the places of all joints depend on."""
+        self.solve(*self.case.targets(self.case.places))
+
+    # --- the inputs and the ground ----------------------------------------------------------------------------------
+    @cached_property
+    def efforts(self) -> list[Number]:
+        """The effort at each input by virtual work, through the carriers of motors."""
+        m, k = self.mechanism, len(self.mechanism.inputs)
+        force = [self.generalized(j) for j in range(k)]
+        if not m.carried:
+            return force
+        matrix: list[list[Number]] = [[float(i == j) for j in range(k)] for i in range(k)]
+        for j in m.carried:
+            link, carrier = str(m.inputs[j].link), m.carrier(j)
+            self.solve([f"angle:{link}", f"angle:{carrier}"], 1)
+            for i in range(k):
+                turned = [self.block.turning(body, i) for body in (link, carrier)]
+                driven, carried = (0.0 if t is None else t for t in turned)
+                matrix[i][j] = driven - carried
+        return self.system_of(matrix, force) if k > 1 else [force[0] / matrix[0][0]]
+
+    def effort(self, j: int) -> Number:
+        return self.efforts[j]
+
+    def generalized(self, j: int) -> Number:
+        value = generalized_force(self.paths, self.block, j)
+        return 0.0 if value is None else -bare(value)
+
+    def newton_euler(self, j: int) -> Number:
+        if self.redundant:
+            return self._bears("force" if self.mechanism.inputs[j].is_slide else "torque", str(j))
+        self.solve_places()
+        return self.joints.effort(self.block, j)
+
+    def shaking(self) -> tuple[Number, Number]:
+        return resultant(shaking_loads(self.case.loads), self.block)
+
+    # --- loads ------------------------------------------------------------------------------------------------------
+    def applied(self, link: str) -> tuple[Number, Number]:
+        self.solve([f"angle:{link}"], 0)
+        loads = applied_loads(self.case.everything, link)
+        return reduced(loads, self.block, self.mechanism.rigid[link].center)
+
+    def load_place(self, number: int) -> Number:
+        path = self.case.loads[number].path
+        assert path is not None
+        self.solve_places()
+        return self.block.position(path)
+
+    # --- joints -----------------------------------------------------------------------------------------------------
+    def rail(self, guide: int) -> Number:
+        self.solve_places()
+        return self.joints.rail(self.block, guide)
+
+    def force(self, joint: str, body: str) -> Number:
+        self.solve_places()
+        of, block = self.joints, self.block
+        at = of.by_key[joint]
+        if not self.redundant:
+            return of.joint_force(block, at, body)
+        if at.guide is not None:
+            sign = 1.0 if body == self.mechanism.guides[at.guide].link else -1.0
+            across = (sign * self._bears("normal", joint)) * (1j * of.rail(block, at.guide))
+            return plus(across, of.rubbed(block, at, body))
+        if body == GROUND:
+            return -sum((self.force(joint, other) for other in at.bodies if other != GROUND), 0j)
+        force = self._bears("fx", joint, body) + 1j * self._bears("fy", joint, body)
+        return plus(force, of.borne(block, at, body, self._tooth))
+
+    def moment(self, joint: str, body: str) -> Number:
+        self.solve_places()
+        of, block = self.joints, self.block
+        guide, value = of.by_key[joint].guide, None
+        if guide is not None and not self.redundant:
+            value = of.guide_moment(block, guide, body)
+        elif guide is not None and self.mechanism.guides[guide].is_slider:
+            value = plus(self._bears("moment", joint), of.beside(block, guide, self._tooth))
+            value = value if body == self.mechanism.guides[guide].link else -value
+        for load in self.case.friction:
+            if load.path is None and load.joint == joint and load.body == body:
+                value = plus(value, load.form(block))
+        return value
+
+    def contact(self, cam: int) -> Number:
+        self.solve_places()
+        self.solve(self.paths.touches.every[cam].targets, 0)
+        push = self._bears("contact", str(cam)) if self.redundant else None
+        return self.joints.contact(self.block, cam, push)
+
+    # --- redundant statics ------------------------------------------------------------------------------------------
+    @cached_property
+    def unknowns(self) -> list[Column]:
+        """The joint forces and torques that enter where statics is redundant."""
+        return unknowns(self.joints)
+
+    @cached_property
+    def system(self) -> dict[tuple[int, int | None], Number]:
+        """The entries of A by row and column, those of b by row and None."""
+        self.solve_places()
+        for touch in self.paths.touches.every:
+            self.solve(touch.targets, 0)
+        entries: dict[tuple[int, int | None], Number] = {}
+        for row, column, part in equations(self.joints, self.block):
+            entries[row, column] = entries.get((row, column), 0.0) + bare(part)
+        return entries
+
+    def _bears(self, kind: str, key: str, body: str = "") -> Number:
+        f = self.enter(f"f {self.unknowns.index((kind, key, body))}")
+        turns = kind == "contact" and self.mechanism.cam_drives[int(key)].guide is None
+        return f * bare(self.mechanism.size) if turns or kind in ("moment", "gear", "torque") else f
+
+    def _tooth(self, _: Any, mesh: int) -> Number:
+        return self._bears(*mesh_column(self.mechanism, mesh))
+
+    # --- friction ---------------------------------------------------------------------------------------------------
+    def bearing(self, n: int) -> Number:
+        self.solve_places()
+        joint, body, *_ = self.case.contacts[n]
+        if self.redundant:
+            force = self.force(joint.key, body)
+        else:
+            force = self.joints.on_side(self.block, (joint.key, body))
+            force = plus(force, self.joints.borne(self.block, joint, body))
+        if force is None or joint.guide is None:
+            return force
+        return dot(force, 1j * self.joints.rail(self.block, joint.guide))
+
+    def rubbing_rate(self, n: int) -> Number:
+        self.solve_places()
+        joint, body, other, *_ = self.case.contacts[n]
+        if joint.guide is not None:
+            return self.block.slide_rate(joint.guide)
+        return minus(self.block.omega(body), self.block.omega(other))

@@ -1,0 +1,351 @@
+"""What tapes of poses need from outside, and the poses whose derivatives enter a tape.
+
+Unknowns of groups without a closed form, friction and redundant statics enter (`entering`). Close to a change point, where two
+branches meet, and at singular poses the groups' derivatives enter too (`formulas.entering`): a series carries them through.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dalembert.arithmetic.engines import Outputs, run
+from dalembert.arithmetic.guard import guarded
+from dalembert.arithmetic.recorded import bare
+from virtualwork.formulas.entering import GroupColumn, RightSide
+from virtualwork.formulas.forces import Bearing, Effort, Entry, RubbingRate
+from virtualwork.formulas.kinematics import AnglePartial
+from virtualwork.formulas.loops import Closed, Margin, Regularity
+from virtualwork.formulas.newton import unknowns
+from virtualwork.formulas.numbers import (
+    SINGULAR,
+    Number,
+    Reals,
+    cross,
+    leave_out,
+    solve_columns,
+    solve_determined,
+)
+from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.quantity import Quantity
+from virtualwork.formulas.rates import crossed, passed
+from virtualwork.formulas.recording import NAMES, NEAR, Recording
+from virtualwork.formulas.tapes import Turning, entered, recorded, taped
+from virtualwork.plan.steps import Group
+
+if TYPE_CHECKING:
+    from virtualwork.formulas.block import Block
+    from virtualwork.formulas.loads import Tabled
+    from virtualwork.formulas.statics import Statics
+
+
+@guarded
+class Solving(Poses):
+    """Poses of an assembly, with what their tapes need."""
+
+    branch: Turning
+
+    def __init__(
+        self,
+        branch: Turning,
+        angle: ArrayLike | None = None,
+        speed: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+        jerk: ArrayLike | None = None,
+        block_of: int | None = None,
+    ) -> None:
+        super().__init__(branch, angle, speed, acceleration, jerk, block_of)
+        # where doubts are right
+        self._bad: dict[Quantity, NDArray[np.bool_] | None] = {}
+        # whether the derivatives of groups enter; and those, with the unknowns
+        self._enter = False
+        self._entered: dict[tuple[Any, ...], Any] = {}
+        # some of the poses, whose derivatives enter
+        self._apart: dict[bytes, Self] = {}
+
+    @cached_property
+    def recording(self) -> Recording:
+        """The formulas of the branch, for rates that are zero where these are."""
+        moves = tuple(any(np.any(rate) for rate in rates) for rates in self.rates)
+        return entered(self.branch, moves) if self.enters else recorded(self.branch, moves)
+
+    @cached_property
+    def enters(self) -> bool:
+        """Whether the derivatives of groups enter: of poses close to a change point, and where a group is singular in every pose."""
+        inputs = self.inputs
+        if inputs.shape[1] == 1 and len(inputs) and not self.branch.settled:
+            self.branch.cover(float(np.nanmin(inputs)), float(np.nanmax(inputs)))
+        return self._enter or bool(self.branch.folded)
+
+    def formed(
+        self, forms: Sequence[Callable[[Block], Number]], kind: type, targets: Iterable[str] = ()
+    ) -> list[Any]:
+        """What forms make of the pose as the loads see it, (n,) each: written down, and run; NaN where a pose is not assembled.
+
+        `targets`: what they depend on beyond the loads and the places of all joints, as `plan.Plan.needed` has it.
+        """
+        recording, wanted = self.recording, tuple(targets)
+        outputs: dict[str, Any] = {}
+        with recording.lock:
+            recording.forces.solve_places()
+            recording.solve(wanted, 1)
+            for i, form in enumerate(forms):
+                value = form(recording.forces.block)
+                value = 0.0 if value is None else bare(value)
+                outputs |= {f"{i} x": value.real, f"{i} y": value.imag}
+            tape = recording.recorder.tape(outputs)
+        rows = run(tape, self.entering(tape.inputs))
+        result: list[Any] = [np.empty(self.n, kind) for _ in forms]
+        for i, to in enumerate(result):
+            to.real = rows.get(f"{i} x", 0.0)
+            if kind is complex:
+                to.imag = rows.get(f"{i} y", 0.0)
+        apart = self._apart_of([Effort(0)])
+        if apart is not None:
+            for to, value in zip(result, apart[1].formed(forms, kind, wanted), strict=True):
+                to[apart[0]] = value
+        if not self.assembled.all():
+            for to in result:
+                leave_out(to, ~self.assembled)
+        return result
+
+    def _apart_of(self, keys: Sequence[Quantity]) -> tuple[NDArray[np.bool_], Self] | None:
+        """The poses whose derivatives enter: which, and these alone; None where there are none."""
+        if self.enters:
+            return None
+        rows = self._careful
+        doubts = [key for key in dict.fromkeys(self._doubts(keys)) if not isinstance(key, Closed)]
+        new = [key for key in doubts if key not in self._bad]
+        self._bad |= {
+            key: self._where_bad(key, value) for key, value in zip(new, self._raw(new), strict=True)
+        }
+        for bad in map(self._bad.get, doubts):
+            rows = rows if bad is None else rows | bad
+        if not rows.any():
+            return None
+        name = rows.tobytes()
+        if name not in self._apart:
+            self._apart[name] = self.some(rows)
+            self._apart[name]._enter = True
+        return rows, self._apart[name]
+
+    def _raw(self, keys: Sequence[Quantity], friction: Reals | None = None) -> list[Any]:
+        """Quantities as the tape has them, with another friction; not kept."""
+        if not keys:
+            return []
+        tape = taped(self.branch, self.recording, tuple(keys))
+        out: Outputs = run(
+            tape,
+            self.entering(tape.inputs, friction),
+            pairs=[key.names[0] for key in keys if key.is_vector],
+        )
+        return [key.of_rows(out, self.n) for key in keys]
+
+    def _too_fast(self, j: int) -> NDArray[np.bool_]:
+        """Where a link turns more than 10¹³ times as fast as the input: at a dead point to rounding, no number is left."""
+        reach = self.mechanism.size if self.mechanism.inputs[j].is_slide else 1.0
+        needed = self.plan.needed(self.recording.forces.case.targets()[0])
+        bodies = (body for g in needed if isinstance(g, Group) for body in g.angles)
+        keys = [AnglePartial(body, j, 1) for body in bodies]
+        result = np.zeros(self.n, dtype=bool)
+        for rate in self._raw(keys):
+            result |= ~(np.abs(rate) * reach < 1e13)
+        return result
+
+    # --- what is solved outside ---------------------------------------------------------------------------------------
+    @cached_property
+    def _settled(self) -> tuple[Reals, int]:
+        """The friction of each contact (c, n), NaN where the joints lock; and how often it was exchanged for the forces."""
+        from virtualwork.formulas.friction import settled
+
+        contacts = self.recording.forces.case.contacts
+        rates = self._raw([RubbingRate(n) for n in range(len(contacts))])
+        arms = np.zeros((len(contacts), self.n))
+        for arm, rate, (joint, _, _, coefficient, radius) in zip(arms, rates, contacts, strict=True):
+            arm[:] = coefficient * (radius if joint.guide is None else 1.0) * np.sign(rate)
+        apart = self._apart_of([Effort(0)]) if contacts else None
+        if apart is not None:
+            arms[:, apart[0]] = np.nan
+        keys = [Bearing(n) for n in range(len(contacts))]
+        friction, count = settled(lambda phi: np.reshape(self._raw(keys, phi), (len(keys), self.n)), arms)
+        if apart is not None:
+            friction[:, apart[0]], more = apart[1]._settled
+            count = max(count, more)
+        return friction, count
+
+    @property
+    def friction(self) -> Reals:
+        """The friction of each contact, (c, n): the torque of a pin, the force along a guide; NaN where the joints lock."""
+        return self._settled[0]
+
+    @property
+    def friction_iterations(self) -> int:
+        """How often friction and joint forces were exchanged until they agreed."""
+        return self._settled[1]
+
+    @cached_property
+    def locked(self) -> NDArray[np.bool_]:
+        """(n,): poses in which friction locks the mechanism: no reaction balances its own friction."""
+        return np.isnan(self.friction).any(axis=0) & self.assembled
+
+    @cached_property
+    def statics(self) -> Statics:
+        """All equilibrium equations at once, where the constraints are redundant."""
+        return self._statics()
+
+    def _statics(self, friction: Reals | None = None) -> Statics:
+        from virtualwork.formulas.statics import Statics
+
+        forces = self.recording.forces
+        keys = [Entry(*place) for place in forces.system]
+        entries = dict(zip(forces.system, self._raw(keys, friction), strict=True))
+        apart = self._apart_of(keys) if friction is None else None
+        if apart is not None:
+            for value, again in zip(entries.values(), apart[1]._raw(keys), strict=True):
+                value[apart[0]] = again
+        return Statics(forces.joints, entries, self.n, self.lock)
+
+    def _doubts(self, keys: Iterable[Quantity]) -> Iterator[Quantity]:
+        """What tells where quantities cannot be had, or not from the tape."""
+        # what opens is known once the inputs are looked over
+        forces, enters = False, self.enters
+        for key in keys:
+            yield from self._closed(key)
+            if enters:
+                continue
+            forces = forces or key.is_force
+            if key.is_force or key.order:
+                yield from (Regularity(g.name) for g in self.branch.plan.groups if g.kind == "Newton")
+        if forces:
+            yield from (Margin(g.name) for g in self.branch.plan.groups if g.kind not in ("Newton", "PRP"))
+
+    def _closed(self, key: Quantity) -> list[Quantity]:
+        """What tells where the groups that a quantity depends on are not assembled."""
+        return [Closed((group,)) for group in key.groups(self.recording)] if self.branch.may_open else []
+
+    def _where_bad(self, key: Quantity, found: Any) -> NDArray[np.bool_] | None:
+        """The poses that a doubt is right about; None where it is right about none."""
+        if isinstance(key, Closed):
+            bad = ~np.isfinite(found)
+        else:
+            bad = np.abs(found) < (NEAR if isinstance(key, Margin) else SINGULAR)
+        return np.broadcast_to(bad, self.n) if np.any(bad) else None
+
+    @cached_property
+    def _nowhere(self) -> NDArray[np.bool_] | None:
+        """The poses whose input is no number; None where there are none."""
+        finite = np.isfinite(self.inputs)
+        return None if finite.all() else np.asarray(~finite.all(axis=1))
+
+    @cached_property
+    def _careful(self) -> NDArray[np.bool_]:
+        """The poses close to a change point."""
+        return self.branch.close_to_change(self.inputs[:, 0])
+
+    def entering(self, inputs: Iterable[str], friction: Reals | None = None) -> dict[str, Any]:
+        """The inputs of a tape, by their names; the friction (c, n) where it is not that of the poses."""
+        statics: Statics | None = None
+        result: dict[str, Any] = {}
+        for name in inputs:
+            kind, _, of = name.partition(" ")
+            if not of:
+                j = int(name[1:])
+                value = self.inputs[:, j] if name[0] == "q" else self.rates[NAMES.index(name[0]) - 1][j]
+                result[name] = value
+            elif kind == "sign":
+                result[name] = np.asarray(self.branch.sign(of, self.inputs[:, 0]), dtype=float)
+            elif kind == "x":
+                group, i = of.rsplit(" ", 1)
+                result[name] = self._unknowns(group)[int(i)]
+            elif kind == "rate":
+                group, i, order, way = of.rsplit(" ", 3)
+                result[name] = self._derivatives(group, int(order), int(way))[int(i)]
+            elif kind == "friction":
+                result[name] = (self.friction if friction is None else friction)[int(of)]
+            elif kind == "f":
+                statics = statics or (self.statics if friction is None else self._statics(friction))
+                result[name] = statics.solved[0][:, int(of)]
+            elif kind == "time":
+                result[name] = self.time
+            elif kind == "table":
+                number, part = of.split()
+                force = self._table(int(number))
+                result[name] = force.real if part == "x" else force.imag
+            elif of.startswith("spring "):
+                result[name] = self.twist(int(of.removeprefix("spring ")))
+            else:
+                result[name] = self._angle(of)
+        if self.n == 1:
+            result = {name: float(np.ravel(value)[0]) for name, value in result.items()}
+        return result
+
+    def _unknowns(self, group: str) -> list[Reals]:
+        """The unknowns of a group that enters, from its own branch."""
+        name = (group,)
+        if name not in self._entered:
+            of = next(g for g in self.branch.plan.groups if g.name == group)
+            self.solve(self.branch.plan.writes(of))
+            each = range(len(of.angles) + len(of.slides))
+            self._entered[name] = [
+                self.join([unknowns(of, st)[i] for st in self.states()], float) for i in each
+            ]
+        return self._entered[name]  # type: ignore[no-any-return]
+
+    def _derivatives(self, group: str, order: int, way: int) -> list[Any]:
+        """The derivatives of the unknowns of a group that enters, (n,) each: over an input, or in time (`entering`)."""
+        name = group, order, way
+        if name not in self._entered:
+            of = next(g for g in self.branch.plan.groups if g.name == group)
+            loops, each = range(len(of.closures)), range(len(of.angles) + len(of.slides))
+            keys: list[Quantity] = [GroupColumn(group, loop, i) for loop in loops for i in each]
+            keys += [RightSide(group, loop, way, order) for loop in loops]
+            values = self._raw(keys)
+            cols = [values[loop * len(each) : (loop + 1) * len(each)] for loop in loops]
+            right = values[len(loops) * len(each) :]
+            with np.errstate(all="ignore"):
+                if group in self.branch.folded:
+                    found = solve_determined(cols, right)
+                elif of.kind == "Newton":
+                    found = solve_columns(cols, right)
+                else:
+                    found = crossed(cols[0], right[0], 1 / cross(*cols[0]))
+                if group not in self.branch.folded:
+                    found = passed(self.branch.passage, of, self.inputs[:, 0], cols, order, found)
+            self._entered[name] = found
+        return self._entered[name]  # type: ignore[no-any-return]
+
+    def _angle(self, body: str) -> Reals:
+        """A body's angle with its whole turns."""
+        self.solve((f"angle:{body}",))
+        return self.over(lambda st: st.angle[body])  # type: ignore[no-any-return]
+
+    def twist(self, number: int) -> Reals:
+        """A torsion spring's twist with its whole turns, (n,)."""
+        from virtualwork.formulas.scene import Scene
+
+        spring = self.branch.mechanism.torsion_springs[number]
+        setting = Scene(self).setting
+        self.solve(tuple(f"angle:{body}" for body in spring.links if body != "ground"))
+        return self.over(lambda st: setting.twist(st, spring))  # type: ignore[no-any-return]
+
+    def _table(self, number: int) -> Any:
+        """What a table gives."""
+        table = self.recording.tables[number]
+        return table.over(self.place(table))
+
+    def place(self, table: Tabled) -> Reals:
+        """What a table is over."""
+        if table.axis == "input":
+            return self.inputs[:, 0]
+        if table.axis == "time":
+            return np.asarray(table.timed(self.time))
+        if table.axis == "speed":
+            return self.angle(table.body, 1)
+        known = self.branch.plan.angles[table.body]
+        if not known.by_inputs:
+            return np.asarray(table.in_turn(self.angle(table.body)))
+        return np.asarray(known.const + sum(c * self.inputs[:, j] for j, c in known.inputs))
