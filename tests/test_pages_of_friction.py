@@ -99,7 +99,7 @@ def faults(seed: int, folder: Path) -> tuple[list[str], int, int]:
 def test_random_mechanisms(tmp_path: Path, first_seed: int) -> None:
     """Driven by the rocker, in both assemblies: friction that settles, that does not, and that locks."""
     moving = locked = 0
-    for seed in range(first_seed, first_seed + 40):
+    for seed in (34, *range(first_seed, first_seed + 39)):  # 34 locks
         wrong, here, stuck = faults(seed, tmp_path)
         assert wrong == []
         moving, locked = moving + here, locked + stuck

@@ -30,10 +30,10 @@ from balancing.objective import Objective
 from cli.field.groups import by_amplitudes
 from cli.field.request import Request, ceiling_in, limits_in, masses_at
 from cli.read.options import bad
-from cli.read.rounding import EPS
 from cli.read.runs.runs import SHOWN, Complex, Group, Real, Runs
 from cli.read.runs.stored import Stored
 from dalembert.angles import degrees
+from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.parts import in_parts
 from dalembert.errors import DataError
 from dalembert.units import Scaled, amplitude_kind, from_si

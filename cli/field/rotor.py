@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from balancing import initial_unbalance
 from cli.field.field_balancing import SINGULAR, FieldBalancing, Solved
-from cli.read.rounding import EPS
 from cli.read.runs.runs import Channel, Complex, Group, Real
 from cli.read.tolerance import Verdict
+from dalembert.arithmetic.exact import EPS
 
 Flags = NDArray[np.bool_]
 

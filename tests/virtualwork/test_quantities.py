@@ -80,6 +80,8 @@ def test_fields_orders_and_what_is_nothing() -> None:
     assert not NOTHING
     with pytest.raises(AttributeError):
         point.order = 1  # type: ignore[misc]
+    with pytest.raises(TypeError):
+        Angle("crank")  # type: ignore[call-arg]
 
 
 def test_the_error_of_what_acts_on_a_link() -> None:

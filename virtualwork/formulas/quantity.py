@@ -75,6 +75,18 @@ class Recording(Planned, Protocol):
     def unwrapped(self, near: str, turn: Number) -> Number: ...
 
 
+new = tuple.__new__
+MAKERS: tuple[Callable[..., Any], ...] = (
+    lambda cls: new(cls, (cls.kind,)),
+    lambda cls, a: new(cls, (cls.kind, a)),
+    lambda cls, a, b: new(cls, (cls.kind, a, b)),
+    lambda cls, a, b, c: new(cls, (cls.kind, a, b, c)),
+    lambda cls, a, b, c, d: new(cls, (cls.kind, a, b, c, d)),
+    lambda cls, a, b, c, d, e: new(cls, (cls.kind, a, b, c, d, e)),
+)
+"""What makes a quantity, by the number of its fields."""
+
+
 @dataclass_transform(frozen_default=True)
 class Quantity(tuple[Any, ...]):
     """A quantity, and at once the key under which its values are kept: a tuple of its kind and its fields."""
@@ -96,6 +108,8 @@ class Quantity(tuple[Any, ...]):
         for place, name in enumerate(own, 1 + len(cls.fields)):
             setattr(cls, name, property(itemgetter(place)))
         cls.kind, cls.fields = kind, (*cls.fields, *own)
+        # a function of so many fields is faster than one of any number, and refuses others
+        cls.__new__ = staticmethod(MAKERS[len(cls.fields)])  # type: ignore[method-assign]
 
     def __new__(cls, *of: Any) -> Self:
         """Make one from its fields."""
