@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from decimal import Decimal
 from math import floor, inf, log10
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,9 @@ from dalembert.results.columns import Column, Table
 
 if TYPE_CHECKING:
     from dalembert.results.columns import Cell
+
+
+EPS = 2.0**-52
 
 
 def digits_that_hold(table: Table) -> tuple[Table, int]:
@@ -37,10 +41,14 @@ def _cut(value: Cell, error: float) -> Cell:
         return None
     if isinstance(value, str) or value is None or not value or not error > 0:
         return value
-    digits = min(floor(log10(abs(value) / error)), 17) if error < abs(value) else 0
-    for last in range(digits - 1, -1, -1):
-        # what the number and the other run agree in, wherever it lies within the error
+    most = floor(log10(abs(value) / error)) if error < abs(value) else -1
+    for last in range(min(most, 16), -1, -1):
         cut = f"{value:.{last}e}"
-        if cut == f"{value + error:.{last}e}" == f"{value - error:.{last}e}":
-            return float(cut)
+        shown = float(cut)
+        room = 0.5 * 10.0 ** (int(cut[cut.index("e") + 1 :]) - last) - error
+        if abs(value - shown) > room + EPS * abs(value):
+            continue
+        # all that lies within the error has these digits, and the double that is printed has no others
+        if abs(float(Decimal(value) - Decimal(cut))) <= room and cut == f"{shown:.{last}e}":
+            return shown
     return 0.0
