@@ -6,7 +6,6 @@ import ast
 import json
 import subprocess
 import sys
-import zipfile
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -416,26 +415,6 @@ def test_a_small_table_needs_numpy_only(tmp_path: Path) -> None:
     assert not loaded & (HEAVY - {"numpy"})
 
 
-def test_the_wheel_holds_the_packages_and_the_examples(tmp_path: Path) -> None:
-    subprocess.run(
-        [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", tmp_path, ROOT],
-        check=True,
-        capture_output=True,
-    )
-    (wheel,) = tmp_path.glob("*.whl")
-    held = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
-    tracked = {
-        str(file.relative_to(ROOT))
-        for package in INSTALLED
-        for file in (ROOT / package).rglob("*")
-        if file.is_file() and "__pycache__" not in file.parts
-    }
-    assert held == tracked
-    assert "cli/examples/riul-rotor/rotor.csv" in held
-    assert {f"{package}/py.typed" for package in INSTALLED} <= held
-
-
-# Within a command's folder, from the top down; the other files of a folder stand between these as they need.
 ROLES = (("command",), ("columns", "picture", "remarks", "report", "words"), ("solve",), ("read",))
 
 

@@ -27,8 +27,8 @@ CASES: dict[str, tuple[Callable[[], object], str]] = {
     "text": (lambda: b.least_squares("x", c(5)), "influence must be an array of numbers, found 'x'"),
     "ridge": (lambda: b.least_squares(c(5, 2), c(5), ridge=[1, 2]), "ridge must be one number"),
     "error": (
-        lambda: b.least_squares(c(5, 2), c(5)).error_estimate(initial_error=np.ones(3)),
-        "initial_error",
+        lambda: b.least_squares(c(5, 2), c(5)).error_estimate("residuals"),
+        "'residuals': expected corrections, residual",
     ),
     "minimax weights": (lambda: b.minimax(c(5, 2), c(5), weights=np.ones(4)), r"weights \(4,\)"),
     "minimax limits": (lambda: b.minimax(c(5, 2), c(5), [1, 2, 3]), "max_mass must have the shape"),

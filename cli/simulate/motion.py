@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
     from cli.cases.case import Rows
     from dalembert.results.columns import Document
-    from dalembert.results.way import Topic
     from virtualwork import Mechanism
     from virtualwork.animation import Series
     from virtualwork.intime.run import Run
@@ -43,8 +42,6 @@ if TYPE_CHECKING:
 
     Reals = NDArray[np.float64]
     Values = dict[Component, Reals]
-    from collections.abc import Sequence
-
     from virtualwork.describe.parts import Input
 
 
