@@ -37,12 +37,12 @@ if TYPE_CHECKING:
     from dalembert.results.columns import Document
     from virtualwork import Mechanism
     from virtualwork.animation import Series
+    from virtualwork.describe.parts import Input
     from virtualwork.intime.run import Run
     from virtualwork.intime.travel import Moved, Travel
 
     Reals = NDArray[np.float64]
     Values = dict[Component, Reals]
-    from virtualwork.describe.parts import Input
 
 
 # an input's angle and its rates
