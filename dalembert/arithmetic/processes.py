@@ -1,10 +1,19 @@
-"""Worker processes of this machine, as an executor that outlives their deaths."""
+"""Worker processes of this machine, as an executor that outlives their deaths.
+
+Results come back as files: a worker that is killed while it sends a long one through the pipe that all share leaves the
+reader waiting for its rest, and the other workers for their turn.
+"""
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from functools import partial
+from itertools import count
 from multiprocessing import get_context
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -22,6 +31,7 @@ class Processes(Executor):
     def __init__(self, workers: int) -> None:
         self.workers = workers
         self._pool = self._new()
+        self._folder, self._numbers = TemporaryDirectory(prefix="dalembert-"), count()
 
     def _new(self) -> ProcessPoolExecutor:
         # each starts afresh: a copy of this process would copy what its threads hold
@@ -29,15 +39,21 @@ class Processes(Executor):
 
     def submit(self, fn: Callable[..., R], /, *args: Any, **kwargs: Any) -> Future[R]:
         """Send a call to a worker."""
+        file = Path(self._folder.name, str(next(self._numbers)))
         try:
-            return self._pool.submit(fn, *args, **kwargs)
+            sent = self._pool.submit(_write_result, file, fn, args, kwargs)
         except BrokenExecutor:
             self._pool = self._new()
-            return self._pool.submit(fn, *args, **kwargs)
+            sent = self._pool.submit(_write_result, file, fn, args, kwargs)
+        result: _FromFile[R] = _FromFile(sent)
+        sent.add_done_callback(partial(result.read, file))
+        return result
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Let the workers go."""
+        """End the workers."""
         self._pool.shutdown(wait, cancel_futures=cancel_futures)
+        if wait:
+            self._folder.cleanup()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -49,6 +65,39 @@ class Processes(Executor):
         # something leaves its sender waiting, and nothing else is begun
         self.shutdown(cancel_futures=True)
         return None
+
+
+class _FromFile(Future[R]):
+    """The result of a call that leaves it in a file."""
+
+    def __init__(self, sent: Future[None]) -> None:
+        super().__init__()
+        self._sent = sent
+
+    def cancel(self) -> bool:
+        """Cancel the call, where it has not begun."""
+        return self._sent.cancel()
+
+    def read(self, file: Path, sent: Future[None]) -> None:
+        """Read the result, once the call is done."""
+        if sent.cancelled():
+            super().cancel()
+        if not self.set_running_or_notify_cancel():
+            return
+        error = sent.exception()
+        if error is None:
+            try:
+                self.set_result(pickle.loads(file.read_bytes()))
+            except Exception as own:
+                error = own
+        file.unlink(missing_ok=True)
+        if error is not None:
+            self.set_exception(error)
+
+
+def _write_result(file: Path, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
+    """Call a function, and leave what it returns in a file."""
+    file.write_bytes(pickle.dumps(fn(*args, **kwargs), protocol=pickle.HIGHEST_PROTOCOL))
 
 
 def _ignore_interrupts() -> None:

@@ -358,7 +358,12 @@ class Poses:
         raise NotImplementedError
 
     def formed(
-        self, forms: Sequence[Callable[[Any], Number]], kind: type, targets: Iterable[str] = ()
+        self,
+        forms: Sequence[Callable[[Any], Number]],
+        kind: type,
+        targets: Iterable[str] = (),
+        order: int = 1,
+        name: str = "",
     ) -> list[Any]:
         """What forms make of the pose as the loads see it, from a tape, (n,) each."""
         raise NotImplementedError

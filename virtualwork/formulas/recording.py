@@ -98,6 +98,8 @@ class Recording:
         self.together = self.rates_of(k, given) if k > 1 else None
         self._done: set[tuple[int, int, int]] = set()
         self._values: dict[Quantity, Number] = {}
+        # tapes of what studies make of the pose
+        self.forms: dict[str, Tape] = {}
         self._forces: PoseForces | None = None
         # how far the loops of groups without a closed form are from closing as they enter, m
         self.open_loops: dict[str, Number] = {}

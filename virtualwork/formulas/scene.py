@@ -109,21 +109,27 @@ class Scene:
             self.poses.advance(wanted, order)
 
     def over(
-        self, forms: Sequence[Callable[[Block], Number]], kind: type, targets: Iterable[str] = ()
+        self,
+        forms: Sequence[Callable[[Block], Number]],
+        kind: type,
+        targets: Iterable[str] = (),
+        order: int = 1,
+        name: str = "",
     ) -> list[Any]:
         """What forms make of the pose as the loads see it, (n,) each; NaN where a pose is not assembled.
 
-        `targets`: what they depend on beyond the loads and the places of all joints.
+        `targets`: what they depend on beyond the loads and the places of all joints, with derivatives up to an order.
+        `name`: under which the tape of forms that are the same for all poses is kept.
         """
         wanted = tuple(targets)
         if self.on_tape:
-            return self.poses.formed(forms, kind, wanted)
+            return self.poses.formed(forms, kind, wanted, order, name)
         try:
             self.forces.solve_places()
-            self._solve(wanted, 1)
+            self._solve(wanted, order)
             values = [form(self.forces.block) for form in forms]
         except (ZeroDivisionError, OverflowError):
-            return self.poses.formed(forms, kind, wanted)
+            return self.poses.formed(forms, kind, wanted, order, name)
         result: list[Any] = [np.array([0.0 if value is None else value], kind) for value in values]
         if not self.poses.assembled.all():
             for value in result:

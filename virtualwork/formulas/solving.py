@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from dalembert.arithmetic.engines import Outputs, run
 from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.recorded import bare
+from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.entering import GroupColumn, RightSide
 from virtualwork.formulas.forces import Bearing, Effort, Entry, RubbingRate
 from virtualwork.formulas.kinematics import AnglePartial
@@ -82,22 +83,25 @@ class Solving(Poses):
         return self._enter or bool(self.branch.folded)
 
     def formed(
-        self, forms: Sequence[Callable[[Block], Number]], kind: type, targets: Iterable[str] = ()
+        self,
+        forms: Sequence[Callable[[Block], Number]],
+        kind: type,
+        targets: Iterable[str] = (),
+        order: int = 1,
+        name: str = "",
     ) -> list[Any]:
         """What forms make of the pose as the loads see it, (n,) each: written down, and run; NaN where a pose is not assembled.
 
-        `targets`: what they depend on beyond the loads and the places of all joints, as `plan.Plan.needed` has it.
+        `targets`: what they depend on beyond the loads and the places of all joints, as `plan.Plan.needed` has it, with
+        derivatives up to an order. `name`: under which the tape of forms that are the same for all poses is kept.
         """
         recording, wanted = self.recording, tuple(targets)
-        outputs: dict[str, Any] = {}
         with recording.lock:
-            recording.forces.solve_places()
-            recording.solve(wanted, 1)
-            for i, form in enumerate(forms):
-                value = form(recording.forces.block)
-                value = 0.0 if value is None else bare(value)
-                outputs |= {f"{i} x": value.real, f"{i} y": value.imag}
-            tape = recording.recorder.tape(outputs)
+            tape = recording.forms.get(name)
+            if tape is None:
+                tape = self._written(forms, wanted, order)
+                if name:
+                    recording.forms[name] = tape
         rows = run(tape, self.entering(tape.inputs))
         result: list[Any] = [np.empty(self.n, kind) for _ in forms]
         for i, to in enumerate(result):
@@ -106,12 +110,25 @@ class Solving(Poses):
                 to.imag = rows.get(f"{i} y", 0.0)
         apart = self._apart_of([Effort(0)])
         if apart is not None:
-            for to, value in zip(result, apart[1].formed(forms, kind, wanted), strict=True):
+            for to, value in zip(result, apart[1].formed(forms, kind, wanted, order, name), strict=True):
                 to[apart[0]] = value
         if not self.assembled.all():
             for to in result:
                 leave_out(to, ~self.assembled)
         return result
+
+    def _written(
+        self, forms: Sequence[Callable[[Block], Number]], targets: tuple[str, ...], order: int
+    ) -> Tape:
+        """The tape of what forms make of the pose."""
+        recording, outputs = self.recording, dict[str, Any]()
+        recording.forces.solve_places()
+        recording.solve(targets, order)
+        for i, form in enumerate(forms):
+            value = form(recording.forces.block)
+            value = 0.0 if value is None else bare(value)
+            outputs |= {f"{i} x": value.real, f"{i} y": value.imag}
+        return recording.recorder.tape(outputs)
 
     def _apart_of(self, keys: Sequence[Quantity]) -> tuple[NDArray[np.bool_], Self] | None:
         """The poses whose derivatives enter: which, and these alone; None where there are none."""

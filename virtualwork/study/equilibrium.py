@@ -11,7 +11,8 @@ V″ a μ = M a (Meriam & Kraige, Dynamics, §8/5; Lagrange).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations, product
@@ -26,6 +27,7 @@ from virtualwork.digits.forces import ForceErrors
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.lanes import Lanes
+from virtualwork.formulas.loads import Load, Tabled
 from virtualwork.formulas.numbers import EPS, Number, Reals, plus
 from virtualwork.formulas.scene import Scene
 from virtualwork.plan.steps import path_reads
@@ -156,22 +158,38 @@ class Rest:
 
                 yield form
 
-        each = self.scene.over([form for j in range(self.k) for form in forms(j)], float)
+        each = self.scene.over([form for j in range(self.k) for form in forms(j)], float, name="rest, first")
         return np.stack(each[0::2], axis=1), np.stack(each[1::2], axis=1)
 
     def along(self, direction: Reals) -> Reals:
         """∂Q/∂q along a direction in the inputs, times the direction: d²(work), (n,)."""
         still: list[Number] = [0.0] * self.k
-        total = np.zeros(len(self.inputs))
-        for i in range(len(self.inputs)):
-            way = [direction.tolist(), still, still] if self.k > 1 else None
-            scene = Scene(self.poses.again(self.inputs[i : i + 1], way), at_rest=True)
-            reads = set().union(*(load.reads() for load in scene.loads)) - {f"angle:{GROUND}"}
-            rates = scene.along(sorted(reads))
+        way = [direction.tolist(), still, still] if self.k > 1 else None
+        scene = Scene(self.poses.again(self.inputs, way), at_rest=True)
+        reads = sorted(set().union(*(load.reads() for load in scene.loads)) - {f"angle:{GROUND}"})
+
+        def bent(block: Block) -> Number:
+            rates, total = block.along or block.by[0], None
             for load in scene.loads:
-                value = None if rates is None else load.second(scene.block, rates)
-                total[i] += np.nan if rates is None else value or 0.0
-        return total * (direction[0] ** 2 if self.k == 1 else 1.0)
+                total = plus(total, load.second(block, rates))
+            return total
+
+        if scene.on_tape and not any(isinstance(load, Tabled) for load in scene.loads):
+            (total,) = scene.over([bent], float, reads, 2, name="rest, second")
+        else:
+            # the slope of a table is that of each pose's own row
+            total = np.array(
+                [self._along(scene.loads, self.inputs[i : i + 1], way) for i in range(len(self.inputs))]
+            )
+        return np.asarray(total * (direction[0] ** 2 if self.k == 1 else 1.0))
+
+    def _along(self, loads: Sequence[Load], inputs: Reals, way: list[list[Number]] | None) -> float:
+        """The derivative of one pose along a way in the inputs; NaN at a singular pose."""
+        scene = Scene(self.poses.again(inputs, way), at_rest=True)
+        rates = scene.along(sorted(set().union(*(load.reads() for load in loads)) - {f"angle:{GROUND}"}))
+        if rates is None:
+            return math.nan
+        return float(sum(load.second(scene.block, rates) or 0.0 for load in loads))
 
     def hessian(self) -> Reals:
         """V″, (n, k, k), by polarization of exact second derivatives along the inputs and their pairs."""
@@ -211,7 +229,7 @@ class Rest:
                 total = plus(total, load.potential(block))
             return total
 
-        (result,) = self.scene.over([stored], float, sorted(keys))
+        (result,) = self.scene.over([stored], float, sorted(keys), name="rest, potential")
         return np.asarray(result)
 
 
