@@ -237,10 +237,12 @@ class LogBalance:
     def unknown_samples(self, n: int = 200, seed: int = 0) -> Complex:
         """Draw x₀ and α of one machine from the errors of its readings, (n, s, 1 + p)."""
         rng, fit = np.random.default_rng(seed), self.fit
-        drawn = fit.unknowns + np.matvec(fit.gain, self.errors.draw(fit.readings, n, rng))
+        # of one machine among many the strides differ, and with them the order in which products are summed
+        gain = np.ascontiguousarray(fit.gain)
+        drawn = fit.unknowns + np.matvec(gain, self.errors.draw(fit.readings, n, rng))
         if fit.foreknown is None:
             return np.asarray(drawn)
-        sources = fit.foreknown.sources
+        sources = np.ascontiguousarray(fit.foreknown.sources)
         one, other = rng.standard_normal((2, n, 1, sources.shape[-1])) / np.sqrt(2)
         return np.asarray(drawn + np.matvec(sources, one + 1j * other))
 
@@ -261,7 +263,6 @@ class LogBalance:
         """
         rng = np.random.default_rng(seed)
         masses = np.concatenate([[1.0], self.corrections])
-        # of one machine among many the strides differ, and with them the order in which products are summed
         share = np.vecmat(masses.conj(), np.ascontiguousarray(self.fit.gain))
         error = (share * self.errors.draw(self.fit.readings, n, rng, student=True)).sum(axis=-1)
         prior = self.fit.foreknown
