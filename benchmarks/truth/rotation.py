@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from math import isqrt
@@ -82,7 +83,7 @@ def taylor(
         _power_of_two(max(float(np.linalg.norm(np.array(omega, dtype=float))), 1e-300)),
     )
     if mgl:
-        fast = max(fast, _power_of_two(np.sqrt(abs(mgl) / max(inertia))))
+        fast = max(fast, _power_of_two(math.sqrt(abs(mgl) / max(inertia))))
     moments = [_fixed(Fraction(x) / heavy) for x in inertia]
     direction = [_fixed(x) for x in attitude]
     # the weight's torque would feel a length of 1 + 1e-16

@@ -26,7 +26,6 @@ What:
   omega X,Y,Z  Angular velocity, rad/s, such as 0,4,12.
   alpha X,Y,Z  Its rate, rad/s²; with --frame-omega: that of its components there.
   frame_omega X,Y,Z  Angular velocity of axes that do not turn with the body, rad/s.
-  about X,Y,Z  A point fixed in space to take the momentum about, m.
   fixed X,Y,Z  The body turns about this point, m: the centre of mass follows.
   velocity X,Y,Z  Velocity of the centre of mass, m/s.
   acceleration X,Y,Z  Acceleration of the centre of mass, m/s².
@@ -42,6 +41,8 @@ What: a shaft:
   speed_rate RATE  Its rate, such as 10rad_s2.
   gravity X,Y,Z  Gravity on the shaft, m/s², such as 0,-9.81,0.
   correct NAME:Z:RADIUS  A correction plane of the shaft, such as A:0mm:20mm.
+Further options (docs/commands.md describes them):
+  about X,Y,Z  A point fixed in space to take the momentum about, m.
 """
 
 

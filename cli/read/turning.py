@@ -37,7 +37,7 @@ def rotation_of(table: Table, values: dict[str, Array]) -> Array:
 
 def vectors(values: dict[str, Array], *names: str) -> Array:
     """Three columns as vectors (k, 3); what is blank is zero."""
-    rows = len(next(iter(values.values())))
+    rows = len(next(iter(values.values()), ()))
     return np.stack([np.nan_to_num(values.get(name, np.zeros(rows))) for name in names], axis=-1)
 
 

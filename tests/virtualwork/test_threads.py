@@ -35,11 +35,11 @@ def agree(
     questions: Questions,
     times: int,
     seed: int = 1,
-    exact: bool = False,
+    unit: Callable[[str, Any], Any] | None = None,
 ) -> None:
     """Ask fresh results from many threads, each in an order of its own; and one thread alone.
 
-    One pose runs other code the second time, which moves the last digits; arrays are exactly the same.
+    `unit`: by how much one may differ, by its name and value; else 1e-12 of its size.
     """
     alone = make()
     truth = {name: ask(alone) for name, ask in questions.items()}
@@ -57,8 +57,12 @@ def agree(
             for got in [future.result(60) for future in [pool.submit(answers, i) for i in range(THREADS)]]:
                 for name, value in got.items():
                     size = np.abs(np.nan_to_num(truth[name])).max(initial=0.0)
-                    unit = 0.0 if exact else 1e-12 * size
-                    np.testing.assert_allclose(value, truth[name], rtol=0, atol=unit, err_msg=name)
+                    allowed = 1e-12 * size if unit is None else unit(name, truth[name])
+                    if np.ndim(allowed):
+                        off, allowed = np.abs(value - truth[name]) / allowed, 1.0
+                        np.testing.assert_allclose(off, 0 * off, rtol=0, atol=1, err_msg=name)
+                    else:
+                        np.testing.assert_allclose(value, truth[name], rtol=0, atol=allowed, err_msg=name)
 
 
 def loaded(**more: Any) -> Mechanism:
@@ -170,7 +174,38 @@ def test_one_motion_often(name: str, engine: str, n: int, monkeypatch: pytest.Mo
     def make() -> Any:
         return MECHANISMS[name]().motion(sweep, speed=7.0, acceleration=3.0)
 
-    agree(make, questions, 10 if n < 1000 else 3, exact=bool(engine) and n > 100 and name != "friction")
+    unit = beside_change_points(make()) if (name, engine) == ("parallelogram", "llvm") else None
+    if engine == "numpy" and n > 100 and name != "friction":
+        unit = exactly
+    agree(make, questions, 10 if n < 1000 else 3, unit=unit)
+
+
+def exactly(name: str, value: Any) -> float:
+    """Nothing."""
+    return 0.0
+
+
+ORDERS = {"angle": 0, "position": 0, "omega": 1, "velocity": 1, "jerk": 3, "frame": 3}
+
+
+def beside_change_points(motion: Any) -> Callable[[str, Any], Any]:
+    """How far answers of compiled code may lie from each other, by the condition of each pose.
+
+    A product goes into a sum in one rounding; not so where it was computed before and enters. Each order of the rates divides
+    once more by the loop's Jacobian, which vanishes there. Of links that stay level most rates are zero but for rounding of the
+    crank's.
+    """
+    condition = np.maximum(motion.condition, 10.0)
+
+    def unit(name: str, value: Any) -> Any:
+        if np.asarray(value).dtype == bool:
+            return 0.0
+        order = ORDERS.get(name.rpartition(" ")[2], 2)
+        size = max(np.abs(np.nan_to_num(value)).max(initial=0.0), 7.0**order)
+        each = 1e-12 * size + 4e-15 * size * condition ** max(order, 1)
+        return each[:, None] if np.ndim(value) > 1 else each if np.ndim(value) else float(each.max())
+
+    return unit
 
 
 def attributes(*names: str) -> dict[str, Callable[[Any], Any]]:
