@@ -19,11 +19,10 @@ from virtualwork.formulas.loads import (
     InertiaForce,
     InertiaTorque,
     Load,
-    SpringEnd,
     Tabled,
-    TorsionEnd,
 )
 from virtualwork.formulas.quantities import Combination, Quantities
+from virtualwork.formulas.springs import SpringEnd, TorsionEnd
 from virtualwork.plan.steps import Joint, Path, Place, Plan, Term, joints, path_reads
 from virtualwork.plan.sums import combined
 
