@@ -143,6 +143,10 @@ class Poses:
         self._done: set[tuple[int, int, int]] = set()
         self._blocks: list[State] | None = None
         self._along: dict[int, Rates] = {}
+        self._begin()
+
+    def _begin(self) -> None:
+        """Set the state that a class below adds; each calls the one above it."""
 
     def _given(self, name: str, value: ArrayLike | None, own: list[float | None]) -> list[Number]:
         """One rate of the inputs, a scalar or (n,) array for each input."""

@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from dalembert.arithmetic.engines import Outputs, run
 from dalembert.arithmetic.guard import guarded
@@ -50,16 +50,8 @@ class Solving(Poses):
 
     branch: Turning
 
-    def __init__(
-        self,
-        branch: Turning,
-        angle: ArrayLike | None = None,
-        speed: ArrayLike | None = None,
-        acceleration: ArrayLike | None = None,
-        jerk: ArrayLike | None = None,
-        block_of: int | None = None,
-    ) -> None:
-        super().__init__(branch, angle, speed, acceleration, jerk, block_of)
+    def _begin(self) -> None:
+        super()._begin()
         # where doubts are right
         self._bad: dict[Quantity, NDArray[np.bool_] | None] = {}
         # whether the derivatives of groups enter; and those, with the unknowns

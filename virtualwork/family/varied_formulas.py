@@ -43,7 +43,7 @@ DIP = 0.05
 
 
 @guarded
-class Written:
+class VariedFormulas:
     """Formulas of an assembly, in which dimensions are inputs of the tape, called by their paths.
 
     Parameters
