@@ -12,6 +12,7 @@ Inputs of a tape
 `near BODY`              the angle, with its whole turns, of a body of which the angle itself is needed
 `near spring 0`          the same of a torsion spring's twist
 `table 0 x`, `table 0 y` the force of the first load that is given by a table
+`slope 0 x`, `slope 0 y` its derivative to what the table is over
 `time`                   where a table is over it
 """
 
