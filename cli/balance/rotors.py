@@ -16,7 +16,7 @@ from dalembert.angles import degrees, phasor
 from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError, quote
 from dalembert.tables.table import Table, read
-from dalembert.units import Scaled, from_si, to_si
+from dalembert.units import from_si, to_si
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -292,10 +292,6 @@ class Balancing:
     def length_unit(self) -> str:
         """The unit in which lengths are said."""
         return self.rotors.radius_unit or self.planes.z_unit or "mm"
-
-    def couple_size(self, couple: Scaled) -> Scaled:
-        """Return a couple unbalance in the unit of unbalances times that of lengths."""
-        return from_si(from_si(couple, "unbalance", self.rotors.unbalance_unit), "length", self.length_unit)
 
     def rows_of(self, rotor: int) -> slice:
         """Return the rows of a rotor's planes."""

@@ -78,7 +78,7 @@ def run(
     from cli.body import tables
     from cli.body.moving import MovingBody, Request
     from cli.read.parts import read_bodies, read_table
-    from cli.read.seeking import pair
+    from cli.read.root_search import pair
     from cli.show.result import Result, with_found
 
     request = Request(
@@ -108,7 +108,7 @@ def run(
     if sought is None:
         bodies = [MovingBody(each, request) for each in read_bodies(parts)]
     else:
-        from cli.body.seeking import find as search
+        from cli.body.find import find as search
 
         moving, solution = search(read_table(parts), parts, request, *sought)
         bodies = [moving]

@@ -15,7 +15,7 @@ from cli.cases.loop import Loop
 from cli.cases.values import Driven, Varied, assigned, with_numbers
 from cli.read.about import about
 from cli.read.options import bad
-from cli.read.seeking import pair
+from cli.read.root_search import pair
 from cli.show.result import Result, with_found
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from cli.cases.case import Case
     from cli.cases.options import Options
-    from cli.read.seeking import Found
+    from cli.read.root_search import Found
     from cli.show.commands import ShowOptions
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
@@ -162,7 +162,7 @@ class Call:
             found = None
             both = pair(getattr(own, "find", None), getattr(own, "so_that", None))
             if both is not None:
-                from cli.cases.sought import find
+                from cli.cases.find import find
 
                 if varied is not None or (moved is not None and moved.n > 1):
                     raise bad("--find", "expected one pose of one mechanism, such as --at 60deg")

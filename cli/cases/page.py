@@ -17,7 +17,7 @@ from dalembert.page import Shown
 from dalembert.results.columns import Table
 from virtualwork import MechanismError, quantities
 from virtualwork.animation import JointForce, Series, moving_page
-from virtualwork.computing import ORDERS, computing_page
+from virtualwork.computing_page import ORDERS, computing_page
 from virtualwork.motion import Motion
 from virtualwork.quantities import Component
 

@@ -98,7 +98,11 @@ def cells_of(
             # the moment of a pin is zero where there is a force in it
             shown[each] = cells(np.zeros(n), finite)
             continue
-        value = computed[each.key] - computed[each.less] if each.less else computed[each.key]
+        value = computed[each.key]
+        if each.less:
+            # where neither has a finite value, there is no difference
+            with np.errstate(invalid="ignore"):
+                value = value - computed[each.less]
         # a vector is known where both its components are
         finite = np.isfinite(value)
         if each.link:

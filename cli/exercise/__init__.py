@@ -58,8 +58,8 @@ def _run(
     from cli.exercise.solving import workshop
     from cli.exercise.tables import tables
     from cli.exercise.variants import variants
+    from cli.show.capture import options_of
     from cli.show.result import Result
-    from cli.show.taking import options_of
 
     if folder is None:
         raise options.bad("-o", "expected -o FOLDER, where the sheets go")

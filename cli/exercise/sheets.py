@@ -114,12 +114,6 @@ def figures_text(figures: int) -> str:
     return "1 significant figure" if figures == 1 else f"{figures} significant figures"
 
 
-def points_text(ask: Ask) -> str:
-    """Return the points of a question."""
-    number = f"{float(ask.points):g}"
-    return f"{number} point" if number == "1" else f"{number} points"
-
-
 def problem_html(variant: Variant, drawing: str) -> str:
     """Return the problem of a student: text, tables, figure."""
     workshop = variant.problem.workshop

@@ -47,9 +47,9 @@ def run(file: str, output: Path, at: str | None = None, profile: str | None = No
     from cli.cases.axes import grids
     from cli.cases.call import load
     from cli.cases.inputs import of_one
+    from cli.exports.file import file_bytes
     from cli.exports.profile import SUFFIXES, of_follower
-    from cli.exports.profile import written as of_cam
-    from cli.exports.written import written
+    from cli.exports.profile import file_bytes as profile_bytes
     from cli.show.result import Result
     from virtualwork import MechanismError
 
@@ -68,9 +68,9 @@ def run(file: str, output: Path, at: str | None = None, profile: str | None = No
     name = "standard input" if file == "-" else Path(file).name
     try:
         if profile is not None:
-            data, notes = of_cam(m, of_follower(m, profile), suffix, name, bare)
+            data, notes = profile_bytes(m, of_follower(m, profile), suffix, name, bare)
         else:
-            data, notes = written(m, inputs, suffix, name, bare)
+            data, notes = file_bytes(m, inputs, suffix, name, bare)
     except MechanismError as error:
         raise DataError(f"{file}: {error}") from None
 

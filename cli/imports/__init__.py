@@ -7,7 +7,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.imports.words import KINDS
+from cli.imports.messages import KINDS
 from cli.read.options import bad
 from cli.show.output import reported
 from dalembert.errors import DataError

@@ -16,7 +16,7 @@ import typer
 from typer.core import TyperCommand
 
 from cli.read.about import HEAD
-from cli.show.taking import take
+from cli.show.capture import take
 from dalembert.dataclass import dataclass
 
 if TYPE_CHECKING:

@@ -74,7 +74,7 @@ def run(
     """
     import numpy as np
 
-    from cli.read.seeking import pair
+    from cli.read.root_search import pair
     from cli.show.result import Result, with_found
     from cli.spin import tables
     from cli.spin.rotation import Rotation, read_body
@@ -94,7 +94,7 @@ def run(
     rotation = Rotation(turning, np.array(times), method.value if method else None, integrator.value)
     sought, solution = pair(find, so_that), None
     if sought is not None:
-        from cli.spin.seeking import find as search
+        from cli.spin.find import find as search
 
         rotation, solution = search(rotation, *sought)
         turning = rotation.body

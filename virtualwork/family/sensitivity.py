@@ -19,7 +19,7 @@ from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.dimensions import Dimension, named, value
-from virtualwork.family.written import Written
+from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import leave_out
 from virtualwork.formulas.quantity import Quantity
@@ -40,7 +40,7 @@ class Sensitivities:
 
     def __init__(self, assembly: Assembly, poses: Lanes) -> None:
         self.assembly, self.poses, self.lock = assembly, poses, assembly.lock
-        self._written: dict[tuple[Dimension, ...], Written] = {}
+        self._written: dict[tuple[Dimension, ...], VariedFormulas] = {}
 
     def dimension(self, path: str) -> Dimension:
         """The one number that a path names.
@@ -128,7 +128,7 @@ class Sensitivities:
         """The quantities themselves, (n,)."""
         return self.poses.values(list(keys))
 
-    def _formulas(self, dimensions: tuple[Dimension, ...]) -> Written:
+    def _formulas(self, dimensions: tuple[Dimension, ...]) -> VariedFormulas:
         if dimensions not in self._written:
             own = {d.where[-1] for d in dimensions if d.where[0] == "inputs"}
             moves = tuple(
@@ -138,10 +138,12 @@ class Sensitivities:
             inner = [d for d in dimensions if d.where[0] != "inputs"]
             # which signs change on the way is known once the way was looked over
             _ = self.poses.states()
-            self._written[dimensions] = Written(self.assembly, inner, moves, own_signs=False, settled=False)
+            self._written[dimensions] = VariedFormulas(
+                self.assembly, inner, moves, own_signs=False, settled=False
+            )
         return self._written[dimensions]
 
-    def _refuse(self, keys: Sequence[Quantity], written: Written) -> None:
+    def _refuse(self, keys: Sequence[Quantity], written: VariedFormulas) -> None:
         m = self.assembly.mechanism
         if not written.placed:
             raise MechanismError(
