@@ -11,10 +11,10 @@ from __future__ import annotations
 import cmath
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from dalembert.arithmetic.tape import Operation, Tape, shortened
+from dalembert.arithmetic.tape import Operation, Tape, performed, reached, shortened
 
 Number = Any
 """A float, a complex, a `Real` or a `Complex`."""
@@ -72,6 +72,25 @@ class Recorder:
             Where an output is complex: its parts are two outputs.
         """
         return shortened(self.operations, self.numbers(outputs))
+
+    def again(self, outputs: Sequence[int], inputs: Mapping[str, Number]) -> list[Number]:
+        """The values of operations where some inputs have other values; what does not depend on these is not done again.
+
+        >>> recorder = Recorder()
+        >>> x, y = recorder.input("x"), recorder.input("y")
+        >>> z = x * x + x * y
+        >>> recorder.tape({"z": z, "at y = 1": recorder.again([z.number], {"y": 1.0})[0]}).cost
+        4
+        """
+        values: dict[int, Number] = {}
+        for number in reached(self.operations, outputs):
+            kind, *of = self.operations[number]
+            if kind == "input":
+                if of[0] in inputs:
+                    values[number] = inputs[of[0]]
+            elif kind != "const" and not values.keys().isdisjoint(of):
+                values[number] = performed(kind, [values.get(a, Real(self, a)) for a in of], RECORDED)
+        return [values.get(number, Real(self, number)) for number in outputs]
 
     def numbers(self, outputs: Mapping[str, Number]) -> list[tuple[str, int]]:
         """The operations that have the values of named results; see `tape`."""
