@@ -73,24 +73,36 @@ class Recorder:
         """
         return shortened(self.operations, self.numbers(outputs))
 
-    def again(self, outputs: Sequence[int], inputs: Mapping[str, Number]) -> list[Number]:
-        """The values of operations where some inputs have other values; what does not depend on these is not done again.
+    def again(self, outputs: Sequence[int], inputs: Sequence[Mapping[str, Number]]) -> list[list[Number]]:
+        """The values of operations where some inputs, each time the same, have other values; nothing else is done again.
 
         >>> recorder = Recorder()
         >>> x, y = recorder.input("x"), recorder.input("y")
         >>> z = x * x + x * y
-        >>> recorder.tape({"z": z, "at y = 1": recorder.again([z.number], {"y": 1.0})[0]}).cost
+        >>> [[at_one], [at_zero]] = recorder.again([z.number], [{"y": 1.0}, {"y": 0.0}])
+        >>> recorder.tape({"z": z, "at y = 1": at_one, "at y = 0": at_zero}).cost
         4
         """
-        values: dict[int, Number] = {}
-        for number in reached(self.operations, outputs):
-            kind, *of = self.operations[number]
-            if kind == "input":
-                if of[0] in inputs:
-                    values[number] = inputs[of[0]]
-            elif kind != "const" and not values.keys().isdisjoint(of):
-                values[number] = performed(kind, [values.get(a, Real(self, a)) for a in of], RECORDED)
-        return [values.get(number, Real(self, number)) for number in outputs]
+        known = [self.node("input", name) for name in inputs[0]]
+        below: dict[int, Operation] = {}
+        for number in reached(self.operations, outputs, known):
+            operation = self.operations[number]
+            if number in known or (
+                operation[0] not in ("const", "input") and not below.keys().isdisjoint(operation[1:])
+            ):
+                below[number] = operation
+        result = []
+        for enters in inputs:
+            values: dict[int, Number] = {}
+            for number, (kind, *of) in below.items():
+                if kind == "input":
+                    values[number] = enters[of[0]]
+                else:
+                    values[number] = performed(
+                        kind, [values[a] if a in values else Real(self, a) for a in of], RECORDED
+                    )
+            result.append([values[number] if number in values else Real(self, number) for number in outputs])
+        return result
 
     def numbers(self, outputs: Mapping[str, Number]) -> list[tuple[str, int]]:
         """The operations that have the values of named results; see `tape`."""

@@ -49,9 +49,9 @@ def written(recording: Recording, more: Sequence[Quantity] = ()) -> Tape:
             value = recording.value(Bearing(n))
             forces |= {f"bears {n} x": value.real, f"bears {n} y": value.imag}
         numbers = dict(recorder.numbers(forces))
-        for unit in (None, *each):
-            enter = {f"friction {n}": float(n == unit) for n in each}
-            values = recorder.again(list(numbers.values()), enter)
+        units = (None, *each)
+        enter = [{f"friction {n}": float(n == unit) for n in each} for unit in units]
+        for unit, values in zip(units, recorder.again(list(numbers.values()), enter), strict=True):
             last = "" if unit is None else f" {unit}"
             outputs |= {name + last: value for name, value in zip(numbers, values, strict=True)}
     return recorder.tape(outputs)
