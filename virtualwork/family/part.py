@@ -334,7 +334,7 @@ class Solver:
         """Leave out the forces of poses that friction locks."""
         rubbed = [x for key, x in zip(keys, values, strict=True) if isinstance(key, Force) and key.is_rubbed]
         if rubbed and self.part.mechanism.friction:
-            locked = np.isnan(self._friction(rows)).any(axis=0)
+            locked = np.asarray(np.isnan(self._friction(rows)).any(axis=0))
             for x in rubbed if locked.any() else ():
                 leave_out(x, locked)
 

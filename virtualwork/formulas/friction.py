@@ -18,7 +18,7 @@ from dalembert.arithmetic.recorded import bare
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.forces import Bearing, RubbingRate
 from virtualwork.formulas.locking import balanced
-from virtualwork.formulas.numbers import Complexes, Reals, solve
+from virtualwork.formulas.numbers import Complexes, Number, Reals, solve
 from virtualwork.formulas.positions import BLOCK
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import Recording
@@ -44,7 +44,7 @@ def written(recording: Recording, more: Sequence[Quantity] = ()) -> Tape:
         outputs[f"rate {n}"] = recording.value(RubbingRate(n))
         outputs[f"arm {n}"] = bare(coefficient) * (bare(radius) if joint.guide is None else 1.0)
     if not recording.forces.redundant:
-        forces = {}
+        forces: dict[str, Number] = {}
         for n in each:
             value = recording.value(Bearing(n))
             forces |= {f"bears {n} x": value.real, f"bears {n} y": value.imag}
