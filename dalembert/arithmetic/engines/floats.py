@@ -172,6 +172,6 @@ def _once(tape: Tape, *inputs: float) -> list[float]:
         elif kind == "input":
             values.append(next(enter))
         else:
-            # the test of a `select`
-            values.append(values[operation[2 if values[operation[1]] > 0 else 3]])
+            _, test, positive, otherwise = operation
+            values.append(values[positive] if values[test] > 0 else values[otherwise])
     return [values[number] for _, number in tape.outputs]
