@@ -356,7 +356,7 @@ class TopRotation:
 def _column(numbers: list[Decimal], like: Array) -> Array:
     """Numbers of 200 digits as a column (b, 1), rounded once."""
     if is_doubled(like):
-        from dalembert.arithmetic.doubled_arrays import exactly
+        from dalembert.arithmetic.doubled_fractions import exactly
 
         return as_array(exactly(map(Fraction, numbers), (len(numbers), 1)))
     return np.array([[float(x)] for x in numbers])

@@ -56,8 +56,9 @@ def run(
         raise options.bad("--speed", "expected the speed of the crankshaft, such as --speed 3000rpm")
     omega = options.needed("--speed", speed, "speed", positive=True)
     planes = None if plane is None else from_options(plane)
+    read = read_cylinders(cylinders)
     engine = Engine(
-        read_cylinders(cylinders), omega, order, counterweight_share, planes, read_shafts(shaft or [], order)
+        read, omega, order, counterweight_share, planes, read_shafts(shaft or [], order), read.pins
     )
 
     def figure() -> Figure:

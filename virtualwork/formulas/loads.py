@@ -238,17 +238,18 @@ class Tabled(Load):
         first = angle_rate(rates, self.body, 1)
         if self.path is not None or self.axis != "angle" or first is None:
             return total
-        return plus(total, self._steep(block).real * first * first)
+        return plus(total, block.slope(self).real * first * first)
 
-    def _steep(self, block: Block) -> Number:
-        """The slope of the table."""
-        at, force, q = self._in_cycle(self.place_in(block))
+    def slope(self, q: Number) -> Number:
+        """The slope of the table at places of it."""
+        at, force, q = self._in_cycle(q)
         place = np.clip(np.searchsorted(at, q, side="right") - 1, 0, len(at) - 2)
-        return complex(np.diff(force)[place] / np.diff(at)[place])
+        values = np.diff(force)[place] / np.diff(at)[place]
+        return values if values.ndim else complex(values)
 
     def turned(self, block: Block, rates: Rates) -> Number:
         """Its derivative over the input, in ground axes."""
-        steep = self._steep(block)
+        steep = block.slope(self)
         if not self.link_axes:
             return steep
         turning = block.by[0].angle[self.body][0]
