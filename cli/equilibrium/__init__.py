@@ -19,9 +19,8 @@ OPTIONS = f"{FILE}{CASES}{WORKERS}"
 def run(own: Options, show: ShowOptions) -> Result:
     """Find the positions in which a mechanism rests under its loads without effort, and whether stably.
 
-    About a stable position: the period of small oscillations, without dampers and friction.
-    --over or --cases of an input give the range that is searched; without them it is a whole turn, of a slide two sizes
-    of the mechanism either way.
+    A stable position has its period of small oscillations, without dampers and friction. --over or --cases of an
+    input set the range of the search (default: a whole turn; of a slide two sizes of the mechanism either way).
     """
     from cli.cases.call import Call
     from cli.equilibrium.rest import Equilibria

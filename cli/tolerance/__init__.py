@@ -15,19 +15,20 @@ EXAMPLE = "tolerances"
 OPTIONS = f"""
 {FILE}{CASES}{WORKERS}
 What:
-  only NAME,...  Only these: H.x,coupler.angle,crank.torque; H is all of H.
-  order position|velocity|acceleration|jerk  How far to differentiate (default: as the input's rates give).
+  only NAME,...  Show only these quantities: H.x,coupler.angle,crank.torque; H is all of H.
+  order position|velocity|acceleration|jerk  Highest derivative (default: the highest that the input's rates give).
   draws N  Number of mechanisms drawn within the tolerances.
   seed N=0  Random seed of --draws.
-  distribution normal|uniform=normal  Distribution of --draws; a limit is three standard deviations, or the end.
+  distribution normal|uniform=normal  Distribution of --draws: normal (a limit is three standard deviations) or uniform (a limit is an end).
 """
 
 
 @declared_command(OPTIONS, Options)
 def run(own: Options, show: ShowOptions) -> Result:
-    """Compute what the [tolerances] of FILE.toml do to the motion: worst case, standard deviation, shares.
+    """Compute the effect of the [tolerances] of FILE.toml on the motion: worst case, standard deviation, shares.
 
-    The first order is from exact derivatives; --draws solves drawn mechanisms. The table has a row for each pose.
+    Worst case and standard deviation are of first order, from exact derivatives. --draws solves drawn mechanisms in
+    addition. The table has a row for each pose.
     """
     from cli.cases.analysis import unknown
     from cli.cases.call import Call
