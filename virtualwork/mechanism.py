@@ -106,7 +106,7 @@ class Mechanism(Description):
 
     def _repr_html_(self) -> str | None:
         """Draw it in its own pose; None, which shows its `repr`, where it has none."""
-        from virtualwork.still import svg
+        from virtualwork.notebook_picture import svg
 
         try:
             motion = self.motion()

@@ -29,8 +29,8 @@ from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.one_pose import one_pose
 from virtualwork.formulas.quantity import Quantity
+from virtualwork.motion_views import MotionViews
 from virtualwork.parts_of_motion import LinkMotion, PointMotion, SlideMotion
-from virtualwork.pictured import Pictured
 from virtualwork.plan.steps import Step
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ ENDS = 10
 
 
 @guarded
-class Motion(Pictured):
+class Motion(MotionViews):
     """Position, velocity, acceleration, jerk and forces over given inputs, on demand.
 
     `Mechanism.motion` makes one. See there for the parameters.
@@ -372,14 +372,14 @@ class Motion(Pictured):
         """
         from pandas import DataFrame
 
-        from virtualwork.table import columns
+        from virtualwork.motion_table import columns
 
         return DataFrame(columns(self.poses))
 
     def _repr_html_(self) -> str:
         from pandas import DataFrame
 
-        from virtualwork.table import columns
+        from virtualwork.motion_table import columns
 
         # of many poses those alone are solved that are shown, and one more, which is shown as dots
         shown = np.arange(self.n)

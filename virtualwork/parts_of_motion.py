@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     from virtualwork.digits.estimates import Estimates
 
 
-class Asked(Protocol):
+class AnyMotion(Protocol):
     """What has quantities: the motion of one mechanism, (n,) each, or of variants, (v, n) each."""
 
     def value(self, key: Quantity) -> Any:
         """A quantity."""
 
 
-class Whole(Asked, Protocol):
+class OneMotion(AnyMotion, Protocol):
     """A motion of a mechanism."""
 
     @property
@@ -45,7 +45,7 @@ class PartOfMotion:
     Of one mechanism; of variants every array has a leading axis of them.
     """
 
-    def __init__(self, motion: Asked) -> None:
+    def __init__(self, motion: AnyMotion) -> None:
         self.motion = motion
 
     def key(self, order: int = 0) -> Quantity:
@@ -60,7 +60,7 @@ class PartOfMotion:
 class PointRates(PartOfMotion):
     """A point of a link, and its rates."""
 
-    def __init__(self, motion: Asked, body: str, place: complex, node: str | None = None) -> None:
+    def __init__(self, motion: AnyMotion, body: str, place: complex, node: str | None = None) -> None:
         self.motion, self.body, self.place, self.node = motion, body, place, node
         # a named point stands wherever the description, or a variant, has it
         self._where = 0j if node is not None else place
@@ -96,7 +96,7 @@ class PointRates(PartOfMotion):
 class LinkRates(PartOfMotion):
     """A link's angle, and its rates."""
 
-    def __init__(self, motion: Asked, body: str) -> None:
+    def __init__(self, motion: AnyMotion, body: str) -> None:
         super().__init__(motion)
         self.body = body
 
@@ -127,7 +127,7 @@ class LinkRates(PartOfMotion):
 class SlideRates(PartOfMotion):
     """A slide along its guide, from the guide's `through`, and its rates."""
 
-    def __init__(self, motion: Asked, guide: int) -> None:
+    def __init__(self, motion: AnyMotion, guide: int) -> None:
         super().__init__(motion)
         self.guide = guide
 
@@ -158,7 +158,7 @@ class SlideRates(PartOfMotion):
 class OfOneMechanism(PartOfMotion):
     """Estimates of rounding errors, and derivatives to the numbers of the description."""
 
-    motion: Whole
+    motion: OneMotion
 
     def error_estimate(self, order: int = 0) -> Reals:
         """Return the rounding error (n,) of the position or angle (order 0), or of its rate of that order.

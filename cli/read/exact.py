@@ -95,3 +95,9 @@ def cosine_and_sine(angle: Numbers, rows: Sequence[int]) -> tuple[DoubledArray, 
     """Cosines and sines of rows of a column of angles."""
     unit = turns(replace(angle, values=np.nan_to_num(angle.values[list(rows)])))
     return DoubledArray.of(unit.x), DoubledArray.of(unit.y)
+
+
+def as_written(numbers: Numbers) -> DoubledArray:
+    """A column of a file, in SI, as it is written; angles in degrees."""
+    exact = DoubledArray.of(doubled_array(numbers.exact, numbers.values.shape))
+    return exact * 180.0 / pi if numbers.dimension == "angle" and numbers.unit != "deg" else exact

@@ -24,10 +24,12 @@ def as_array(x: ArrayLike) -> NDArray[np.float64]:
 
 
 def in_32_digits(x: ArrayLike) -> Any:
-    """Return the same numbers as a `DoubledArray`."""
-    from dalembert.arithmetic.doubled_arrays import DoubledArray
+    """Return the same numbers as a `DoubledArray`; complex ones as a `DoubledComplex`."""
+    from dalembert.arithmetic.doubled_arrays import DoubledArray, DoubledComplex
 
-    return x if is_doubled(x) else DoubledArray(x)
+    if is_doubled(x):
+        return x
+    return DoubledComplex.of(x) if np.iscomplexobj(x) else DoubledArray(x)
 
 
 def filled(shape: Shape, value: float, like: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from virtualwork import Force, Guess, Guide, Input, Link, Mechanism, Spring, Torque, TorsionSpring
-from virtualwork.study.equilibrium import Rest
+from virtualwork.study.loads_at_rest import Rest
 
 G = 9.81
+TABLE = ((-3.0, -2.0), (-0.4, 1.0), (1.1, 4.0), (3.3, -2.0))
 
 
 def bar(**loads: Any) -> Mechanism:
@@ -35,7 +36,7 @@ def slider_crank() -> Mechanism:
     )
 
 
-def arm() -> Mechanism:
+def arm(**loads: Any) -> Mechanism:
     """Two inputs."""
     return Mechanism(
         {"O": 0j},
@@ -43,6 +44,27 @@ def arm() -> Mechanism:
         inputs=(Input(link="upper"), Input(link="lower")),
         torsion_springs=[TorsionSpring(("upper", "lower"), 3.0, 0.4)],
         gravity=-G * 1j,
+        **loads,
+    )
+
+
+def rocker() -> Mechanism:
+    """A rocker with torques by tables over its own angle, and over its speed, and a force that turns with it, over the input."""
+    bars = {
+        "crank": Link({"A": 0j, "B": 0.1}),
+        "rod": Link({"B": 0j, "C": 0.35}),
+        "rocker": Link({"D": 0j, "C": 0.25}),
+    }
+    return Mechanism(
+        {"A": 0j, "D": 0.4 + 0j},
+        bars,
+        inputs=Input(link="crank"),
+        torques=[
+            Torque("rocker", history=TABLE, periodic=True, over="angle"),
+            Torque("rocker", history=TABLE, over="speed"),
+        ],
+        forces=[Force("rocker", 0.1j, history=((-4.0, 2.0 + 1j), (0.2, -1j), (4.0, 3.0 + 0j)), frame="link")],
+        guess=Guess(1.0, {"rod": 0.5, "rocker": 1.7}),
     )
 
 
@@ -52,6 +74,13 @@ CASES = {
     "spring": lambda: bar(torsion_springs=[TorsionSpring(("ground", "bar"), 3.0, 0.7)]),
     "slider-crank": slider_crank,
     "arm": arm,
+    "arm, tables": lambda: arm(
+        torques=[
+            Torque("lower", history=TABLE, periodic=True, over="angle"),
+            Torque("upper", history=TABLE, over="speed"),
+        ]
+    ),
+    "rocker, tables": rocker,
     "no load": lambda: Mechanism({"O": 0j}, {"bar": Link({"O": 0j})}, inputs=Input(link="bar")),
 }
 

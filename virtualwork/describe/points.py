@@ -10,7 +10,7 @@ from typing import Any
 from dalembert.dataclass import dataclass
 from dalembert.hints import nearest
 from virtualwork.describe import DescriptionError
-from virtualwork.describe.forms import Form, Quantity
+from virtualwork.describe.forms import Form, Scalar
 from virtualwork.describe.keys import declared
 
 Point = complex | tuple[float, float] | Sequence[float]
@@ -71,8 +71,8 @@ class Polar:
     """A point of a link by its distance and direction from another point of it, in the link's axes, m and rad."""
 
     origin: str = declared(Form(), "another point of this link", name="from")
-    length: float = declared(Quantity("length"), "the distance from there")
-    angle: float = declared(Quantity("angle"), "its direction against the link's x-axis")
+    length: float = declared(Scalar("length"), "the distance from there")
+    angle: float = declared(Scalar("angle"), "its direction against the link's x-axis")
 
     @property
     def arm(self) -> complex:

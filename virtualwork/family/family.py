@@ -30,8 +30,8 @@ from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, by_path, changed, dimensions, named, value
 from virtualwork.describe.parts import Point, as_point
-from virtualwork.family.kept import answer, forget
 from virtualwork.family.part import ASSEMBLED, LANES, Part, room
+from virtualwork.family.solver_cache import answer, forget
 from virtualwork.formulas.forces import Effort, Reaction
 from virtualwork.formulas.numbers import Number, Reals, real_array, xy
 from virtualwork.formulas.poses import check_rate

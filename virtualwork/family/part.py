@@ -21,7 +21,7 @@ from virtualwork.describe import MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, by_path, changed
 from virtualwork.family.branches import at_guess, chosen, stays_within, with_signs
-from virtualwork.family.written import Written
+from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.loops import Closed, Twist
 from virtualwork.formulas.numbers import Number, Reals, leave_out
@@ -139,7 +139,7 @@ class Solver:
         return tuple(name in varied or any(np.any(rate) for rate in order) for name, order in rates)
 
     @cached_property
-    def written(self) -> Written | None:
+    def written(self) -> VariedFormulas | None:
         """The formulas with the dimensions as inputs; None where the branch is more than signs."""
         m = self.part.mechanism
         own = self.assembly
@@ -152,8 +152,8 @@ class Solver:
         fixed = tuple(d for d in self.part.dimensions if d.where[0] != "inputs")
         key = "family", fixed, self.moves
         if key not in own.recordings:
-            own.recordings[key] = Written(own, fixed, self.moves, own_signs=True)
-        result: Written = own.recordings[key]
+            own.recordings[key] = VariedFormulas(own, fixed, self.moves, own_signs=True)
+        result: VariedFormulas = own.recordings[key]
         return None if result.open_gears else result
 
     @cached_property

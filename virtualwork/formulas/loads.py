@@ -14,8 +14,8 @@ from dalembert.dataclass import dataclass, field
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
+from virtualwork.formulas.force_terms import Combination, ForceTerms, LoadTerm, Turned
 from virtualwork.formulas.numbers import Complexes, Number, Reals, dot, plus, times
-from virtualwork.formulas.quantities import Combination, Given, Quantities, Turned
 from virtualwork.formulas.rates import Rates
 from virtualwork.plan.steps import Path, path_reads
 
@@ -53,11 +53,11 @@ class Load:
         """Its value over a block: complex N, or N·m; None where it is zero."""
         raise NotImplementedError
 
-    def combination(self, quantities: Quantities) -> Combination:
-        """Its value as constants times quantities."""
+    def combination(self, force_terms: ForceTerms) -> Combination:
+        """Its value as constants times force terms."""
         if self.mate is not None:
-            return self.mate.combination(quantities).times(-1.0)
-        return Combination({quantities(Given, self): 1.0})
+            return self.mate.combination(force_terms).times(-1.0)
+        return Combination({force_terms(LoadTerm, self): 1.0})
 
     def reads(self) -> set[str]:
         """What it depends on: `angle:BODY`, `slide:GUIDE`, `point:NODE`."""
@@ -137,7 +137,7 @@ class Constant(Load):
     def form(self, block: Block) -> Number:
         return self.amount
 
-    def combination(self, quantities: Quantities) -> Combination:
+    def combination(self, force_terms: ForceTerms) -> Combination:
         return Combination({None: self.amount})
 
     def potential(self, block: Block) -> Number:
@@ -157,8 +157,8 @@ class Follower(Load):
     def form(self, block: Block) -> Number:
         return self.amount * block.st.turn[self.body]
 
-    def combination(self, quantities: Quantities) -> Combination:
-        return Combination({quantities(Turned, self.body, None): self.amount})
+    def combination(self, force_terms: ForceTerms) -> Combination:
+        return Combination({force_terms(Turned, self.body, None): self.amount})
 
     def turned(self, block: Block, rates: Rates) -> Number:
         turning = angle_rate(rates, self.body, 1)
@@ -238,17 +238,18 @@ class Tabled(Load):
         first = angle_rate(rates, self.body, 1)
         if self.path is not None or self.axis != "angle" or first is None:
             return total
-        return plus(total, self._steep(block).real * first * first)
+        return plus(total, block.slope(self).real * first * first)
 
-    def _steep(self, block: Block) -> Number:
-        """The slope of the table."""
-        at, force, q = self._in_cycle(self.place_in(block))
+    def slope(self, q: Number) -> Number:
+        """The slope of the table at places of it."""
+        at, force, q = self._in_cycle(q)
         place = np.clip(np.searchsorted(at, q, side="right") - 1, 0, len(at) - 2)
-        return complex(np.diff(force)[place] / np.diff(at)[place])
+        values = np.diff(force)[place] / np.diff(at)[place]
+        return values if values.ndim else complex(values)
 
     def turned(self, block: Block, rates: Rates) -> Number:
         """Its derivative over the input, in ground axes."""
-        steep = self._steep(block)
+        steep = block.slope(self)
         if not self.link_axes:
             return steep
         turning = block.by[0].angle[self.body][0]
@@ -268,7 +269,7 @@ class InertiaForce(Load):
         assert self.path is not None
         return block.acceleration(self.path, -self.mass)
 
-    def combination(self, quantities: Quantities) -> Combination:
+    def combination(self, force_terms: ForceTerms) -> Combination:
         return self.acceleration.times(-self.mass)
 
 
@@ -282,8 +283,8 @@ class InertiaTorque(Load):
     def form(self, block: Block) -> Number:
         return block.alpha(self.body, -self.inertia)
 
-    def combination(self, quantities: Quantities) -> Combination:
-        return Combination({quantities.second("angle", self.body): -self.inertia})
+    def combination(self, force_terms: ForceTerms) -> Combination:
+        return Combination({force_terms.second("angle", self.body): -self.inertia})
 
 
 @dataclass(frozen=True, eq=False)

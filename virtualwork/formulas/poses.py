@@ -139,6 +139,8 @@ class Poses:
         self.input_rest: ArrayLike | Callable[[], Reals] | None = None
         # (n,) s, where the poses are those of a motion in time
         self.time: Reals | None = None
+        # whether nothing moves: the rates are those of virtual displacements
+        self.at_rest = False
         self._solved: list[tuple[Step, int]] = []
         self._done: set[tuple[int, int, int]] = set()
         self._blocks: list[State] | None = None
@@ -178,6 +180,7 @@ class Poses:
 
         some = self.again(self.inputs[which], [[of(rate) for rate in rates] for rates in self.rates])
         some.time = None if self.time is None else np.asarray(self.time)[which]
+        some.at_rest = self.at_rest
         return some
 
     @cached_property

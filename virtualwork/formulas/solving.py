@@ -19,9 +19,9 @@ from dalembert.arithmetic.recorded import bare
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.entering import GroupColumn, RightSide
 from virtualwork.formulas.forces import Bearing, Effort, Entry, RubbingRate
+from virtualwork.formulas.group_loops import unknowns
 from virtualwork.formulas.kinematics import AnglePartial
 from virtualwork.formulas.loops import Closed, Margin, Regularity
-from virtualwork.formulas.newton import unknowns
 from virtualwork.formulas.numbers import (
     SINGULAR,
     Number,
@@ -88,13 +88,17 @@ class Solving(Poses):
         derivatives up to an order. `name`: under which the tape of forms that are the same for all poses is kept.
         """
         recording, wanted = self.recording, tuple(targets)
+        doubts = self._singular([Effort(0)])
         with recording.lock:
             tape = recording.forms.get(name)
             if tape is None:
-                tape = self._written(forms, wanted, order)
+                tape = self._written(forms, wanted, order, doubts)
                 if name:
                     recording.forms[name] = tape
         rows = run(tape, self.entering(tape.inputs))
+        for key in doubts:
+            if key not in self._bad:
+                self._bad[key] = self._where_bad(key, key.of_rows(rows, self.n))
         result: list[Any] = [np.empty(self.n, kind) for _ in forms]
         for i, to in enumerate(result):
             to.real = rows.get(f"{i} x", 0.0)
@@ -104,16 +108,26 @@ class Solving(Poses):
         if apart is not None:
             for to, value in zip(result, apart[1].formed(forms, kind, wanted, order, name), strict=True):
                 to[apart[0]] = value
-        if not self.assembled.all():
+        if not self._whole and not self.assembled.all():
             for to in result:
                 leave_out(to, ~self.assembled)
         return result
 
+    @cached_property
+    def _whole(self) -> bool:
+        """Whether every pose is assembled, as the branch tells."""
+        return self._nowhere is None and not self.branch.may_open
+
     def _written(
-        self, forms: Sequence[Callable[[Block], Number]], targets: tuple[str, ...], order: int
+        self,
+        forms: Sequence[Callable[[Block], Number]],
+        targets: tuple[str, ...],
+        order: int,
+        doubts: Sequence[Quantity],
     ) -> Tape:
-        """The tape of what forms make of the pose."""
-        recording, outputs = self.recording, dict[str, Any]()
+        """The tape of what forms make of the pose, and of what tells where a group is singular."""
+        recording = self.recording
+        outputs = recording.outputs(doubts)
         recording.forces.solve_places()
         recording.solve(targets, order)
         for i, form in enumerate(forms):
@@ -126,8 +140,7 @@ class Solving(Poses):
         """The poses whose derivatives enter: which, and these alone; None where there are none."""
         if self.enters:
             return None
-        rows = self._careful
-        doubts = [key for key in dict.fromkeys(self._doubts(keys)) if not isinstance(key, Closed)]
+        rows, doubts = self._careful, self._singular(keys)
         new = [key for key in doubts if key not in self._bad]
         self._bad |= {
             key: self._where_bad(key, value) for key, value in zip(new, self._raw(new), strict=True)
@@ -141,6 +154,10 @@ class Solving(Poses):
             self._apart[name] = self.some(rows)
             self._apart[name]._enter = True
         return rows, self._apart[name]
+
+    def _singular(self, keys: Iterable[Quantity]) -> list[Quantity]:
+        """What tells where a group is singular that quantities depend on."""
+        return [key for key in dict.fromkeys(self._doubts(keys)) if not isinstance(key, Closed)]
 
     def _raw(self, keys: Sequence[Quantity], friction: Reals | None = None) -> list[Any]:
         """Quantities as the tape has them, with another friction; not kept."""
@@ -199,7 +216,8 @@ class Solving(Poses):
     @cached_property
     def locked(self) -> NDArray[np.bool_]:
         """(n,): poses in which friction locks the mechanism: no reaction balances its own friction."""
-        return np.isnan(self.friction).any(axis=0) & self.assembled
+        nowhere = np.isnan(self.friction).any(axis=0)
+        return np.asarray(nowhere & self.assembled if nowhere.any() else nowhere)
 
     @cached_property
     def statics(self) -> Statics:
@@ -280,9 +298,9 @@ class Solving(Poses):
                 result[name] = statics.solved[0][:, int(of)]
             elif kind == "time":
                 result[name] = self.time
-            elif kind == "table":
+            elif kind in ("table", "slope"):
                 number, part = of.split()
-                force = self._table(int(number))
+                force = self._table(int(number), kind)
                 result[name] = force.real if part == "x" else force.imag
             elif of.startswith("spring "):
                 result[name] = self.twist(int(of.removeprefix("spring ")))
@@ -341,10 +359,11 @@ class Solving(Poses):
         self.solve(tuple(f"angle:{body}" for body in spring.links if body != "ground"))
         return self.over(lambda st: setting.twist(st, spring))  # type: ignore[no-any-return]
 
-    def _table(self, number: int) -> Any:
-        """What a table gives."""
+    def _table(self, number: int, kind: str) -> Any:
+        """What a table gives, or how steep it is."""
         table = self.recording.tables[number]
-        return table.over(self.place(table))
+        place = self.place(table)
+        return table.over(place) if kind == "table" else table.slope(place)
 
     def place(self, table: Tabled) -> Reals:
         """What a table is over."""
@@ -352,6 +371,8 @@ class Solving(Poses):
             return self.inputs[:, 0]
         if table.axis == "time":
             return np.asarray(table.timed(self.time))
+        if table.axis == "speed" and self.at_rest:
+            return np.zeros(self.n)
         if table.axis == "speed":
             return self.angle(table.body, 1)
         known = self.branch.plan.angles[table.body]

@@ -189,7 +189,7 @@ class Run:
         True
         """
         from virtualwork.animation import JointForce, force_columns, moving_page, plain
-        from virtualwork.table import moving_columns
+        from virtualwork.motion_table import moving_columns
 
         m = self.assembly.mechanism
         inputs = {

@@ -105,7 +105,7 @@ def run(
     if one and engine in (None, "python") and floats.takes(tape):
         # one pose: nothing of numpy on the way, but at a singular place, where its numbers go on with infinity and NaN
         try:
-            return Outputs(tape, floats.compiled(tape)(*values))
+            return Outputs(tape, floats.function(tape)(*values))
         except (ZeroDivisionError, ValueError, OverflowError):
             engine = "numpy"
     columns = [np.asarray(value, dtype=float) for value in values]
@@ -279,7 +279,7 @@ def _lanes(tape: Tape, columns: list[Reals], table: Rows, n: int, engine: str) -
 
 
 def _on_floats(tape: Tape, columns: list[Reals], table: Rows, n: int) -> None:
-    function = floats.compiled(tape)
+    function = floats.function(tape, n)
     # a tape without inputs has its lanes too
     lanes = zip(*(np.broadcast_to(c, n).tolist() for c in columns), strict=True) if columns else [()] * n
     for lane, values in enumerate(lanes):

@@ -1,0 +1,92 @@
+"""Stress of engines, flywheels, trial runs and error budgets: what cancels, long rods and short ones, many digits lost."""
+
+from __future__ import annotations
+
+import mpmath as mp
+import numpy as np
+
+from balancing import error_budget, torque_cycle, trial_effect
+from balancing.engine import reciprocating_forces
+from benchmarks.stress.pairs import Pairs, noise, pairs
+from benchmarks.truth.machines import shaking, turning_moments
+
+ORDERS = 6
+
+
+def _engine(rng: np.random.Generator) -> Pairs:
+    n = int(rng.integers(1, 7))
+    step = rng.choice([1.0, 30.0, 90.0])
+    crank, bank = (np.round(rng.uniform(0, 360, n) / step) * step + rng.choice([0, 1e-9]) for _ in range(2))
+    z, mass = rng.uniform(-1, 1, n), np.full(n, rng.uniform(0.1, 2))
+    throw = np.full(n, rng.uniform(0.03, 0.06))
+    rod = throw / rng.uniform(0.01, 0.6)
+    speed = float(rng.uniform(1, 700))
+    forces = reciprocating_forces(crank, bank, z, throw, rod, mass, speed, ORDERS)
+    found: Pairs = []
+    with mp.workdps(45):
+        rows = [[mp.mpf(x) for x in row] for row in zip(crank, bank, z, throw, rod, mass, strict=True)]
+        for couple, true in enumerate(shaking(rows, mp.mpf(speed), ORDERS)):
+            values = forces.coefficients(bool(couple)).ravel().tolist()
+            bound = forces.error_estimate("coefficients", bool(couple)).ravel()
+            found += pairs(values, [x for row in true for x in row], bound)
+    return found
+
+
+def _flywheel(rng: np.random.Generator) -> Pairs:
+    n = int(rng.integers(2, 60))
+    angle = np.concatenate([[0.0], np.sort(rng.uniform(0, 4 * np.pi, n)), [4 * np.pi]])
+    torque = rng.normal(size=n + 2) * 10.0 ** rng.uniform(-3, 3) + rng.choice([0.0, 1e6])
+    cycle = torque_cycle(angle, torque)
+    error = cycle.error_estimate()
+    with mp.workdps(45):
+        true = turning_moments([mp.mpf(x) for x in angle], [mp.mpf(x) for x in torque])
+        found = pairs(cycle.energy.tolist(), true["energy"], error["energy"])
+        names = ("mean", "work", "fluctuation")
+        return found + pairs(
+            [getattr(cycle, x) for x in names], [true[x] for x in names], [error[x] for x in names]
+        )
+
+
+def _effect(rng: np.random.Generator) -> Pairs:
+    n = 20
+    before = noise(rng, n) * 10.0 ** rng.uniform(-3, 3, n)
+    after = before * (1 + 10.0 ** rng.uniform(-15, 1, n) * noise(rng, n))
+    effect = trial_effect(before, after)
+    bound = effect.error_estimate()
+    with mp.workdps(60):
+        both = [
+            (mp.mpmathify(a), mp.mpmathify(b)) for a, b in zip(before.tolist(), after.tolist(), strict=True)
+        ]
+        share = [abs(abs(b) - abs(a)) / abs(a) for a, b in both]
+        turn = [abs(mp.arg(b / a)) for a, b in both]
+        return pairs(effect.amplitude, share, bound.amplitude) + pairs(effect.phase, turn, bound.phase)
+
+
+def _budget(rng: np.random.Generator) -> Pairs:
+    n = 20
+    random, systematic = rng.normal(size=(2, n, int(rng.integers(1, 8)))) * 10.0 ** rng.uniform(-3, 3)
+    sizes = np.abs(systematic).sum(axis=-1) + np.sqrt(np.square(random).sum(axis=-1))
+    permissible = sizes * (1 + 10.0 ** rng.uniform(-15, 1, n))
+    budget = error_budget(permissible, random, systematic)
+    bound = budget.error_estimate()
+    with mp.workdps(45):
+        error = [
+            mp.fsum(abs(mp.mpf(x)) for x in s) + mp.sqrt(mp.fsum(mp.mpf(x) ** 2 for x in r))
+            for r, s in zip(random.tolist(), systematic.tolist(), strict=True)
+        ]
+        u = [mp.mpf(x) for x in permissible.tolist()]
+        accept = [max(x - e, 0) for x, e in zip(u, error, strict=True)]
+        reject = [x + e for x, e in zip(u, error, strict=True)]
+        return [
+            *pairs(budget.error, error, bound.error),
+            *pairs(budget.accept, accept, bound.accept),
+            *pairs(budget.reject, reject, bound.reject),
+        ]
+
+
+CAMPAIGNS = {
+    "engines": ("one to six cylinders of any layout, λ of 0.01 … 0.6", _engine),
+    "flywheels": ("torque over two turns, up to 60 rows, on a large mean now and then", _flywheel),
+    "trial runs": ("readings that a trial mass changes by 1e-15 … 10 times", _effect),
+    "error budgets": ("errors that use up the permissible unbalance to 1e-15", _budget),
+}
