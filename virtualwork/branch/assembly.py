@@ -137,11 +137,4 @@ class Assembly(Choice):
 
     def state(self, inputs: tuple[float, ...]) -> State:
         """Positions of one pose, as Python numbers."""
-        st = State(list(inputs))
-        try:
-            self.run(self.plan.steps, st)
-        except ZeroDivisionError:
-            st = State([np.array([q]) for q in inputs], many=True)
-            with np.errstate(all="ignore"):
-                self.run(self.plan.steps, st)
-        return st
+        return self.track.pose(self.plan.steps, inputs)

@@ -8,7 +8,7 @@ branches; at k > 2 it is linear in the free (k−1)-th rate. So the branch goes 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import factorial
@@ -43,6 +43,9 @@ class Along(Passage, Protocol):
 
     def run(self, steps: Iterable[Step], st: State) -> None:
         """Work out positions, each group on its branch."""
+
+    def pose(self, steps: Iterable[Step], inputs: Sequence[float], singular: bool = False) -> State:
+        """What steps make of one pose."""
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from dalembert.dataclass import dataclass, replace
 from virtualwork.branch.noted import SAME
 from virtualwork.branch.track import Track
 from virtualwork.formulas.closed_forms import Gap
-from virtualwork.formulas.newton import gaps, newton
-from virtualwork.formulas.numbers import EPS, Complexes, Reals, stack_rows
+from virtualwork.formulas.newton import newton
+from virtualwork.formulas.numbers import EPS, Complexes, Reals
 from virtualwork.formulas.positions import State
 from virtualwork.plan.steps import Group, turns
 
@@ -278,8 +278,9 @@ class Reach:
         if all(np.isfinite(value).all() for value in unknowns):
             return None
         start = np.asarray(assembly.starts[group.name], dtype=float)[None]
-        newton(group, many, start, assembly.mechanism.size)
-        gap = float(np.linalg.norm(stack_rows(gaps(group, many), 1)))
+        loops = assembly.loops(group)
+        x, _ = newton(loops, many, start, assembly.mechanism.size)
+        gap = float(np.linalg.norm(loops.over(many)(x)[0]))
         return Gap(gap, 0.0, "its loops stay {by} apart where they come nearest")
 
 

@@ -9,7 +9,7 @@ pose's branch follows from the number of change points between the guess and it:
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -88,6 +88,16 @@ class Track:
     def run(self, steps: Iterable[Step], st: State) -> None:
         """Work out positions, step by step, each group on its branch."""
         run(steps, st, self.close, self.assembly.plain)
+
+    def pose(self, steps: Iterable[Step], inputs: Sequence[float], singular: bool = False) -> State:
+        """What steps make of one pose, as Python numbers; as arrays (1,) at a singular place, where Python divides by zero."""
+        st = State([np.array([q]) for q in inputs], many=True) if singular else State(list(inputs))
+        try:
+            with np.errstate(all="ignore"):
+                self.run(steps, st)
+        except (ZeroDivisionError, OverflowError):
+            return self.pose(steps, inputs, singular=True)
+        return st
 
     def close(self, group: Group, st: State) -> None:
         """Close the loops of one group."""

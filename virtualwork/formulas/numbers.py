@@ -188,18 +188,17 @@ def equilibrated(jacobian: Reals) -> tuple[Reals, Reals]:
     return jacobian / lengths[:, None, :], lengths
 
 
-def singular_values(cols: list[list[Number]], n: int) -> Reals:
-    """The singular values of the Jacobian (`equilibrated`) at each pose; NaN where it is not assembled."""
-    jacobian = stack(cols, n)
+def singular_values(jacobian: Reals) -> Reals:
+    """The singular values of each pose's Jacobian (`equilibrated`); NaN where it is not assembled."""
     good = np.isfinite(jacobian).all(axis=(1, 2))
-    out = np.full((n, min(jacobian.shape[1:])), np.nan)
+    out = np.full((len(jacobian), min(jacobian.shape[1:])), np.nan)
     out[good] = np.linalg.svd(equilibrated(jacobian[good])[0], compute_uv=False)
     return out
 
 
 def singular_poses(cols: list[list[Number]], n: int) -> NDArray[np.bool_]:
     """Which poses have a Jacobian whose smallest singular value is below 1e-6 of its largest."""
-    s = singular_values(cols, n)
+    s = singular_values(stack(cols, n))
     return np.asarray(s[:, -1] < SINGULAR * s[:, 0])
 
 

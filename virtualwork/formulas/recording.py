@@ -27,7 +27,7 @@ from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare, squa
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.description import Description
 from virtualwork.formulas.closed_forms import Case
-from virtualwork.formulas.newton import gaps, put_unknowns
+from virtualwork.formulas.group_loops import gaps, put_unknowns
 from virtualwork.formulas.numbers import WRITTEN, Written
 from virtualwork.formulas.positions import State, columns, run
 from virtualwork.formulas.quantity import Quantity

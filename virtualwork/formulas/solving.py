@@ -19,9 +19,9 @@ from dalembert.arithmetic.recorded import bare
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.entering import GroupColumn, RightSide
 from virtualwork.formulas.forces import Bearing, Effort, Entry
+from virtualwork.formulas.group_loops import unknowns
 from virtualwork.formulas.kinematics import AnglePartial
 from virtualwork.formulas.loops import Closed, Margin, Regularity
-from virtualwork.formulas.newton import unknowns
 from virtualwork.formulas.numbers import (
     SINGULAR,
     Complexes,
