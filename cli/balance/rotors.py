@@ -81,7 +81,7 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
         )
     (amount,) = amounts
     given = table.numbers[amount]
-    table.reject(given.values < 0, amount, f"a {amount} that is not negative")
+    table.reject(given.values < 0, amount, f"a{'n' * (amount == 'unbalance')} {amount} that is not negative")
     size = given.si
     radius = None
     if amount != "unbalance":

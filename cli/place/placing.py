@@ -125,7 +125,12 @@ class Placing:
             )
 
         try:
-            placed = choose(request.max_pieces) if request.max_pieces is not None else self._few(goal, choose)
+            if request.max_pieces is None:
+                placed = self._few(goal, choose)
+            else:
+                placed = choose(request.max_pieces)
+                most = request.max_pieces
+                self._far(f"at most {most} weight{'s' * (most != 1)} leave{'s' * (most == 1)}", placed)
         except ValueError as error:
             raise DataError(f"--stock: {error}") from None
         if len(angles) > 2 and placed.bound == 0 and abs(placed.error) > 1e-12 * abs(goal):
@@ -144,15 +149,24 @@ class Placing:
         used = next(k for k, one in enumerate(placed) if abs(one.error) <= least)
         more = len(placed)
         error, further = (abs(one.error) for one in (placed[used], choose(more)))
-        if goal and further < least:
-            weights = f"{used} weight{'s' * (used != 1)}"
-            leave = (
-                f"{weights} leave{'s' * (used == 1)} an error of {self.text(error)} ({error / abs(goal):.2%})"
-            )
+        weights = f"{used} weight{'s' * (used != 1)} leave{'s' * (used == 1)}"
+        if goal and further < error - 1e-12 * abs(goal):
             self.warnings.append(
-                f"{leave}; with {more} it would be {self.text(further)} (--max-pieces {more})"
+                f"{weights} {self._missed(placed[used])}; with {more} it would be {self.text(further)} (--max-pieces {more})"
             )
+        else:
+            self._far(weights, placed[used], "; one more leaves no less")
         return placed[used]
+
+    def _missed(self, placed: Placement) -> str:
+        """The error of weights from stock, and its share of the correction."""
+        error = abs(placed.error)
+        return f"an error of {self.text(error)} ({error / abs(placed.target):.2%})"
+
+    def _far(self, weights: str, placed: Placement, more: str = "") -> None:
+        """Warn where weights from stock do not come near the correction."""
+        if abs(placed.error) > ENOUGH * abs(placed.target):
+            self.warnings.append(f"{weights} {self._missed(placed)}{more}")
 
     def _turned(self, goal: complex, weights: list[float]) -> tuple[list[float], Placement]:
         """Turn weights of fixed mass: their angles, and what they are together."""

@@ -13,7 +13,7 @@ from dalembert.errors import DataError
 from dalembert.results.way import Topic, figures
 from dalembert.tables.sources import open_source
 from dalembert.tables.table import read
-from dalembert.units import find_unit
+from dalembert.units import amplitude_kind, find_unit
 
 MARKS = ("mark", "tacho", "keyphasor", "pulse", "trigger")
 
@@ -57,6 +57,12 @@ def read_signal(path: str, pulses: int) -> Recording:
     if len(set(units.values())) > 1:
         raise DataError(
             f"{path}: the vibration is in {', '.join(sorted(set(units.values())))}: expected one unit"
+        )
+    tag = amplitude_kind(next(iter(units.values())))[1]
+    if tag in ("_pp", "_rms"):
+        raise DataError(
+            f"{path}: the vibration is in {next(iter(units.values()))}: samples are values of an instant, and the amplitude "
+            f"that comes out is a peak: expected a unit without {tag}"
         )
     table = read(
         path, numbers={time: "time", **dict.fromkeys(marking, "number"), **dict.fromkeys(units, "amplitude")}

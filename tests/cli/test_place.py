@@ -156,3 +156,25 @@ def test_other_planes(dalembert: Dalembert, tmp_path: Path) -> None:
         assert abs(sum(parts) - share * np.exp(1j * np.radians(40))) < 1e-16
     assert dalembert("place", "12g@40deg", "--to-z", "0mm:90mm").returncode == 2
     assert dalembert("place", "12g@40deg", "--at-z", "1mm", "--to-z", "0mm:0mm").returncode == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "warning"),
+    [
+        (
+            ("--positions", "0deg,90deg"),
+            "2 weights leave an error of 3.586 g (71.72%); one more leaves no less",
+        ),
+        (("--blades", "8", "--max-pieces", "1"), "at most 1 weight leaves an error of 4 g (80.00%)"),
+        (
+            ("--blades", "8", "--max-mass", "0.5g"),
+            "0 weights leave an error of 5 g (100.00%); one more leaves no less",
+        ),
+    ],
+)
+def test_weights_from_stock_that_do_not_come_near(
+    options: tuple[str, ...], warning: str, dalembert: Dalembert
+) -> None:
+    """The error stood in JSON alone: 1 g on each of 0° and 90° is 1.414 g of 5 g."""
+    found = document(dalembert("place", "5g@45deg", "--stock", "1g", *options, "--json"))
+    assert found["warnings"] == [warning]

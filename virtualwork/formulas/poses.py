@@ -334,6 +334,8 @@ class Poses:
         if len(parts) == 1:
             value: Any = np.asarray(parts[0], dtype=kind)
             return value.copy() if value.shape == (self.n,) else np.full(self.n, value)
+        if not parts:
+            return np.empty(0, dtype=kind)
         sizes = (np.shape(st.inputs[0]) for st in self.states())
         return np.concatenate(
             [np.broadcast_to(np.asarray(p, dtype=kind), size) for p, size in zip(parts, sizes, strict=True)]
