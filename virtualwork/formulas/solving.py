@@ -70,9 +70,8 @@ class Solving(Poses):
     @cached_property
     def enters(self) -> bool:
         """Whether the derivatives of groups enter: of poses close to a change point, and where a group is singular in every pose."""
-        inputs = self.inputs
-        if inputs.shape[1] == 1 and len(inputs) and not self.branch.settled:
-            self.branch.cover(float(np.nanmin(inputs)), float(np.nanmax(inputs)))
+        if not self.branch.settled:
+            self.cover()
         return self._enter or bool(self.branch.folded)
 
     def formed(
@@ -107,15 +106,10 @@ class Solving(Poses):
         if apart is not None:
             for to, value in zip(result, apart[1].formed(forms, kind, wanted, order, name), strict=True):
                 to[apart[0]] = value
-        if not self._whole and not self.assembled.all():
+        if not self.assembled.all():
             for to in result:
                 leave_out(to, ~self.assembled)
         return result
-
-    @cached_property
-    def _whole(self) -> bool:
-        """Whether every pose is assembled, as the branch tells."""
-        return self._nowhere is None and not self.branch.may_open
 
     def _written(
         self,
