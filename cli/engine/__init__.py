@@ -22,11 +22,11 @@ Arguments:
   cylinders CYLINDERS  CSV with a row for each cylinder; - is standard input.
 What:
   speed SPEED  Speed of the crankshaft, such as 3000rpm.
-  order K  The highest order.
+  order K  Highest order.
 How: what balances it:
   counterweight_share SHARE  Counterweights for the rotating masses and this share of the reciprocating ones, such as 0.5.
-  plane NAME:Z:RADIUS  A plane of the counterweights, such as A:0mm:60mm, once or more; without: opposite each crank pin.
-  shaft ORDER:Z:with|against  A balance shaft at ORDER times the speed, with or against the crank, such as 2:150mm:against; repeatable.
+  plane NAME:Z:RADIUS  Plane of counterweights, such as A:0mm:60mm; repeatable (default: opposite each crank pin).
+  shaft ORDER:Z:with|against  Balance shaft at ORDER times the speed, with or against the crank: 2:150mm:against; repeatable.
 """
 
 
@@ -39,7 +39,8 @@ def run(
     plane: list[str] | None = None,
     shaft: list[str] | None = None,
 ) -> Result:
-    """Find the shaking forces and couples of an engine by exact orders, and what counterweights and balance shafts leave.
+    """Compute the shaking forces and couples of an engine by exact orders, and the residuals after counterweights and
+    balance shafts.
 
     CYLINDERS has the columns cylinder, crank_deg, bank_deg, z_*, throw_*, rod_*, reciprocating_* and rotating_* (masses); * is a
     unit. The crank pin stands at θ + crank_deg; bank_deg is the direction of the cylinder's axis, counter-clockwise from

@@ -21,7 +21,7 @@ Arguments:
   table TABLE  CSV of torque over the angle of the shaft, whole turns; - is standard input.
 What:
   speed SPEED  Mean speed of the shaft, such as 600rpm.
-  fluctuation COEFFICIENT  Largest less smallest speed over the mean, such as 0.02 or 2%.
+  fluctuation COEFFICIENT  Largest minus smallest speed, over the mean speed, such as 0.02 or 2%.
 """
 
 

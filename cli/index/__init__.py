@@ -18,7 +18,7 @@ OPTIONS = """
 Arguments:
   readings READINGS  CSV with a row for each position of the rotor on its mandrel; - is standard input.
 What:
-  phase_lag  The instrument's phase lags.
+  phase_lag  The phase of the instrument lags.
 """
 
 
@@ -28,7 +28,7 @@ def run(readings: str, phase_lag: bool = False) -> Result:
 
     READINGS has the columns turned_deg (the angle by which the rotor was turned on the mandrel) with unbalance_* and
     angle_*, or amplitude_* and phase_deg; * is a unit. Each reading is mandrel + rotor·e^{i·turned}. All angles are
-    counted in one common sense from the mandrel's zero mark; the rotor's is that of its position turned = 0.
+    counted in one common sense from the mandrel's zero mark; the rotor's angle is that of its position turned = 0.
     """
     from cli.index.readings import read_positions
     from cli.index.tables import METHOD, tables, warnings

@@ -46,7 +46,7 @@ def chosen_units(text: str) -> dict[str, str]:
             )
             raise bad(
                 "--units",
-                f"'{part.strip()}' is no unit of a column: expected such as mm,g,deg,N_mm,rpm{hint}",
+                f"'{part.strip()}' is no unit of a column: expected units such as mm,g,deg,N_mm,rpm{hint}",
             )
         for dimension, unit in fitting.items():
             if chosen.setdefault(dimension, unit) != unit:

@@ -18,7 +18,7 @@ OPTIONS = """
 Arguments:
   recording FILE  CSV of a recording: t_s, mark (or tacho), A_um …; - is standard input.
 What:
-  pulses N  Pulses of the mark in one turn.
+  pulses N  Number of pulses of the mark in one turn.
 """
 
 

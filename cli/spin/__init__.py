@@ -39,15 +39,15 @@ Arguments:
   body BODY.toml  The body and its state; - is standard input.
 What:
   time START:STOP:STEP  Times in seconds, such as 0:10:0.01 or 0:10/1000.
-  at T  A time, s; may be repeated.
-  find NAME  Find this number of the file: omega.z, inertia.3, top.mgl, a top's tilt.
-  so_that QUANTITY=VALUE  What it is to give: slow=0.5rad_s, momentum.z=2.
-  only NAME,...  Only these: omega, attitude, momentum, energy, drift, period, nutation_period, cones, steady.
+  at T  Time, s; repeatable.
+  find NAME  Number of the file to find: omega.z, inertia.3, top.mgl, or a top's tilt.
+  so_that QUANTITY=VALUE  With --find: value of a result, such as slow=0.5rad_s or momentum.z=2.
+  only NAME,...  Show only these results: omega, attitude, momentum, energy, drift, period, nutation_period, cones, steady.
 How:
-  method  Default: exact wherever a closed form exists, else integrate.
-  integrator  For integration; the splitting is for a symmetric top.
+  method  Closed form, or integration (default: exact wherever a closed form exists).
+  integrator  Method of integration; the splitting is for a symmetric top.
 Output: of the rotation:
-  page FILE.html  Write a page that moves to FILE: play, slider, curves, values.
+  page FILE.html  Write a page that replays the rotation, with curves and values.
 """
 
 
@@ -65,10 +65,10 @@ def run(
     *,
     show: ShowOptions,
 ) -> Result:
-    """Turn a body through time: angular velocity, attitude, momentum and energy at any instant.
+    """Compute the rotation of a body in time: angular velocity, attitude, momentum and energy at any instant.
 
     BODY.toml holds inertia = [I1, I2, I3] (or a 3 × 3 matrix, or parts = "parts.csv"), kg·m²; omega in body axes,
-    rad/s; attitude = [w, x, y, z], body to space (default [1, 0, 0, 0]); if wanted a table [top] with mgl in N·m
+    rad/s; attitude = [w, x, y, z], body to space (default [1, 0, 0, 0]); optionally a table [top] with mgl in N·m
     (then inertia is about the fixed point, the axis is body z and gravity acts along -z of space), or torque =
     [x, y, z] in N·m with frame = "body" or "space".
     """

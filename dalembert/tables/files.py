@@ -48,6 +48,8 @@ def note(path: str | Path) -> Path:
 def load(path: str | Path) -> bytes:
     """Read a file, or standard input for `-`; OSError or ValueError where it cannot be."""
     name = str(path)
+    if not name:
+        raise ValueError("expected the name of a file")
     if name in _held:
         return _held[name]
     file = note(path)
@@ -59,7 +61,7 @@ def load(path: str | Path) -> bytes:
 
 def read_bytes(path: str) -> tuple[str, bytes]:
     """Read a file: what messages call it, and what it holds."""
-    file = "standard input" if path == "-" else path
+    file = "standard input" if path == "-" else path or "''"
     try:
         return file, load(path)
     except (OSError, ValueError) as error:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
-from dalembert.tables.files import load
+from dalembert.tables.files import read_bytes
 from dalembert.units import AMPLITUDES, TAGS, UNITS, dimensions, find_unit, nearest_unit, parted, unit_name
 
 # compiled where a header is so written
@@ -101,9 +101,7 @@ def rename_from(path: str) -> None:
     import tomllib
 
     try:
-        stored = tomllib.loads(load(path).decode("utf-8-sig"))
-    except OSError as error:
-        raise DataError(f"{path}: {error.strerror}") from None
+        stored = tomllib.loads(read_bytes(path)[1].decode("utf-8-sig"))
     except ValueError as error:
         raise DataError(f"{path}: {error}") from None
     for name, header in stored.items():
