@@ -7,10 +7,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from cli.cases.analysis import Analysis, Request
-from cli.cases.inputs import of_one
-from cli.cases.poses import column
-from cli.cases.quantities import cells_of, keys_of, solved
-from cli.cases.values import Varied, dimension_named, place_or_angle, with_numbers
+from cli.cases.axes import dimension_named, place_or_angle
+from cli.cases.inputs import Varied, of_one, with_numbers
+from cli.cases.poses import cells_of, column, keys_of, solved
 from cli.read import root_search
 from cli.read.options import bad
 from dalembert.errors import DataError
@@ -19,7 +18,7 @@ from virtualwork import MechanismError
 from virtualwork.quantities import Component
 
 if TYPE_CHECKING:
-    from cli.cases.axes import Grid
+    from cli.cases.inputs import Grid
     from virtualwork import Mechanism
 
 
@@ -31,7 +30,12 @@ class Changed(NamedTuple):
 
 
 def find(
-    m: Mechanism, bare: Mapping[str, str], request: Request, moved: Grid | None, name: str, wanted: str
+    m: Mechanism,
+    bare: Mapping[str, str],
+    request: Request,
+    moved: Grid | None,
+    name: str | None,
+    wanted: str | None,
 ) -> Changed:
     """Return the mechanism with the number nearest to its own with which the quantity has the value.
 
@@ -42,6 +46,9 @@ def find(
     DataError
         No number in reach gives the value.
     """
+    both = root_search.pair(name, wanted)
+    assert both is not None
+    name, wanted = both
     of = dimension_named(m, name, name, "--find")
     word, text = root_search.quantity_and_value(wanted, "B.vx=3m_s")
     its_own = request._replace(only=[word], order=None)

@@ -6,17 +6,24 @@ depends on how many cases there are, nor on which option made them; parts are wo
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, suppress
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cli.cases.axes import Grid
-from cli.cases.case import Case, Study
-from cli.cases.rows import Remarks, blank, emptied, joined, length, like, without_bounds
-from cli.cases.values import Driven
+from cli.cases.case import (
+    Case,
+    Study,
+    blank,
+    emptied,
+    joined,
+    length,
+    like,
+    without_bounds,
+)
+from cli.cases.inputs import Grid
 from cli.read.options import processes
 from cli.show.result import Written
 from cli.show.terminal import progress
@@ -26,14 +33,79 @@ from dalembert.results.columns import Column, Table
 from virtualwork import MechanismError
 
 if TYPE_CHECKING:
+    from uuid import UUID
+
     from numpy.typing import NDArray
 
+    from cli.cases.together import Solved as TogetherSolved
     from cli.cases.together import Together
     from cli.show.result import Form, Part
     from dalembert.results.columns import Document
 
     Rows = NDArray[np.float64]
     Mask = NDArray[np.bool_]
+
+
+# variants whose remarks are kept, the first ones, whoever works them out; so many kinds of remark are printed, and of
+# each the first so many variants are named
+EXPLAINED, KINDS, NAMED = 50, 10, 5
+
+
+@dataclass
+class Remarks:
+    """What to remark on variants: each remark once, with the variants that it is about.
+
+    Attributes
+    ----------
+    kept : list of (variant, its remarks)
+        Of the first variants that have any; a name that is empty is that of the mechanism itself.
+    further : int
+        Variants after these that have remarks too.
+    any_assembled : bool
+        Whether there is a number of any variant.
+    """
+
+    kept: list[tuple[str, tuple[str, ...]]] = field(default_factory=list)
+    further: int = 0
+    any_assembled: bool = False
+
+    @property
+    def full(self) -> bool:
+        """Whether no further remark is kept."""
+        return len(self.kept) >= EXPLAINED
+
+    def add(self, name: str, remarks: Iterable[str]) -> None:
+        """Add the remarks on a variant, which may be none."""
+        its = tuple(dict.fromkeys(remarks))
+        if its and self.full:
+            self.further += 1
+        elif its:
+            self.kept.append((name, its))
+
+    def join(self, other: Remarks) -> None:
+        """Add the remarks on later variants."""
+        for name, remarks in other.kept:
+            self.add(name, remarks)
+        self.further += other.further
+        self.any_assembled |= other.any_assembled
+
+    def lines(self) -> list[str]:
+        """As they are printed."""
+        about: dict[str, list[str]] = {}
+        for name, remarks in self.kept:
+            for remark in remarks:
+                about.setdefault(remark, []).append(name)
+        if any(names == [""] for names in about.values()):
+            return list(about)
+        lines = []
+        for remark, names in list(about.items())[:KINDS]:
+            more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+            lines.append(f"variant{'s' * (len(names) > 1)} {', '.join(names[:NAMED])}{more}: {remark}")
+        printed = set(list(about)[:KINDS])
+        further = self.further + sum(printed.isdisjoint(remarks) for _, remarks in self.kept)
+        if further:
+            lines.append(f"{further} further variant{'s have' if further > 1 else ' has'} remarks too")
+        return lines
 
 
 class Home(NamedTuple):
@@ -81,6 +153,14 @@ class Loop:
     def count(self) -> int:
         """How many mechanisms there are."""
         return 1 if self.varied is None else self.varied.n
+
+    def warnings(self) -> list[str]:
+        """What to remark on, once all is worked out."""
+        return self.remarks.lines()
+
+    def failed(self) -> bool:
+        """Whether nothing could be assembled."""
+        return not self.remarks.any_assembled
 
     def rows(self, low: int, high: int) -> Rows:
         """The numbers of the variants from low to high, as they are shown."""
@@ -184,6 +264,10 @@ def as_it_is(part: Part, number: int) -> Written:
     return Written(part, 0)
 
 
+_written: dict[tuple[UUID, bool], Together] = {}
+"""The formulas of a study, which a process writes down once."""
+
+
 @dataclass
 class Variants:
     """Some variants, which are called from `first` on."""
@@ -227,9 +311,7 @@ class Variants:
         """What JSON has of each; poses of one that cannot be assembled are not assembled."""
         listed: list[Any]
         if self.home.together:
-            poses, assembled, alone = _prepared(self.study, self.home, True).of(
-                *part_of(self.study, self.shown)
-            )
+            poses, assembled, alone = self._together(True)
             v, n = assembled.shape
             listed = [{"poses": poses[i * n : (i + 1) * n]} for i in range(v)]
             for i, document in self._left(assembled, alone, True):
@@ -277,9 +359,20 @@ class Variants:
         table, there = (emptied(pattern), False) if answer is None else (like(pattern, answer[0]), answer[1])
         return table, there if isinstance(there, list) else [there] * length(table)
 
+    def _together(self, json: bool) -> TogetherSolved:
+        """All of them at once."""
+        name = self.study.key, json
+        if name not in _written:
+            assert self.home.row is not None
+            made = self.study.together(self.home.row, json)
+            assert made is not None
+            _written.clear()
+            _written[name] = made
+        return _written[name].of(*self.study.part(self.shown))
+
     def _table_together(self) -> Table:
         pattern = self.home.pattern
-        table, assembled, alone = _prepared(self.study, self.home, False).of(*part_of(self.study, self.shown))
+        table, assembled, alone = self._together(False)
         v, n = assembled.shape
         columns: list[list[Any]] = [list(c.values) for c in like(pattern, table).columns]
         whole = assembled.ravel().tolist()
@@ -314,53 +407,3 @@ class Variants:
             answer = self.one(i, json and bool(alone[i]))
             if alone[i]:
                 yield i, answer
-
-
-def part_of(study: Study, shown: Rows) -> tuple[Any, Rows]:
-    """Variants as a part of a family, and their inputs as they are shown, (v or 1, n, k)."""
-    from virtualwork.family.family import Family
-    from virtualwork.family.part import Part as FamilyPart
-
-    m, v = study.mechanism, len(shown)
-    family = Family(m, study.in_si(shown))
-    own = study.inputs(m, None).whole
-    moved = {name.j for axis in study.moved.axes for name in axis.names} if study.moved is not None else set()  # type: ignore[union-attr]
-    si, seen = own.values[None], own.shown[None]
-    rates = family.rates(own.speed, own.acceleration)
-    # what each variant has of its own: a column of inputs, or another position in its file
-    for name, column in zip(study.names, shown.T, strict=True):
-        j = (
-            name.j
-            if isinstance(name, Driven)
-            else int(name.of.where[1])
-            if name.of.where[0] == "inputs"
-            else -1
-        )
-        if j < 0 or (j in moved and not isinstance(name, Driven)):
-            continue
-        numbers = np.radians(column) if name.unit == "deg" else np.asarray(column, dtype=float)
-        if isinstance(name, Driven) and name.order:
-            rates[name.order - 1][j] = numbers[:, None]
-        elif isinstance(name, Driven) or name.of.where[-1] == "value":
-            if len(si) == 1:
-                si, seen = (np.repeat(x, v, axis=0) for x in (si, seen))
-            value = Driven.of(m, j)
-            si[:, :, j] = numbers[:, None]
-            as_shown = column if isinstance(name, Driven) else [value.shown(x) for x in numbers.tolist()]
-            seen[:, :, j] = np.asarray(as_shown)[:, None]
-    return FamilyPart(m, family.dimensions, family.values, si, rates), seen
-
-
-_known: dict[tuple[str, bool], Together] = {}
-
-
-def _prepared(study: Study, home: Home, json: bool) -> Together:
-    """The formulas of a study, which a process writes down once."""
-    name = study.key, json
-    if name not in _known:
-        assert home.row is not None
-        made = study.together(home.row, json)
-        assert made is not None
-        _known.clear()
-        _known[name] = made
-    return _known[name]

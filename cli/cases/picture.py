@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.cases.analysis import Analysis
-from cli.cases.quantities import cells_of, keys_of, solved
+from cli.cases.poses import cells_of, keys_of, solved
 from cli.show.picture import blank
 from cli.show.result import Section, Sheet
 from dalembert.angles import read_degrees

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.cases.analysis import Analysis
-from cli.cases.values import Driven, Varied
+from cli.cases.inputs import Driven, Varied
 from dalembert.angles import in_turn
 
 if TYPE_CHECKING:

@@ -128,10 +128,10 @@ class Equilibria(TableStudy):
 
     def case(self, row: Rows | None = None) -> Rest:
         """A variant, or the mechanism itself."""
-        m = self.mechanism if row is None else self.variant(row)
-        _ = m.assembly
+        analysis = self.analysis(row)
+        _ = analysis.mechanism.assembly
         ranged = self.moved is not None and self.moved.axes[0].option != "[input] law"
-        return Rest(Analysis(self.request, m, self.inputs(m, row)), ranged)
+        return Rest(analysis, ranged)
 
 
 def way(a: Analysis, positions: Sequence[Equilibrium]) -> list[Topic]:

@@ -36,7 +36,6 @@ def run(own: Options, show: ShowOptions) -> Result:
     file with the fitted numbers. --keep holds from the first to the last input of the target, over a whole turn where
     the input is free.
     """
-    from cli.cases.analysis import Request
     from cli.cases.call import Call, naming
     from cli.fit.fitting import STARTS, Fits, aims, bounds
     from cli.fit.targets import kept
@@ -48,14 +47,14 @@ def run(own: Options, show: ShowOptions) -> Result:
     ):
         if not value:
             raise bad(flag, f"missing: expected {example}")
-    call = Call.of(own, show, Request(own.file))
+    call = Call.of(own, show)
     call.refuse_inputs("the rows of the target have the inputs: expected a dimension, links.crank.B.x=...")
     with naming(own.file):
         targets = aims(call.mechanism, own.target, own.want, own.weight, call.remarks)
         free = bounds(call.mechanism, own.free, call.bare)
         keep = kept(call.mechanism, own.keep, call.bare)
     workers = 1 if call.varied is not None else call.workers
-    study = call.study(
+    return call.result(
         Fits,
         aims=targets,
         free=free,
@@ -65,4 +64,3 @@ def run(own: Options, show: ShowOptions) -> Result:
         best=own.best or 1,
         workers=workers,
     )
-    return call.result(study)

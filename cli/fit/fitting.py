@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cli.cases.axes import assigned_paths, quantity
 from cli.cases.call import beside
 from cli.cases.case import Case, TableCase, TableStudy
-from cli.cases.values import Varied, assigned_paths, quantity
+from cli.cases.inputs import Varied
 from cli.fit.targets import targets, wanted, weights
 from cli.read import options
 from cli.show.picture import blank

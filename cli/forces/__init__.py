@@ -8,9 +8,6 @@ from cli.cases.options import BRANCH, CASES, FILE, WORKERS, Options
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from cli.cases.case import Case
     from cli.show.commands import ShowOptions
     from cli.show.result import Result
 
@@ -36,20 +33,11 @@ def run(own: Options, show: ShowOptions) -> Result:
     The loads of FILE.toml act: gravity, forces, torques, springs, friction and the inertia of its masses. The table has
     a row for each pose. A whole cycle gives mean, peak, r.m.s., power and energy in addition.
     """
-    from cli.cases.analysis import Request, branch, names
+    from cli.cases.analysis import names
     from cli.cases.call import Call
     from cli.forces.cycle import Forces, checked
 
     weights = names(own.counterweights, "--counterweights", "names of links, such as crank, rocker")
-    request = Request(own.file, names(own.only), None, branch(own.branch), forces=True)
-    call = Call.of(own, show, request)
-    call.check_names()
+    call = Call.of(own, show, forces=True)
     checked(call, own.flywheel, weights, own.states)
-    study = call.study(Forces, flywheel=own.flywheel, counterweights=weights, states=own.states)
-
-    def page(cases: Sequence[tuple[str, Case]]) -> bytes:
-        from cli.cases.page import of_poses
-
-        return of_poses(cases, show.units, call.bare)
-
-    return call.result(study, own.page, page)
+    return call.result(Forces, flywheel=own.flywheel, counterweights=weights, states=own.states)

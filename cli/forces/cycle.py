@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.cases.analysis import Analysis
-    from cli.cases.axes import Grid
     from cli.cases.call import Call
+    from cli.cases.inputs import Grid
     from cli.show.commands import ShowOptions
     from dalembert.results.way import Topic
 

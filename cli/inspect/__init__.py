@@ -26,13 +26,11 @@ def run(own: Options, show: ShowOptions) -> Result:
     The results hold for the whole range of the input. --over, --cases and --set change dimensions. A terminal shows
     the order of solution in addition.
     """
-    from cli.cases.analysis import Request, names
     from cli.cases.call import Call
     from cli.inspect.character import Inspection
 
-    call = Call.of(own, show, Request(own.file, names(own.only), forces=True))
-    call.check_names()
+    call = Call.of(own, show, forces=True)
     call.refuse_inputs(
         "inspect speaks of the whole range of the input: expected a dimension, links.crank.B.x=..."
     )
-    return call.result(call.study(Inspection))
+    return call.result(Inspection)

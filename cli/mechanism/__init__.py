@@ -8,9 +8,6 @@ from cli.cases.options import BRANCH, CASES, FILE, WORKERS, Options
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from cli.cases.case import Case
     from cli.show.commands import ShowOptions
     from cli.show.result import Result
 
@@ -48,19 +45,7 @@ def run(own: Options, show: ShowOptions) -> Result:
     FILE.toml describes ground, links, slots, sliders, gears, input and guess. The table has a row for each pose: its
     input, every point and link, or those of --only.
     """
-    from cli.cases.analysis import ORDERS, Request, branch, names
     from cli.cases.call import Call
     from cli.mechanism.newton import Poses
 
-    order = None if own.order is None else ORDERS.index(own.order)
-    request = Request(own.file, names(own.only), order, branch(own.branch))
-    call = Call.of(own, show, request)
-    call.check_names()
-    study = call.study(Poses, newton=own.newton)
-
-    def page(cases: Sequence[tuple[str, Case]]) -> bytes:
-        from cli.cases.page import of_poses
-
-        return of_poses(cases, show.units, call.bare)
-
-    return call.result(study, own.page, page)
+    return Call.of(own, show).result(Poses, newton=own.newton)

@@ -263,10 +263,10 @@ class Steps(NamedTuple):
         return np.array([(self.first + k * self.each) / self.below for k in i.tolist()])
 
 
-def steps(flag: str, text: str, read: Callable[[str], float], example: str) -> Steps:
+def steps(flag: str, text: str, read: Callable[[list[str]], list[float]], example: str) -> Steps:
     """Read `START:STOP:STEP` or `START:STOP/N` (N equal steps); a step that divides the range includes its end.
 
-    `read` reads one of the three.
+    `read` reads the two or three.
     """
     from fractions import Fraction
 
@@ -281,7 +281,7 @@ def steps(flag: str, text: str, read: Callable[[str], float], example: str) -> S
     if len(parts) != (2 if count else 3):
         raise bad(flag, f"'{text}': expected START:STOP:STEP or START:STOP/N, such as {example}")
     # the decimals that the numbers print as, exactly: 50mm and a step of 1mm are 0.051, not 0.051000000000000004
-    start, stop, *by = [Fraction(repr(read(part))) for part in parts]
+    start, stop, *by = [Fraction(repr(value)) for value in read(parts)]
     if count is None:
         if by[0] == 0 or (stop - start) * by[0] < 0:
             raise bad(flag, f"'{text}': a step of {parts[2]} never gets from {parts[0]} to {parts[1]}")
@@ -298,7 +298,7 @@ def grid(
     flag: str, text: str, read: Callable[[str], float], what: str, example: str, most: int = STATES
 ) -> list[float]:
     """The values of such a range; `what` is counted, `most` of them at most."""
-    first, each, below, n = steps(flag, text, read, example)
+    first, each, below, n = steps(flag, text, lambda parts: [*map(read, parts)], example)
     if n - 1 > most:
         raise bad(flag, f"'{text}': {float(n - 1):.3g} {what}: expected at most {most}")
     return [(first + i * each) / below for i in range(n)]

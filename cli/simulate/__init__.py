@@ -33,18 +33,14 @@ def run(own: Options, show: ShowOptions) -> Result:
     The inputs start at the first time with the file's angle (or position) and speed; --at, --over and --cases set
     other starts. The table has a row for each time: the inputs, the energy, and what --only names.
     """
-    from cli.cases.analysis import Request, branch, names
     from cli.cases.call import Call
     from cli.read.options import bad
-    from cli.simulate.motion import Simulation, page, times_and_accuracy
+    from cli.simulate.motion import Simulation, times_and_accuracy
 
     if own.time is None:
         raise bad("--time", "expected the times, such as --time 0:10:0.01")
     if own.until is not None and own.page is not None and (own.over or own.cases):
         raise bad("--until", "expected no --page: its variants have one clock; --set shows one of them")
     times, accuracy = times_and_accuracy(own.time, own.accuracy)
-    request = Request(own.file, names(own.only), 2, branch(own.branch), forces=own.forces)
-    call = Call.of(own, show, request).started()
-    call.check_names()
-    study = call.study(Simulation, times=times, accuracy=accuracy, until=own.until)
-    return call.result(study, own.page, lambda cases: page(cases, show.units), len(times))
+    call = Call.of(own, show, 2, forces=own.forces).started()
+    return call.result(Simulation, times=times, accuracy=accuracy, until=own.until)

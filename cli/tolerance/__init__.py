@@ -30,23 +30,19 @@ def run(own: Options, show: ShowOptions) -> Result:
     Worst case and standard deviation are of first order, from exact derivatives. --draws solves drawn mechanisms in
     addition. The table has a row for each pose.
     """
-    from cli.cases.analysis import ORDERS, Request, names
+    from cli.cases.analysis import unknown
     from cli.cases.call import Call
-    from cli.cases.quantities import unknown
     from cli.read.options import bad
     from cli.tolerance.spread import Spreads
     from virtualwork.quantities import places
 
     if own.draws is not None and own.draws < 2:
         raise bad("--draws", f"{own.draws}: expected two or more drawn mechanisms")
-    order = None if own.order is None else ORDERS.index(own.order)
-    call = Call.of(own, show, Request(own.file, names(own.only), order))
+    call = Call.of(own, show)
     only = call.request.only
     if only is not None and unknown(places(call.mechanism, 3, only), only) is not None:
         call.request = call.request._replace(forces=True)
-    call.check_names()
     workers = 1 if call.varied is not None else call.workers
-    study = call.study(
+    return call.result(
         Spreads, draws=own.draws or 0, seed=own.seed, distribution=own.distribution, workers=workers
     )
-    return call.result(study)

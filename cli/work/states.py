@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,23 @@ class StateTable:
     values: dict[str, Real]
     occurrence: list[int]
     warnings: list[str]
+
+    @property
+    def exact(self) -> dict[str, Any]:
+        """The numbers in 32 digits, in SI, of the decimals as they are written; what is blank is zero."""
+        from cli.read.exact import column
+
+        rows = range(self.table.rows)
+        values: dict[str, Any] = {name: column(x, rows) for name, x in self.table.numbers.items()}
+        for axis in "xy":
+            name = f"fv{axis}"
+            if name in self.values:
+                center = values.get(f"v{axis}", np.zeros(self.table.rows))
+                given = (
+                    self.table.numbers[name].values if name in values else np.full(self.table.rows, np.nan)
+                )
+                values[name] = np.where(np.isnan(given), center, values.get(name, center))
+        return values
 
     @property
     def links(self) -> list[str]:
