@@ -112,7 +112,7 @@ def run(
         return made.html.encode()
 
     def way() -> list[Topic]:
-        from cli.spin.way import way
+        from cli.spin.tables import way
 
         return way(rotation)
 
