@@ -102,6 +102,7 @@ def sheet(b: Balancing) -> Page:
         ],
         "units": units(DIMENSIONS[name] for name in columns),
         "couple": b.has_couple,
+        "placed": b.planes.z is not None,
         "remove": request.remove,
         "steps": steps,
         "sought": bool(b.sought.any()),
