@@ -194,7 +194,7 @@ def all_loops(mechanism: Mechanism) -> Callable[[Real, Real, int], Real]:
     loops = Loops(order.groups[0])
 
     def solve(angles: Real, start: Real, steps: int) -> Real:
-        state = State([angles], many=True)
+        state = State([angles])
         for step in order.steps:
             if isinstance(step, Group):
                 return newton(loops, state, start, mechanism.size, limit=steps)[0]

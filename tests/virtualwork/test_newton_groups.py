@@ -136,7 +136,7 @@ def test_a_damped_step_never_widens_the_gap() -> None:
     rng = np.random.default_rng(0)
     closed = 0
     for _ in range(40):
-        st = State([np.array([m.at[0]])], many=True)
+        st = State([np.array([m.at[0]])])
         for step in merged.steps[: merged.steps.index(group)]:
             m.assembly.run([step], st)
         start = rng.uniform(-math.pi, math.pi, (1, 2))
@@ -156,7 +156,7 @@ def test_a_damped_step_never_widens_the_gap() -> None:
 def known(m: Mechanism, q: object) -> tuple[Loops, State]:
     """All loops of a mechanism at once, and what they depend on at inputs."""
     merged, group = m.assembly.merged
-    st = State([q], many=np.ndim(q) > 0)
+    st = State([q])
     m.assembly.run(merged.steps[: merged.steps.index(group)], st)
     return m.assembly.loops(group), st
 

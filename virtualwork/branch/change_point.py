@@ -168,7 +168,7 @@ def _nearest(way: Along, group: Group, q0: float, span: float, share: float) -> 
     """The series that the closed form follows within a span around a change point, and how far they are apart."""
     choice = way.assembly
     nodes = span * share * chebyshev_nodes(12) * way.length / (2 * np.pi)
-    st = State([q0 + nodes], many=True)
+    st = State([q0 + nodes])
     way.run(choice.needed(choice.plan.writes(group)), st)
     weights = _at_centre(nodes)
     turn, slide = [], []

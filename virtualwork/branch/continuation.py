@@ -168,7 +168,7 @@ class Continuation:
             np.concatenate([own[None], its[some][::side]])
             for own, its in ((np.array(self.q[end]), q), (self.x[end], x))
         )
-        st = State([q], many=True)
+        st = State([q])
         with np.errstate(all="ignore"):
             self.track.run(self.before, st)
             x, closed = newton(self.loops, st, x, self.size, limit=8)
@@ -238,7 +238,7 @@ class Continuation:
     def singular(self) -> bool:
         """Whether the Jacobian is singular at all nodes."""
         some = np.unique(np.linspace(0, len(self.q) - 1, 24).astype(int))
-        st = State([np.array(self.q)[some]], many=True)
+        st = State([np.array(self.q)[some]])
         with np.errstate(all="ignore"):
             self.track.run(self.before, st)
         return singular(self.loops.over(st)(np.array(self.x)[some])[1])
@@ -270,7 +270,7 @@ class Continuation:
 
     def unknowns(self, q: Reals) -> Reals:
         """The group's unknowns at inputs q, (n, unknowns)."""
-        st = State([q], many=True)
+        st = State([q])
         with np.errstate(all="ignore"):
             self.track.run(self.before, st)
             self.close(st)

@@ -130,7 +130,7 @@ class Reach:
     def _stands(self, q: Reals) -> Complexes:
         """Rotations and slides (over the size) of all groups at inputs q; NaN where not assembled."""
         plan, assembly = self.track.plan, self.track.assembly
-        st = State([q], many=True)
+        st = State([q])
         with np.errstate(all="ignore"):
             self.track.run(assembly.needed([key for g in plan.groups for key in plan.writes(g)]), st)
         rows = [st.turn[b] for g in plan.groups for b in g.members]
@@ -272,7 +272,7 @@ class Reach:
 
     def _left(self, group: Group, inputs: tuple[float, ...]) -> Gap | None:
         """The least gap that Newton-Raphson leaves in a group without a closed form, from the guess's own pose on."""
-        many, assembly = State([np.array([q]) for q in inputs], many=True), self.track.assembly
+        many, assembly = State([np.array([q]) for q in inputs]), self.track.assembly
         self.track.run(assembly.needed(assembly.plan.writes(group)), many)
         unknowns = [*(many.turn[b] for b in group.members), *(many.slide[s] for s in group.slides)]
         if all(np.isfinite(value).all() for value in unknowns):

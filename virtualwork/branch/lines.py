@@ -35,7 +35,7 @@ def along_lines(track: Along, group: Group, st: State) -> None:
     while left.any():
         i = np.flatnonzero(left)
         to = np.minimum(gone[i] + step[i], 1.0)
-        trial = State(list((at + to[:, None] * way[i]).T), many=True)
+        trial = State(list((at + to[:, None] * way[i]).T))
         moved = (to - gone[i])[:, None]
         with np.errstate(all="ignore"):
             track.run(before, trial)
@@ -60,7 +60,7 @@ def along_lines(track: Along, group: Group, st: State) -> None:
 
 def _slope(track: Along, group: Group, before: Sequence[Step], inputs: Reals, way: Reals, x: Reals) -> Reals:
     """dx of a group's unknowns where every input changes by its way; none where it is singular."""
-    st, n = State(list(inputs.T), many=True), len(x)
+    st, n = State(list(inputs.T)), len(x)
     with np.errstate(all="ignore"):
         track.run(before, st)
         write_unknowns(group, st, x)
@@ -81,7 +81,7 @@ def wind_along_lines(track: Along, group: Group, st: State, bodies: Collection[s
     before = assembly.before(group)
 
     def rotations(inputs: list[Reals]) -> Complexes:
-        trial = State(list(inputs), many=True)
+        trial = State(list(inputs))
         track.run(before, trial)
         case.solve(trial, sign, size)
         n = len(inputs[0])

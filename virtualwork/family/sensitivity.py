@@ -140,7 +140,7 @@ class Sensitivities:
             )
             inner = [d for d in dimensions if d.where[0] != "inputs"]
             # which signs change on the way is known once the way was looked over
-            _ = self.poses.states()
+            self.poses.cover()
             self._written[dimensions] = VariedFormulas(
                 self.assembly, inner, moves, own_signs=False, settled=False
             )

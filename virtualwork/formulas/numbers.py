@@ -361,18 +361,6 @@ class Many:
         return np.array(values)[np.clip(np.searchsorted(knots, x, "right") - 1, 0, len(values) - 1)]
 
 
-class Folded:
-    """A kind for two assemblies that meet in every pose: the root is zero, and its noise is left out."""
-
-    def __init__(self, kind: Kind) -> None:
-        self.exp, self.join, self.angle = kind.exp, kind.join, kind.angle
-        self.select, self.among, self.solve = kind.select, kind.among, kind.solve
-
-    def sqrt(self, x: Number) -> Number:
-        """Zero."""
-        return 0.0 * x
-
-
 def real_part(z: Number) -> Number:
     """The real part of any number."""
     return bare(z).real

@@ -60,6 +60,10 @@ class Branch(Protocol):
         """What has been written down of it."""
 
     @property
+    def together(self) -> dict[Any, Any]:
+        """What one pose that is requested again and again brings with a first request (`one_pose`)."""
+
+    @property
     def known_steps(self) -> dict[tuple[str, ...], tuple[Step, ...]]:
         """The steps that targets depend on, as far as requested."""
 
@@ -73,6 +77,10 @@ class Branch(Protocol):
 
     def cover(self, low: float, high: float) -> None:
         """Look for change points and limits over the inputs from low to high."""
+
+    @property
+    def may_open(self) -> bool:
+        """Whether it cannot be assembled somewhere in what was covered, as far as is known."""
 
 
 def as_inputs(angle: ArrayLike, k: int) -> Reals:
@@ -200,15 +208,19 @@ class Poses:
     @cached_property
     def assembled(self) -> NDArray[np.bool_]:
         """(n,) bool: which poses can be assembled."""
+        finite: NDArray[np.bool_] = np.asarray(np.isfinite(self.inputs).all(axis=1))
+        # what opens is known once the inputs are looked over
+        self.cover()
+        if not self.branch.may_open:
+            return finite
         self.solve([key for g in self.plan.groups for key in self.plan.writes(g)])
-        whole = np.ones(self.n, dtype=bool)
         for rows, st in self.rows():
             for g in self.plan.groups:
                 for value in (*(st.turn[body] for body in g.angles), *(st.slide[s] for s in g.slides)):
                     # the sum of squares is finite where all of them are; else each is looked at
                     if not np.isfinite(np.vdot(value, value)):
-                        whole[rows] &= np.isfinite(value)
-        return np.asarray(whole & np.isfinite(self.inputs).all(axis=1))
+                        finite[rows] &= np.isfinite(value)
+        return finite
 
     @property
     def condition(self) -> Reals:
@@ -234,19 +246,23 @@ class Poses:
         """What has been worked out so far, (step, order); order 0 is position."""
         return self._solved
 
+    def cover(self) -> None:
+        """Look for change points and limits over the one input of all poses, of those that have one."""
+        if self.inputs.shape[1] == 1 and self.n:
+            self.branch.cover(
+                float(np.fmin.reduce(self.inputs[:, 0])), float(np.fmax.reduce(self.inputs[:, 0]))
+            )
+
     def states(self) -> list[State]:
         """The blocks of poses."""
         if self._blocks is None:
             k = self.inputs.shape[1]
-            if k == 1 and self.n:
-                q = self.inputs[:, 0]
-                self.branch.cover(float(q.min()), float(q.max()))
+            self.cover()
             if not self.many:
                 self._blocks = [State([float(v) for v in self.inputs[0]])]
             else:
                 self._blocks = [
-                    State([self.inputs[i : i + BLOCK, j] for j in range(k)], many=True)
-                    for i in range(0, self.n, BLOCK)
+                    State([self.inputs[i : i + BLOCK, j] for j in range(k)]) for i in range(0, self.n, BLOCK)
                 ]
         return self._blocks
 
@@ -289,7 +305,7 @@ class Poses:
                     run(new, st, self._close, self._plain)
                 except (ZeroDivisionError, OverflowError):
                     # one pose on Python numbers at a singular place: the same again on arrays
-                    states[i] = State([np.array([q]) for q in st.inputs], many=True)
+                    states[i] = State([np.array([q]) for q in st.inputs])
                     run(
                         [*(step for step, k in self._solved if not k), *new],
                         states[i],
