@@ -341,7 +341,7 @@ def place_from_stock(
 
 def _sums(
     arms: Complex, cap: Real, loads: Real, counts: NDArray[np.intp], most: int | None
-) -> tuple[Complex, Real, NDArray[np.intp], NDArray[np.intp]]:
+) -> tuple[Complex, Real, NDArray[np.intp], NDArray[np.int32]]:
     """Return all sums of loads on positions, of at most so many pieces: the sum, its mass, its pieces, what stands where.
 
     What stands where is a row of codes, one for each position that bears a load: (positions from here on)·(number of loads) + load;

@@ -269,6 +269,10 @@ class FamilyMotion:
         """A quantity by its key, (v, n)."""
         return self.values([key])[0].copy()
 
+    def vector(self, key: Quantity) -> Reals:
+        """A vector by its key, (v, n, 2)."""
+        return xy(self.value(key))
+
     @cached_property
     def assembled(self) -> NDArray[np.bool_]:
         """(v, n) bool: which poses of which variants can be assembled."""
@@ -350,4 +354,4 @@ class FamilyMotion:
         """
         if not any(j.name == joint and on in j.bodies for j in joints(self.part.mechanism)):
             raise DescriptionError(f"link '{on}' has no joint at '{joint}'")
-        return xy(self.value(Reaction(joint, on)))
+        return self.vector(Reaction(joint, on))

@@ -60,6 +60,10 @@ class Branch(Protocol):
         """What has been written down of it."""
 
     @property
+    def together(self) -> dict[Any, Any]:
+        """What one pose that is requested again and again brings with a first request (`one_pose`)."""
+
+    @property
     def known_steps(self) -> dict[tuple[str, ...], tuple[Step, ...]]:
         """The steps that targets depend on, as far as requested."""
 
