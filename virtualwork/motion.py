@@ -141,12 +141,12 @@ class Motion(MotionViews):
     @property
     def assembled(self) -> NDArray[np.bool_]:
         """(n,) bool: which poses can be assembled."""
-        return self.poses.assembled
+        return self.poses.assembled.copy()
 
     @property
     def condition(self) -> Reals:
         """(n,): ‖J⁻¹‖∞ of all loops, lengths divided by the size: a relative error ε moves the pose by some ε·condition."""
-        return self.poses.condition
+        return self.poses.condition.copy()
 
     # --- what moves -----------------------------------------------------------------------------------------------
     @unlocked
