@@ -241,7 +241,7 @@ def once_per_turn(
         expected = (
             "two at least, a turn apart" if pulses == 1 else f"{pulses + 1} at least, a turn of {pulses}"
         )
-        raise ValueError(f"the mark rises {len(knots)} times: expected {expected}")
+        raise ValueError(f"the mark rises {len(knots)} time{'s' * (len(knots) != 1)}: expected {expected}")
     recording = time, x, level, pulses, None if tacho is None else np.asarray(tacho, dtype=float)
     if tacho is not None and pulses != 1:
         raise ValueError("the pulses of a turn are counted from mark to mark, beside a tacho")

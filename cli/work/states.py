@@ -116,7 +116,11 @@ def read_states(path: str) -> StateTable:
             )
     for quantity in ("mass", "inertia"):
         if quantity in table.numbers:
-            table.reject(table.numbers[quantity].values < 0, quantity, f"a {quantity} that is not negative")
+            table.reject(
+                table.numbers[quantity].values < 0,
+                quantity,
+                f"{'an' if quantity == 'inertia' else 'a'} {quantity} that is not negative",
+            )
     warnings: list[str] = []
     values = {name: column.si for name, column in table.numbers.items()}
     for name, value in values.items():
