@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.guard import guarded, unlocked
 from dalembert.arithmetic.records import alike
+from dalembert.hints import choices
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
@@ -154,7 +155,7 @@ class Motion(MotionViews):
         """
         place = self.mechanism.points.get(name)
         if place is None:
-            raise DescriptionError(f"no point is named '{name}'")
+            raise DescriptionError(f"no point is named '{name}'{choices(str(name), self.mechanism.points)}")
         return PointMotion(self, *place, name)
 
     @unlocked
@@ -174,7 +175,7 @@ class Motion(MotionViews):
             Where there is no link of that name.
         """
         if name not in self.mechanism.links:
-            raise DescriptionError(f"no link is named '{name}'")
+            raise DescriptionError(f"no link is named '{name}'{choices(str(name), self.mechanism.links)}")
         return LinkMotion(self, name)
 
     @unlocked
@@ -323,17 +324,20 @@ class Motion(MotionViews):
         return sensitivities.of([key], [sensitivities.dimension(path)])[0][0]
 
     def sensitivity(self, what: str, path: str) -> Reals:
-        """Return the derivative of a force of the whole mechanism to a number of the description.
+        """Return the derivative of a quantity to a number of the description.
 
         Parameters
         ----------
         what : str
-            "effort": (n,), or (n, k) for k inputs; "shaking force": (n, 2); "shaking moment": (n,).
+            A name as `--only` has it: "H.x", "coupler.omega", "crank.torque", "B.coupler.fx": (n,), SI and radians;
+            or "effort": (n,), or (n, k) for k inputs; "shaking force": (n, 2); "shaking moment": (n,).
         path : str
             Of the number, such as "links.crank.B.x".
 
         Raises
         ------
+        DescriptionError
+            No quantity has this name, or no number this path.
         MechanismError
             With friction, whose forces are no closed form.
 
@@ -355,7 +359,16 @@ class Motion(MotionViews):
             return xy(self.derivative(Shaking(), path))
         if what == "shaking moment":
             return np.asarray(self.derivative(ShakingMoment(), path))
-        raise ValueError(f"'{what}': expected effort, shaking force or shaking moment")
+        from virtualwork.quantities import named
+
+        if len(of := named(self.mechanism, what)) > 1:
+            raise DescriptionError(
+                f"'{what}': expected one quantity, such as {of[0].names[0]} or {of[1].names[0]}"
+            )
+        if not of[0].key or of[0].polar:
+            raise DescriptionError(f"'{what}' has no sensitivity")
+        less = self.derivative(of[0].less, path) if of[0].less else 0.0
+        return np.asarray(of[0].in_si(self.derivative(of[0].key, path), less))
 
     # --- as a table -------------------------------------------------------------------------------------------------
     def to_frame(self) -> DataFrame:

@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from dalembert.arithmetic.engines import as_part
 from dalembert.arithmetic.guard import Lock, guarded, own_lock
 from dalembert.arithmetic.parts import in_parts
+from dalembert.hints import choices
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.description import Description
@@ -159,6 +160,8 @@ class Family:
             return np.stack(self.own("value"), axis=-1)[:, None, :]
         q = real_array("angle", angle)
         if k == 1:
+            if q.ndim > 1 and q.shape[1:] != (1,):
+                raise ValueError(f"angle: expected shape (n,) for one input, found {q.shape}")
             return q.reshape(1, -1, 1)
         if q.shape != (k,) and (q.ndim != 2 or q.shape[1] != k):
             raise ValueError(f"angle: expected shape (n, {k}) for {k} inputs, found {q.shape}")
@@ -304,7 +307,7 @@ class FamilyMotion:
         """
         points = self.part.mechanism.points
         if name not in points:
-            raise DescriptionError(f"no point is named '{name}'")
+            raise DescriptionError(f"no point is named '{name}'{choices(name, points)}")
         return PointOfFamily(self, *points[name], name)
 
     def at(self, link: str, point: Point | str) -> PointOfFamily:
@@ -322,7 +325,7 @@ class FamilyMotion:
             Where there is no link of that name.
         """
         if name not in self.part.mechanism.links:
-            raise DescriptionError(f"no link is named '{name}'")
+            raise DescriptionError(f"no link is named '{name}'{choices(name, self.part.mechanism.links)}")
         return LinkOfFamily(self, name)
 
     def slide(self, name: str) -> SlideRates:

@@ -128,6 +128,8 @@ class Poses:
             angle = angle if k == 1 else [angle]
         q = real_array("angle", angle)
         if k == 1:
+            if q.ndim > 1 and q.shape[1:] != (1,):
+                raise ValueError(f"angle: expected shape (n,) for one input, found {q.shape}")
             q = q.reshape(-1, 1)
         elif q.ndim == 1 and q.shape == (k,):
             q = q.reshape(1, k)
