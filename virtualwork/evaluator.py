@@ -46,7 +46,7 @@ class Evaluator:
 
     def __init__(self, assembly: Assembly, *wanted: str) -> None:
         self.assembly = assembly
-        of = [each for name in wanted for each in _requests(assembly, name)]
+        of = [each for name in wanted for each in requests(assembly, name)]
         self.wanted, self.keys = tuple(name for name, _, _ in of), tuple(key for _, key, _ in of)
         # of vectors of which one component is requested
         self._components = {name: int(imaginary) for name, _, imaginary in of if imaginary is not None}
@@ -112,7 +112,7 @@ class Evaluator:
         return taped(self.assembly, recorded(self.assembly, (speed, acceleration, False)), self.keys).cost
 
 
-def _requests(assembly: Assembly, name: str) -> list[tuple[str, Quantity, bool | None]]:
+def requests(assembly: Assembly, name: str) -> list[tuple[str, Quantity, bool | None]]:
     """The quantities of a name, each with its own name, its key, and of a vector whether it is the y; else None."""
     key = key_of(assembly, name)
     if key is not None:

@@ -25,7 +25,7 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import Point, as_point
-from virtualwork.formulas.forces import Effort, Reaction, Shaking, ShakingMoment
+from virtualwork.formulas.forces import Effort, Force, Reaction, Shaking, ShakingMoment
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.one_pose import one_pose
@@ -222,7 +222,7 @@ class Motion(MotionViews):
         Parameters
         ----------
         names : str
-            Called as in `Mechanism.evaluator`: `points.H.velocity`, `links.coupler.omega`, `effort`.
+            Called as in `Mechanism.evaluator`: `points.H.velocity`, `links.coupler.omega`, `effort`; `H.vx`, `crank.torque`.
 
         Raises
         ------
@@ -237,17 +237,23 @@ class Motion(MotionViews):
         >>> bool(0 < found["points.P"][0] < 1e-15), bool(found["links.crank.omega"][0] < 1e-28)
         (True, True)
         """
-        from virtualwork.evaluator import key_of
+        from virtualwork.evaluator import key_of, requests
 
-        keys = {name: key_of(self.assembly, name) for name in names}
-        joints = {name: key for name, key in keys.items() if isinstance(key, Reaction)}
+        # as JSON names them, or as --only does
+        whole = {name: key for name in names if (key := key_of(self.assembly, name)) is not None}
+        parts = {
+            part: key for name in names if name not in whole for part, key, _ in requests(self.assembly, name)
+        }
+        keys = whole | parts
+        joints: dict[str, Force] = {name: key for name, key in whole.items() if isinstance(key, Reaction)}
+        joints |= {name: key for name, key in parts.items() if isinstance(key, Force)}
         self.rounding.together(key for name, key in keys.items() if name not in joints)
         estimates = {name: self.rounding.of(key) for name, key in keys.items() if name not in joints}
         if joints:
             errors = self.dynamics.error_estimate()
             errors.together(joints.values())
             estimates |= {name: key.read(errors) for name, key in joints.items()}
-        return {name: estimates[name] for name in names}
+        return {name: estimates[name] for name in keys}
 
     # --- forces -----------------------------------------------------------------------------------------------
     @cached_property

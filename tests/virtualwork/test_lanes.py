@@ -178,6 +178,8 @@ def test_an_evaluator_and_a_sensitivity_take_the_names_of_only() -> None:
     np.testing.assert_array_equal(
         motion.sensitivity("B.vx", radius), motion.point("B").sensitivity(radius, 1)[:, 0]
     )
+    errors = motion.error_estimates(*wanted)
+    assert all(0 <= errors[name][0] <= 1e-9 * np.abs(found[name]).max() + 1e-15 for name in wanted)
     assert list(m.evaluator("rod")(0.3)) == ["rod.angle", "rod.omega", "rod.alpha"]
     with pytest.raises(DescriptionError, match=r"expected one quantity, such as rod\.angle or rod\.omega"):
         motion.sensitivity("rod", path)
