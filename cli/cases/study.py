@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.cases import poses, remarks
-from cli.cases.analysis import Analysis
-from cli.cases.call import naming
+from cli.cases.analysis import Analysis, naming
 from cli.cases.case import Case, Study, like
 from cli.show.result import Result, Section, Sheet
 from cli.show.terminal import progress
@@ -132,9 +131,9 @@ class PoseCase(Case):
     def _at_guess(self, block: Analysis) -> Analysis:
         """The block's first pose, with the inputs where the guess has them: there the mechanism is assembled."""
         first = block.inputs.part(0, 1)
-        home = replace(block, inputs=replace(first, values=np.array([self.analysis.mechanism.at])))
-        home.assemblies = block.assemblies
-        return home
+        first_pose = replace(block, inputs=replace(first, values=np.array([self.analysis.mechanism.at])))
+        first_pose.assemblies = block.assemblies
+        return first_pose
 
     @cached_property
     def further(self) -> Further:

@@ -169,10 +169,6 @@ def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -
     from cli.read.runs.reading import latest
     from cli.show.result import Result
 
-    if b.runs.fitted:
-        from cli.field.logs import check
-
-        check(b)
     remarks, day = warnings(b), latest(b.runs.table)
     made = tables(b, remarks)
 
