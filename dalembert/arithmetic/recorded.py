@@ -63,6 +63,24 @@ class Recorder:
         turned = self._known.get(("sub", b, a))
         return Real(self, self.node("sub", a, b)) if turned is None else Real(self, turned, True)
 
+    def opposite(self, number: int) -> int | None:
+        """The operation with the same value but for the sign, where it is a difference or has a constant factor; None if there is none.
+
+        >>> recorder = Recorder()
+        >>> x = recorder.input("x")
+        >>> recorder.opposite((x * 2.0).number), recorder.opposite((-x * 2.0).settled) == (x * 2.0).number
+        (None, True)
+        """
+        kind, *of = self.operations[number]
+        if kind == "sub":
+            return self._known.get(("sub", of[1], of[0]))
+        for factor, other in (of, of[::-1]) if kind == "mul" else ():
+            which, *value = self.operations[factor]
+            const = self._known.get(("const", -value[0])) if which == "const" else None
+            if const is not None:
+                return self._known.get(("mul", min(const, other), max(const, other)))
+        return None
+
     def tape(self, outputs: Mapping[str, Number]) -> Tape:
         """The tape of named results; a plain float is a constant.
 
