@@ -150,7 +150,7 @@ def once_per_turn(
         expected = (
             "two at least, a turn apart" if pulses == 1 else f"{pulses + 1} at least, a turn of {pulses}"
         )
-        raise ValueError(f"the mark rises {len(knots)} times: expected {expected}")
+        raise ValueError(f"the mark rises {len(knots)} time{'s' * (len(knots) != 1)}: expected {expected}")
     at = knots[::pulses]
     if tacho is not None:
         if pulses != 1:

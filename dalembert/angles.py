@@ -55,6 +55,19 @@ def read_degrees(angle: float) -> float:
     return short if abs(math.radians(short) - angle) <= math.ulp(angle) else shown
 
 
+def in_turn(angle: float, turns: int = 1) -> float:
+    """Return an angle in degrees, in [0, 360), or in so many turns.
+
+    The remainder of a tiny negative angle alone rounds to 360.
+
+    >>> in_turn(-90.0), -1e-20 % 360.0, in_turn(-1e-20)
+    (270.0, 360.0, 0.0)
+    """
+    end = 360.0 * turns
+    rest = angle % end
+    return rest if rest < end else 0.0
+
+
 @overload
 def degrees(z: NDArray[np.complex128]) -> NDArray[np.float64]: ...
 @overload

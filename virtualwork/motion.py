@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.guard import guarded, unlocked
+from dalembert.arithmetic.guard import Lock, guarded, unlocked
 from dalembert.arithmetic.records import alike
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from virtualwork.forces import Forces
     from virtualwork.study.cycle import Cycle
 
+EFFORT = Effort(0)
 # poses at each end of a motion that a notebook shows
 ENDS = 10
 
@@ -66,7 +67,7 @@ class Motion(MotionViews):
         jerk: ArrayLike | None = None,
         block_of: int | None = None,
     ) -> None:
-        self.assembly, self.lock = assembly, assembly.lock
+        self.assembly = assembly
         self._one = one_pose(assembly, angle, speed, acceleration, jerk)
         if self._one is None:
             self.poses = Lanes(assembly, angle, speed, acceleration, jerk, block_of)
@@ -89,6 +90,11 @@ class Motion(MotionViews):
         poses = self.poses
         own = self.inputs, poses.input_error, poses.input_rest
         return _again, (self.assembly, own, poses.rates, poses.block_of, poses.time)
+
+    @property
+    def lock(self) -> Lock:
+        """That of the assembly."""
+        return self.assembly.lock
 
     @cached_property
     def _units(self) -> dict[int, Motion]:
@@ -135,12 +141,12 @@ class Motion(MotionViews):
     @property
     def assembled(self) -> NDArray[np.bool_]:
         """(n,) bool: which poses can be assembled."""
-        return self.poses.assembled
+        return self.poses.assembled.copy()
 
     @property
     def condition(self) -> Reals:
         """(n,): ‖J⁻¹‖∞ of all loops, lengths divided by the size: a relative error ε moves the pose by some ε·condition."""
-        return self.poses.condition
+        return self.poses.condition.copy()
 
     # --- what moves -----------------------------------------------------------------------------------------------
     @unlocked
@@ -152,7 +158,7 @@ class Motion(MotionViews):
         DescriptionError
             Where no body has a point of that name.
         """
-        place = self.mechanism.points.get(name)
+        place = self.assembly.mechanism.points.get(name)
         if place is None:
             raise DescriptionError(f"no point is named '{name}'")
         return PointMotion(self, *place, name)
@@ -173,7 +179,7 @@ class Motion(MotionViews):
         DescriptionError
             Where there is no link of that name.
         """
-        if name not in self.mechanism.links:
+        if name not in self.assembly.mechanism.links:
             raise DescriptionError(f"no link is named '{name}'")
         return LinkMotion(self, name)
 
@@ -195,6 +201,12 @@ class Motion(MotionViews):
         """A quantity by its key, (n,)."""
         result = None if self._one is None else self._one.value(key)
         return self._values((key,))[0] if result is None else result
+
+    @unlocked
+    def vector(self, key: Quantity) -> Reals:
+        """A vector by its key, (n, 2)."""
+        result = None if self._one is None else self._one.vector(key)
+        return xy(self._values((key,))[0]) if result is None else result
 
     def _values(self, keys: tuple[Quantity, ...]) -> list[Any]:
         if self._one is not None:
@@ -263,9 +275,9 @@ class Motion(MotionViews):
 
         Static where speed and acceleration are zero (Riul, unit II, eq. 3), else with inertia loads (eq. 5).
         """
-        inputs = len(self.mechanism.inputs)
+        inputs = 1 if self._one is not None else len(self.mechanism.inputs)
         if inputs == 1:
-            return self.value(Effort(0))  # type: ignore[no-any-return]
+            return self.value(EFFORT)  # type: ignore[no-any-return]
         return np.stack(self._values(tuple(Effort(j) for j in range(inputs))), axis=1)
 
     @unlocked
@@ -279,7 +291,7 @@ class Motion(MotionViews):
         on : str
             A link that the joint holds.
         """
-        return xy(self.value(Reaction(joint, on)))
+        return self.vector(Reaction(joint, on))
 
     def applied(self, link: str) -> tuple[Complexes, Reals]:
         """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""

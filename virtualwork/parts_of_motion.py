@@ -19,6 +19,9 @@ class AnyMotion(Protocol):
     def value(self, key: Quantity) -> Any:
         """A quantity."""
 
+    def vector(self, key: Quantity) -> Reals:
+        """A vector, its parts along the last axis."""
+
 
 class OneMotion(AnyMotion, Protocol):
     """A motion of a mechanism."""
@@ -68,22 +71,22 @@ class PointRates(PartOfMotion):
     @property
     def position(self) -> Reals:
         """(n, 2) m; NaN where the pose cannot be assembled."""
-        return xy(self.complex(0))
+        return self.motion.vector(self.key(0))
 
     @property
     def velocity(self) -> Reals:
         """(n, 2) m/s (Ibrahim eq. 1.4.1)."""
-        return xy(self.complex(1))
+        return self.motion.vector(self.key(1))
 
     @property
     def acceleration(self) -> Reals:
         """(n, 2) m/s² (Ibrahim eq. 1.5.1)."""
-        return xy(self.complex(2))
+        return self.motion.vector(self.key(2))
 
     @property
     def jerk(self) -> Reals:
         """(n, 2) m/s³ (Ibrahim eq. 1.5.3)."""
-        return xy(self.complex(3))
+        return self.motion.vector(self.key(3))
 
     def complex(self, order: int) -> Complexes:
         """The order-th time derivative as x + iy, (n,)."""

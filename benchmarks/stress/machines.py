@@ -9,6 +9,7 @@ from balancing import error_budget, torque_cycle, trial_effect
 from balancing.engine import reciprocating_forces
 from benchmarks.stress.pairs import Pairs, noise, pairs
 from benchmarks.truth.machines import shaking, turning_moments
+from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance
 
 ORDERS = 6
 
@@ -84,7 +85,50 @@ def _budget(rng: np.random.Generator) -> Pairs:
         ]
 
 
+def _link_states(rng: np.random.Generator) -> Pairs:
+    n, k = int(rng.integers(1, 8)), int(rng.integers(1, 4))
+    shape = (n,) if k == 1 else (k, n)
+    near = 10.0 ** rng.uniform(-9, 0)
+    velocity, omega = (
+        noise(rng, n) + near * noise(rng, *shape),
+        rng.normal(size=n) + near * rng.normal(size=shape),
+    )
+    real = {name: rng.normal(size=n) for name in ("mass", "inertia", "alpha", "torque")}
+    given = {"acceleration": noise(rng, n), "force": noise(rng, n), **real}
+    states = LinkStates(velocity, omega, **given, gravity=-9.81j)
+    unknowns = [UnitLoad(force=noise(rng, n), torque=rng.normal(size=n)) for _ in range(k)]
+    found = balance(states, unknowns)
+    with mp.workdps(60):
+        rows, right, sizes = mp.matrix(k, k), mp.matrix(k, 1), []
+        for f in range(k):
+            v, w = ([mp.mpmathify(x) for x in (a if k == 1 else a[f]).tolist()] for a in (velocity, omega))
+            of = {name: [mp.mpmathify(x) for x in x.tolist()] for name, x in given.items()}
+            right[f] = -mp.fsum(
+                (
+                    (of["force"][i] + of["mass"][i] * (mp.mpc(0, -9.81) - of["acceleration"][i]))
+                    * mp.conj(v[i])
+                ).real
+                + (of["torque"][i] - of["inertia"][i] * of["alpha"][i]) * w[i]
+                for i in range(n)
+            )
+            sizes.append(-right[f])
+            for j, unknown in enumerate(unknowns):
+                force, torque = (
+                    [mp.mpmathify(x) for x in np.asarray(each).tolist()]
+                    for each in (unknown.force, unknown.torque)
+                )
+                rows[f, j] = mp.fsum((force[i] * mp.conj(v[i])).real + torque[i] * w[i] for i in range(n))
+        if not found.determined.all():
+            return []
+        true = list(mp.lu_solve(rows, right))
+    bound = states.error_estimate()
+    return pairs(found.value, true, found.error_estimate()) + pairs(
+        np.atleast_1d(states.power), sizes, np.atleast_1d(bound)
+    )
+
+
 CAMPAIGNS = {
+    "link states": ("loads and unknowns of up to seven links, fields that nearly agree", _link_states),
     "engines": ("one to six cylinders of any layout, λ of 0.01 … 0.6", _engine),
     "flywheels": ("torque over two turns, up to 60 rows, on a large mean now and then", _flywheel),
     "trial runs": ("readings that a trial mass changes by 1e-15 … 10 times", _effect),

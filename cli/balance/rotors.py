@@ -27,6 +27,15 @@ if TYPE_CHECKING:
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+DIMENSIONS = {
+    "mass": "mass",
+    "weight": "force",
+    "unbalance": "unbalance",
+    "radius": "length",
+    "angle": "angle",
+    "z": "length",
+}
+"""Of the columns of a table of masses."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,15 +68,7 @@ class Rotors:
 
 def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
     """Read masses or weights with their radii, or unbalances, with angles and, if needed, axial positions."""
-    dimensions = {
-        "mass": "mass",
-        "weight": "force",
-        "unbalance": "unbalance",
-        "radius": "length",
-        "angle": "angle",
-        "z": "length",
-    }
-    table = read(path, numbers=dimensions, texts=["rotor", "name"])
+    table = read(path, numbers=DIMENSIONS, texts=["rotor", "name"])
     amounts = [name for name in ("mass", "weight", "unbalance") if name in table.numbers]
     if len(amounts) > 1:
         both = " and ".join(table.numbers[name].header for name in amounts)

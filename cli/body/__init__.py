@@ -9,8 +9,6 @@ from cli.read import options
 from cli.show.output import command
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from cli.body.moving import ShaftRequest
     from cli.show.result import Result
     from dalembert.results.way import Topic
@@ -116,9 +114,6 @@ def run(
 
     chosen = None if only is None else options.only(only, tables.names_of(bodies[0]))
 
-    def figure() -> Figure:
-        return tables.draw(bodies)
-
     def way() -> list[Topic]:
         from cli.body.way import way
 
@@ -127,7 +122,7 @@ def run(
     result = Result(
         tables=tables.tables(bodies, chosen),
         screen=lambda: tables.every(bodies, partial(tables.quantities, only=chosen)),
-        figure=figure,
+        figure=partial(tables.draw, bodies),
         way=way,
         method=tables.METHOD,
         about={

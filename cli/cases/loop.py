@@ -108,7 +108,7 @@ class Remarks:
         return lines
 
 
-class Home(NamedTuple):
+class Plan(NamedTuple):
     """What all parts of the work have in common.
 
     Attributes
@@ -176,11 +176,11 @@ class Loop:
         from dalembert.arithmetic.engines import as_part
         from dalembert.arithmetic.parts import LostPart, in_parts
 
-        count, home = self.count, self.home(json)
-        work: Any = partial(_solved, self.study, home, form, json)
-        if home.lanes:
-            work = partial(as_part, home.lanes, work)
-        each = home.each
+        count, plan = self.count, self.plan(json)
+        work: Any = partial(_solved, self.study, plan, form, json)
+        if plan.lanes:
+            work = partial(as_part, plan.lanes, work)
+        each = plan.each
         starts = range(0, count, each)
         some = ((a + 1, self.rows(a, a + each)) for a in starts)
         workers = min(self.workers, len(starts))
@@ -205,7 +205,7 @@ class Loop:
         self.remarks.any_assembled = there if isinstance(there, bool) else any(there)
         self.remarks.add("", case.warnings())
 
-    def home(self, json: bool) -> Home:
+    def plan(self, json: bool) -> Plan:
         """The first variant that can be assembled, and whether and how many are solved at once."""
         study = self.study
         lanes = self.count * (1 if study.moved is None else study.moved.n)
@@ -215,10 +215,10 @@ class Loop:
                 pattern = without_bounds(study.case(row).pattern())
                 break
         else:
-            return Home(study.size(json, together=False), lanes=lanes)
+            return Plan(study.size(json, together=False), lanes=lanes)
         # however few they are: what is refused, and what is remarked, does not depend on how many others there are
         together = study.together(row, json) is not None
-        return Home(study.size(json, together), pattern, row, together, lanes)
+        return Plan(study.size(json, together), pattern, row, together, lanes)
 
     @cached_property
     def table(self) -> Table:
@@ -253,9 +253,9 @@ class Solved(NamedTuple):
     remarks: Remarks
 
 
-def _solved(study: Study, home: Home, form: Form, json: bool, first: int, shown: Rows) -> Solved:
+def _solved(study: Study, plan: Plan, form: Form, json: bool, first: int, shown: Rows) -> Solved:
     """Work out a part: some variants, which are called from `first` on."""
-    part = Variants(study, home, first, shown)
+    part = Variants(study, plan, first, shown)
     return Solved(form(part.documents() if json else part.table(), first - 1), part.remarks)
 
 
@@ -273,7 +273,7 @@ class Variants:
     """Some variants, which are called from `first` on."""
 
     study: Study
-    home: Home
+    plan: Plan
     first: int
     shown: Rows
     remarks: Remarks = field(default_factory=Remarks)
@@ -310,7 +310,7 @@ class Variants:
     def documents(self) -> list[Document]:
         """What JSON has of each; poses of one that cannot be assembled are not assembled."""
         listed: list[Any]
-        if self.home.together:
+        if self.plan.together:
             poses, assembled, alone = self._together(True)
             v, n = assembled.shape
             listed = [{"poses": poses[i * n : (i + 1) * n]} for i in range(v)]
@@ -321,8 +321,8 @@ class Variants:
             listed = list(self.each(True))
         if any(document is None for document in listed):
             empty: Document = dict(self.study.blank)
-            if self.home.row is not None and not self.study.one_blank_row:
-                like_it = Variants(self.study, self.home, 0, self.home.row[None]).one(0, True)
+            if self.plan.row is not None and not self.study.one_blank_row:
+                like_it = Variants(self.study, self.plan, 0, self.plan.row[None]).one(0, True)
                 empty = {key: blank(value) for key, value in like_it.items()}
             listed = [empty if document is None else document for document in listed]
         headers = [d.header for d in self.study.dimensions]
@@ -336,8 +336,8 @@ class Variants:
     # --- as a table -----------------------------------------------------------------------------------------------
     def table(self) -> Table:
         """The rows of all of them, which tell whether the pose is assembled."""
-        pattern = self.home.pattern
-        if self.home.together:
+        pattern = self.plan.pattern
+        if self.plan.together:
             return self._table_together()
         tables, rows = [], []
         for answer in self.each(False):
@@ -352,7 +352,7 @@ class Variants:
 
     def _rows(self, answer: Any) -> tuple[Table, list[Any]]:
         """The rows of what `one` gives, and of each whether its pose is assembled."""
-        pattern = self.home.pattern
+        pattern = self.plan.pattern
         if not pattern.columns or (answer is None and self.study.one_blank_row):
             columns = pattern.columns or [Column("step", "", [None])]
             pattern = Table([Column(c.name, c.unit, [None]) for c in columns], pattern.keys)
@@ -363,15 +363,15 @@ class Variants:
         """All of them at once."""
         name = self.study.key, json
         if name not in _written:
-            assert self.home.row is not None
-            made = self.study.together(self.home.row, json)
+            assert self.plan.row is not None
+            made = self.study.together(self.plan.row, json)
             assert made is not None
             _written.clear()
             _written[name] = made
         return _written[name].of(*self.study.part(self.shown))
 
     def _table_together(self) -> Table:
-        pattern = self.home.pattern
+        pattern = self.plan.pattern
         table, assembled, alone = self._together(False)
         v, n = assembled.shape
         columns: list[list[Any]] = [list(c.values) for c in like(pattern, table).columns]

@@ -154,8 +154,8 @@ def table(analysis: Analysis, computed: Sequence[Mapping[Quantity, Any]] = ()) -
 
     `computed`: what the poses of each assembly have computed already; there are no bounds of it.
     """
-    wanted = analysis.tabled
-    n, shown, driven = analysis.inputs.n, analysis.inputs.whole.shown, analysis.set_angles
+    wanted, its = analysis.tabled, analysis.inputs.whole
+    n, shown, driven = len(its.shown), its.shown, analysis.set_angles
     every = computed or [solved(motion, keys_of(wanted)) for motion in analysis.motions]
     times = len(every)
     parts = [cells_of(wanted, each, n, driven) for each in every]
@@ -177,7 +177,7 @@ def table(analysis: Analysis, computed: Sequence[Mapping[Quantity, Any]] = ()) -
                 ]
         return [b for each in bounds for b in bounds_of(each)]  # type: ignore[arg-type]
 
-    columns = [Column("step", "", [*analysis.inputs.whole.steps] * times)]
+    columns = [Column("step", "", [*its.steps] * times)]
     if analysis.several:
         numbers = [str(assembly.number) for assembly in analysis.assemblies for _ in range(n)]
         columns.append(Column("branch", "", numbers))

@@ -132,9 +132,9 @@ class PoseCase(Case):
     def _at_guess(self, block: Analysis) -> Analysis:
         """The block's first pose, with the inputs where the guess has them: there the mechanism is assembled."""
         first = block.inputs.part(0, 1)
-        home = replace(block, inputs=replace(first, values=np.array([self.analysis.mechanism.at])))
-        home.assemblies = block.assemblies
-        return home
+        first_pose = replace(block, inputs=replace(first, values=np.array([self.analysis.mechanism.at])))
+        first_pose.assemblies = block.assemblies
+        return first_pose
 
     @cached_property
     def further(self) -> Further:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,10 +11,7 @@ from cli.read import options
 from cli.show.output import command
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from cli.show.result import Result
-    from dalembert.results.way import Topic
 
 
 EXAMPLE = "inline-four"
@@ -48,7 +46,7 @@ def run(
     order and sense balance force and couple.
     """
     from cli.engine.cylinders import Engine, read_cylinders, read_shafts
-    from cli.engine.tables import METHOD, tables, warnings
+    from cli.engine.tables import METHOD, draw, tables, warnings, way
     from cli.read.planes import from_options
     from cli.show.result import Result
 
@@ -61,20 +59,10 @@ def run(
         read, omega, order, counterweight_share, planes, read_shafts(shaft or [], order), read.pins
     )
 
-    def figure() -> Figure:
-        from cli.engine.tables import draw
-
-        return draw(engine)
-
-    def way() -> list[Topic]:
-        from cli.engine.tables import way
-
-        return way(engine)
-
     return Result(
-        way=way,
+        way=partial(way, engine),
         tables=tables(engine),
-        figure=figure,
+        figure=partial(draw, engine),
         method=METHOD,
         about={"title": "Balance of an engine"},
         warnings=[*engine.cylinders.table.warnings, *warnings(engine)],

@@ -53,10 +53,9 @@ def _run(
     from cli.exercise.files import put
     from cli.exercise.mistakes import candidates
     from cli.exercise.moodle import moodle
-    from cli.exercise.sheets import answers_csv, filled, key_csv, sheet_page
+    from cli.exercise.sheets import answers_csv, filled, key_csv, sheet_page, tables
     from cli.exercise.solutions import solutions
     from cli.exercise.solving import workshop
-    from cli.exercise.tables import tables
     from cli.exercise.variants import variants
     from cli.show.capture import options_of
     from cli.show.result import Result

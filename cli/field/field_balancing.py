@@ -32,7 +32,7 @@ from cli.field.request import Request, ceiling_in, limits_in, masses_at
 from cli.read.options import bad
 from cli.read.runs.runs import SHOWN, Complex, Group, Real, Runs
 from cli.read.runs.stored import Stored
-from dalembert.angles import degrees
+from dalembert.angles import degrees, in_turn
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.parts import in_parts
 from dalembert.errors import DataError
@@ -399,7 +399,7 @@ class FieldBalancing:
             return []
         masses = place(complex(w), np.radians(self.request.places)).masses.tolist()
         return [
-            (str(k + 1), self.request.places[k] % 360.0, mass) for k, mass in enumerate(masses) if mass > 0
+            (str(k + 1), in_turn(self.request.places[k]), mass) for k, mass in enumerate(masses) if mass > 0
         ]
 
     @property

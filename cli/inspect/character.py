@@ -11,6 +11,7 @@ from cli.cases.analysis import Analysis
 from cli.cases.case import TableCase, TableStudy
 from cli.cases.poses import keys_of, listed
 from cli.cases.study import METHOD
+from dalembert.angles import in_turn
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.results.columns import Table, finite, names
 from dalembert.results.way import Topic, figures
@@ -162,7 +163,7 @@ def _cams(check: Check) -> Statement:
         off = check.lift_off(number)
         if off is not None:
             entry["lift_off_speed_rad_s"] = finite(off.speed)
-            entry["lift_off_at_deg"] = math.degrees(off.at) % 360.0
+            entry["lift_off_at_deg"] = in_turn(math.degrees(off.at))
         entries.append(entry)
     rows = [(key, str(entry["name"]), entry[key]) for entry in entries for key in list(entry)[1:]]
     return Statement("cams", entries, rows)  # type: ignore[arg-type]

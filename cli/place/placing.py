@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from balancing import Placement, drill_depth, place, place_from_stock, place_weights, transfer
 from cli.place.corrections import Correction, Drill, Request
-from dalembert.angles import degrees, phasor
+from dalembert.angles import degrees, in_turn, phasor
 from dalembert.errors import DataError
 from dalembert.units import from_si, to_si
 
@@ -74,7 +74,7 @@ class Placing:
         if opposite:
             self.warnings.append("material is drilled out opposite (+180°) to the mass that would be added")
         self.masses = [
-            Placed(share, i, float(mass), share.places[i] % 360.0, *_drilled(float(mass), request.drill))
+            Placed(share, i, float(mass), in_turn(share.places[i]), *_drilled(float(mass), request.drill))
             for share in self.shares
             for i, mass in enumerate(share.placed.masses)
             if mass > 0

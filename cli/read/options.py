@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
+from dalembert.angles import in_turn
 from dalembert.errors import DataError
 
 if TYPE_CHECKING:
@@ -150,7 +151,7 @@ def places(
         raise bad("--blades", "expected --positions or --blades, not both")
     if blades is not None:
         start, way = in_degrees("--first", first), -1 if numbering == "against" else 1
-        return [(start + way * (360.0 * k / blades)) % 360.0 for k in range(blades)]
+        return [in_turn(start + way * (360.0 * k / blades)) for k in range(blades)]
     if numbering == "against":
         raise bad(
             "--numbering", "speaks of --blades: --positions are numbered in the order in which they stand"
@@ -158,7 +159,7 @@ def places(
     if positions is None:
         return None
     chosen = [in_degrees("--positions", part) for part in positions.split(",")]
-    turned = sorted(angle % 360.0 for angle in chosen)
+    turned = sorted(in_turn(angle) for angle in chosen)
     for one, other in zip(turned, [*turned[1:], turned[0] + 360.0], strict=True):
         if len(turned) > 1 and other - one < 1e-7:
             raise bad("--positions", f"two positions at {one:g}deg")

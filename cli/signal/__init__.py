@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -12,7 +13,6 @@ if TYPE_CHECKING:
     from cli.show.result import Result
     from cli.signal.recording import Recording
     from dalembert.results.columns import Table
-    from dalembert.results.way import Topic
 
 OPTIONS = """
 Arguments:
@@ -33,17 +33,12 @@ def run(
     vibration for each sensor: A_um, B_um, acceleration_m_s2. The rows of the result are readings for dalembert field.
     """
     from cli.show.result import Result
-    from cli.signal.recording import read_signal
+    from cli.signal.recording import read_signal, way
 
     read = read_signal(recording, pulses)
 
-    def way() -> list[Topic]:
-        from cli.signal.recording import way
-
-        return way(read)
-
     return Result(
-        way=way,
+        way=partial(way, read),
         tables={"signal": lambda: vectors(read)},
         head={"amplitude_unit": read.unit},
         about={"title": "Vibration once per turn"},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,10 +14,7 @@ from cli.show.commands import ShowOptions, suffix_among
 from cli.show.output import command
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from cli.show.result import Result
-    from dalembert.results.way import Topic
 
 
 class Method(StrEnum):
@@ -100,9 +98,6 @@ def run(
         turning = rotation.body
     rotation.states  # noqa: B018  faults of the data are errors before anything is shown
 
-    def figure() -> Figure:
-        return tables.draw(rotation)
-
     def moving() -> bytes:
         from cli.show.picture import shown
         from rigidbody3d.animation import turning_page
@@ -111,16 +106,11 @@ def run(
         made = turning_page(turning.name, turning.inertia, turning.omega, table, turning.mgl is not None)
         return made.html.encode()
 
-    def way() -> list[Topic]:
-        from cli.spin.way import way
-
-        return way(rotation)
-
     result = Result(
-        way=way,
+        way=partial(tables.way, rotation),
         tables=tables.tables(rotation, chosen),
         head={"method": "exact" if rotation.exact else rotation.integrator},
-        figure=figure,
+        figure=partial(tables.draw, rotation),
         beside={} if page is None else {page: moving},
         method=tables.METHOD,
         about={"title": turning.name or "Rotation in time"} | turning.about,

@@ -101,6 +101,15 @@ class DoubledArray(NDArrayOperatorsMixin):
     def T(self) -> DoubledArray:
         return DoubledArray(self.high.T, self.low.T)
 
+    @property
+    def real(self) -> DoubledArray:
+        """Itself, as of numpy's real arrays."""
+        return self
+
+    def conj(self) -> DoubledArray:
+        """Itself, as of numpy's real arrays."""
+        return self
+
     def __len__(self) -> int:
         return len(self.high)
 
@@ -234,6 +243,10 @@ class DoubledComplex(NDArrayOperatorsMixin):
         """The sum along an axis, in pairs."""
         return DoubledComplex(self.real.sum(axis), self.imag.sum(axis))
 
+    def any(self) -> bool:
+        """Whether one is not zero."""
+        return bool(self.real.any() or self.imag.any())
+
     def off(self, value: ArrayLike) -> Array:
         """Return by how much complex floats differ from these, and what 32 digits do not tell."""
         z = np.asarray(value, dtype=complex)
@@ -246,6 +259,8 @@ class DoubledComplex(NDArrayOperatorsMixin):
     def __array_function__(self, function: Any, _: Any, args: Any, kwargs: Any) -> Any:
         if function is np.sum:
             return args[0].sum(**kwargs)
+        if function is np.shape:
+            return args[0].shape
         if function not in _LAYOUT:
             return NotImplemented
         return DoubledComplex(*(_each(function, *_parts(args, name), **kwargs) for name in ("real", "imag")))

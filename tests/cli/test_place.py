@@ -36,6 +36,12 @@ def test_blades(dalembert: Dalembert) -> None:
     assert shifted["masses"][0]["angle_deg"] == 10
 
 
+def test_a_place_just_below_zero_stands_at_zero_not_at_360(dalembert: Dalembert) -> None:
+    # -1e-15 % 360 is 360.0
+    found = document(dalembert("place", "3g@0deg", "--positions=-1e-15deg", "--json"))
+    assert [m["angle_deg"] for m in found["masses"]] == [0.0]
+
+
 def test_blades_numbered_against_the_angles(dalembert: Dalembert) -> None:
     """Same masses at the same angles; the blade at 360° − θ has θ's number, and the first stays where it is."""
     vector = ["83.5g@308.87deg", "--blades", "16", "--json"]

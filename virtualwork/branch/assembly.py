@@ -57,6 +57,11 @@ class Assembly(Choice):
         """What has been written down of it on tapes."""
         return {}
 
+    @cached_property
+    def together(self) -> dict[Any, Any]:
+        """What one pose brings with a first request, by that request."""
+        return {}
+
     # --- along the input ------------------------------------------------------------------------------------------
     @cached_property
     def track(self) -> Track:

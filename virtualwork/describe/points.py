@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from dalembert.dataclass import dataclass
-from dalembert.hints import nearest
+from dalembert.hints import choices
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.forms import Form, Scalar
 from virtualwork.describe.keys import declared
@@ -104,7 +104,7 @@ def placed(points: Mapping[str, Point | Polar]) -> Mapping[str, complex]:
             point, at = next((p, at) for p, at in waiting.items() if isinstance(at, Polar))
             if at.origin not in waiting:
                 raise DescriptionError(
-                    f"points.{point} from: unknown point '{at.origin}'{nearest(at.origin, points)}"
+                    f"points.{point} from: unknown point '{at.origin}'{choices(at.origin, points)}"
                 )
             raise DescriptionError(f"points.{point} from: '{at.origin}' itself is placed from '{point}'")
         for point in ready:

@@ -194,7 +194,7 @@ def written(tree: Mapping[str, Any]) -> str:
 
 
 def _tables(tree: Mapping[str, Any]) -> Iterator[tuple[str, Table]]:
-    require_keys(tree, {*FILE, *TABLES}, "the file", "table")
+    require_keys(tree, {*FILE, *TABLES}, "the file", "table or key")
     whole = {key: tree[key] for key in ("name", "source", "note", "gravity") if key in tree}
     if whole:
         yield "", whole

@@ -66,7 +66,7 @@ class Design:
         self._first = Solver(Part(self.mechanism, self.dimensions, own, np.zeros((1, 1, 1)), self._at_rates))
         self._paths = [d.path for d in self.dimensions]
         self._alone = Alone(self.mechanism, self.dimensions, self.keys, self.rates)
-        if forces and not self._first.takes(self.keys):
+        if forces and (mechanism.friction or not self._first.takes(self.keys)):
             raise DescriptionError(
                 "the effort has no derivatives here: friction, redundant joints and tables over an angle or a speed of a link "
                 "are of each pose"

@@ -34,7 +34,7 @@ from virtualwork.family.part import ASSEMBLED, LANES, Part, room
 from virtualwork.family.solver_cache import answer, forget
 from virtualwork.formulas.forces import Effort, Reaction
 from virtualwork.formulas.numbers import Number, Reals, real_array, xy
-from virtualwork.formulas.poses import check_rate
+from virtualwork.formulas.poses import as_inputs, check_rate
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.parts_of_motion import LinkRates, PointRates, SlideRates
 from virtualwork.plan.steps import joints
@@ -154,15 +154,9 @@ class Family:
 
     def inputs(self, angle: ArrayLike | None) -> Reals:
         """(v or 1, n, k)."""
-        k = len(self.mechanism.inputs)
         if angle is None:
             return np.stack(self.own("value"), axis=-1)[:, None, :]
-        q = real_array("angle", angle)
-        if k == 1:
-            return q.reshape(1, -1, 1)
-        if q.shape != (k,) and (q.ndim != 2 or q.shape[1] != k):
-            raise ValueError(f"angle: expected shape (n, {k}) for {k} inputs, found {q.shape}")
-        return q.reshape(1, -1, k)
+        return as_inputs(angle, len(self.mechanism.inputs))[None]
 
     def rates(self, *requested: ArrayLike | None) -> list[list[Number]]:
         """Speed, acceleration, jerk of each input: a number, or an array that broadcasts to (v, n)."""
@@ -174,7 +168,7 @@ class Family:
                     [r if np.ndim(r) == 0 else float(r[0]) if (r == r[0]).all() else r[:, None] for r in own]
                 )
                 continue
-            r = np.asarray(rate, dtype=float)
+            r = real_array(name, rate)
             k = len(self.mechanism.inputs)
             if r.ndim == 0:
                 rates.append([float(r)] * k)
@@ -269,6 +263,10 @@ class FamilyMotion:
         """A quantity by its key, (v, n)."""
         return self.values([key])[0].copy()
 
+    def vector(self, key: Quantity) -> Reals:
+        """A vector by its key, (v, n, 2)."""
+        return xy(self.value(key))
+
     @cached_property
     def assembled(self) -> NDArray[np.bool_]:
         """(v, n) bool: which poses of which variants can be assembled."""
@@ -350,4 +348,4 @@ class FamilyMotion:
         """
         if not any(j.name == joint and on in j.bodies for j in joints(self.part.mechanism)):
             raise DescriptionError(f"link '{on}' has no joint at '{joint}'")
-        return xy(self.value(Reaction(joint, on)))
+        return self.vector(Reaction(joint, on))

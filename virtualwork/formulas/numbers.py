@@ -77,14 +77,16 @@ def leave_out(values: NDArray[Any], which: NDArray[np.bool_]) -> None:
 
 
 def real_array(name: str, value: ArrayLike) -> Reals:
-    """Read real numbers as an array; ValueError names what holds something else.
+    """Read real numbers as an array of its own; ValueError names what holds something else.
+
+    A motion is solved when it is first asked for: what the caller does to his array in between does not change it.
 
     >>> real_array("angle", "abc")
     Traceback (most recent call last):
     ValueError: angle: expected real numbers, found 'abc'
     """
     try:
-        return np.asarray(value, dtype=float)
+        return np.array(value, dtype=float)
     except (TypeError, ValueError):
         text = repr(value)
         text = text if len(text) <= 60 else f"{text[:60]} …"

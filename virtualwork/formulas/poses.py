@@ -61,6 +61,10 @@ class Branch(Protocol):
         """What has been written down of it."""
 
     @property
+    def together(self) -> dict[Any, Any]:
+        """What one pose that is requested again and again brings with a first request (`one_pose`)."""
+
+    @property
     def known_steps(self) -> dict[tuple[str, ...], tuple[Step, ...]]:
         """The steps that targets depend on, as far as requested."""
 
@@ -78,6 +82,27 @@ class Branch(Protocol):
     @property
     def may_open(self) -> bool:
         """Whether it cannot be assembled somewhere in what was covered, as far as is known."""
+
+
+def as_inputs(angle: ArrayLike, k: int) -> Reals:
+    """Inputs as an array (n, k), from a number or an array (n,) where k is 1, from (k,) or (n, k).
+
+    >>> as_inputs([0.0, 0.5], 1).shape, as_inputs([0.0, 0.5], 2).shape
+    ((2, 1), (1, 2))
+
+    Raises
+    ------
+    ValueError
+    """
+    q = real_array("angle", angle)
+    if k == 1 and q.ndim < 2:
+        return q.reshape(-1, 1)
+    if k > 1 and q.shape == (k,):
+        return q.reshape(1, k)
+    if q.ndim != 2 or q.shape[1] != k:
+        expected = "a number or shape (n,) for one input" if k == 1 else f"shape (n, {k}) for {k} inputs"
+        raise ValueError(f"angle: expected {expected}, found {q.shape}")
+    return q
 
 
 def check_rate(name: str, rate: Reals, n: int, k: int) -> None:
@@ -127,14 +152,7 @@ class Poses:
             given = [e.value for e in m.inputs]
             angle = [a if v is None else v for v, a in zip(given, m.at, strict=True)]
             angle = angle if k == 1 else [angle]
-        q = real_array("angle", angle)
-        if k == 1:
-            q = q.reshape(-1, 1)
-        elif q.ndim == 1 and q.shape == (k,):
-            q = q.reshape(1, k)
-        elif q.ndim != 2 or q.shape[1] != k:
-            raise ValueError(f"angle: expected shape (n, {k}) for {k} inputs, found {q.shape}")
-        self.inputs = q
+        self.inputs = q = as_inputs(angle, k)
         self.n = len(q)
         self.rates = [
             self._given(name, value, [getattr(e, name) for e in m.inputs])

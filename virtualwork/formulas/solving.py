@@ -18,12 +18,13 @@ from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.recorded import bare
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.entering import GroupColumn, RightSide
-from virtualwork.formulas.forces import Bearing, Effort, Entry, RubbingRate
+from virtualwork.formulas.forces import Bearing, Effort, Entry
 from virtualwork.formulas.group_loops import unknowns
 from virtualwork.formulas.kinematics import AnglePartial
 from virtualwork.formulas.loops import Closed, Margin, Regularity
 from virtualwork.formulas.numbers import (
     SINGULAR,
+    Complexes,
     Number,
     Reals,
     cross,
@@ -95,9 +96,7 @@ class Solving(Poses):
                 if name:
                     recording.forms[name] = tape
         rows = run(tape, self.entering(tape.inputs))
-        for key in doubts:
-            if key not in self._bad:
-                self._bad[key] = self._where_bad(key, key.of_rows(rows, self.n))
+        self._doubted(doubts, rows)
         result: list[Any] = [np.empty(self.n, kind) for _ in forms]
         for i, to in enumerate(result):
             to.real = rows.get(f"{i} x", 0.0)
@@ -180,18 +179,27 @@ class Solving(Poses):
     @cached_property
     def _settled(self) -> tuple[Reals, int]:
         """The friction of each contact (c, n), NaN where the joints lock; and how often it was exchanged for the forces."""
-        from virtualwork.formulas.friction import settled
+        from virtualwork.formulas.friction import read, settled, written
 
-        contacts = self.recording.forces.case.contacts
-        rates = self._raw([RubbingRate(n) for n in range(len(contacts))])
-        arms = np.zeros((len(contacts), self.n))
-        for arm, rate, (joint, _, _, coefficient, radius) in zip(arms, rates, contacts, strict=True):
-            arm[:] = coefficient * (radius if joint.guide is None else 1.0) * np.sign(rate)
-        apart = self._apart_of([Effort(0)]) if contacts else None
+        recording = self.recording
+        c, doubts = len(recording.forces.case.contacts), self._singular([Effort(0)])
+        if not c:
+            return np.zeros((0, self.n)), 0
+        with recording.lock:
+            if "friction" not in recording.forms:
+                recording.forms["friction"] = written(recording, doubts)
+        tape, keys = recording.forms["friction"], [Bearing(k) for k in range(c)]
+
+        def bears(friction: Reals) -> Complexes:
+            return np.reshape(self._raw(keys, friction), (c, self.n))
+
+        rows = run(tape, self.entering(tape.inputs))
+        self._doubted(doubts, rows)
+        arms, free, per = read(rows, c, self.n, bears)
+        apart = self._apart_of([Effort(0)])
         if apart is not None:
             arms[:, apart[0]] = np.nan
-        keys = [Bearing(n) for n in range(len(contacts))]
-        friction, count = settled(lambda phi: np.reshape(self._raw(keys, phi), (len(keys), self.n)), arms)
+        friction, count = settled(arms, free, per, bears)
         if apart is not None:
             friction[:, apart[0]], more = apart[1]._settled
             count = max(count, more)
@@ -247,6 +255,12 @@ class Solving(Poses):
     def _closed(self, key: Quantity) -> list[Quantity]:
         """What tells where the groups that a quantity depends on are not assembled."""
         return [Closed((group,)) for group in key.groups(self.recording)] if self.branch.may_open else []
+
+    def _doubted(self, doubts: Iterable[Quantity], rows: Outputs) -> None:
+        """Note where doubts are right, by a run that has them."""
+        for key in doubts:
+            if key not in self._bad:
+                self._bad[key] = self._where_bad(key, key.of_rows(rows, self.n))
 
     def _where_bad(self, key: Quantity, found: Any) -> NDArray[np.bool_] | None:
         """The poses that a doubt is right about; None where it is right about none."""
