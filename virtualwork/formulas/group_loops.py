@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache, partial
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -320,29 +321,36 @@ class Loops:
         state = np.zeros((2 * count + len(SEARCH), n))
         state[:count] = start.T
         state[2 * count :].T[:] = np.inf, np.inf, 1.0, 1.0, limit + 1.0
-        few = (n == 1 and _one_pose(fixed)) or lanes_in_all(n) <= FEW
-        for lane in range(n) if few and floats.takes(of.search) else ():
-            own = [float(value[lane]) if isinstance(value, np.ndarray) else value for value in fixed]
-            state[:, lane] = self._alone(floats.compiled(of.search, among=order), own, state[:, lane])
-        going = np.flatnonzero(state[-1] > 0)
+        # the digits of a pose depend on how many there are in all, and of one pose on nothing
+        one, few = _one_pose(fixed), lanes_in_all(n) <= FEW
+        on_floats, going = floats.takes(of.search), np.arange(n)
         while going.size:
             here = [value[going] if isinstance(value, np.ndarray) else value for value in fixed]
             rows = state[:, going]
-            named = dict(zip(order, (*here, *rows, *self._solved(here, rows)), strict=True))
-            state[:, going] = np.asarray(run(of.search, named, "numpy").table)
-            going = going[state[-1, going] > 0]
+            if on_floats and (few or (one and going.size <= FEW)):
+                step = floats.compiled(of.search, among=order)
+                lanes = (v.tolist() if isinstance(v, np.ndarray) else repeat(v, going.size) for v in here)
+                pairs = zip(zip(*lanes, strict=True), rows.T.tolist(), strict=True)
+                result = np.array([self._alone(step, own, values) for own, values in pairs]).T
+                # at a singular pose numpy goes on with infinity and NaN
+                on_floats = False
+            else:
+                named = dict(zip(order, (*here, *rows, *self._solved(here, rows)), strict=True))
+                result = np.asarray(run(of.search, named, "numpy").table)
+            state[:, going] = result
+            going = going[result[-1] > 0]
         return state[:count].T, state[2 * count]
 
-    def _alone(self, step: Callable[..., tuple[float, ...]], fixed: list[float], state: Reals) -> Reals:
+    def _alone(
+        self, step: Callable[..., Sequence[float]], fixed: Sequence[float], state: Sequence[float]
+    ) -> Sequence[float]:
         """The state of a search in one pose after all its steps, or as far as Python's floats go."""
-        values = tuple(state.tolist())
         try:
-            while values[-1] > 0:
-                values = step(*fixed, *values, *self._solved(fixed, values))
+            while state[-1] > 0:
+                state = step(*fixed, *state, *self._solved(fixed, state))
         except (ZeroDivisionError, ValueError, OverflowError):
-            # a singular pose: numpy goes on with infinity and NaN
             pass
-        return np.array(values)
+        return state
 
     def _solved(self, fixed: Sequence[Number], state: Any) -> Sequence[Number]:
         """The gap after the step that a search is about to try, and the next step, where its tape has none."""
