@@ -20,11 +20,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.guard import Lock, guarded, unlocked
 from dalembert.arithmetic.records import alike
+from dalembert.hints import choices
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import Point, as_point
-from virtualwork.formulas.forces import Effort, Reaction, Shaking, ShakingMoment
+from virtualwork.formulas.forces import Effort, Force, Reaction, Shaking, ShakingMoment
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.one_pose import one_pose
@@ -160,7 +161,7 @@ class Motion(MotionViews):
         """
         place = self.assembly.mechanism.points.get(name)
         if place is None:
-            raise DescriptionError(f"no point is named '{name}'")
+            raise DescriptionError(f"no point is named '{name}'{choices(str(name), self.mechanism.points)}")
         return PointMotion(self, *place, name)
 
     @unlocked
@@ -180,7 +181,7 @@ class Motion(MotionViews):
             Where there is no link of that name.
         """
         if name not in self.assembly.mechanism.links:
-            raise DescriptionError(f"no link is named '{name}'")
+            raise DescriptionError(f"no link is named '{name}'{choices(str(name), self.mechanism.links)}")
         return LinkMotion(self, name)
 
     @unlocked
@@ -233,7 +234,7 @@ class Motion(MotionViews):
         Parameters
         ----------
         names : str
-            Called as in `Mechanism.evaluator`: `points.H.velocity`, `links.coupler.omega`, `effort`.
+            Called as in `Mechanism.evaluator`: `points.H.velocity`, `links.coupler.omega`, `effort`; `H.vx`, `crank.torque`.
 
         Raises
         ------
@@ -248,17 +249,23 @@ class Motion(MotionViews):
         >>> bool(0 < found["points.P"][0] < 1e-15), bool(found["links.crank.omega"][0] < 1e-28)
         (True, True)
         """
-        from virtualwork.evaluator import key_of
+        from virtualwork.evaluator import key_of, requests
 
-        keys = {name: key_of(self.assembly, name) for name in names}
-        joints = {name: key for name, key in keys.items() if isinstance(key, Reaction)}
+        # as JSON names them, or as --only does
+        whole = {name: key for name in names if (key := key_of(self.assembly, name)) is not None}
+        parts = {
+            part: key for name in names if name not in whole for part, key, _ in requests(self.assembly, name)
+        }
+        keys = whole | parts
+        joints: dict[str, Force] = {name: key for name, key in whole.items() if isinstance(key, Reaction)}
+        joints |= {name: key for name, key in parts.items() if isinstance(key, Force)}
         self.rounding.together(key for name, key in keys.items() if name not in joints)
         estimates = {name: self.rounding.of(key) for name, key in keys.items() if name not in joints}
         if joints:
             errors = self.dynamics.error_estimate()
             errors.together(joints.values())
             estimates |= {name: key.read(errors) for name, key in joints.items()}
-        return {name: estimates[name] for name in names}
+        return {name: estimates[name] for name in keys}
 
     # --- forces -----------------------------------------------------------------------------------------------
     @cached_property
@@ -335,17 +342,20 @@ class Motion(MotionViews):
         return sensitivities.of([key], [sensitivities.dimension(path)])[0][0]
 
     def sensitivity(self, what: str, path: str) -> Reals:
-        """Return the derivative of a force of the whole mechanism to a number of the description.
+        """Return the derivative of a quantity to a number of the description.
 
         Parameters
         ----------
         what : str
-            "effort": (n,), or (n, k) for k inputs; "shaking force": (n, 2); "shaking moment": (n,).
+            A name as `--only` has it: "H.x", "coupler.omega", "crank.torque", "B.coupler.fx": (n,), SI and radians;
+            or "effort": (n,), or (n, k) for k inputs; "shaking force": (n, 2); "shaking moment": (n,).
         path : str
             Of the number, such as "links.crank.B.x".
 
         Raises
         ------
+        DescriptionError
+            No quantity has this name, or no number this path.
         MechanismError
             With friction, whose forces are no closed form.
 
@@ -367,7 +377,16 @@ class Motion(MotionViews):
             return xy(self.derivative(Shaking(), path))
         if what == "shaking moment":
             return np.asarray(self.derivative(ShakingMoment(), path))
-        raise ValueError(f"'{what}': expected effort, shaking force or shaking moment")
+        from virtualwork.quantities import named
+
+        if len(of := named(self.mechanism, what)) > 1:
+            raise DescriptionError(
+                f"'{what}': expected one quantity, such as {of[0].names[0]} or {of[1].names[0]}"
+            )
+        if not of[0].key or of[0].polar:
+            raise DescriptionError(f"'{what}' has no sensitivity")
+        less = self.derivative(of[0].less, path) if of[0].less else 0.0
+        return np.asarray(of[0].in_si(self.derivative(of[0].key, path), less))
 
     # --- as a table -------------------------------------------------------------------------------------------------
     def to_frame(self) -> DataFrame:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import mpmath as mp
 import numpy as np
 
-from balancing import error_budget, torque_cycle, trial_effect
+from balancing import error_budget, once_per_turn, torque_cycle, trial_effect
 from balancing.engine import reciprocating_forces
 from benchmarks.stress.pairs import Pairs, noise, pairs
-from benchmarks.truth.machines import shaking, turning_moments
+from benchmarks.truth.machines import even_marks, shaking, turning_moments
+from benchmarks.truth.machines import once_per_turn as once_per_turn_truth
 from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance
 
 ORDERS = 6
@@ -127,7 +128,47 @@ def _link_states(rng: np.random.Generator) -> Pairs:
     )
 
 
+def _recording(rng: np.random.Generator) -> Pairs:
+    turns, per = int(rng.integers(2, 6)), int(rng.integers(8, 24))
+    n, period = turns * per + int(rng.integers(4, per)), rng.uniform(0.01, 0.1)
+    t = np.arange(n) * period / (per + rng.uniform(0, 0.9)) + rng.choice([0.0, 1e3]) * period
+    phase = 2 * np.pi * (t - t[0]) / period + rng.uniform(0, 6)
+    x = np.cos(phase + 1.0) + 0.3 * np.cos(2 * phase) + 10.0 ** rng.uniform(-12, 0) * rng.normal(size=n)
+    two_levels = rng.random() < 0.5
+    mark = (np.sin(phase) > 0.3).astype(float) if two_levels else np.sin(phase)
+    try:
+        found = once_per_turn(t, x[:, None], mark)
+    except ValueError:
+        return []
+    errors = found.error_estimate()
+    with mp.workdps(50):
+        at, levels, values = ([mp.mpf(float(v)) for v in each] for each in (t, mark, x))
+        half = (min(levels) + max(levels)) / 2
+        rises = [i for i in range(n - 1) if levels[i] < half <= levels[i + 1]]
+        if two_levels:
+            if mark[0] > 0:
+                return []
+            falls = max(i for i in range(n - 1) if levels[i] >= half > levels[i + 1])
+            inside = [i for i in rises if i < falls]
+            places = even_marks([at[i] for i in inside], [at[i + 1] for i in inside])
+        else:
+            places = [
+                at[i] + (half - levels[i]) / (levels[i + 1] - levels[i]) * (at[i + 1] - at[i]) for i in rises
+            ]
+        if len(places) != found.turns + 1:
+            return []
+        mean, deviation = once_per_turn_truth(at, values, places, 3)
+        speed = 2 * mp.pi * found.turns / (places[-1] - places[0])
+    pairs_of = [(float(abs(mp.mpmathify(complex(found.vector[0])) - mean)), float(errors.vector[0]))]
+    pairs_of += pairs([found.speed], [speed], [errors.speed])
+    return pairs_of if deviation is None else pairs_of + pairs(found.deviation, [deviation], errors.deviation)
+
+
 CAMPAIGNS = {
+    "once per turn": (
+        "recordings of some turns with harmonics and noise, marks of two levels and others",
+        _recording,
+    ),
     "link states": ("loads and unknowns of up to seven links, fields that nearly agree", _link_states),
     "engines": ("one to six cylinders of any layout, λ of 0.01 … 0.6", _engine),
     "flywheels": ("torque over two turns, up to 60 rows, on a large mean now and then", _flywheel),

@@ -46,6 +46,53 @@ def shaking(cylinders: Sequence[Sequence[Any]], speed: Any, highest: int) -> lis
     return result
 
 
+def even_marks(low: Sequence[Any], high: Sequence[Any]) -> list[Any]:
+    """Return even marks in intervals, as far from all their ends as can be, by trying all pairs of lines; else the middles."""
+    n = len(low)
+    middles = [(a + b) / 2 for a, b in zip(low, high, strict=True)]
+    if n < 3:
+        return middles
+    k = [mp.mpf(2 * i - n + 1) / 2 for i in range(n)]
+
+    def room(slope: Any) -> tuple[Any, Any, Any]:
+        first = max(a - slope * i for a, i in zip(low, k, strict=True))
+        last = min(b - slope * i for b, i in zip(high, k, strict=True))
+        return last - first, first, last
+
+    # the room is bent where two lower ends, or two upper ones, bound it alike
+    bends = [(e[j] - e[i]) / (k[j] - k[i]) for e in (low, high) for i in range(n) for j in range(i)]
+    most = max(room(slope)[0] for slope in bends)
+    # where one interval bounds it alone, the middle of where it does
+    level = [slope for slope in bends if most - room(slope)[0] <= mp.mpf(10) ** -40 * most]
+    best = (min(level) + max(level)) / 2
+    width, first, last = room(best)
+    return [(first + last) / 2 + best * i for i in k] if width > 0 else middles
+
+
+def once_per_turn(
+    t: Sequence[Any], x: Sequence[Any], marks: Sequence[Any], harmonics: int
+) -> tuple[Any, Any]:
+    """Return the mean over turns of the first order of a signal, and its standard deviation, by normal equations."""
+    vectors = []
+    for start, end in pairwise(marks):
+        rows, right = [], []
+        for at, value in zip(t, x, strict=True):
+            if start <= at < end:
+                angle = 2 * mp.pi * (at - start) / (end - start)
+                orders = range(1, harmonics + 1)
+                rows.append(
+                    [mp.mpf(1), *(mp.cos(j * angle) for j in orders), *(mp.sin(j * angle) for j in orders)]
+                )
+                right.append(value)
+        a, b = mp.matrix(rows), mp.matrix(right)
+        c = mp.lu_solve(a.T * a, a.T * b)
+        vectors.append(mp.mpc(c[1], -c[1 + harmonics]))
+    mean = mp.fsum(vectors) / len(vectors)
+    if len(vectors) < 2:
+        return mean, None
+    return mean, mp.sqrt(mp.fsum(abs(v - mean) ** 2 for v in vectors) / (len(vectors) - 1) / 2 / len(vectors))
+
+
 def turning_moments(angle: Sequence[Any], torque: Sequence[Any]) -> dict[str, Any]:
     """Return mean, work, and the range of the energy of a torque between rows, by the areas between its zeros."""
     steps = [b - a for a, b in pairwise(angle)]

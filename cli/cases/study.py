@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.cases import poses, remarks
-from cli.cases.analysis import Analysis
-from cli.cases.call import naming
+from cli.cases.analysis import Analysis, naming
 from cli.cases.case import Case, Study, like
 from cli.show.result import Result, Section, Sheet
 from cli.show.terminal import progress

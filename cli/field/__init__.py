@@ -165,12 +165,10 @@ def run(
 
 def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -> Result:
     from cli.field.doubts import warnings
-    from cli.field.logs import check
     from cli.field.tables import METHOD, sense, tables
     from cli.read.runs.reading import latest
     from cli.show.result import Result
 
-    check(b)
     remarks, day = warnings(b), latest(b.runs.table)
     made = tables(b, remarks)
 

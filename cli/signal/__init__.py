@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -51,18 +51,30 @@ def vectors(recording: Recording) -> Table:
     import numpy as np
 
     from dalembert.angles import degrees
+    from dalembert.arithmetic.doubled_vectors import off
     from dalembert.results.columns import Column, Table, names, number
 
     of, unit = recording.vectors, recording.unit
     rows = len(recording.sensors)
     size = np.abs(of.vector)
+
+    def sizes() -> Any:
+        return off(size, recording.second.vector.vectors.size)
+
+    def deviations() -> Any:
+        return off(of.deviation, recording.second.deviation.doubled)
+
     return Table(
         [
             names("sensor", recording.sensors),
-            number("speed", "speed", [of.speed] * rows, "rpm"),
-            Column("amplitude", unit, size, None, "amplitude", size),
-            number("phase", "angle", degrees(of.vector)),
-            Column("amplitude_uncertainty", unit, of.deviation, None, "amplitude_uncertainty", of.deviation),
+            number("speed", "speed", [of.speed] * rows, "rpm", exact=lambda: recording.second.speed.doubled),
+            Column("amplitude", unit, size, sizes, "amplitude", size),
+            number(
+                "phase", "angle", degrees(of.vector), exact=lambda: recording.second.vector.vectors.degrees
+            ),
+            Column(
+                "amplitude_uncertainty", unit, of.deviation, deviations, "amplitude_uncertainty", of.deviation
+            ),
             names("turns", [of.turns] * rows),
         ],
         keys=("sensor",),

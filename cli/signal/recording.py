@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +29,13 @@ class Recording:
     unit: str
     vectors: OncePerTurn
     warnings: list[str]
+    exact: Callable[[], tuple[Any, ...]]
+    """The recording in 32 digits, of the decimals as they are written."""
+
+    @cached_property
+    def second(self) -> Any:
+        """The vectors in 32 digits."""
+        return self.vectors.second_run(self.exact())
 
 
 def read_signal(path: str, pulses: int) -> Recording:
@@ -89,7 +99,19 @@ def read_signal(path: str, pulses: int) -> Recording:
             f"{table.file}: the mark rises between two samples, in the middle as taken: phases hold to "
             f"± {np.degrees(vectors.phase_resolution):.2g}°; more samples in a turn makes them more exact"
         )
-    return Recording(sensors, next(iter(units.values())), vectors, table.warnings)
+
+    def exact() -> tuple[Any, ...]:
+        from cli.read.exact import long_column
+        from dalembert.units import UNITS
+
+        above, below = UNITS["time"][t.unit]
+        level, tacho = (
+            long_column(table.numbers[name]) if name else None for name in (mark, (more or [""])[0])
+        )
+        signals: Any = np.stack([long_column(table.numbers[name]) for name in units], axis=1)
+        return long_column(t) * float(above) / float(below), signals, level, pulses, tacho
+
+    return Recording(sensors, next(iter(units.values())), vectors, table.warnings, exact)
 
 
 def way(recording: Recording) -> list[Topic]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
 import mpmath as mp
 import pytest
 
-from benchmarks.truth.machines import shaking, turning_moments
+from benchmarks.truth.machines import even_marks, once_per_turn, shaking, turning_moments
 from tests.cli.test_digits_of_balancing import holds, rows, vector
 from tests.conftest import Dalembert
 
@@ -227,3 +228,29 @@ def test_a_flywheel(unit: str, dalembert: Dalembert) -> None:
         holds(row["mean_torque_lbf_ft"], true["mean"] / foot_pound, 14)
         speed = mp.mpf("600.1") * mp.pi / 30
         holds(row["flywheel_inertia_kg_m2"], true["fluctuation"] / (mp.mpf("0.007") * speed**2), 13)
+
+
+def test_a_recording(dalembert: Dalembert) -> None:
+    """A vibration with a second order, in milliseconds; the mark is a ramp, or has two levels."""
+    times = [mp.mpf(i) * mp.mpf("0.7") for i in range(90)]
+    x = [f"{3 * math.cos(0.33 * i + 1) + math.sin(0.66 * i):.3f}" for i in range(90)]
+    ramp = [f"{math.sin(0.33 * i - 0.2):.4f}" for i in range(90)]
+    level = ["1" if math.sin(0.33 * i - 0.2) > 0.4 else "0" for i in range(90)]
+    for mark in (ramp, level):
+        text = "t_ms,mark,A_um\n" + "".join(f"{0.7 * i:.1f},{mark[i]},{x[i]}\n" for i in range(90))
+        (row,) = rows(dalembert("signal", "-", "--digits", stdin=text))
+        with mp.workdps(45):
+            t, v, m = [at / 1000 for at in times], [mp.mpf(one) for one in x], [mp.mpf(one) for one in mark]
+            half = (min(m) + max(m)) / 2
+            rises = [i for i in range(89) if m[i] < half <= m[i + 1]]
+            if mark is level:
+                last = max(i for i in range(89) if m[i] >= half > m[i + 1])
+                rises = [i for i in rises if i < last]
+                marks = even_marks([t[i] for i in rises], [t[i + 1] for i in rises])
+            else:
+                marks = [t[i] + (half - m[i]) / (m[i + 1] - m[i]) * (t[i + 1] - t[i]) for i in rises]
+            mean, deviation = once_per_turn(t, v, marks, 3)
+            holds(row["amplitude_um"], abs(mean), 13)
+            holds(row["phase_deg"], mp.degrees(mp.arg(mean)) % 360, 13, 360)
+            holds(row["amplitude_uncertainty_um"], deviation, 10)
+            holds(row["speed_rpm"], 60 * mp.mpf(len(marks) - 1) / (marks[-1] - marks[0]), 13)

@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from dalembert.arithmetic.engines import as_part
 from dalembert.arithmetic.guard import Lock, guarded, own_lock
 from dalembert.arithmetic.parts import in_parts
+from dalembert.hints import choices
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.description import Description
@@ -302,7 +303,7 @@ class FamilyMotion:
         """
         points = self.part.mechanism.points
         if name not in points:
-            raise DescriptionError(f"no point is named '{name}'")
+            raise DescriptionError(f"no point is named '{name}'{choices(name, points)}")
         return PointOfFamily(self, *points[name], name)
 
     def at(self, link: str, point: Point | str) -> PointOfFamily:
@@ -320,7 +321,7 @@ class FamilyMotion:
             Where there is no link of that name.
         """
         if name not in self.part.mechanism.links:
-            raise DescriptionError(f"no link is named '{name}'")
+            raise DescriptionError(f"no link is named '{name}'{choices(name, self.part.mechanism.links)}")
         return LinkOfFamily(self, name)
 
     def slide(self, name: str) -> SlideRates:

@@ -45,6 +45,10 @@ def _quantity(poses: Poses, word: str) -> PlotQuantity:
     name, _, what = word.rpartition(".")
     guides = {g.point: i for i, g in enumerate(m.guides)}
     names = {*m.points, *m.links}
+    if not name:
+        raise DescriptionError(
+            f"'{word}': expected a quantity, such as {word}.{'x' if word in m.points else 'omega'}"
+        )
     if name not in names:
         raise DescriptionError(f"'{word}': no link or point is named '{name}'{nearest(name, names)}")
     if name in m.points and what in POINTS:
