@@ -18,7 +18,7 @@ from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.recorded import bare
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.entering import GroupColumn, RightSide
-from virtualwork.formulas.forces import Bearing, Effort, Entry, RubbingRate
+from virtualwork.formulas.forces import Bearing, Effort, Entry, SlippingRate
 from virtualwork.formulas.kinematics import AnglePartial
 from virtualwork.formulas.loops import Closed, Margin, Regularity
 from virtualwork.formulas.newton import unknowns
@@ -180,7 +180,7 @@ class Solving(Poses):
         from virtualwork.formulas.friction import settled
 
         contacts = self.recording.forces.case.contacts
-        rates = self._raw([RubbingRate(n) for n in range(len(contacts))])
+        rates = self._raw([SlippingRate(n) for n in range(len(contacts))])
         arms = np.zeros((len(contacts), self.n))
         for arm, rate, (joint, _, _, coefficient, radius) in zip(arms, rates, contacts, strict=True):
             arm[:] = coefficient * (radius if joint.guide is None else 1.0) * np.sign(rate)
