@@ -26,6 +26,7 @@ MODULES = tuple(
         "solids",
         "gyroscopes",
         "topology_rates",
+        "loaded",
         "equilibria",
         "assemblies",
         "in_time",
