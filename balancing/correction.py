@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -44,6 +45,7 @@ Complex = NDArray[np.complex128]
 
 # rotors of a part that goes to another process
 PART = 1 << 14
+LARGEST = 1e290  # products beyond it overflow where they are split into parts
 
 
 class CoincidentPlanes(ValueError):
@@ -300,8 +302,11 @@ class Correction:
         return np.asarray(np.einsum("...pq,...q->...p", np.abs(apart), moments) / square[..., None])
 
     def mass(self, radius: ArrayLike) -> Real:
-        """Return the masses to add at the radius (m) of each plane, (..., p), kg."""
-        return np.asarray(np.abs(self.unbalance) / spread_to("radius", radius, self.unbalance.shape))
+        """Return the masses to add at the radius (m) of each plane, (..., p), kg; ValueError where it is not positive."""
+        at = spread_to("radius", radius, self.unbalance.shape)
+        if not (at > 0).all():
+            raise ValueError("the radius must be positive")
+        return np.asarray(np.abs(self.unbalance) / at)
 
     @property
     def angle(self) -> Real:
@@ -353,7 +358,7 @@ def correct(
     CoincidentPlanes
         All planes of a rotor at one place.
     ValueError
-        Not finite, or shapes that do not fit.
+        Not finite, products beyond 1e290, or shapes that do not fit.
 
     Notes
     -----
@@ -374,8 +379,12 @@ def correct(
     u = np.atleast_1d(as_numbers("moment", moment, complex))
     at = as_numbers("z", z)
     p = np.atleast_1d(as_numbers("planes", planes))
-    if not (np.isfinite(u).all() and np.isfinite(at).all() and np.isfinite(p).all()):
+    size, far, wide = (float(np.abs(part).max(initial=0.0)) for part in (u.real, at, p))
+    size = max(size, float(np.abs(u.imag).max(initial=0.0)))
+    if not (isfinite(size) and isfinite(far) and isfinite(wide)):
         raise ValueError("moment, z and planes must be finite")
+    if size * max(far, wide, 1.0) > LARGEST or wide * max(far, wide) > LARGEST:
+        raise ValueError(f"moment, z and planes are too large: expected products up to {LARGEST:g}")
     shape = common_shape(moment=u.shape, z=at.shape)
     lead = common_shape(rotors=shape[:-1], planes=p.shape[:-1])
     fix = Correction(

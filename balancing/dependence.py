@@ -126,7 +126,7 @@ def columns_scaled(a: Complex) -> tuple[Complex, Real]:
     """Return a·diag(scale) with columns within a factor of two of the largest, and the scale (powers of two)."""
     size = np.abs(a)
     square = np.einsum("...sp,...sp->...p", size, size)
-    low, high = square.min(), square.max()
+    low, high = square.min(initial=1e200), square.max(initial=1e-200)
     if low > 1e-280 and high < 1e280:
         # within a factor of two already
         if high < 4 * low:

@@ -6,19 +6,22 @@ E(θ) = ∫ (T − T̄) dθ, speeds the flywheel up where it rises and slows it 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
+from dalembert.arithmetic.shapes import as_array, in_32_digits, is_doubled
+from dalembert.dataclass import dataclass, field
 
 Real = NDArray[np.float64]
 
 
 @record
-class TorqueCycle(NamedTuple):
+@dataclass(frozen=True, eq=False, repr=False)
+class TorqueCycle:
     """The work of a torque over a cycle, and what a flywheel has to store of it."""
 
     mean: float
@@ -28,13 +31,13 @@ class TorqueCycle(NamedTuple):
     fluctuation: float
     """The largest less the smallest energy E, J."""
     fastest: float
-    """The angle of the largest energy, where the shaft is fastest, rad."""
+    """The angle of the largest energy, where the shaft is fastest, rad; of energies that are equal to rounding the first."""
     slowest: float
     """The angle of the smallest energy, rad."""
     energy: Real
     """E at each row, from zero at the first, J, (n,)."""
-    rounding: float
-    """A bound of the rounding errors of the work and of every energy, J."""
+    rows: tuple[Real, Real] = field(compare=False)
+    """The angles (n,), rad, and torques (n,), N·m, of the table."""
 
     def inertia(self, speed: float, coefficient: float) -> float:
         """Return the moment of inertia that keeps the speed within a coefficient of fluctuation, kg·m².
@@ -47,13 +50,42 @@ class TorqueCycle(NamedTuple):
         ValueError
             A speed that is zero, or a coefficient outside 0 to 2: at 2 the shaft comes to rest.
         """
-        if not (np.isfinite(speed) and speed):
+        if not (np.isfinite(speed) and speed != 0):
             raise ValueError("a flywheel needs a speed that is not zero")
         if not 0 < coefficient <= 2:
             raise ValueError(
                 "the coefficient of fluctuation (ω_max − ω_min)/ω is more than 0 and at most 2, where the shaft comes to rest"
             )
         return self.fluctuation / (coefficient * speed**2)
+
+    def error_estimate(self, exact: TorqueCycle | None = None) -> dict[str, Any]:
+        """Return the rounding errors of `mean`, `work`, `fluctuation`, `fastest`, `slowest` and `energy` (n,).
+
+        They are by what the same formulas in numbers of 32 digits differ: `exact`, or None: the rows are exact.
+
+        Examples
+        --------
+        >>> cycle = torque_cycle([0.0, 0.3, 2 * np.pi], [20.0, 0.1, 0.0])
+        >>> bool(cycle.error_estimate()["work"] < 1e-15)
+        True
+        """
+        true: Any = torque_cycle(*map(in_32_digits, self.rows)) if exact is None else exact
+        names = ("mean", "work", "fluctuation", "fastest", "slowest", "energy")
+        errors = {name: getattr(true, name).off(getattr(self, name))[()] for name in names}
+        # what cancels in 32 digits
+        hidden = 2.0**-46 * self.negligible
+        return errors | {name: errors[name] + hidden for name in ("work", "fluctuation", "energy")}
+
+    @property
+    def negligible(self) -> float:
+        """An energy below which there is none: the rounding of all the work that a turn does and takes back, J."""
+        at, T = self.rows
+        return _negligible(at, T)
+
+
+def _negligible(at: Real, T: Real) -> float:
+    size = ((np.abs(T[:-1]) + np.abs(T[1:])) / 2 * np.diff(at)).sum()
+    return float((len(at) + 8) * 2 * EPS * size)
 
 
 def torque_cycle(angle: ArrayLike, torque: ArrayLike) -> TorqueCycle:
@@ -87,7 +119,7 @@ def torque_cycle(angle: ArrayLike, torque: ArrayLike) -> TorqueCycle:
     >>> round(cycle.inertia(speed=50.0, coefficient=0.02), 6)
     0.314159
     """
-    at, T = np.asarray(angle, dtype=float), np.asarray(torque, dtype=float)
+    at, T = as_array(angle), as_array(torque)
     if at.ndim != 1 or at.shape != T.shape or len(at) < 2:
         raise ValueError("expected as many torques as angles, and at least two")
     if not (np.isfinite(at).all() and np.isfinite(T).all()):
@@ -95,8 +127,8 @@ def torque_cycle(angle: ArrayLike, torque: ArrayLike) -> TorqueCycle:
     step = np.diff(at)
     if (step < 0).any() or not step.any():
         raise ValueError("expected angles that rise")
-    work = float(((T[:-1] + T[1:]) / 2 * step).sum())
-    mean = work / float(at[-1] - at[0])
+    work = ((T[:-1] + T[1:]) / 2 * step).sum()
+    mean = work / (at[-1] - at[0])
     over = T - mean
     energy = np.concatenate([[0.0], np.cumsum((over[:-1] + over[1:]) / 2 * step)])
     # the parabola's extreme within a step
@@ -104,15 +136,8 @@ def torque_cycle(angle: ArrayLike, torque: ArrayLike) -> TorqueCycle:
     share = over[k] / (over[k] - over[k + 1])
     every = np.concatenate([energy, energy[k] + over[k] * share * step[k] / 2])
     places = np.concatenate([at, at[k] + share * step[k]])
-    high, low = int(np.argmax(every)), int(np.argmin(every))
-    size = float(((np.abs(T[:-1]) + np.abs(T[1:])) / 2 * step).sum())
-    rounding = (len(at) + 8) * EPS * (size + abs(work))
-    return TorqueCycle(
-        mean,
-        work,
-        float(every[high] - every[low]),
-        float(places[high]),
-        float(places[low]),
-        energy,
-        rounding,
-    )
+    most, least, equal = every[every.argmax()], every[every.argmin()], _negligible(at, T)
+    fastest, slowest = places[every >= most - equal], places[every <= least + equal]
+    numbers: Any = mean, work, most - least, fastest[fastest.argmin()], slowest[slowest.argmin()]
+    mean, work, stored, fast, slow = numbers if is_doubled(T) else map(float, numbers)
+    return TorqueCycle(mean, work, stored, fast, slow, energy, (at, T))

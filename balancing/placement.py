@@ -296,22 +296,10 @@ def place_from_stock(
     away = np.abs(np.angle(np.exp(1j * theta) * np.conj(goal))) if goal else np.zeros(len(theta))
     room = _room(len(loads), len(theta), max_pieces)
     used = np.argsort(away, kind="stable")[:room]
-    halves = []
+    arms = np.exp(1j * theta)
     # every other one: both halves reach in all directions
-    for part in (used[0::2], used[1::2]):
-        sums, mass, count = np.zeros(1, dtype=complex), np.zeros(1), np.zeros(1, dtype=np.intp)
-        choice = np.zeros((1, len(part)), dtype=np.int16)
-        for column, position in enumerate(part):
-            fit = np.flatnonzero(loads <= cap[position] * (1 + 1e-12))
-            sums = (sums[:, None] + loads[fit] * np.exp(1j * theta[position])).ravel()
-            mass = (mass[:, None] + loads[fit]).ravel()
-            count = (count[:, None] + counts[fit]).ravel()
-            choice = np.repeat(choice, len(fit), axis=0)
-            choice[:, column] = np.tile(fit, len(choice) // len(fit))
-            if max_pieces is not None:
-                keep = count <= max_pieces
-                sums, mass, count, choice = sums[keep], mass[keep], count[keep], choice[keep]
-        halves.append((sums, mass, count, choice))
+    parts = used[0::2], used[1::2]
+    halves = [_sums(arms[part], cap[part], loads, counts, max_pieces) for part in parts]
     (sa, ma, ca, xa), (sb, mb, cb, xb) = halves
     best: tuple[float, float, int, int] | None = None
     slack = 1e-12 * float(max(abs(goal), weights[-1]))
@@ -345,8 +333,48 @@ def place_from_stock(
     # no weight anywhere is always a choice
     assert best is not None
     masses = np.zeros(len(theta))
-    masses[used[0::2]], masses[used[1::2]] = loads[xa[best[2]]], loads[xb[best[3]]]
+    for part, codes in ((parts[0], xa[best[2]]), (parts[1], xb[best[3]])):
+        place, load = np.divmod(codes[codes > 0], len(loads))
+        masses[part[len(part) - place]] = loads[load]
     return Placement(goal, theta, masses, best[0] if room >= len(theta) else 0.0)
+
+
+def _sums(
+    arms: Complex, cap: Real, loads: Real, counts: NDArray[np.intp], most: int | None
+) -> tuple[Complex, Real, NDArray[np.intp], NDArray[np.int32]]:
+    """Return all sums of loads on positions, of at most so many pieces: the sum, its mass, its pieces, what stands where.
+
+    What stands where is a row of codes, one for each position that bears a load: (positions from here on)·(number of loads) + load;
+    then zeros. The sums are in the order of these codes.
+    """
+    n = len(arms)
+    sums, mass, count = np.zeros(1, dtype=complex), np.zeros(1), np.zeros(1, dtype=np.intp)
+    codes = np.zeros((1, n if most is None else min(most, n)), dtype=np.int32)
+    occupied = np.zeros(1, dtype=np.intp)
+    full = []
+    for column in range(n if codes.shape[1] else 0):
+        fit = np.flatnonzero(loads <= cap[column] * (1 + 1e-12))
+        parent, load = np.repeat(np.arange(len(sums)), len(fit)), np.tile(fit, len(sums))
+        if most is not None:
+            few = count[parent] + counts[load] <= most
+            parent, load = parent[few], load[few]
+        sums, mass = sums[parent] + loads[load] * arms[column], mass[parent] + loads[load]
+        count, codes, occupied = count[parent] + counts[load], codes[parent], occupied[parent]
+        there = np.flatnonzero(load)
+        codes[there, occupied[there]] = (n - column) * len(loads) + load[there]
+        occupied[there] += 1
+        if most is not None:
+            # to these nothing can be added
+            whole = count == most
+            full.append((sums[whole], mass[whole], count[whole], codes[whole]))
+            sums, mass, count, codes, occupied = (x[~whole] for x in (sums, mass, count, codes, occupied))
+    if not full:
+        return sums, mass, count, codes
+    sums, mass, count, codes = (
+        np.concatenate(each) for each in zip(*full, (sums, mass, count, codes), strict=True)
+    )
+    order = np.lexsort(codes.T[::-1])
+    return sums[order], mass[order], count[order], codes[order]
 
 
 def _room(loads: int, positions: int, max_pieces: int | None) -> int:

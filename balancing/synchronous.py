@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.records import record
+from dalembert.arithmetic.shapes import as_array, filled, in_32_digits, is_doubled
+from dalembert.dataclass import dataclass, field, replace
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 HARMONICS = 3
 """So many orders are fitted beside one another, where a turn has samples enough."""
+REFINED = 4
+"""Steps of refinement in 32 digits, where one is not enough."""
+BLOCK = 8192
+"""Samples that are worked on together."""
 
 
 @record
-class OncePerTurn(NamedTuple):
+@dataclass(frozen=True, eq=False, repr=False)
+class OncePerTurn:
     """V of V e^{iωt}, t = 0 at the mark, and the turns it is the mean of."""
 
     vector: Complex
@@ -32,14 +38,45 @@ class OncePerTurn(NamedTuple):
     turns: int
     phase_resolution: float = 0.0
     """By how much the phases may be off, either way, as samples tell the edge of a mark of two levels, rad."""
+    recording: tuple[Any, ...] = field(default=(), compare=False)
+    """Times, signals, mark, pulses and tacho."""
+
+    def error_estimate(self, exact: tuple[Any, ...] | None = None) -> OncePerTurn:
+        """Return the rounding errors: by what the same formulas in 32 digits differ; of `vector` the length of the error.
+
+        `exact`: times (n,), signals (n, s), mark (n,), pulses and tacho (n,) or None, in 32 digits; None: the floats.
+
+        >>> t = np.arange(0, 1, 0.001)
+        >>> found = once_per_turn(t, np.cos(40 * np.pi * t)[:, None], np.sin(40 * np.pi * t))
+        >>> bool(found.error_estimate().vector[0] < 1e-13)
+        True
+        """
+        true: Any = self.second_run(exact)
+        vector = np.asarray(true.vector.off(self.vector))
+        numbers = (
+            np.where(
+                np.isfinite(value := np.asarray(getattr(self, name))), getattr(true, name).off(value), np.nan
+            )
+            for name in ("deviation", "speed", "speed_deviation", "phase_resolution")
+        )
+        deviation, speed, of_speed, resolution = numbers
+        return OncePerTurn(vector, deviation, float(speed), float(of_speed), self.turns, float(resolution))
+
+    def second_run(self, exact: tuple[Any, ...] | None = None) -> OncePerTurn:
+        """Return the same in 32 digits, of a recording as for `error_estimate`."""
+        if exact is None:
+            t, signal, mark, pulses, tacho = self.recording
+            t, signal, mark = map(in_32_digits, (t, signal, mark))
+            exact = t, signal, mark, pulses, None if tacho is None else in_32_digits(tacho)
+        return _averaged(*exact)
 
 
 class Marks(NamedTuple):
     """When a mark rises."""
 
-    at: Real
+    at: Any
     """(n,), s."""
-    resolution: float
+    resolution: Any
     """By how much all of them together may be earlier or later, s."""
 
 
@@ -53,45 +90,99 @@ def marks(t: ArrayLike, mark: ArrayLike) -> Marks:
     >>> marks([0, 1, 2, 3], [0, 0, 1, 0]), marks([0, 1, 2, 3], [0, 0, 3, 4])
     (Marks(at=array([1.5]), resolution=0.5), Marks(at=array([1.66666667]), resolution=0.0))
     """
-    time, level = np.asarray(t, dtype=float), np.asarray(mark, dtype=float)
-    low, high = float(level.min()), float(level.max())
+    time, level = as_array(t), as_array(mark)
+    nearest = _floats(level)
+    low, high = level[nearest.argmin()], level[nearest.argmax()]
     half = (low + high) / 2
-    rises = np.flatnonzero((level[:-1] < half) & (level[1:] >= half))
-    if ((level == low) | (level == high)).all():
+    # decisions are those of floats
+    rises = np.flatnonzero((nearest[:-1] < float(half)) & (nearest[1:] >= float(half)))
+    if ((nearest == float(low)) | (nearest == float(high))).all():
         rises = rises + 1
-        falls = np.flatnonzero((level[:-1] >= half) & (level[1:] < half)) + 1
+        falls = np.flatnonzero((nearest[:-1] >= float(half)) & (nearest[1:] < float(half))) + 1
         whole = rises[rises < falls[-1:].max(initial=0)]
         pulses = falls[np.searchsorted(falls, whole, side="right")] - whole
-        if level[0] >= half and len(pulses) and falls[0] >= pulses.min():
+        if nearest[0] >= float(half) and len(pulses) and falls[0] >= pulses.min():
             # the recording begins with a whole pulse
             rises = np.concatenate([[0], rises])
-        step = np.diff(time, prepend=2 * time[0] - time[1])
-        return _even(time[rises] - step[rises], time[rises])
+        before = np.concatenate([2 * time[:1] - time[1:2], time[:-1]])
+        return _even(before[rises], time[rises])
     share = (half - level[rises]) / (level[rises + 1] - level[rises])
-    return Marks(np.asarray(time[rises] + share * (time[rises + 1] - time[rises])), 0.0)
+    return Marks(time[rises] + share * (time[rises + 1] - time[rises]), 0.0)
 
 
-def _even(low: Real, high: Real) -> Marks:
+def _floats(x: Any) -> Any:
+    """The floats nearest to numbers: what decides is taken from them in the second run too."""
+    return x.value if is_doubled(x) else x
+
+
+def _even(low: Any, high: Any) -> Marks:
     """Return marks that each lie in an interval as even ones, where they can be."""
     middle = (low + high) / 2
-    each = Marks(middle, float(np.max(high - low, initial=0.0)) / 2)
+    apart = high - low
+    widest = apart[apart.argmax()] / 2 if len(middle) else 0.0
+    each = Marks(middle, widest if is_doubled(widest) else float(widest))
     if len(middle) < 3:
         return each
     k = np.arange(len(middle)) - (len(middle) - 1) / 2
+    start, wide = float(k @ _floats(middle) / (k @ k)), 4 * float(each.resolution) / len(k)
+    slope = _roomiest(k, low, high, start - wide, start + wide)
+    below, above = low - slope * k, high - slope * k
+    first, last = below[below.argmax()], above[above.argmin()]
+    if not first < last:
+        return each
+    half = (last - first) / 2
+    return Marks((first + last) / 2 + slope * k, half if is_doubled(half) else float(half))
 
-    def room(slope: float) -> tuple[float, float]:
-        return float((low - slope * k).max()), float((high - slope * k).min())
 
-    # the distance from mark to mark that leaves most room: concave, so that thirds of its range close in on it
-    slope, apart = float(k @ middle / (k @ k)), each.resolution / len(k)
-    least, most = slope - 4 * apart, slope + 4 * apart
-    for _ in range(80):
-        one, other = least + (most - least) / 3, most - (most - least) / 3
-        (a, b), (c, d) = room(one), room(other)
-        least, most = (one, most) if b - a < d - c else (least, other)
-    slope = (least + most) / 2
-    first, last = room(slope)
-    return Marks(np.asarray((first + last) / 2 + slope * k), (last - first) / 2) if first < last else each
+def _roomiest(k: Any, low: Any, high: Any, least: float, most: float) -> Any:
+    """Return the distance from mark to mark, between two, that leaves most room: min (high − slope·k) − max (low − slope·k).
+
+    It is concave, and linear between bends: the lines of both sides meet above it, and closer with each line there (J. E.
+    Kelley, J. SIAM 8 (1960) 703-712).
+    """
+
+    def edges(slope: Any) -> tuple[int, int]:
+        return int((low - slope * k).argmax()), int((high - slope * k).argmin())
+
+    def room(ends: tuple[int, int], slope: Any) -> Any:
+        i, j = ends
+        return (high[j] - low[i]) - slope * (k[j] - k[i])
+
+    def fall(ends: tuple[int, int]) -> float:
+        return float(k[ends[1]] - k[ends[0]])
+
+    zero = 0.0 * low[0]
+
+    def meeting(a: tuple[int, int], b: tuple[int, int]) -> Any:
+        return (room(a, zero) - room(b, zero)) / (fall(a) - fall(b))
+
+    def bend(side: tuple[int, int], top: tuple[int, int]) -> Any:
+        """Where the room stops to be that of a level line, on one side."""
+        slope = meeting(side, top)
+        for _ in k:
+            here = edges(slope)
+            if not room(side, slope) - room(here, slope) > 0 or not fall(here):
+                break
+            side, slope = here, meeting(here, top)
+        return slope
+
+    left, right = edges(least + zero), edges(most + zero)
+    if fall(left) >= 0 or fall(right) <= 0:
+        return (least if fall(left) >= 0 else most) + zero
+    slope = zero
+    for _ in range(4 * len(k)):
+        slope = meeting(left, right)
+        here = edges(slope)
+        if not room(left, slope) - room(here, slope) > 0:
+            break
+        if not fall(here):
+            # one interval bounds the room alone: the middle of where it does
+            return (bend(left, here) + bend(right, here)) / 2
+        if fall(here) < 0:
+            left = here
+        else:
+            right = here
+    return slope
 
 
 def once_per_turn(
@@ -145,64 +236,123 @@ def once_per_turn(
         raise ValueError("the times must rise from row to row")
     if pulses < 1:
         raise ValueError(f"{pulses} pulses in a turn: expected one at least")
-    knots, resolution = marks(time, level)
+    knots, _ = marks(time, level)
     if len(knots) < pulses + 1:
         expected = (
             "two at least, a turn apart" if pulses == 1 else f"{pulses + 1} at least, a turn of {pulses}"
         )
-        raise ValueError(f"the mark rises {len(knots)} times: expected {expected}")
+        raise ValueError(f"the mark rises {len(knots)} time{'s' * (len(knots) != 1)}: expected {expected}")
+    recording = time, x, level, pulses, None if tacho is None else np.asarray(tacho, dtype=float)
+    if tacho is not None and pulses != 1:
+        raise ValueError("the pulses of a turn are counted from mark to mark, beside a tacho")
+    return replace(_averaged(*recording), recording=recording)
+
+
+def _averaged(time: Any, x: Any, level: Any, pulses: int, tacho: Any) -> OncePerTurn:
+    """Return the vectors of a recording, of floats or of numbers in 32 digits."""
+    knots, resolution = marks(time, level)
     at = knots[::pulses]
     if tacho is not None:
-        if pulses != 1:
-            raise ValueError("the pulses of a turn are counted from mark to mark, beside a tacho")
-        knots, at, pulses = _counted(time, np.asarray(tacho, dtype=float), at)
-    angle = np.asarray(2 * np.pi / pulses * np.arange(len(knots)), dtype=float)
-    each = np.diff(at)
-    vectors = np.array([_turn(time, x, start, end, knots, angle) for start, end in pairwise(at.tolist())])
+        knots, at, pulses = _counted(time, tacho, at)
+    each = at[1:] - at[:-1]
+    vectors = _turns(time, x, at, knots, pulses)
     turns = len(each)
-    mean = vectors.mean(axis=0)
-    deviation, of_speed = np.full(mean.shape, np.nan), np.nan
+    mean = vectors.sum(axis=0) / turns
+    deviation: Any = np.full(mean.shape, np.nan)
+    of_speed: Any = np.nan
     if turns > 1:
-        scatter = np.square(np.abs(vectors - mean)).sum(axis=0) / (turns - 1)
+        off = vectors - mean
+        scatter = (off * off.conj()).real.sum(axis=0) / (turns - 1)
         deviation = np.sqrt(scatter / 2 / turns)
-        of_speed = float(np.std(2 * np.pi / each, ddof=1))
-    speed = float(2 * np.pi * turns / (at[-1] - at[0]))
-    return OncePerTurn(mean, deviation, speed, of_speed, turns, speed * resolution)
+        speeds = 2 * np.pi / each
+        spread = speeds - speeds.sum(axis=0) / turns
+        of_speed = np.sqrt((spread * spread).sum(axis=0) / (turns - 1))
+    speed = 2 * np.pi * turns / (at[-1] - at[0])
+    if is_doubled(time):
+        deviation, of_speed, sure = map(in_32_digits, (deviation, of_speed, speed * resolution))
+        return OncePerTurn(mean, deviation, speed, of_speed, turns, sure)
+    return OncePerTurn(mean, deviation, float(speed), float(of_speed), turns, float(speed * resolution))
 
 
-def _counted(time: Real, tacho: Real, at: Real) -> tuple[Real, Real, int]:
+def _counted(time: Any, tacho: Any, at: Any) -> tuple[Any, Any, int]:
     """Return the times of a tacho's pulses, the marks between the first and the last of them, and how many a turn has."""
-    if tacho.shape != time.shape or not np.isfinite(tacho).all():
+    if tacho.shape != time.shape or not np.isfinite(_floats(tacho)).all():
         raise ValueError("the tacho must be finite, a value for each time")
     knots = marks(time, tacho).at
     if len(knots) < 2:
         raise ValueError(f"the tacho rises {len(knots)} times: expected several pulses in each turn")
-    at = at[(at >= knots[0]) & (at <= knots[-1])]
+    places = _floats(knots)
+    at = at[(_floats(at) >= places[0]) & (_floats(at) <= places[-1])]
     if len(at) < 2:
         raise ValueError("the tacho has no whole turn from mark to mark")
     # pulses and marks may coincide: between marks their whole number is told by the mean
-    passed = np.interp(at, knots, np.arange(len(knots)))
+    passed = np.interp(_floats(at), places, np.arange(len(places)))
     pulses = round(float(passed[-1] - passed[0]) / (len(at) - 1))
     odd = np.flatnonzero(np.abs(np.diff(passed) - pulses) > 0.5)
     if pulses < 1 or len(odd):
         k = int(odd[0]) if len(odd) else 0
         period = float(passed[k + 1] - passed[k])
         raise ValueError(
-            f"the turn at {at[k]:g} s has {period:.3g} pulses of the tacho: expected {max(pulses, 1)}, as others"
+            f"the turn at {_floats(at)[k]:g} s has {period:.3g} pulses of the tacho: expected {max(pulses, 1)}, as others"
         )
     return knots, at, pulses
 
 
-def _turn(t: Real, x: Real, start: float, end: float, knots: Real, angles: Real) -> Complex:
-    """Return the first order of one turn, (s,), the angles known at some times."""
-    first, last = np.searchsorted(t, [start, end])
-    samples = int(last - first)
-    if samples < 4:
-        raise ValueError(f"the turn at {start:g} s has {samples} samples: expected four at least")
-    angle = np.interp(t[first:last], knots, angles) - np.interp(start, knots, angles)
-    orders = np.arange(1, min(HARMONICS, (samples - 1) // 2) + 1)
-    grown = angle[:, None] * orders
-    rows = np.concatenate([np.ones((samples, 1)), np.cos(grown), np.sin(grown)], axis=1)
-    q, r = np.linalg.qr(rows)
-    coefficients = np.linalg.solve(r, q.T @ x[first:last])
-    return np.asarray(coefficients[1] - 1j * coefficients[1 + len(orders)])
+def _turns(t: Any, x: Any, at: Any, knots: Any, pulses: int) -> Any:
+    """Return the first order of every turn between marks, (turns, s); the angle grows evenly from pulse to pulse."""
+    places, starts = _floats(t), _floats(at)
+    first = np.searchsorted(places, starts)
+    samples = np.diff(first)
+    short = np.flatnonzero(samples < 4)
+    if len(short):
+        k = int(short[0])
+        raise ValueError(f"the turn at {starts[k]:g} s has {samples[k]} samples: expected four at least")
+    # of all samples of whole turns, and of the turns' beginnings: counted in pulses
+    since = _interpolated(t[first[0] : first[-1]], knots), _interpolated(at[:-1], knots)
+    turn = np.repeat(np.arange(len(samples)), samples)
+    angle = (since[0] - since[1][turn]) * 2.0 * np.pi / float(pulses)
+    orders = np.minimum(HARMONICS, (samples - 1) // 2)
+    result = np.zeros_like(t, dtype=complex, shape=(len(samples), x.shape[1]))
+    for order in np.unique(orders).tolist():
+        alike = np.flatnonzero(orders == order)
+        # turns one below the other, the shorter ones filled up, as many as the cache holds
+        place = np.arange(samples[alike].max())
+        for rows in np.array_split(alike, 1 + len(alike) * len(place) // BLOCK):
+            there = place < samples[rows, None]
+            index = np.where(there, first[rows, None] - first[0] + place, 0)
+            signal = np.where(there[..., None], x[index + first[0]], 0.0)
+            result[rows] = _first_order(angle[index], signal, there, order)
+    return result
+
+
+def _interpolated(t: Any, knots: Any) -> Any:
+    """Return how many pulses there have been at times, parts of them by even growth."""
+    i = np.clip(np.searchsorted(_floats(knots), _floats(t), side="right") - 1, 0, len(knots) - 2)
+    return (t - knots[i]) / (knots[i + 1] - knots[i]) + i
+
+
+def _first_order(angle: Any, x: Any, there: Any, orders: int) -> Any:
+    """Return the first order (k, s) of signals (k, n, s) by least squares, of a constant and some orders."""
+    c, s = np.cos(angle), np.sin(angle)
+    cosines, sines = [c], [s]
+    for _ in range(orders - 1):
+        cosines.append(cosines[-1] * c - sines[-1] * s)
+        sines.append(sines[-1] * c + cosines[-2] * s)
+    columns = [np.where(there, each, 0.0) for each in (filled(angle.shape, 1.0, angle), *cosines, *sines)]
+    rows = np.stack(columns, axis=-1)
+    q, r = np.linalg.qr(_floats(rows))
+    coefficients = np.linalg.solve(r, np.swapaxes(q, -1, -2) @ _floats(x))
+    if is_doubled(rows):
+        # the gradient of what is left, in 32 digits, says by how much they are off
+        coefficients = in_32_digits(coefficients)
+        for _ in range(1 if np.linalg.cond(r).max() < 1e3 else REFINED):
+            left = np.where(there[..., None], x - coefficients[..., 0, None, :], 0.0)
+            for i, column in enumerate(columns[1:], 1):
+                left = left - column[..., None] * coefficients[..., i, None, :]
+            slopes = [left, *(column[..., None] * left for column in columns[1:])]
+            slope: Any = np.stack([each.sum(axis=-2) for each in slopes], axis=-2)
+            step = np.linalg.solve(np.swapaxes(r, -1, -2), slope.value)
+            coefficients = coefficients + np.linalg.solve(r, step)
+    result = np.zeros_like(angle, dtype=complex, shape=(len(rows), x.shape[-1]))
+    result.real, result.imag = coefficients[..., 1, :], -coefficients[..., 1 + orders, :]
+    return result

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
-from dalembert.arithmetic.shapes import as_numbers, common_shape
+from dalembert.arithmetic.shapes import as_array, as_numbers, common_shape, in_32_digits
+from dalembert.dataclass import dataclass, field
 
 Real = NDArray[np.float64]
 
@@ -40,15 +40,32 @@ def load_rule(mass: Any, omega: Any, planes: float, share: Any, gravity: Any) ->
 
 
 @record
-class TrialEffect(NamedTuple):
+@dataclass(frozen=True, eq=False, repr=False)
+class TrialEffect:
     """What a trial mass changed: the amplitude by this share, the phase by this angle (rad), (...,) each."""
 
     amplitude: Real
     phase: Real
+    readings: tuple[Any, Any] = field(compare=False)
+    """Before and after, complex, (...,)."""
 
-    def error_estimate(self) -> TrialEffect:
-        """Return bounds of the rounding errors, the readings taken as exact: both are differences of readings."""
-        return TrialEffect(4 * EPS * (2 + self.amplitude), 4 * EPS * (1 + self.phase))
+    def error_estimate(self, exact: tuple[Any, Any] | None = None) -> TrialEffect:
+        """Return the rounding errors: by what the same formula in 32 digits differs.
+
+        `exact`: the readings in 32 digits; None: they are the floats. A rise from zero, which is inf, has the error inf.
+
+        >>> error = trial_effect(3.0, 3.0 + 2**-40).error_estimate()
+        >>> bool(error.amplitude < 1e-16 * 2**-40)
+        True
+        """
+        before, after = readings = tuple(map(in_32_digits, self.readings)) if exact is None else exact
+        amplitude, phase = _effect(before, after)
+        size, other = (np.abs(z.value) for z in (before, after))
+        # what cancels in 32 digits
+        with np.errstate(divide="ignore", invalid="ignore"):
+            hidden = 2.0**-98 * (1 + other / size)
+        rise = np.where(np.isfinite(self.amplitude), amplitude.off(self.amplitude) + hidden, np.inf)
+        return TrialEffect(rise[()], phase.off(self.phase)[()], readings)
 
 
 def trial_effect(before: ArrayLike, after: ArrayLike) -> TrialEffect:
@@ -63,15 +80,23 @@ def trial_effect(before: ArrayLike, after: ArrayLike) -> TrialEffect:
     """
     v0, v1 = as_numbers("before", before, complex), as_numbers("after", after, complex)
     common_shape(before=v0.shape, after=v1.shape)
+    amplitude, phase = _effect(v0, v1)
+    return TrialEffect(amplitude[()], phase[()], (v0, v1))
+
+
+def _effect(v0: Any, v1: Any) -> tuple[Any, Any]:
+    """Return the changes of amplitude and phase, of complex floats or of complex numbers in 32 digits."""
     size = np.abs(v0)
     change = np.abs(np.abs(v1) - size)
-    amplitude = np.where(size > 0, change / np.where(size > 0, size, 1.0), np.where(change > 0, np.inf, 0.0))
-    phase = np.where((size > 0) & (np.abs(v1) > 0), np.abs(np.angle(v1 * v0.conj())), 0.0)
-    return TrialEffect(amplitude[()], phase[()])
+    there = size > 0
+    amplitude = np.where(there, change / np.where(there, size, 1.0), np.where(change > 0, np.inf, 0.0))
+    turned = v1 * v0.conj()
+    return amplitude, np.where(there & (np.abs(v1) > 0), np.abs(np.arctan2(turned.imag, turned.real)), 0.0)
 
 
 @record
-class ErrorBudget(NamedTuple):
+@dataclass(frozen=True, eq=False, repr=False)
+class ErrorBudget:
     """The error of a residual unbalance, and the readings from which on a rotor is in or out of tolerance."""
 
     error: Real
@@ -80,10 +105,21 @@ class ErrorBudget(NamedTuple):
     reject: Real
     """More than this reading: beyond tolerance whatever the error."""
 
-    def error_estimate(self) -> ErrorBudget:
-        """Return bounds of the rounding errors, the given errors taken as exact (up to some ten of them)."""
-        bound = 8 * EPS * (self.error + self.reject)
-        return ErrorBudget(8 * EPS * self.error, bound, bound)
+    errors: tuple[Any, Any, Any] = field(compare=False)
+    """The permissible unbalance (...), random and systematic errors (..., n)."""
+
+    def error_estimate(self, exact: tuple[Any, Any, Any] | None = None) -> ErrorBudget:
+        """Return the rounding errors: by what the same formula in 32 digits differs.
+
+        `exact`: permissible unbalance and errors in 32 digits; None: they are the floats.
+
+        >>> bool(error_budget(100.0, random=[0.1, 0.2]).error_estimate().accept < 1e-14)
+        True
+        """
+        numbers: Any = tuple(map(in_32_digits, self.errors)) if exact is None else exact
+        true = zip(_budget(*numbers), (self.error, self.accept, self.reject), strict=True)
+        error, accept, reject = (x.off(value) for x, value in true)
+        return ErrorBudget(error, accept, reject, numbers)
 
 
 def error_budget(permissible: ArrayLike, random: ArrayLike = (), systematic: ArrayLike = ()) -> ErrorBudget:
@@ -106,9 +142,14 @@ def error_budget(permissible: ArrayLike, random: ArrayLike = (), systematic: Arr
     >>> error_budget(100.0, random=[3.0, 4.0], systematic=[2.0])
     ErrorBudget(error=7, accept=93, reject=107)
     """
-    u = np.asarray(permissible, dtype=float)
-    r, s = np.asarray(random, dtype=float), np.asarray(systematic, dtype=float)
+    u, r, s = as_array(permissible), as_array(random), as_array(systematic)
     if not ((u > 0).all() and np.isfinite(r).all() and np.isfinite(s).all()):
         raise ValueError("permissible must be positive and the errors finite")
+    error, accept, reject = map(np.asarray, _budget(u, r, s))
+    return ErrorBudget(error, accept, reject, (u, r, s))
+
+
+def _budget(u: Any, r: Any, s: Any) -> tuple[Any, Any, Any]:
+    """Return ΔU, and the readings that are accepted and rejected, of floats or of numbers in 32 digits."""
     error = np.abs(s).sum(axis=-1) + np.sqrt(np.square(r).sum(axis=-1))
-    return ErrorBudget(np.asarray(error), np.asarray(np.maximum(u - error, 0.0)), np.asarray(u + error))
+    return error, np.maximum(u - error, 0.0), u + error

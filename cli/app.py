@@ -44,13 +44,13 @@ GROUPS = {
             "Find the positions of rest, their stability and periods of oscillation.",
         ),
         "simulate": ("cli.simulate", "Simulate the motion in time under the loads."),
-        "tolerance": ("cli.tolerance", "Compute what the tolerances of dimensions do."),
+        "tolerance": ("cli.tolerance", "Compute the effect of the tolerances of dimensions."),
         "fit": ("cli.fit", "Fit dimensions to a target."),
         "work": ("cli.work", "Find the load that balances a table of link states, by virtual work."),
     },
     "Bodies": {
-        "body": ("cli.body", "Put a body together: inertia, angular momentum, shaft reactions."),
-        "spin": ("cli.spin", "Turn a body through time: free, under gravity, under a torque."),
+        "body": ("cli.body", "Compute inertia, angular momentum and shaft reactions of a body."),
+        "spin": ("cli.spin", "Compute the rotation of a body in time: free, under gravity, under a torque."),
     },
     "Teaching": {
         "exercise": (

@@ -23,7 +23,7 @@ OPTIONS = """
 What:
   rotor_mass MASS  Mass of the rotor, such as 120kg.
   speed SPEED  Speed of the run, such as 3000rpm.
-  radius LENGTH  Radius at which the trial mass goes on, such as 200mm.
+  radius LENGTH  Radius of the trial mass, such as 200mm.
   planes N  Number of correction planes.
 """
 

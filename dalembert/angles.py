@@ -15,11 +15,12 @@ if TYPE_CHECKING:
 def cosine_sine(angle: NDArray[np.float64], unit: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return cos and sin of angles in `deg` or `rad`; degrees are reduced first, so that 90° has cosine 0.
 
-    The reduction to within 45° of a quarter turn is exact in degrees, where 360 is a number.
+    The reduction to within 45° of a quarter turn is exact in degrees, where 360 is a number. The angles may be numbers of 32
+    digits too.
     """
     import numpy as np
 
-    angle = np.asarray(angle, dtype=float)
+    angle = angle if hasattr(angle, "high") else np.asarray(angle, dtype=float)
     if unit != "deg":
         angle = to_si(angle, "angle", unit)
         return np.cos(angle), np.sin(angle)
@@ -33,12 +34,13 @@ def cosine_sine(angle: NDArray[np.float64], unit: str) -> tuple[NDArray[np.float
 
 
 def phasor(magnitude: NDArray[np.float64], angle: NDArray[np.float64], unit: str) -> NDArray[np.complex128]:
-    """Return magnitude·e^{i·angle} for an angle in `deg` or `rad`."""
+    """Return magnitude·e^{i·angle} for an angle in `deg` or `rad`, of floats or of numbers of 32 digits."""
     import numpy as np
 
     c, s = cosine_sine(angle, unit)
-    z = np.empty(np.broadcast(magnitude, c).shape, dtype=complex)
-    z.real, z.imag = magnitude * c, magnitude * s
+    x, y = magnitude * c, magnitude * s
+    z = np.empty_like(x, dtype=complex)
+    z.real, z.imag = x, y
     return z
 
 
@@ -51,6 +53,19 @@ def read_degrees(angle: float) -> float:
     shown = math.degrees(angle)
     short = float(f"{shown:.15g}")
     return short if abs(math.radians(short) - angle) <= math.ulp(angle) else shown
+
+
+def in_turn(angle: float, turns: int = 1) -> float:
+    """Return an angle in degrees, in [0, 360), or in so many turns.
+
+    The remainder of a tiny negative angle alone rounds to 360.
+
+    >>> in_turn(-90.0), -1e-20 % 360.0, in_turn(-1e-20)
+    (270.0, 360.0, 0.0)
+    """
+    end = 360.0 * turns
+    rest = angle % end
+    return rest if rest < end else 0.0
 
 
 @overload

@@ -82,18 +82,6 @@ def exactly(number: str, factor: Factor) -> Fraction:
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.ASCII | re.DOTALL)
 
 
-def quantity_in_si(text: str, dimension: str) -> float | None:
-    """A quantity with its unit in SI (an angle in radians); None where text is no quantity of that dimension.
-
-    Examples
-    --------
-    >>> quantity_in_si("120 mm", "length"), quantity_in_si("0.1rev", "angle"), quantity_in_si("3 kg", "length")
-    (0.12, 0.6283185307179586, None)
-    """
-    parts = _quantity(text, dimension)
-    return None if parts is None else decimal_to_si(*parts)
-
-
 def _quantity(text: str, dimension: str) -> tuple[str, Factor] | None:
     """The decimals of a quantity and the factor of its unit; None where text is no quantity of that dimension."""
     match = _QUANTITY.match(text.replace(MINUS, "-"))
@@ -168,6 +156,11 @@ def number_in_si(value: Any, dimension: str, factor: Factor = (1, 1)) -> float |
     """Read a value of a TOML file: a bare number in the unit with this factor, or a text with its unit.
 
     None where it is neither, infinity where it is too large.
+
+    Examples
+    --------
+    >>> number_in_si("120 mm", "length"), number_in_si("0.1rev", "angle"), number_in_si("3 kg", "length")
+    (0.12, 0.6283185307179586, None)
     """
     if isinstance(value, (int, float)) and not abs(value) <= LARGEST:
         # a whole number of TOML has no bound

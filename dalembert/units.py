@@ -113,12 +113,15 @@ DIMENSIONS: dict[str, Dimension] = {
     "torsional stiffness": Dimension((2, 1, -2, -1), "N_m_per_rad N_m_per_deg", example="4 N m/rad"),
     "torsional damping": Dimension((2, 1, -1, -1), "N_m_s_per_rad N_m_s_per_deg", example="4 N m s/rad"),
 }
-# results alone have these, and keep their SI unit
+# results alone have these
 RESULTS: dict[str, str] = {
     "angular momentum": "kg_m2_s",
     "energy": "J",
     "power": "W",
 }
+
+
+_ENERGY = ("J", "kJ")  # and no torque, whose exponents are the same
 
 
 def _power(word: str) -> tuple[Factor, Exponents] | None:
@@ -225,7 +228,7 @@ class Units(dict[str, Factor]):
     def factor(self, name: str) -> Factor:
         """The factor of a unit; KeyError where it is none of this dimension."""
         unit = composed(name)
-        if unit is not None and unit[1] == self.exponents:
+        if unit is not None and unit[1] == self.exponents and name not in _ENERGY:
             return unit[0]
         # `kg_m3` in a header is a mass over a volume
         head, _, tail = name.rpartition("_")
@@ -238,8 +241,8 @@ class Units(dict[str, Factor]):
         return self.factor(name)
 
 
-class _Vibration(dict[str, Factor]):
-    """Units with a tag behind them, or of several dimensions: those that are listed, no other."""
+class _Listed(dict[str, Factor]):
+    """Units that are listed, no other: with a tag behind them, of several dimensions, or of results alone."""
 
 
 UNITS: dict[str, dict[str, Factor]] = {dimension: Units(dimension) for dimension in DIMENSIONS}
@@ -258,12 +261,16 @@ AMPLITUDES: dict[str, dict[str, Factor]] = {
 }
 # A tag says how it is read: peak, peak to peak, r.m.s.; amplitudes of different tags are different quantities.
 TAGS = ("", "_pk", "_pp", "_rms")
-UNITS["amplitude"] = _Vibration(
+UNITS["amplitude"] = _Listed(
     {unit + tag: si for tag in TAGS for units in AMPLITUDES.values() for unit, si in units.items()}
 )
 # What influence coefficients are per: a mass or an unbalance.
-UNITS["per"] = _Vibration({name: UNITS[of][name] for of in ("mass", "unbalance") for name in LISTED[of]})
+UNITS["per"] = _Listed({name: UNITS[of][name] for of in ("mass", "unbalance") for name in LISTED[of]})
 LISTED |= {dimension: tuple(UNITS[dimension]) for dimension in ("amplitude", "per")}
+UNITS |= {
+    dimension: _Listed({unit: WORDS[unit][0] for unit in units})
+    for dimension, units in {"energy": _ENERGY, "power": ("W", "kW")}.items()
+}
 
 
 def _tag(unit: str) -> str:
@@ -366,6 +373,22 @@ def nearest_unit(suffix: str, dimension: str) -> str:
     from dalembert.hints import nearest
 
     return nearest(suffix, filter(like, listed), cutoff=0.75) if len(suffix) > 3 else ""
+
+
+def common_dimension(unit: str, other: str) -> str | None:
+    """Return the dimension of a listed unit that `unit`, in any case of letters, is of too; None if it is of another.
+
+    Examples
+    --------
+    >>> common_dimension("mg_mm", "kg_m"), common_dimension("um_pp", "um"), common_dimension("kJ", "N_m")
+    ('unbalance', None, None)
+    """
+    vibrations = [find_unit("amplitude", name) for name in (unit, other)]
+    if vibrations[0] and vibrations[1]:
+        one, two = map(amplitude_kind, filter(None, vibrations))
+        return "amplitude" if one == two else None
+    kinds = (d for d, units in UNITS.items() if d not in ("number", "amplitude", "per") and other in units)
+    return next((d for d in kinds if find_unit(d, unit) is not None), None)
 
 
 def to_si(value: Scaled, dimension: str, unit: str) -> Scaled:

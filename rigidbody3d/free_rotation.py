@@ -228,7 +228,7 @@ def _apart(I1: Array, I2: Array, I3: Array, w1: Array, w3: Array) -> Array:
     """I1 (I2 - I1) w1² - I3 (I3 - I2) w3², whose terms all but cancel near the separatrix."""
     exact: Any = (I1, I2, I3, w1, w3)
     if is_doubled(I1):
-        from dalembert.arithmetic.doubled_arrays import by_fractions
+        from dalembert.arithmetic.doubled_fractions import by_fractions
 
         doubled: Any = by_fractions(_difference, *exact)
         return as_array(doubled)

@@ -59,6 +59,8 @@ class FreeBody:
     omega: ArrayLike
     attitude: ArrayLike = (1.0, 0.0, 0.0, 0.0)
     _lead: tuple[int, ...] = field(init=False, repr=False, compare=False)
+    _unit: Array = field(init=False, repr=False, compare=False)
+    """A power of two for each body, (b,): the rotation is that of moments near 1, whose powers neither overflow nor vanish."""
     _rotation: FreeRotation = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -75,8 +77,10 @@ class FreeBody:
         moments = np.broadcast_to(moments, lead + (3,)).reshape(-1, 3)
         axes = np.broadcast_to(axes, lead + (3, 3)).reshape(-1, 3, 3)
         spin = (axes * np.broadcast_to(omega, lead + (3,)).reshape(-1, 1, 3)).sum(axis=-1)
+        size = np.ldexp(1.0, np.frexp(moments.value[:, 2] if is_doubled(moments) else moments[:, 2])[1])
         object.__setattr__(self, "_lead", lead)
-        object.__setattr__(self, "_rotation", FreeRotation(moments, axes, spin, unit))
+        object.__setattr__(self, "_unit", size)
+        object.__setattr__(self, "_rotation", FreeRotation(moments / size[:, None], axes, spin, unit))
 
     def at(self, t: ArrayLike) -> FreeState:
         """Return the state at times t, (n,) or a single one, s: `.omega` (..., n, 3), `.attitude` (..., n, 4)."""
@@ -95,13 +99,13 @@ class FreeBody:
     @property
     def momentum(self) -> Array:
         """The angular momentum in space axes, constant, (..., 3), kg·m²/s."""
-        return self._rotation.momentum.reshape(self._lead + (3,))
+        return as_array(self._rotation.momentum * self._unit[:, None]).reshape(self._lead + (3,))
 
     @property
     def energy(self) -> Array:
         """The kinetic energy, constant, (...), J."""
         m = self._rotation
-        return as_array((m.moments * m.omega**2).sum(axis=-1) / 2).reshape(self._lead)
+        return as_array((m.moments * m.omega**2).sum(axis=-1) * self._unit / 2).reshape(self._lead)
 
     @cached_property
     def in_32_digits(self) -> FreeBody:

@@ -138,14 +138,14 @@ class Motion:
         """The angular acceleration in fixed space, (ω̇)_rel + Ω × ω, (..., 3), rad/s²."""
         if self.frame_omega is None:
             return self.alpha
-        return self.alpha + np.cross(self.frame_omega, self.omega)
+        return self.alpha + _cross(self.frame_omega, self.omega)
 
     @cached_property
     def rate(self) -> Array:
         """Ḣ_G in fixed space, (..., 3), N·m: the moment about the centre of mass that the motion asks for."""
         I, w, alpha = self.inertia, self.omega, self.true_alpha
         if I.ndim > 2 or w.ndim == 1 or w.shape != alpha.shape or is_doubled(w):
-            return _times(I, alpha) + np.cross(w, self.momentum)
+            return _times(I, alpha) + _cross(w, self.momentum)
         # both in one pass, while a block of ω is in the cache; H is not worked out twice
         momentum, rate = _momentum_and_rate(I, w, alpha, self.__dict__.get("momentum"))
         self.__dict__["momentum"] = momentum
@@ -155,7 +155,7 @@ class Motion:
     def transport(self) -> Array:
         """Ω × H_G, the part of the rate that the turning of the axes gives, (..., 3), N·m."""
         frame = self.omega if self.frame_omega is None else self.frame_omega
-        return np.cross(frame, self.momentum)
+        return _cross(frame, self.momentum)
 
     @cached_property
     def relative(self) -> Array:
@@ -173,7 +173,7 @@ class Motion:
         if self.frame_omega is None:
             return np.zeros_like(self.momentum)
         slip = self.omega - self.frame_omega
-        return np.cross(slip, self.momentum) - _times(self.inertia, np.cross(slip, self.omega))
+        return _cross(slip, self.momentum) - _times(self.inertia, _cross(slip, self.omega))
 
     @cached_property
     def linear_momentum(self) -> Array:
@@ -204,11 +204,11 @@ class Motion:
 
     def momentum_about(self, point: ArrayLike) -> Array:
         """Return H about a point, H_G + (G - P) × m v_G, (..., 3), kg·m²/s."""
-        return self.momentum + np.cross(self.center - as_array(point), self.linear_momentum)
+        return self.momentum + _cross(self.center - as_array(point), self.linear_momentum)
 
     def rate_about(self, point: ArrayLike) -> Array:
         """Return Ḣ about a point fixed in space, Ḣ_G + (G - P) × m a_G, (..., 3), N·m: the moment needed there."""
-        return self.rate + np.cross(self.center - as_array(point), self.force)
+        return self.rate + _cross(self.center - as_array(point), self.force)
 
     def to_frame(self) -> pd.DataFrame:
         """Return a table with a row per state: ω, H and its rate, d'Alembert's inertia force, kinetic energy."""
@@ -307,8 +307,8 @@ ESTIMATED = [
 def _about_pivot(motion: Motion, pivot: Array) -> tuple[Array, Array]:
     """Velocity and acceleration of the centre of mass of a body that turns about a point fixed in space."""
     arm = motion.center - pivot
-    velocity = np.cross(motion.omega, arm)
-    return velocity, np.cross(motion.true_alpha, arm) + np.cross(motion.omega, velocity)
+    velocity = _cross(motion.omega, arm)
+    return velocity, _cross(motion.true_alpha, arm) + _cross(motion.omega, velocity)
 
 
 def _times(I: Array, w: Array) -> Array:
@@ -367,6 +367,16 @@ def _gyroscopic(I: Array) -> Array:
     for x, (y, z) in enumerate(_PAIRS):
         out[y, x], out[z, x] = I[z, y], -I[y, z]
         out[3 + x, x], out[3 + y, x], out[3 + z, x] = I[z, z] - I[y, y], -I[y, x], I[z, x]
+    return out
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """a × b of vectors (..., 3); of many in blocks, whose parts stay in the cache."""
+    if is_doubled(a) or is_doubled(b) or a.ndim != 2 or a.shape != b.shape or len(a) <= BLOCK:
+        return np.cross(a, b)
+    out = np.empty_like(a)
+    for s in range(0, len(a), BLOCK):
+        out[s : s + BLOCK] = np.cross(a[s : s + BLOCK], b[s : s + BLOCK])
     return out
 
 

@@ -227,7 +227,9 @@ class TopRotation:
         self.upside = mgl < 0
         q = np.where(self.upside[:, None], quaternion.compose([0.0, 1.0, 0.0, 0.0], q), q)
         rows = [constants(I[b], mgl[b : b + 1], omega[b], q[b]) for b in range(self.count)]
-        c = {name: _column([row[name] for row in rows], I) for name in rows[0]} if rows else {}
+        # of no top the names alone count
+        names = rows[0] if rows else constants(np.ones(3), np.ones(1), np.ones(3), np.eye(4)[0])
+        c = {name: _column([row[name] for row in rows], I) for name in names}
         self.p = parameter(c["m"], c["m1"])
         self.rate, self.span, self.above, self.below = c["rate"], c["span"], c["above"], c["below"]
         self.plus, self.minus, self.twice_I1 = c["plus"], c["minus"], 2 * I[:, :1]
@@ -356,10 +358,10 @@ class TopRotation:
 def _column(numbers: list[Decimal], like: Array) -> Array:
     """Numbers of 200 digits as a column (b, 1), rounded once."""
     if is_doubled(like):
-        from dalembert.arithmetic.doubled_arrays import exactly
+        from dalembert.arithmetic.doubled_fractions import exactly
 
         return as_array(exactly(map(Fraction, numbers), (len(numbers), 1)))
-    return np.array([[float(x)] for x in numbers])
+    return np.array([float(x) for x in numbers])[:, None]
 
 
 def _complex(x: Any, y: Any) -> Any:

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import pytest
 
-from dalembert.quantities import quantity_in_si
+from dalembert.quantities import number_in_si
 from dalembert.units import LISTED, UNITS, composed, find_unit, to_si, unit_name, written
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.units import Units
@@ -56,7 +56,7 @@ def test_slug_and_blob_are_what_a_pound_force_accelerates() -> None:
 def test_options_tables_and_files_take_the_same_units(text: str, dimension: str, si: float) -> None:
     from dalembert.quantities import parse_quantity
 
-    assert quantity_in_si(text, dimension) == pytest.approx(si, rel=4e-16)
+    assert number_in_si(text, dimension) == pytest.approx(si, rel=4e-16)
     assert Units({}).number(text, dimension, "x") == pytest.approx(si, rel=4e-16)
     number, unit = parse_quantity(text, dimension)
     assert to_si(number, dimension, unit) == pytest.approx(si, rel=4e-16)

@@ -25,7 +25,7 @@ from virtualwork.formulas.kinematics import AnglePartial, PointPartial
 from virtualwork.formulas.numbers import xy
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.quantity import Quantity
-from virtualwork.table import columns
+from virtualwork.motion_table import columns
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -21,6 +21,7 @@ from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import xy
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.tapes import Ready, ready, recorded, taped
+from virtualwork.quantities import named
 
 POINT = ("position", "velocity", "acceleration", "jerk")
 LINK = ("angle", "omega", "alpha", "jerk")
@@ -39,11 +40,16 @@ class Evaluator:
     {'points.P': (2.0, 0.0), 'links.arm.omega': 3.0}
     >>> at([0.0, np.pi], speed=3.0)["links.arm.omega"]
     array([3., 3.])
+    >>> arm.evaluator("P.x", "arm.omega")(0.0, speed=3.0)
+    {'P.x': 2.0, 'arm.omega': 3.0}
     """
 
     def __init__(self, assembly: Assembly, *wanted: str) -> None:
-        self.assembly, self.wanted = assembly, wanted
-        self.keys = tuple(key_of(assembly, name) for name in wanted)
+        self.assembly = assembly
+        of = [each for name in wanted for each in requests(assembly, name)]
+        self.wanted, self.keys = tuple(name for name, _, _ in of), tuple(key for _, key, _ in of)
+        # of vectors of which one component is requested
+        self._components = {name: int(imaginary) for name, _, imaginary in of if imaginary is not None}
         self._ready: dict[tuple[bool, ...], Ready | None] = {}
 
     def __repr__(self) -> str:
@@ -77,33 +83,57 @@ class Evaluator:
                 except (ZeroDivisionError, ValueError, OverflowError):
                     pass
                 else:
-                    return {
-                        name: (value.real, value.imag) if isinstance(value, complex) else value
-                        for name, value in zip(self.wanted, values, strict=True)
-                    }
+                    return self._shown(
+                        {
+                            name: (value.real, value.imag) if isinstance(value, complex) else value
+                            for name, value in zip(self.wanted, values, strict=True)
+                        }
+                    )
         numbers = Lanes(self.assembly, angle, speed, acceleration, jerk).values(self.keys)
         shown = {
             name: xy(value) if key.is_vector else value
             for name, key, value in zip(self.wanted, self.keys, numbers, strict=True)
         }
         if np.ndim(angle):
-            return shown
-        return {
-            name: tuple(map(float, np.ravel(v))) if v.ndim > 1 else float(v[0]) for name, v in shown.items()
-        }
+            return self._shown(shown)
+        return self._shown(
+            {name: tuple(map(float, np.ravel(v))) if v.ndim > 1 else float(v[0]) for name, v in shown.items()}
+        )
+
+    def _shown(self, values: dict[str, Any]) -> dict[str, Any]:
+        """The values, of some vectors one component alone."""
+        for name, i in self._components.items():
+            value = values[name]
+            values[name] = value[i] if isinstance(value, tuple) else value[..., i]
+        return values
 
     def operations(self, *, speed: bool = True, acceleration: bool = True) -> int:
         """How many operations a pose costs: what is not asked for, and what a zero rate makes vanish, is not counted."""
         return taped(self.assembly, recorded(self.assembly, (speed, acceleration, False)), self.keys).cost
 
 
-def key_of(assembly: Assembly, name: str) -> Quantity:
-    """The key of a quantity called as in the JSON output: `points.H.velocity`, `reactions.B.coupler`.
+def requests(assembly: Assembly, name: str) -> list[tuple[str, Quantity, bool | None]]:
+    """The quantities of a name, each with its own name, its key, and of a vector whether it is the y; else None."""
+    key = key_of(assembly, name)
+    if key is not None:
+        return [(name, key, None)]
+    of = named(assembly.mechanism, name)
+    for each in of:
+        if not each.key or each.less or each.polar:
+            raise DescriptionError(f"'{name}': an evaluator has no '{each.names[0]}'")
+    return [
+        (each.names[0] if len(of) > 1 else name, each.key, each.imaginary if each.key.is_vector else None)
+        for each in of
+    ]
+
+
+def key_of(assembly: Assembly, name: str) -> Quantity | None:
+    """The key of a quantity called as in the JSON output: `points.H.velocity`, `reactions.B.coupler`; else None.
 
     Raises
     ------
     DescriptionError
-        With what is known in place of what is not.
+        A part of the name is unknown.
     """
     m = assembly.mechanism
     kind, *of = name.split(".")
@@ -136,7 +166,4 @@ def key_of(assembly: Assembly, name: str) -> Quantity:
         return Shaking()
     if name == "shaking.moment":
         return ShakingMoment()
-    raise DescriptionError(
-        f"'{name}': expected points.NAME.velocity, links.NAME.omega, slides.NAME.speed, effort, reactions.JOINT.LINK, "
-        "shaking.force or shaking.moment"
-    )
+    return None

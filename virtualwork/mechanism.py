@@ -106,7 +106,7 @@ class Mechanism(Description):
 
     def _repr_html_(self) -> str | None:
         """Draw it in its own pose; None, which shows its `repr`, where it has none."""
-        from virtualwork.still import svg
+        from virtualwork.notebook_picture import svg
 
         try:
             motion = self.motion()
@@ -206,8 +206,9 @@ class Mechanism(Description):
         Parameters
         ----------
         wanted : str
-            Called as in the JSON output: `points.H`, `points.H.velocity`, `links.coupler.omega`, `slides.S.speed`,
-            `effort`, `reactions.B.coupler` (the force on that link), `shaking.force`, `shaking.moment`.
+            Names as `--only` has them (`H.x`, `coupler.omega`, `crank.torque`, `B.coupler.fx`; `H` is all of H), or as in the
+            JSON output: `points.H`, `points.H.velocity`, `links.coupler.omega`, `slides.S.speed`, `effort`,
+            `reactions.B.coupler` (the force of all others on that link), `shaking.force`, `shaking.moment`.
 
         Raises
         ------

@@ -18,19 +18,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.guard import guarded, unlocked
+from dalembert.arithmetic.guard import Lock, guarded, unlocked
 from dalembert.arithmetic.records import alike
+from dalembert.hints import choices
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import Point, as_point
-from virtualwork.formulas.forces import Effort, Reaction, Shaking, ShakingMoment
+from virtualwork.formulas.forces import Effort, Force, Reaction, Shaking, ShakingMoment
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.one_pose import one_pose
 from virtualwork.formulas.quantity import Quantity
+from virtualwork.motion_views import MotionViews
 from virtualwork.parts_of_motion import LinkMotion, PointMotion, SlideMotion
-from virtualwork.pictured import Pictured
 from virtualwork.plan.steps import Step
 
 if TYPE_CHECKING:
@@ -41,12 +42,13 @@ if TYPE_CHECKING:
     from virtualwork.forces import Forces
     from virtualwork.study.cycle import Cycle
 
+EFFORT = Effort(0)
 # poses at each end of a motion that a notebook shows
 ENDS = 10
 
 
 @guarded
-class Motion(Pictured):
+class Motion(MotionViews):
     """Position, velocity, acceleration, jerk and forces over given inputs, on demand.
 
     `Mechanism.motion` makes one. See there for the parameters.
@@ -66,7 +68,7 @@ class Motion(Pictured):
         jerk: ArrayLike | None = None,
         block_of: int | None = None,
     ) -> None:
-        self.assembly, self.lock = assembly, assembly.lock
+        self.assembly = assembly
         self._one = one_pose(assembly, angle, speed, acceleration, jerk)
         if self._one is None:
             self.poses = Lanes(assembly, angle, speed, acceleration, jerk, block_of)
@@ -89,6 +91,11 @@ class Motion(Pictured):
         poses = self.poses
         own = self.inputs, poses.input_error, poses.input_rest
         return _again, (self.assembly, own, poses.rates, poses.block_of, poses.time)
+
+    @property
+    def lock(self) -> Lock:
+        """That of the assembly."""
+        return self.assembly.lock
 
     @cached_property
     def _units(self) -> dict[int, Motion]:
@@ -135,12 +142,12 @@ class Motion(Pictured):
     @property
     def assembled(self) -> NDArray[np.bool_]:
         """(n,) bool: which poses can be assembled."""
-        return self.poses.assembled
+        return self.poses.assembled.copy()
 
     @property
     def condition(self) -> Reals:
         """(n,): ‖J⁻¹‖∞ of all loops, lengths divided by the size: a relative error ε moves the pose by some ε·condition."""
-        return self.poses.condition
+        return self.poses.condition.copy()
 
     # --- what moves -----------------------------------------------------------------------------------------------
     @unlocked
@@ -152,9 +159,9 @@ class Motion(Pictured):
         DescriptionError
             Where no body has a point of that name.
         """
-        place = self.mechanism.points.get(name)
+        place = self.assembly.mechanism.points.get(name)
         if place is None:
-            raise DescriptionError(f"no point is named '{name}'")
+            raise DescriptionError(f"no point is named '{name}'{choices(str(name), self.mechanism.points)}")
         return PointMotion(self, *place, name)
 
     @unlocked
@@ -173,8 +180,8 @@ class Motion(Pictured):
         DescriptionError
             Where there is no link of that name.
         """
-        if name not in self.mechanism.links:
-            raise DescriptionError(f"no link is named '{name}'")
+        if name not in self.assembly.mechanism.links:
+            raise DescriptionError(f"no link is named '{name}'{choices(str(name), self.mechanism.links)}")
         return LinkMotion(self, name)
 
     @unlocked
@@ -195,6 +202,12 @@ class Motion(Pictured):
         """A quantity by its key, (n,)."""
         result = None if self._one is None else self._one.value(key)
         return self._values((key,))[0] if result is None else result
+
+    @unlocked
+    def vector(self, key: Quantity) -> Reals:
+        """A vector by its key, (n, 2)."""
+        result = None if self._one is None else self._one.vector(key)
+        return xy(self._values((key,))[0]) if result is None else result
 
     def _values(self, keys: tuple[Quantity, ...]) -> list[Any]:
         if self._one is not None:
@@ -221,7 +234,7 @@ class Motion(Pictured):
         Parameters
         ----------
         names : str
-            Called as in `Mechanism.evaluator`: `points.H.velocity`, `links.coupler.omega`, `effort`.
+            Called as in `Mechanism.evaluator`: `points.H.velocity`, `links.coupler.omega`, `effort`; `H.vx`, `crank.torque`.
 
         Raises
         ------
@@ -236,17 +249,23 @@ class Motion(Pictured):
         >>> bool(0 < found["points.P"][0] < 1e-15), bool(found["links.crank.omega"][0] < 1e-28)
         (True, True)
         """
-        from virtualwork.evaluator import key_of
+        from virtualwork.evaluator import key_of, requests
 
-        keys = {name: key_of(self.assembly, name) for name in names}
-        joints = {name: key for name, key in keys.items() if isinstance(key, Reaction)}
+        # as JSON names them, or as --only does
+        whole = {name: key for name in names if (key := key_of(self.assembly, name)) is not None}
+        parts = {
+            part: key for name in names if name not in whole for part, key, _ in requests(self.assembly, name)
+        }
+        keys = whole | parts
+        joints: dict[str, Force] = {name: key for name, key in whole.items() if isinstance(key, Reaction)}
+        joints |= {name: key for name, key in parts.items() if isinstance(key, Force)}
         self.rounding.together(key for name, key in keys.items() if name not in joints)
         estimates = {name: self.rounding.of(key) for name, key in keys.items() if name not in joints}
         if joints:
             errors = self.dynamics.error_estimate()
             errors.together(joints.values())
             estimates |= {name: key.read(errors) for name, key in joints.items()}
-        return {name: estimates[name] for name in names}
+        return {name: estimates[name] for name in keys}
 
     # --- forces -----------------------------------------------------------------------------------------------
     @cached_property
@@ -263,9 +282,9 @@ class Motion(Pictured):
 
         Static where speed and acceleration are zero (Riul, unit II, eq. 3), else with inertia loads (eq. 5).
         """
-        inputs = len(self.mechanism.inputs)
+        inputs = 1 if self._one is not None else len(self.mechanism.inputs)
         if inputs == 1:
-            return self.value(Effort(0))  # type: ignore[no-any-return]
+            return self.value(EFFORT)  # type: ignore[no-any-return]
         return np.stack(self._values(tuple(Effort(j) for j in range(inputs))), axis=1)
 
     @unlocked
@@ -279,7 +298,7 @@ class Motion(Pictured):
         on : str
             A link that the joint holds.
         """
-        return xy(self.value(Reaction(joint, on)))
+        return self.vector(Reaction(joint, on))
 
     def applied(self, link: str) -> tuple[Complexes, Reals]:
         """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""
@@ -323,17 +342,20 @@ class Motion(Pictured):
         return sensitivities.of([key], [sensitivities.dimension(path)])[0][0]
 
     def sensitivity(self, what: str, path: str) -> Reals:
-        """Return the derivative of a force of the whole mechanism to a number of the description.
+        """Return the derivative of a quantity to a number of the description.
 
         Parameters
         ----------
         what : str
-            "effort": (n,), or (n, k) for k inputs; "shaking force": (n, 2); "shaking moment": (n,).
+            A name as `--only` has it: "H.x", "coupler.omega", "crank.torque", "B.coupler.fx": (n,), SI and radians;
+            or "effort": (n,), or (n, k) for k inputs; "shaking force": (n, 2); "shaking moment": (n,).
         path : str
             Of the number, such as "links.crank.B.x".
 
         Raises
         ------
+        DescriptionError
+            No quantity has this name, or no number this path.
         MechanismError
             With friction, whose forces are no closed form.
 
@@ -355,7 +377,16 @@ class Motion(Pictured):
             return xy(self.derivative(Shaking(), path))
         if what == "shaking moment":
             return np.asarray(self.derivative(ShakingMoment(), path))
-        raise ValueError(f"'{what}': expected effort, shaking force or shaking moment")
+        from virtualwork.quantities import named
+
+        if len(of := named(self.mechanism, what)) > 1:
+            raise DescriptionError(
+                f"'{what}': expected one quantity, such as {of[0].names[0]} or {of[1].names[0]}"
+            )
+        if not of[0].key or of[0].polar:
+            raise DescriptionError(f"'{what}' has no sensitivity")
+        less = self.derivative(of[0].less, path) if of[0].less else 0.0
+        return np.asarray(of[0].in_si(self.derivative(of[0].key, path), less))
 
     # --- as a table -------------------------------------------------------------------------------------------------
     def to_frame(self) -> DataFrame:
@@ -372,14 +403,14 @@ class Motion(Pictured):
         """
         from pandas import DataFrame
 
-        from virtualwork.table import columns
+        from virtualwork.motion_table import columns
 
         return DataFrame(columns(self.poses))
 
     def _repr_html_(self) -> str:
         from pandas import DataFrame
 
-        from virtualwork.table import columns
+        from virtualwork.motion_table import columns
 
         # of many poses those alone are solved that are shown, and one more, which is shown as dots
         shown = np.arange(self.n)

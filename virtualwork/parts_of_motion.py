@@ -13,14 +13,17 @@ if TYPE_CHECKING:
     from virtualwork.digits.estimates import Estimates
 
 
-class Asked(Protocol):
+class AnyMotion(Protocol):
     """What has quantities: the motion of one mechanism, (n,) each, or of variants, (v, n) each."""
 
     def value(self, key: Quantity) -> Any:
         """A quantity."""
 
+    def vector(self, key: Quantity) -> Reals:
+        """A vector, its parts along the last axis."""
 
-class Whole(Asked, Protocol):
+
+class OneMotion(AnyMotion, Protocol):
     """A motion of a mechanism."""
 
     @property
@@ -45,7 +48,7 @@ class PartOfMotion:
     Of one mechanism; of variants every array has a leading axis of them.
     """
 
-    def __init__(self, motion: Asked) -> None:
+    def __init__(self, motion: AnyMotion) -> None:
         self.motion = motion
 
     def key(self, order: int = 0) -> Quantity:
@@ -60,7 +63,7 @@ class PartOfMotion:
 class PointRates(PartOfMotion):
     """A point of a link, and its rates."""
 
-    def __init__(self, motion: Asked, body: str, place: complex, node: str | None = None) -> None:
+    def __init__(self, motion: AnyMotion, body: str, place: complex, node: str | None = None) -> None:
         self.motion, self.body, self.place, self.node = motion, body, place, node
         # a named point stands wherever the description, or a variant, has it
         self._where = 0j if node is not None else place
@@ -68,22 +71,22 @@ class PointRates(PartOfMotion):
     @property
     def position(self) -> Reals:
         """(n, 2) m; NaN where the pose cannot be assembled."""
-        return xy(self.complex(0))
+        return self.motion.vector(self.key(0))
 
     @property
     def velocity(self) -> Reals:
         """(n, 2) m/s (Ibrahim eq. 1.4.1)."""
-        return xy(self.complex(1))
+        return self.motion.vector(self.key(1))
 
     @property
     def acceleration(self) -> Reals:
         """(n, 2) m/s² (Ibrahim eq. 1.5.1)."""
-        return xy(self.complex(2))
+        return self.motion.vector(self.key(2))
 
     @property
     def jerk(self) -> Reals:
         """(n, 2) m/s³ (Ibrahim eq. 1.5.3)."""
-        return xy(self.complex(3))
+        return self.motion.vector(self.key(3))
 
     def complex(self, order: int) -> Complexes:
         """The order-th time derivative as x + iy, (n,)."""
@@ -96,7 +99,7 @@ class PointRates(PartOfMotion):
 class LinkRates(PartOfMotion):
     """A link's angle, and its rates."""
 
-    def __init__(self, motion: Asked, body: str) -> None:
+    def __init__(self, motion: AnyMotion, body: str) -> None:
         super().__init__(motion)
         self.body = body
 
@@ -127,7 +130,7 @@ class LinkRates(PartOfMotion):
 class SlideRates(PartOfMotion):
     """A slide along its guide, from the guide's `through`, and its rates."""
 
-    def __init__(self, motion: Asked, guide: int) -> None:
+    def __init__(self, motion: AnyMotion, guide: int) -> None:
         super().__init__(motion)
         self.guide = guide
 
@@ -158,7 +161,7 @@ class SlideRates(PartOfMotion):
 class OfOneMechanism(PartOfMotion):
     """Estimates of rounding errors, and derivatives to the numbers of the description."""
 
-    motion: Whole
+    motion: OneMotion
 
     def error_estimate(self, order: int = 0) -> Reals:
         """Return the rounding error (n,) of the position or angle (order 0), or of its rate of that order.

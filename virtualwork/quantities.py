@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from dalembert.hints import choices
+from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
 from virtualwork.formulas.forces import (
     Contact,
@@ -62,6 +64,13 @@ class Component(NamedTuple):
     """`length` or `angle` of a vector, in place of a component (Ibrahim §1.2)."""
     reverse: bool = False
     """Whether it is the other side of a joint force, shown only where its full name is requested."""
+
+    def in_si(self, value: Any, less: Any = 0.0) -> Any:
+        """The number in SI and radians, from its quantity and the one that is subtracted."""
+        value = value - less
+        if self.polar:
+            return np.abs(value) if self.polar == "length" else np.angle(value)
+        return value.imag if self.imaginary else value.real
 
     @property
     def link(self) -> str:
@@ -162,6 +171,35 @@ def cam(m: Description, number: int, of: Iterable[tuple[str, type[Quantity]]]) -
         )
         for header, kind in of
     ]
+
+
+def named(m: Description, name: str) -> list[Component]:
+    """The quantities of a name as `--only` has it: `H.vx`, `crank.torque`, `B.coupler.fx`; of a bare name up to accelerations.
+
+    Raises
+    ------
+    DescriptionError
+        No quantity has this name.
+
+    Examples
+    --------
+    >>> from virtualwork import Link
+    >>> m = Description({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})})
+    >>> [each.names[0] for each in named(m, "crank")], [each.key for each in named(m, "P.vy")]
+    (['crank.angle', 'crank.omega', 'crank.alpha'], [Point('crank', 0j, 'P', 1)])
+    """
+    from virtualwork.plan.joint_forces import pairs
+    from virtualwork.plan.steps import joints
+
+    moving, acting = places(m, 3, [name]), forces(m, pairs(joints(m)))
+    if result := [each for each in (*moving, *acting) if name in each.names]:
+        # a short name that two joints share is that of the first
+        return result[:1]
+    for every in (moving, acting):
+        if result := [each for each in every if name in each.owners and each.order < 3 and not each.reverse]:
+            return result
+    names = dict.fromkeys(of for each in (*moving, *acting) if not each.reverse for of in each.names[:1])
+    raise DescriptionError(f"no quantity is named '{name}'{choices(name, names)}")
 
 
 def _two_points(m: Description, word: str) -> tuple[str, str] | None:

@@ -17,6 +17,7 @@ from benchmarks.truth import reference
 from virtualwork import Mechanism
 from virtualwork.branch.assembly import Assembly
 from virtualwork.formulas.forces import Effort, Reaction
+from virtualwork.formulas.group_loops import Loops
 from virtualwork.formulas.newton import newton
 from virtualwork.formulas.positions import State
 from virtualwork.motion import Motion
@@ -190,12 +191,13 @@ def all_loops(mechanism: Mechanism) -> Callable[[Real, Real, int], Real]:
     """Return a function of (crank angles, start, steps): all loops at once by so many steps of Newton and Raphson."""
     order = plan(mechanism, merged=True)
     run = Assembly(mechanism, order, {}, {}).run
+    loops = Loops(order.groups[0])
 
     def solve(angles: Real, start: Real, steps: int) -> Real:
-        state = State([angles], many=True)
+        state = State([angles])
         for step in order.steps:
             if isinstance(step, Group):
-                return newton(step, state, start, mechanism.size, limit=steps)[0]
+                return newton(loops, state, start, mechanism.size, limit=steps)[0]
             run([step], state)
         raise AssertionError("the mechanism has no loop")
 

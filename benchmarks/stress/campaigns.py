@@ -22,6 +22,7 @@ MODULES = tuple(
         "groups",
         "vibration",
         "placing",
+        "machines",
         "rotation",
         "solids",
         "gyroscopes",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import mpmath as mp
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Pairs = list[tuple[float, float]]
 
 
-def pairs(found: Sequence[Any], true: Sequence[Any], bound: Any) -> Pairs:
+def pairs(found: Iterable[Any], true: Iterable[Any], bound: Any) -> Pairs:
     """Return (error, bound) of each number."""
     return [
         (float(abs(mp.mpmathify(f) - t)), float(b))

@@ -1,4 +1,4 @@
-"""The engines of the tape on mechanisms of all kinds: against each other, and against fifty digits within their bounds."""
+"""The engines of the tape on mechanisms of all kinds: against each other, and against fifty digits within their estimates."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.stress import random_linkages
 from benchmarks.stress.topologies import generate
 from dalembert.arithmetic.engines import run
-from dalembert.arithmetic.rounding import rounding_bounds
+from dalembert.arithmetic.engines.doubled import Answer, compared
 from dalembert.arithmetic.tape import Tape
 from virtualwork import Mechanism
 from virtualwork.describe import MechanismError
@@ -125,7 +125,7 @@ def exact(tape: Tape, given: dict[str, Any], lane: int) -> dict[str, Any]:
 def beside_fifty_digits(
     motion: Motion, rng: Generator, engines: tuple[str, ...]
 ) -> list[tuple[float, float]]:
-    """Some quantities on each engine: the error, and the bound that the tape's adjoint gives."""
+    """Some quantities on each engine: the error, and its estimate by a second run in 32 digits."""
     keys = every_key(motion)
     lanes = motion.poses
     if not lanes.takes(keys):
@@ -133,17 +133,14 @@ def beside_fifty_digits(
     chosen = tuple(keys[i] for i in sorted(rng.choice(len(keys), FEW, replace=False)))
     tape = taped(motion.assembly, lanes.recording, chosen)
     given = lanes.entering(tape.inputs)
-    bounds = run(rounding_bounds(tape), given, "numpy")
     lane = int(rng.integers(motion.n))
     truth = exact(tape, given, lane)
     found = []
     for engine in engines:
         rows = run(tape, given, engine)
-        for name in tape.names:
-            row, bound = (
-                np.broadcast_to(rows[name], motion.n),
-                np.broadcast_to(bounds[f"error({name})"], motion.n),
-            )
+        bounds, _ = compared(tape, given, {Answer((name,)): [rows[name]] for name in tape.names})
+        for name, of in zip(tape.names, bounds, strict=True):
+            row, bound = np.broadcast_to(rows[name], motion.n), np.broadcast_to(of, motion.n)
             if np.isfinite(row[lane]) and np.isfinite(bound[lane]):
                 found.append((abs(float(row[lane] - truth[name])), float(bound[lane])))
     return found

@@ -24,26 +24,27 @@ OPTIONS = """
 Arguments:
   table TABLE  CSV of eccentric masses; - is standard input.
 What:
-  plane NAME[:Z]:RADIUS  A correction plane, such as A:0mm:20mm; once: static balancing.
-  planes FILE.csv  The planes as a table: plane, z_*, radius_*, rotor.
-  mass NAME:MASS  Mass of a plane's correction, such as A:7kg: its radius is found where the plane has ? for it.
-  gravity G  g for weights, m/s².
+  plane NAME[:Z]:RADIUS  Correction plane, such as A:0mm:20mm; one plane: static balancing.
+  planes FILE.csv  Table of correction planes: plane, z_*, radius_*, rotor.
+  mass NAME:MASS  Mass of a plane's correction, such as A:7kg; a plane with ? as its radius gets the radius for it.
+  gravity G  Acceleration of gravity for weights, m/s².
 How:
-  remove  Corrections as material to remove, not to add.
+  remove  Give the material to remove, not to add.
   round_mass MASS  Round the corrections to this step, such as 0.1g.
   round_angle ANGLE  Round the angles to this step, such as 1deg.
-  modes FILE.csv  Mode shapes (z_* and a column for each mode): their modal sums vanish.
+  modes FILE.csv  Modal balancing with these mode shapes: z_* and a column for each mode.
 How: the tolerance:
-  center_z Z  Where the centre of mass lies: for the couple and the tolerance.
-  grade GRADE  Balance quality grade of ISO 21940-11, such as G2.5; or API (4W/N), or MIL (MIL-STD-167-1).
+  center_z Z  Axial position of the centre of mass, for couple and tolerance.
+  grade GRADE  Balance quality grade of ISO 21940-11, such as G2.5; API (4W/N) or MIL (MIL-STD-167-1).
   speed SPEED  Highest service speed, such as 3000rpm.
   rotor_mass MASS  Mass of the rotor, such as 12kg.
   permissible UNBALANCE  Permissible residual unbalance, such as 30g_mm, in place of a grade.
-  bearings Z1:Z2  The bearing planes, where the tolerance holds; with --speed also the forces in them.
-  page FILE.html  Write a page with the masses to edit, which computes the corrections itself.
+  bearings Z1:Z2  Bearing planes, in which the tolerance holds; with --speed also the bearing forces.
+Output:
+  page FILE.html  Write a page that computes: edit the masses, and the corrections follow.
 Further options (docs/commands.md describes them):
   mode_count K  Take the first K modes of --modes.
-  rigid  With --modes: force and couple vanish too (N + 2 planes).
+  rigid  With --modes: balance force and couple too (N + 2 planes).
   workers N  Processes that solve many rotors.
 """
 
@@ -54,7 +55,7 @@ def run(
     plane: list[str] | None = None,
     planes: str | None = None,
     mass: list[str] | None = None,
-    gravity: float = 9.80665,
+    gravity: str = "9.80665",
     remove: bool = False,
     round_mass: str | None = None,
     round_angle: str | None = None,
@@ -75,7 +76,7 @@ def run(
     """Balance rotors from a table of known eccentric masses, in one, two or more planes.
 
     TABLE has the columns mass_* and radius_* (or weight_* and radius_*, or unbalance_*), angle_*, z_* (not
-    needed with one plane), and if wanted rotor and name; * is a unit: mass_kg, radius_mm, angle_deg, z_mm.
+    needed with one plane), and optionally rotor and name; * is a unit: mass_kg, radius_mm, angle_deg, z_mm.
     Angles are counter-clockwise as seen against +z.
     """
     # numpy and all that needs it are loaded only once the command line itself is in order
@@ -87,8 +88,9 @@ def run(
 
     if (plane is None) == (planes is None):
         raise options.bad("--plane", "expected --plane (once or more) or --planes FILE.csv")
-    if not 1e-9 < gravity < 1e9:
-        raise options.bad("--gravity", f"'{gravity:g}': expected a positive number of m/s²")
+    g = options.number_or_quantity("--gravity", gravity, "acceleration")
+    if not 1e-9 < g < 1e9:
+        raise options.bad("--gravity", f"'{gravity}': expected a positive number of m/s²")
     if modes is None:
         options.refuse("needs --modes", mode_count=mode_count, rigid=rigid)
     else:
@@ -108,7 +110,7 @@ def run(
         )
     only_forces = carried is not None and grade is None and permissible is None
     request = Request(
-        gravity=gravity,
+        gravity=g,
         remove=remove,
         mass_step=options.with_unit("--round-mass", round_mass, "mass", positive=True),
         angle_step=options.with_unit("--round-angle", round_angle, "angle", positive=True),
@@ -119,7 +121,7 @@ def run(
         modes=shapes,
     )
     needs_z = chosen.several or carried is not None or shapes is not None
-    rotors = read_rotors(table, gravity, needs_z=needs_z)
+    rotors = read_rotors(table, g, needs_z=needs_z)
     if carried is not None and chosen.z is None:
         raise options.bad("--bearings", "the forces need the place of the plane: --plane NAME:Z:RADIUS")
     with options.processes(workers) as executor:

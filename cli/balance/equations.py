@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cli.balance.rotors import Balancing
-from dalembert.angles import degrees
+from dalembert.angles import degrees, in_turn
 from dalembert.results.columns import Table, names, number
 from dalembert.results.way import Topic, figures
 from dalembert.units import from_si
@@ -81,7 +81,7 @@ def plane_topic(
         )
         lines.append(f"  tan θ = y/x; {signs}: quadrant {q}, θ = {figures(angle)}°")
     if b.request.remove:
-        lines.append(f"  to remove instead: on the other side, at {figures((angle + 180.0) % 360.0)}°")
+        lines.append(f"  to remove instead: on the other side, at {figures(in_turn(angle + 180.0))}°")
     unit = b.rotors.unbalance_unit
     table = Table(
         [],

@@ -9,7 +9,7 @@ import numpy as np
 
 from balancing.known_masses import Modal, known_masses
 from balancing.modal import shape_pieces
-from cli.balance.rotors import Balancing
+from cli.balance.rotors import DIMENSIONS, Balancing
 from dalembert.arithmetic.engines.javascript import engine, written
 from dalembert.errors import DataError
 from dalembert.page import Page
@@ -19,14 +19,6 @@ from dalembert.units import from_si, to_si
 
 MOST = 50
 """Rotors of a page."""
-KINDS = {
-    "mass": "mass",
-    "weight": "force",
-    "unbalance": "unbalance",
-    "radius": "length",
-    "angle": "angle",
-    "z": "length",
-}
 
 
 def sheet(b: Balancing) -> Page:
@@ -35,7 +27,7 @@ def sheet(b: Balancing) -> Page:
     if len(rotors.names) > MOST:
         raise DataError(f"--page: {len(rotors.names)} rotors: expected at most {MOST}")
     read = rotors.table.numbers
-    columns = [name for name in KINDS if name in read]
+    columns = [name for name in DIMENSIONS if name in read]
     amount = columns[0]
     tapes: dict[str, int] = {}
     outputs: list[dict[str, list[str]]] = []
@@ -102,14 +94,15 @@ def sheet(b: Balancing) -> Page:
         "columns": [
             {
                 "name": name,
-                "kind": KINDS[name],
+                "kind": DIMENSIONS[name],
                 "unit": spelled(read[name].unit),
                 "header": f"{name}_{read[name].unit}",
             }
             for name in columns
         ],
-        "units": units(KINDS[name] for name in columns),
+        "units": units(DIMENSIONS[name] for name in columns),
         "couple": b.has_couple,
+        "placed": b.planes.z is not None,
         "remove": request.remove,
         "steps": steps,
         "sought": bool(b.sought.any()),

@@ -16,7 +16,7 @@ from dalembert.angles import degrees, phasor
 from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError, quote
 from dalembert.tables.table import Table, read
-from dalembert.units import Scaled, from_si, to_si
+from dalembert.units import from_si, to_si
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -27,6 +27,15 @@ if TYPE_CHECKING:
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+DIMENSIONS = {
+    "mass": "mass",
+    "weight": "force",
+    "unbalance": "unbalance",
+    "radius": "length",
+    "angle": "angle",
+    "z": "length",
+}
+"""Of the columns of a table of masses."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,15 +68,7 @@ class Rotors:
 
 def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
     """Read masses or weights with their radii, or unbalances, with angles and, if needed, axial positions."""
-    dimensions = {
-        "mass": "mass",
-        "weight": "force",
-        "unbalance": "unbalance",
-        "radius": "length",
-        "angle": "angle",
-        "z": "length",
-    }
-    table = read(path, numbers=dimensions, texts=["rotor", "name"])
+    table = read(path, numbers=DIMENSIONS, texts=["rotor", "name"])
     amounts = [name for name in ("mass", "weight", "unbalance") if name in table.numbers]
     if len(amounts) > 1:
         both = " and ".join(table.numbers[name].header for name in amounts)
@@ -81,7 +82,7 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
         )
     (amount,) = amounts
     given = table.numbers[amount]
-    table.reject(given.values < 0, amount, f"a {amount} that is not negative")
+    table.reject(given.values < 0, amount, f"a{'n' * (amount == 'unbalance')} {amount} that is not negative")
     size = given.si
     radius = None
     if amount != "unbalance":
@@ -292,10 +293,6 @@ class Balancing:
     def length_unit(self) -> str:
         """The unit in which lengths are said."""
         return self.rotors.radius_unit or self.planes.z_unit or "mm"
-
-    def couple_size(self, couple: Scaled) -> Scaled:
-        """Return a couple unbalance in the unit of unbalances times that of lengths."""
-        return from_si(from_si(couple, "unbalance", self.rotors.unbalance_unit), "length", self.length_unit)
 
     def rows_of(self, rotor: int) -> slice:
         """Return the rows of a rotor's planes."""

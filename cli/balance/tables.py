@@ -156,7 +156,9 @@ def states(b: Balancing) -> Table:
 
     unbalance = rotors.unbalance_unit
     # a couple unbalance has the dimension of a moment of inertia; without axial positions there is none
-    couple, left = (np.where(b.has_couple, of, np.nan) for of in (b.couple, b.residual_couple))
+    couple = np.where(b.has_couple, b.couple, np.nan)
+    # the correction has a moment where its plane's place is given
+    left = np.where(b.has_couple and b.planes.z is not None, b.residual_couple, np.nan)
     about = np.where(b.has_couple, b.about, np.nan)
     angle = np.where(b.has_couple, degrees(b.couple), np.nan)
     couples = [

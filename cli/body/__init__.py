@@ -9,8 +9,6 @@ from cli.read import options
 from cli.show.output import command
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from cli.body.moving import ShaftRequest
     from cli.show.result import Result
     from dalembert.results.way import Topic
@@ -24,25 +22,25 @@ Arguments:
   parts PARTS  CSV of parts; - is standard input.
 What:
   omega X,Y,Z  Angular velocity, rad/s, such as 0,4,12.
-  alpha X,Y,Z  Its rate, rad/s²; with --frame-omega: that of its components there.
+  alpha X,Y,Z  Angular acceleration, rad/s²; with --frame-omega: rate of omega's components in those axes.
   frame_omega X,Y,Z  Angular velocity of axes that do not turn with the body, rad/s.
-  fixed X,Y,Z  The body turns about this point, m: the centre of mass follows.
+  fixed X,Y,Z  Point about which the body turns, m; the motion of the centre of mass follows.
   velocity X,Y,Z  Velocity of the centre of mass, m/s.
   acceleration X,Y,Z  Acceleration of the centre of mass, m/s².
-  find NAME  Find this number: omega.y, the shaft's speed, or a part's, such as rod.ry.
-  so_that QUANTITY=VALUE  What it is to give: momentum.x=2, bearing1_dynamic.size=20N.
-  only NAME,...  Only these: mass, inertia, principal_axes, momentum, bearing1.
+  find NAME  Number to find: omega.y, speed of the shaft, or a cell of the table, such as rod.ry.
+  so_that QUANTITY=VALUE  With --find: value of a result, such as momentum.x=2 or bearing1_dynamic.size=20N.
+  only NAME,...  Show only these results: mass, inertia, principal_axes, momentum, bearing1.
 What: a robot:
-  check_inertias  PARTS is a robot (URDF, SDF, MJCF): can bodies have its tensors?
+  check_inertias  Check the inertia tensors of a robot file (URDF, SDF, MJCF).
 What: a shaft:
-  shaft Z1:Z2  The parts turn on bearings at these places of the axis, such as 0mm:400mm.
+  shaft Z1:Z2  Positions of the two bearings along the axis, such as 0mm:400mm.
   axis AXIS  Axis of the shaft through the origin: x, y, z (default), -x … or a vector, such as 1,0,1.
   speed SPEED  Speed of the shaft, such as 1200rpm.
-  speed_rate RATE  Its rate, such as 10rad_s2.
+  speed_rate RATE  Angular acceleration of the shaft, such as 10rad_s2.
   gravity X,Y,Z  Gravity on the shaft, m/s², such as 0,-9.81,0.
-  correct NAME:Z:RADIUS  A correction plane of the shaft, such as A:0mm:20mm.
+  correct NAME:Z:RADIUS  Correction plane of the shaft, such as A:0mm:20mm.
 Further options (docs/commands.md describes them):
-  about X,Y,Z  A point fixed in space to take the momentum about, m.
+  about X,Y,Z  Point fixed in space, m: angular momentum about it.
 """
 
 
@@ -67,7 +65,8 @@ def run(
     correct: list[str] | None = None,
     check_inertias: bool = False,
 ) -> Result:
-    """Put a body together from parts: mass, centre of mass, inertia; its angular momentum and what its motion asks for.
+    """Compute mass, centre of mass and inertia of a body from its parts, its angular momentum, and the wrench of its
+    motion.
 
     PARTS has the columns body (one of several), part, shape, mass_* (a hole: negative) or density_*, x_* y_* z_* of its centre of mass,
     axis_x axis_y axis_z (default z), rx_* ry_* rz_* (a further turn about the fixed axes in that order), and the
@@ -78,7 +77,7 @@ def run(
     from cli.body import tables
     from cli.body.moving import MovingBody, Request
     from cli.read.parts import read_bodies, read_table
-    from cli.read.seeking import pair
+    from cli.read.root_search import pair
     from cli.show.result import Result, with_found
 
     request = Request(
@@ -94,7 +93,7 @@ def run(
     if check_inertias:
         others = request != Request() or find or so_that or only
         if others or axis or gravity or speed or speed_rate or correct:
-            raise options.bad("--check-inertias", "it is asked alone: expected no motion and no shaft")
+            raise options.bad("--check-inertias", "goes with no option of a motion or a shaft")
         return _inertias(parts)
     of_center = {"velocity": velocity, "acceleration": acceleration}
     if fixed is not None:
@@ -108,15 +107,12 @@ def run(
     if sought is None:
         bodies = [MovingBody(each, request) for each in read_bodies(parts)]
     else:
-        from cli.body.seeking import find as search
+        from cli.body.find import find as search
 
         moving, solution = search(read_table(parts), parts, request, *sought)
         bodies = [moving]
 
     chosen = None if only is None else options.only(only, tables.names_of(bodies[0]))
-
-    def figure() -> Figure:
-        return tables.draw(bodies)
 
     def way() -> list[Topic]:
         from cli.body.way import way
@@ -126,7 +122,7 @@ def run(
     result = Result(
         tables=tables.tables(bodies, chosen),
         screen=lambda: tables.every(bodies, partial(tables.quantities, only=chosen)),
-        figure=figure,
+        figure=partial(tables.draw, bodies),
         way=way,
         method=tables.METHOD,
         about={

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cli.cases.inputs import InputGrid, Inputs
-from cli.cases.quantities import chosen, unknown
 from cli.read import options
 from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError
@@ -23,6 +22,7 @@ from virtualwork.quantities import Component
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from cli.cases.options import Options
     from virtualwork import Mechanism
     from virtualwork.branch.assembly import Assembly
     from virtualwork.formulas.quantity import Quantity
@@ -52,6 +52,14 @@ class Request(NamedTuple):
     order: int | None = None
     branch: str | None = None
     forces: bool = False
+
+    @classmethod
+    def of(cls, own: Options, order: int | None = None, *, forces: bool = False) -> Request:
+        """What --only, --order and --branch ask for, as far as a command has these options."""
+        options_of = vars(own)
+        if options_of.get("order") is not None:
+            order = ORDERS.index(own.order)
+        return cls(own.file, names(options_of.get("only")), order, branch(options_of.get("branch")), forces)
 
 
 def names(
@@ -291,3 +299,30 @@ class Analysis:
         result += [Angle(name, 0) for name in self.links]
         slides = [each.key for each in self.places if each.path[0] == "slides"]
         return [*result, *dict.fromkeys(key.of_order(0) for key in slides)]
+
+
+# --- which quantities are requested ---
+def chosen(every: Sequence[Component], words: Sequence[str] | None, order: int) -> list[Component]:
+    """The quantities of these names, up to an order where a bare name stands; all without names.
+
+    `every` has them to the highest order.
+    """
+    if words is None:
+        return [each for each in every if each.order <= order and not each.reverse]
+    bare, full = set(words), set(words)
+    return [
+        each
+        for each in every
+        if not full.isdisjoint(each.names)
+        or (
+            each.order <= order
+            and not bare.isdisjoint(each.owners)
+            and (not each.reverse or bool({name for name in bare if "." in name} & set(each.owners)))
+        )
+    ]
+
+
+def unknown(every: Sequence[Component], words: Sequence[str]) -> str | None:
+    """The first of some names that none of the quantities has."""
+    names = {name for each in every for name in (*each.names, *each.owners)}
+    return next((word for word in words if word not in names), None)

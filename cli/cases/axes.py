@@ -1,29 +1,27 @@
-"""Axes: the values that inputs and dimensions go through, one by one, of `--at`, `--over` and `--cases`.
-
-An axis holds one number of a range, or several side by side: the rows of a table. The cases are the grid of all axes,
-the last fastest.
-"""
+"""The options that say which poses, and which mechanism: `--at`, `--over`, `--cases` as axes, `--set` as numbers."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.cases.values import Driven, Varied, dimension_named, driven, quantity
+from cli.cases.inputs import Axis, Driven, Grid, Varied, listed, with_numbers
 from cli.read import options
-from cli.read.options import Steps
-from dalembert.dataclass import dataclass
+from dalembert.angles import read_degrees
 from dalembert.errors import DataError
-from dalembert.units import UNITS
+from dalembert.hints import nearest
+from dalembert.quantities import is_number, parse_number, parse_quantity
+from dalembert.units import UNITS, to_si
+from virtualwork.describe import DescriptionError
+from virtualwork.describe.units import Units
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from virtualwork import Mechanism
+    from virtualwork.describe.dimensions import Dimension
 
     Reals = NDArray[np.float64]
 
@@ -32,89 +30,92 @@ MOST = 10**15
 TIMES = ("time", "t")
 
 
-class Values(NamedTuple):
-    """The values of an axis at some places."""
-
-    shown: Reals
-    """(places, numbers): SI, but angles in degrees."""
-    si: Reals
-
-
-class Part(NamedTuple):
-    """Some rows of a grid."""
-
-    shown: Reals
-    """(rows, names): SI, but angles in degrees."""
-    si: Reals
-    labels: list[str]
-    """The names of the rows: those of a table, else their numbers from 1."""
-    time: Reals | None
-    """The times of a law of motion, s."""
+# --- a name and its value ---------------------------------------------------------------------------------------------
+def driven(m: Mechanism, name: str, text: str, flag: str) -> int:
+    """The place of an input."""
+    names = [e.name for e in m.inputs]
+    if name not in names:
+        raise options.bad(
+            flag, f"'{text}': no input drives '{name}': expected {', '.join(names)}{nearest(name, names)}"
+        )
+    return names.index(name)
 
 
-@dataclass(frozen=True, eq=False)
-class Axis:
-    """Numbers that vary together: a range of one, or the rows of several.
+def dimension_named(m: Mechanism, path: str, text: str, flag: str) -> Varied:
+    """The one number that a path names."""
+    from virtualwork.describe.dimensions import named
 
-    Attributes
-    ----------
-    option : str
-        Where they were requested, for messages.
-    names : tuple of Driven or Varied
-        The inputs, rates of inputs or dimensions that they are values of.
-    steps : Steps, optional
-        The range.
-    rows : Values, optional
-    labels : sequence of str, optional
-        The names of the rows.
-    time : array, optional
-        The times of the rows, s.
-    """
-
-    option: str
-    names: tuple[Driven | Varied, ...]
-    steps: Steps | None = None
-    rows: Values | None = None
-    labels: Sequence[str] | None = None
-    time: Reals | None = None
-
-    @property
-    def n(self) -> int:
-        """How many values."""
-        if self.steps is not None:
-            return self.steps.n
-        return 0 if self.rows is None else len(self.rows.shown)
-
-    def at(self, i: NDArray[np.intp]) -> Values:
-        """The values at some places."""
-        if self.rows is not None:
-            return Values(self.rows.shown[i], self.rows.si[i])
-        assert self.steps is not None
-        shown = self.steps.at(i)[:, None]
-        return Values(shown, _in_si(self.names, shown))
-
-    @property
-    def of_inputs(self) -> bool:
-        """Whether it moves inputs alone."""
-        return all(isinstance(name, Driven) for name in self.names)
+    try:
+        first, *both = named(m, path)
+    except DescriptionError as error:
+        inputs = [e.name for e in m.inputs]
+        hint = "" if "did you mean" in str(error) else nearest(path, inputs)
+        raise options.bad(flag, f"{error}{hint}") from None
+    if both:
+        raise options.bad(flag, f"'{text}': two numbers: expected {first.path} or {both[0].path}")
+    return Varied(first)
 
 
-def listed(
-    option: str,
-    names: Sequence[Driven | Varied],
-    shown: Reals,
-    si: Reals | None = None,
-    labels: Sequence[str] | None = None,
-    time: Reals | None = None,
-) -> Axis:
-    """An axis of rows."""
-    rows = Values(shown, _in_si(names, shown) if si is None else si)
-    return Axis(option, tuple(names), rows=rows, labels=labels, time=time)
+def assigned_paths(m: Mechanism, text: str, flag: str, what: str) -> tuple[tuple[Dimension, ...], str]:
+    """Part `NAME=VALUE`, and find the dimensions that it names."""
+    from virtualwork.describe.dimensions import named
+
+    path, equals, value = text.rpartition("=")
+    if not equals or not path.strip():
+        raise options.bad(flag, f"'{text}': expected NAME={what}, such as links.crank.B.x=...")
+    try:
+        return named(m, path.strip()), value
+    except DescriptionError as error:
+        raise options.bad(flag, error) from None
 
 
-def _in_si(names: Sequence[Driven | Varied], shown: Reals) -> Reals:
-    degrees = [name.unit == "deg" for name in names]
-    return np.where(degrees, np.radians(shown), shown)
+def assigned(m: Mechanism, bare: Mapping[str, str], texts: Sequence[str]) -> Mechanism:
+    """The mechanism after every `--set NAME=VALUE`; both coordinates of a point as `X,Y`."""
+    numbers: dict[Dimension, float] = {}
+    for text in texts:
+        dimensions, value = assigned_paths(m, text, "--set", "VALUE")
+        parts = value.split(",")
+        if len(parts) != len(dimensions):
+            wanted = "one value" if len(dimensions) == 1 else "two values X,Y"
+            raise options.bad("--set", f"'{text}': expected {wanted} for {text.rpartition('=')[0]}")
+        for dimension, part in zip(dimensions, parts, strict=True):
+            if dimension in numbers:
+                raise options.bad("--set", f"'{text}': {dimension.path} is given twice")
+            numbers[dimension] = quantity(Varied(dimension), part, "--set", bare)
+    try:
+        return with_numbers(m, list(numbers), list(numbers.values()))
+    except DescriptionError as error:
+        raise options.bad("--set", error) from None
+
+
+def quantity(of: Driven | Varied, text: str, flag: str, bare: Mapping[str, str]) -> float:
+    """A value as it is shown: SI, angles in degrees; a bare number is in the unit of the file."""
+    if isinstance(of, Driven) or (
+        of.kind in ("length", "angle") and not (is_number(text) and of.kind not in bare)
+    ):
+        return place_or_angle(text, of.kind, flag, bare)
+    try:
+        si = Units({}).number(text.strip(), of.kind, of.label)
+    except DescriptionError as error:
+        raise options.bad(flag, error) from None
+    return read_degrees(si) if of.unit == "deg" else si
+
+
+def place_or_angle(text: str, kind: str, flag: str, bare: Mapping[str, str]) -> float:
+    """A length in metres, or an angle in degrees: those of an angle in degrees stay as they are written."""
+    named_unit = bare.get(kind)
+    if named_unit is not None and is_number(text):
+        if named_unit in ("deg", "°"):
+            return parse_number(text)
+        si = Units({kind: named_unit}).number(text, kind, flag)
+        return si if kind == "length" else read_degrees(si)
+    try:
+        value, its_unit = parse_quantity(text, kind)
+    except ValueError as error:
+        raise options.bad(flag, error) from None
+    if kind == "length":
+        return float(to_si(value, "length", its_unit))
+    return value if its_unit == "deg" else read_degrees(value)
 
 
 # --- --at and --over --------------------------------------------------------------------------------------------------
@@ -158,7 +159,11 @@ def over_axis(m: Mechanism, text: str, bare: Mapping[str, str]) -> Axis:
         of = Driven.of(m, [e.name for e in m.inputs].index(name.strip()))
     else:
         of = dimension_named(m, name.strip(), text, "--over")
-    steps = options.steps("--over", span, lambda part: quantity(of, part, "--over", bare), "0deg:360deg:1deg")
+
+    def values(parts: list[str]) -> list[float]:
+        return [quantity(of, part, "--over", bare) for part in parts]
+
+    steps = options.steps("--over", span, values, "0deg:360deg:1deg")
     if steps.n > MOST:
         raise options.bad("--over", f"'{span}': {steps.n:.3g} values: expected at most {MOST:.0e}")
     return Axis("--over", (of,), steps)
@@ -285,36 +290,7 @@ def history_axis(m: Mechanism) -> Axis:
     return listed("[input] law", order, shown, si, time=time)
 
 
-# --- the grid of some axes --------------------------------------------------------------------------------------------
-@dataclass(frozen=True, eq=False)
-class Grid:
-    """All combinations of the values of some axes, the last fastest."""
-
-    axes: tuple[Axis, ...]
-
-    @cached_property
-    def names(self) -> tuple[Driven | Varied, ...]:
-        """What the columns are values of."""
-        return tuple(name for axis in self.axes for name in axis.names)
-
-    @cached_property
-    def n(self) -> int:
-        """How many there are."""
-        return math.prod(axis.n for axis in self.axes)
-
-    def part(self, low: int, high: int) -> Part:
-        """The rows from low to high, or to the last."""
-        axes, high = self.axes, min(high, self.n)
-        places: Any = np.arange(low, high)
-        each = np.unravel_index(places, [axis.n for axis in axes]) if len(axes) > 1 else [places]
-        parts = [axis.at(i) for axis, i in zip(axes, each, strict=True)]
-        shown, si = (np.concatenate(values, axis=1) for values in zip(*parts, strict=True))
-        # the names and times of the rows of a table, where nothing else varies
-        names, time = (axes[0].labels, axes[0].time) if len(axes) == 1 else (None, None)
-        labels = [str(i + 1) for i in range(low, high)] if names is None else list(names[low:high])
-        return Part(shown, si, labels, None if time is None else time[low:high])
-
-
+# --- all of them -----------
 def grids(
     m: Mechanism,
     at: Sequence[str] | None,
@@ -339,12 +315,16 @@ def grids(
                     axis.option, f"{name.label} is given twice, by {both}: expected one of them"
                 )
             seen[name] = axis.option
-    if math.prod(axis.n for axis in axes) > MOST:
-        raise options.bad(
-            "--over", f"{float(math.prod(axis.n for axis in axes)):.3g} cases: expected at most {MOST:.0e}"
-        )
-    varied = tuple(axis for axis in axes if not axis.of_inputs)
-    moved = tuple(axis for axis in axes if axis.of_inputs)
+    count = Grid(tuple(axes)).n
+    if count > MOST:
+        raise options.bad("--over", f"{float(count):.3g} cases: expected at most {MOST:.0e}")
+    varied = tuple(axis for axis in axes if not _of_inputs(axis))
+    moved = tuple(axis for axis in axes if _of_inputs(axis))
     if not moved and not any(isinstance(name, Driven) for name in seen) and any(e.history for e in m.inputs):
         moved = (history_axis(m),)
     return Grid(varied) if varied else None, Grid(moved) if moved else None
+
+
+def _of_inputs(axis: Axis) -> bool:
+    """Whether an axis moves inputs alone."""
+    return all(isinstance(name, Driven) for name in axis.names)

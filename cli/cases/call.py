@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cli.cases.analysis import Analysis, Request
-from cli.cases.axes import Grid, grids
+from cli.cases.analysis import Request
+from cli.cases.axes import assigned, grids
 from cli.cases.case import Study
+from cli.cases.inputs import Driven, Grid, Varied, with_numbers
 from cli.cases.loop import Loop
-from cli.cases.values import Driven, Varied, assigned, with_numbers
 from cli.read.about import about
 from cli.read.options import bad
-from cli.read.seeking import pair
 from cli.show.result import Result, with_found
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
@@ -25,11 +24,8 @@ from dalembert.tables.table import Numbers, read
 from dalembert.units import UNITS, to_si
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from cli.cases.case import Case
     from cli.cases.options import Options
-    from cli.read.seeking import Found
+    from cli.read.root_search import Found
     from cli.show.commands import ShowOptions
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
@@ -59,7 +55,7 @@ def load(path: str) -> Described:
     try:
         text = data.decode("utf-8-sig")
         folder = Path() if path == "-" else Path(path).parent
-        mechanism = Mechanism.from_toml_text(text, file, folder, lambda table: _beside(warnings, table))
+        mechanism = Mechanism.from_toml_text(text, file, folder, partial(beside, warnings))
     except UnicodeDecodeError:
         raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
     except ValueError as error:
@@ -67,12 +63,6 @@ def load(path: str) -> Described:
     document = tomllib.loads(text)
     units = {kind: str(unit) for kind, unit in document.get("units", {}).items()}
     return Described(mechanism, units, warnings, about(file, document))
-
-
-def _beside(warnings: list[str], path: Path) -> bytes:
-    # loaded where the file has a table beside it
-
-    return beside(warnings, path)
 
 
 @contextmanager
@@ -148,27 +138,30 @@ class Call:
     varied: Grid | None
     moved: Grid | None
     workers: int
+    page: Path | None
+    """Where the page goes that moves."""
     found: Found | None = None
     """The number that --find asked for."""
 
     @classmethod
-    def of(cls, own: Options, show: ShowOptions, request: Request) -> Call:
-        """Read the file, change its numbers, and lay out the cases."""
+    def of(cls, own: Options, show: ShowOptions, order: int | None = None, *, forces: bool = False) -> Call:
+        """Read the file, change its numbers, and lay out the cases; `order` and `forces` as in a `Request`."""
+        request = Request.of(own, order, forces=forces)
         with naming(request.file):
             mechanism, bare, remarks, about = load(own.file)
             if own.set:
                 mechanism = assigned(mechanism, bare, own.set)
             varied, moved = grids(mechanism, own.at, own.over, own.cases, bare, remarks)
             found = None
-            both = pair(getattr(own, "find", None), getattr(own, "so_that", None))
-            if both is not None:
-                from cli.cases.sought import find
+            name, wanted = getattr(own, "find", None), getattr(own, "so_that", None)
+            if (name, wanted) != (None, None):
+                from cli.cases.find import find
 
                 if varied is not None or (moved is not None and moved.n > 1):
                     raise bad("--find", "expected one pose of one mechanism, such as --at 60deg")
-                mechanism, found = find(mechanism, bare, request, moved, *both)
-        workers = getattr(own, "workers", None) or 1
-        return cls(request, show, mechanism, bare, remarks, about, varied, moved, workers, found)
+                mechanism, found = find(mechanism, bare, request, moved, name, wanted)
+        workers, page = getattr(own, "workers", None) or 1, getattr(own, "page", None)
+        return cls(request, show, mechanism, bare, remarks, about, varied, moved, workers, page, found)
 
     def refuse_inputs(self, message: str) -> None:
         """Refuse options that move inputs, where these mean nothing."""
@@ -205,22 +198,10 @@ class Call:
             m = with_numbers(self.mechanism, numbers, row)
         return replace(self, mechanism=m, varied=None, moved=None)
 
-    def check_names(self) -> None:
-        """Refuse names that --only cannot find."""
-        if self.request.only is not None:
-            with naming(self.request.file):
-                self.analysis().check_names()
-
-    def analysis(self) -> Analysis:
-        """The mechanism itself over the inputs of the call."""
-        from cli.cases.inputs import of_one
-
-        return Analysis(self.request, self.mechanism, of_one(self.mechanism, self.moved))
-
-    def study(self, kind: type[Study], **more: Any) -> Study:
-        """What is done with every case."""
+    def result(self, kind: type[Study], **more: Any) -> Result:
+        """What a study makes of all cases, in the forms that are requested."""
         names = () if self.varied is None else self.varied.names
-        return kind(
+        study = kind(
             self.request,
             self.mechanism,
             self.bare,
@@ -230,39 +211,24 @@ class Call:
             self.moved,
             **more,
         )
-
-    @property
-    def poses(self) -> int:
-        """How many poses a variant has."""
-        return 1 if self.moved is None else self.moved.n
-
-    def result(
-        self,
-        study: Study,
-        page: Path | None = None,
-        drawn: Callable[[list[tuple[str, Case]]], bytes] | None = None,
-        states: int | None = None,
-    ) -> Result:
-        """The result of all cases, in the forms that are requested.
-
-        `page`: where the page that moves goes, of so many states a variant; `drawn` makes it of the cases.
-        """
         with naming(self.request.file):
+            study.own.check_names()
             loop = Loop(study, self.varied, self.workers)
             self.remarks += study.warnings()
-            if page is not None:
+            if self.page is not None:
                 from cli.show.picture import refuse_long
 
-                refuse_long((self.poses if states is None else states) * loop.count)
+                refuse_long(study.frames * loop.count)
             result = self._alone(study, loop) if self.varied is None else self._of_variants(loop)
-        if page is not None and drawn is not None:
-            result = replace(result, beside={**result.beside, page: lambda: drawn(loop.every_case())})
+        if self.page is not None:
+            beside = {self.page: lambda: study.page(loop.every_case(), self.show.units)}
+            result = replace(result, beside={**result.beside, **beside})
         if self.found is not None:
             result = with_found(result, self.found)
         title = {"title": self.mechanism.name or "Mechanism"}
         if self.show.steps:
             result = replace(result, way=lambda: self._way(loop))
-        return replace(result, about=title | self.about, within=lambda: naming(self.request.file))
+        return replace(result, about=title | self.about, within=partial(naming, self.request.file))
 
     def _way(self, loop: Loop) -> list[Topic]:
         """The worked solution of every mechanism; of variants each topic says which."""
@@ -282,8 +248,8 @@ class Call:
                 blocks=loop.blocks,
                 beside=study.beside_table(),
                 warnings=self.remarks,
-                late_warnings=lambda: loop.remarks.lines(),
-                failed=lambda: not loop.remarks.any_assembled,
+                late_warnings=loop.warnings,
+                failed=loop.failed,
             )
         study.check_size(self.show, 1)
         case = study.case()
@@ -296,7 +262,7 @@ class Call:
         result = Result(
             document=lambda: {"name": name},
             warnings=self.remarks,
-            failed=lambda: not loop.remarks.any_assembled,
+            failed=loop.failed,
             method=loop.study.method,
         )
         if show.streams or show.streams_json:
@@ -305,7 +271,7 @@ class Call:
                 blocks=partial(loop.blocks, json=show.streams_json),
                 blocks_name="variants",
                 shared=self.workers > 1,
-                late_warnings=lambda: loop.remarks.lines(),
+                late_warnings=loop.warnings,
             )
         loop.study.check_size(show, loop.count)
         # what there is to remark on stands in the document too

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
-from uuid import uuid4
+from uuid import UUID, uuid4
 
 import numpy as np
 
-from cli.cases.axes import Grid
-from cli.cases.inputs import of_one
-from cli.cases.rows import joined
-from cli.cases.values import Driven, Varied, with_numbers
+from cli.cases.analysis import Analysis
+from cli.cases.inputs import Driven, Grid, Varied, of_one, with_numbers
 from cli.show.result import Result
-from dalembert.dataclass import dataclass, field
-from dalembert.results.columns import Table
+from dalembert.dataclass import dataclass, field, replace
+from dalembert.results.columns import Column, Table
 from dalembert.results.columns import document as result_document
 from virtualwork import MechanismError
 
@@ -27,10 +26,11 @@ if TYPE_CHECKING:
     from cli.cases.inputs import InputGrid, Inputs
     from cli.cases.together import Together
     from cli.show.commands import ShowOptions
-    from dalembert.results.columns import Document
+    from dalembert.results.columns import Cell, Document
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
     from virtualwork.describe.dimensions import Dimension
+    from virtualwork.family.part import Part
 
     Rows = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ class Study:
         What a row of variants sets.
     moved : Grid, optional
         The inputs that all variants go through.
-    key : str
+    key : UUID
         By which a process finds what it has prepared for it.
     """
 
@@ -96,7 +96,7 @@ class Study:
     json: bool
     names: tuple[Driven | Varied, ...] = ()
     moved: Grid | None = None
-    key: str = field(default_factory=lambda: uuid4().hex)
+    key: UUID = field(default_factory=uuid4)
 
     method = ""
     blank: ClassVar[Mapping[str, Any]] = {}
@@ -125,6 +125,15 @@ class Study:
         """The result of a mechanism alone, in every form."""
         raise NotImplementedError
 
+    def page(self, cases: Sequence[tuple[str, Case]], units: str | None) -> bytes:
+        """The page that moves, of every case by its name."""
+        raise NotImplementedError
+
+    @property
+    def frames(self) -> int:
+        """How many states of a case the page shows."""
+        return 1 if self.moved is None else self.moved.n
+
     def warnings(self) -> list[str]:
         """What to remark on the request itself, whatever the variant."""
         return []
@@ -149,12 +158,32 @@ class Study:
 
     def size(self, json: bool, together: bool) -> int:
         """How many variants a part has."""
-        poses = 1 if self.moved is None else self.moved.n
         rows = TOGETHER[json] if together else ONE_BY_ONE[1][json]
         most = rows if together else ONE_BY_ONE[0]
-        return max(1, min(most, rows // poses))
+        return max(1, min(most, rows // (1 if self.moved is None else self.moved.n)))
 
     # --- variants -------------------------------------------------------------------------------------------------
+    @cached_property
+    def own(self) -> Analysis:
+        """The mechanism itself, over the inputs of the call."""
+        return Analysis(self.request, self.mechanism, self.inputs(self.mechanism, None))
+
+    def analysis(self, row: Rows | None = None) -> Analysis:
+        """A variant over its inputs, or the mechanism itself.
+
+        Raises
+        ------
+        MechanismError
+        """
+        if row is None:
+            return self.own
+        m = self.variant(row)
+        return Analysis(self.request, m, self.inputs(m, row))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process needs: all but what is worked out of it."""
+        return {name: value for name, value in vars(self).items() if name != "own"}
+
     @property
     def dimensions(self) -> list[Dimension]:
         """The dimensions that vary."""
@@ -190,6 +219,41 @@ class Study:
             if isinstance(name, Driven)
         ]
         return of_one(m, self.moved, its)
+
+    def part(self, shown: Rows) -> tuple[Part, Rows]:
+        """Variants as a part of a family, and their inputs as they are shown, (v or 1, n, k)."""
+        from virtualwork.family.family import Family
+        from virtualwork.family.part import Part
+
+        m, v = self.mechanism, len(shown)
+        family = Family(m, self.in_si(shown))
+        own = self.inputs(m, None).whole
+        names = () if self.moved is None else self.moved.names
+        moved = {name.j for name in names if isinstance(name, Driven)}
+        si, seen = own.values[None], own.shown[None]
+        rates = family.rates(own.speed, own.acceleration)
+        # what each variant has of its own: a column of inputs, or another position in its file
+        for name, column in zip(self.names, shown.T, strict=True):
+            j = (
+                name.j
+                if isinstance(name, Driven)
+                else int(name.of.where[1])
+                if name.of.where[0] == "inputs"
+                else -1
+            )
+            if j < 0 or (j in moved and not isinstance(name, Driven)):
+                continue
+            numbers = np.radians(column) if name.unit == "deg" else np.asarray(column, dtype=float)
+            if isinstance(name, Driven) and name.order:
+                rates[name.order - 1][j] = numbers[:, None]
+            elif isinstance(name, Driven) or name.of.where[-1] == "value":
+                if len(si) == 1:
+                    si, seen = (np.repeat(x, v, axis=0) for x in (si, seen))
+                value = Driven.of(m, j)
+                si[:, :, j] = numbers[:, None]
+                as_shown = column if isinstance(name, Driven) else [value.shown(x) for x in numbers.tolist()]
+                seen[:, :, j] = np.asarray(as_shown)[:, None]
+        return Part(m, family.dimensions, family.values, si, rates), seen
 
 
 class TableCase(Case):
@@ -248,3 +312,62 @@ class TableStudy(Study):
             method=self.method,
             warnings=case.warnings(),
         )
+
+
+# --- tables of many variants: the same columns for all, one below the other ----
+def length(table: Table) -> int:
+    """How many rows a table has."""
+    return len(table.columns[0].values) if table.columns else 1
+
+
+def like(pattern: Table, table: Table) -> Table:
+    """A table with the columns of the first."""
+    columns = {c.header: c for c in table.columns}
+    empty: list[Cell] = [None] * length(table)
+    return Table(
+        [columns.get(c.header) or Column(c.name, c.unit, empty) for c in pattern.columns], pattern.keys
+    )
+
+
+def emptied(pattern: Table) -> Table:
+    """The rows of a variant that cannot be assembled: what names them stays."""
+    return Table(
+        [
+            c if c.header in pattern.keys else Column(c.name, c.unit, [None] * len(c.values))
+            for c in pattern.columns
+        ],
+        pattern.keys,
+    )
+
+
+def without_bounds(table: Table) -> Table:
+    """A table without the bounds of its errors."""
+    return replace(table, columns=[replace(c, error=None) for c in table.columns])
+
+
+def joined(tables: Sequence[Table]) -> Table:
+    """Tables of the same columns, one below the other."""
+    if len(tables) == 1:
+        return tables[0]
+
+    def bounds(parts: Sequence[Column]) -> Iterator[float]:
+        for part in parts:
+            # a variant that is not assembled has no numbers, and no bounds of them
+            yield from [0.0] * len(part.values) if part.error is None else part.error()
+
+    def column(*parts: Column) -> Column:
+        error = None if all(part.error is None for part in parts) else lambda: list(bounds(parts))
+        return replace(parts[0], values=[value for part in parts for value in part.values], error=error)
+
+    return replace(tables[0], columns=list(map(column, *(table.columns for table in tables))))
+
+
+def blank(part: Any, key: str = "") -> Any:
+    """Poses that are not assembled, in the form of others: what names them stays."""
+    if isinstance(part, dict):
+        return {key: blank(value, key) for key, value in part.items()}
+    if isinstance(part, list):
+        return [] if key == "marks" else [blank(each, key) for each in part]
+    if isinstance(part, bool):
+        return False
+    return part if isinstance(part, str) or key in ("input_deg", "input_m", "branch") else None

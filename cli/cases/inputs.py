@@ -1,26 +1,263 @@
-"""The inputs of the poses of one mechanism: formed when they are needed, a part at a time where they are many."""
+"""The inputs of every pose: what varies, an input, its rate or a dimension; the axes of its values, and their grid.
+
+An axis holds one number of a range, or several side by side: the rows of a table. The cases are the grid of all axes,
+the last fastest. The inputs of the poses are formed when they are needed, a part at a time where they are many.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cli.cases.axes import Grid, Values
-from cli.cases.values import Driven
-from dalembert.dataclass import dataclass, field
+from cli.read.options import Steps
+from dalembert.angles import read_degrees
+from dalembert.dataclass import dataclass, field, replace
+from dalembert.units import UNITS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dalembert.arithmetic.doubled import Doubled
     from virtualwork import Mechanism
+    from virtualwork.describe.dimensions import Dimension
 
     Reals = NDArray[np.float64]
 
+# of an input: its value, and its rates as a table's header and a description call them
+RATES = ("", "speed", "acceleration")
 
+
+@dataclass(frozen=True)
+class Driven:
+    """An input, or a rate of it.
+
+    Attributes
+    ----------
+    j : int
+        Its place among the inputs.
+    name : str
+    slides : bool
+    order : int
+        0: its value; 1: its speed; 2: its acceleration.
+    """
+
+    j: int
+    name: str
+    slides: bool
+    order: int = 0
+
+    @classmethod
+    def of(cls, m: Mechanism, j: int) -> Driven:
+        """The value of an input."""
+        return cls(j, m.inputs[j].name, m.inputs[j].is_slide)
+
+    @classmethod
+    def all(cls, m: Mechanism, j: int) -> Iterator[Driven]:
+        """The value of an input and its rates."""
+        value = cls.of(m, j)
+        return (value.rate(k) for k in range(3))
+
+    def rate(self, order: int) -> Driven:
+        """Its rate of this order."""
+        return Driven(self.j, self.name, self.slides, order)
+
+    @property
+    def label(self) -> str:
+        """What a header calls it, without its unit: `crank`, `crank_speed`."""
+        return f"{self.name}_{RATES[self.order]}" if self.order else self.name
+
+    @property
+    def dimension(self) -> str:
+        """Which of the tables' dimensions it has."""
+        kinds = (
+            ("length", "velocity", "acceleration")
+            if self.slides
+            else ("angle", "speed", "angular acceleration")
+        )
+        return kinds[self.order]
+
+    @property
+    def unit(self) -> str:
+        """The unit that it is shown in."""
+        return ("m" if self.slides else "deg") if not self.order else next(iter(UNITS[self.dimension]))
+
+    def shown(self, si: float) -> float:
+        """A value as it is shown."""
+        return si if self.slides or self.order else read_degrees(si)
+
+    def own(self, m: Mechanism) -> float:
+        """The file's own value as it is shown; where it has none, that of the guess."""
+        value = m.inputs[self.j].value
+        return self.shown(m.at[self.j] if value is None else value)
+
+    @property
+    def kind(self) -> str:
+        """The unit that a bare number of it takes, as `[units]` of a file has it."""
+        return "length" if self.slides else "angle"
+
+
+@dataclass(frozen=True)
+class Varied:
+    """A dimension, by its path in the file."""
+
+    of: Dimension
+
+    @property
+    def label(self) -> str:
+        """Its path."""
+        return self.of.path
+
+    @property
+    def dimension(self) -> str:
+        """Which of the tables' dimensions it has."""
+        return self.of.kind
+
+    @property
+    def unit(self) -> str:
+        """The unit that it is shown in."""
+        return self.of.unit
+
+    @property
+    def kind(self) -> str:
+        """Which quantity it is."""
+        return self.of.kind
+
+    def si(self, shown: float) -> float:
+        """A value in SI."""
+        return math.radians(shown) if self.of.unit == "deg" else shown
+
+
+def with_numbers(m: Mechanism, dimensions: Sequence[Dimension], shown: Sequence[float]) -> Mechanism:
+    """The mechanism with other numbers, as they are shown."""
+    from virtualwork.describe.dimensions import changed
+
+    numbers = {d.path: Varied(d).si(value) for d, value in zip(dimensions, shown, strict=True)}
+    if m.decimals is not None:
+        read = ((d.kind, numbers[d.path], x, _factor(d)) for d, x in zip(dimensions, shown, strict=True))
+        m = replace(m, decimals=m.decimals.and_also(read))
+    return changed(m, numbers)
+
+
+def _factor(dimension: Dimension) -> tuple[float, float]:
+    """What a number as it is shown has to be multiplied by."""
+    return (math.pi, 180) if dimension.unit == "deg" else (1, 1)
+
+
+# --- axes, and their grid ---------------------------------------------------------------------------------------------
+class Values(NamedTuple):
+    """The values of an axis at some places."""
+
+    shown: Reals
+    """(places, numbers): SI, but angles in degrees."""
+    si: Reals
+
+
+class Part(NamedTuple):
+    """Some rows of a grid."""
+
+    shown: Reals
+    """(rows, names): SI, but angles in degrees."""
+    si: Reals
+    labels: list[str]
+    """The names of the rows: those of a table, else their numbers from 1."""
+    time: Reals | None
+    """The times of a law of motion, s."""
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """Numbers that vary together: a range of one, or the rows of several.
+
+    Attributes
+    ----------
+    option : str
+        Where they were requested, for messages.
+    names : tuple of Driven or Varied
+        The inputs, rates of inputs or dimensions that they are values of.
+    steps : Steps, optional
+        The range.
+    rows : Values, optional
+    labels : sequence of str, optional
+        The names of the rows.
+    time : array, optional
+        The times of the rows, s.
+    """
+
+    option: str
+    names: tuple[Driven | Varied, ...]
+    steps: Steps | None = None
+    rows: Values | None = None
+    labels: Sequence[str] | None = None
+    time: Reals | None = None
+
+    @property
+    def n(self) -> int:
+        """How many values."""
+        if self.steps is not None:
+            return self.steps.n
+        return 0 if self.rows is None else len(self.rows.shown)
+
+    def at(self, i: NDArray[np.intp]) -> Values:
+        """The values at some places."""
+        if self.rows is not None:
+            return Values(self.rows.shown[i], self.rows.si[i])
+        assert self.steps is not None
+        shown = self.steps.at(i)[:, None]
+        return Values(shown, _in_si(self.names, shown))
+
+
+def listed(
+    option: str,
+    names: Sequence[Driven | Varied],
+    shown: Reals,
+    si: Reals | None = None,
+    labels: Sequence[str] | None = None,
+    time: Reals | None = None,
+) -> Axis:
+    """An axis of rows."""
+    rows = Values(shown, _in_si(names, shown) if si is None else si)
+    return Axis(option, tuple(names), rows=rows, labels=labels, time=time)
+
+
+def _in_si(names: Sequence[Driven | Varied], shown: Reals) -> Reals:
+    degrees = [name.unit == "deg" for name in names]
+    return np.where(degrees, np.radians(shown), shown)
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """All combinations of the values of some axes, the last fastest."""
+
+    axes: tuple[Axis, ...]
+
+    @cached_property
+    def names(self) -> tuple[Driven | Varied, ...]:
+        """What the columns are values of."""
+        return tuple(name for axis in self.axes for name in axis.names)
+
+    @cached_property
+    def n(self) -> int:
+        """How many there are."""
+        return math.prod(axis.n for axis in self.axes)
+
+    def part(self, low: int, high: int) -> Part:
+        """The rows from low to high, or to the last."""
+        axes, high = self.axes, min(high, self.n)
+        places: Any = np.arange(low, high)
+        each = np.unravel_index(places, [axis.n for axis in axes]) if len(axes) > 1 else [places]
+        parts = [axis.at(i) for axis, i in zip(axes, each, strict=True)]
+        shown, si = (np.concatenate(values, axis=1) for values in zip(*parts, strict=True))
+        # the names and times of the rows of a table, where nothing else varies
+        names, time = (axes[0].labels, axes[0].time) if len(axes) == 1 else (None, None)
+        labels = [str(i + 1) for i in range(low, high)] if names is None else list(names[low:high])
+        return Part(shown, si, labels, None if time is None else time[low:high])
+
+
+# --- the inputs of the poses of one mechanism -------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Inputs:
     """The inputs of every pose, in SI and as they are shown (degrees or metres), and their rates where a table gives them."""
@@ -124,9 +361,12 @@ class InputGrid:
     @property
     def span(self) -> tuple[float, float]:
         """The least and the largest value of the first input."""
-        if len(self.grid.axes) > 1 or self.grid.axes[0].steps is None:
+        first, *others = self.grid.axes
+        if others or first.steps is None:
             return self.whole.span
-        ends = [float(self.part(i, i + 1).values[0, 0]) for i in (0, self.n - 1)]
+        if first.names[0] != self.names[0]:
+            return (float(self.held.si[0]),) * 2
+        ends = first.at(np.array([0, first.n - 1])).si[:, 0].tolist()
         return min(ends), max(ends)
 
     def part(self, low: int, high: int) -> Inputs:

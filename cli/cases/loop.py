@@ -6,17 +6,24 @@ depends on how many cases there are, nor on which option made them; parts are wo
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, suppress
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cli.cases.axes import Grid
-from cli.cases.case import Case, Study
-from cli.cases.rows import Remarks, blank, emptied, joined, length, like, without_bounds
-from cli.cases.values import Driven
+from cli.cases.case import (
+    Case,
+    Study,
+    blank,
+    emptied,
+    joined,
+    length,
+    like,
+    without_bounds,
+)
+from cli.cases.inputs import Grid
 from cli.read.options import processes
 from cli.show.result import Written
 from cli.show.terminal import progress
@@ -26,8 +33,11 @@ from dalembert.results.columns import Column, Table
 from virtualwork import MechanismError
 
 if TYPE_CHECKING:
+    from uuid import UUID
+
     from numpy.typing import NDArray
 
+    from cli.cases.together import Solved as TogetherSolved
     from cli.cases.together import Together
     from cli.show.result import Form, Part
     from dalembert.results.columns import Document
@@ -36,7 +46,69 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
 
 
-class Home(NamedTuple):
+# variants whose remarks are kept, the first ones, whoever works them out; so many kinds of remark are printed, and of
+# each the first so many variants are named
+EXPLAINED, KINDS, NAMED = 50, 10, 5
+
+
+@dataclass
+class Remarks:
+    """What to remark on variants: each remark once, with the variants that it is about.
+
+    Attributes
+    ----------
+    kept : list of (variant, its remarks)
+        Of the first variants that have any; a name that is empty is that of the mechanism itself.
+    further : int
+        Variants after these that have remarks too.
+    any_assembled : bool
+        Whether there is a number of any variant.
+    """
+
+    kept: list[tuple[str, tuple[str, ...]]] = field(default_factory=list)
+    further: int = 0
+    any_assembled: bool = False
+
+    @property
+    def full(self) -> bool:
+        """Whether no further remark is kept."""
+        return len(self.kept) >= EXPLAINED
+
+    def add(self, name: str, remarks: Iterable[str]) -> None:
+        """Add the remarks on a variant, which may be none."""
+        its = tuple(dict.fromkeys(remarks))
+        if its and self.full:
+            self.further += 1
+        elif its:
+            self.kept.append((name, its))
+
+    def join(self, other: Remarks) -> None:
+        """Add the remarks on later variants."""
+        for name, remarks in other.kept:
+            self.add(name, remarks)
+        self.further += other.further
+        self.any_assembled |= other.any_assembled
+
+    def lines(self) -> list[str]:
+        """As they are printed."""
+        about: dict[str, list[str]] = {}
+        for name, remarks in self.kept:
+            for remark in remarks:
+                about.setdefault(remark, []).append(name)
+        if any(names == [""] for names in about.values()):
+            return list(about)
+        lines = []
+        for remark, names in list(about.items())[:KINDS]:
+            more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+            lines.append(f"variant{'s' * (len(names) > 1)} {', '.join(names[:NAMED])}{more}: {remark}")
+        printed = set(list(about)[:KINDS])
+        further = self.further + sum(printed.isdisjoint(remarks) for _, remarks in self.kept)
+        if further:
+            lines.append(f"{further} further variant{'s have' if further > 1 else ' has'} remarks too")
+        return lines
+
+
+class Plan(NamedTuple):
     """What all parts of the work have in common.
 
     Attributes
@@ -82,6 +154,14 @@ class Loop:
         """How many mechanisms there are."""
         return 1 if self.varied is None else self.varied.n
 
+    def warnings(self) -> list[str]:
+        """What to remark on, once all is worked out."""
+        return self.remarks.lines()
+
+    def failed(self) -> bool:
+        """Whether nothing could be assembled."""
+        return not self.remarks.any_assembled
+
     def rows(self, low: int, high: int) -> Rows:
         """The numbers of the variants from low to high, as they are shown."""
         assert self.varied is not None
@@ -96,11 +176,11 @@ class Loop:
         from dalembert.arithmetic.engines import as_part
         from dalembert.arithmetic.parts import LostPart, in_parts
 
-        count, home = self.count, self.home(json)
-        work: Any = partial(_solved, self.study, home, form, json)
-        if home.lanes:
-            work = partial(as_part, home.lanes, work)
-        each = home.each
+        count, plan = self.count, self.plan(json)
+        work: Any = partial(_solved, self.study, plan, form, json)
+        if plan.lanes:
+            work = partial(as_part, plan.lanes, work)
+        each = plan.each
         starts = range(0, count, each)
         some = ((a + 1, self.rows(a, a + each)) for a in starts)
         workers = min(self.workers, len(starts))
@@ -125,7 +205,7 @@ class Loop:
         self.remarks.any_assembled = there if isinstance(there, bool) else any(there)
         self.remarks.add("", case.warnings())
 
-    def home(self, json: bool) -> Home:
+    def plan(self, json: bool) -> Plan:
         """The first variant that can be assembled, and whether and how many are solved at once."""
         study = self.study
         lanes = self.count * (1 if study.moved is None else study.moved.n)
@@ -135,10 +215,10 @@ class Loop:
                 pattern = without_bounds(study.case(row).pattern())
                 break
         else:
-            return Home(study.size(json, together=False), lanes=lanes)
+            return Plan(study.size(json, together=False), lanes=lanes)
         # however few they are: what is refused, and what is remarked, does not depend on how many others there are
         together = study.together(row, json) is not None
-        return Home(study.size(json, together), pattern, row, together, lanes)
+        return Plan(study.size(json, together), pattern, row, together, lanes)
 
     @cached_property
     def table(self) -> Table:
@@ -173,9 +253,9 @@ class Solved(NamedTuple):
     remarks: Remarks
 
 
-def _solved(study: Study, home: Home, form: Form, json: bool, first: int, shown: Rows) -> Solved:
+def _solved(study: Study, plan: Plan, form: Form, json: bool, first: int, shown: Rows) -> Solved:
     """Work out a part: some variants, which are called from `first` on."""
-    part = Variants(study, home, first, shown)
+    part = Variants(study, plan, first, shown)
     return Solved(form(part.documents() if json else part.table(), first - 1), part.remarks)
 
 
@@ -184,12 +264,16 @@ def as_it_is(part: Part, number: int) -> Written:
     return Written(part, 0)
 
 
+_written: dict[tuple[UUID, bool], Together] = {}
+"""The formulas of a study, which a process writes down once."""
+
+
 @dataclass
 class Variants:
     """Some variants, which are called from `first` on."""
 
     study: Study
-    home: Home
+    plan: Plan
     first: int
     shown: Rows
     remarks: Remarks = field(default_factory=Remarks)
@@ -226,10 +310,8 @@ class Variants:
     def documents(self) -> list[Document]:
         """What JSON has of each; poses of one that cannot be assembled are not assembled."""
         listed: list[Any]
-        if self.home.together:
-            poses, assembled, alone = _prepared(self.study, self.home, True).of(
-                *part_of(self.study, self.shown)
-            )
+        if self.plan.together:
+            poses, assembled, alone = self._together(True)
             v, n = assembled.shape
             listed = [{"poses": poses[i * n : (i + 1) * n]} for i in range(v)]
             for i, document in self._left(assembled, alone, True):
@@ -239,8 +321,8 @@ class Variants:
             listed = list(self.each(True))
         if any(document is None for document in listed):
             empty: Document = dict(self.study.blank)
-            if self.home.row is not None and not self.study.one_blank_row:
-                like_it = Variants(self.study, self.home, 0, self.home.row[None]).one(0, True)
+            if self.plan.row is not None and not self.study.one_blank_row:
+                like_it = Variants(self.study, self.plan, 0, self.plan.row[None]).one(0, True)
                 empty = {key: blank(value) for key, value in like_it.items()}
             listed = [empty if document is None else document for document in listed]
         headers = [d.header for d in self.study.dimensions]
@@ -254,8 +336,8 @@ class Variants:
     # --- as a table -----------------------------------------------------------------------------------------------
     def table(self) -> Table:
         """The rows of all of them, which tell whether the pose is assembled."""
-        pattern = self.home.pattern
-        if self.home.together:
+        pattern = self.plan.pattern
+        if self.plan.together:
             return self._table_together()
         tables, rows = [], []
         for answer in self.each(False):
@@ -270,16 +352,27 @@ class Variants:
 
     def _rows(self, answer: Any) -> tuple[Table, list[Any]]:
         """The rows of what `one` gives, and of each whether its pose is assembled."""
-        pattern = self.home.pattern
+        pattern = self.plan.pattern
         if not pattern.columns or (answer is None and self.study.one_blank_row):
             columns = pattern.columns or [Column("step", "", [None])]
             pattern = Table([Column(c.name, c.unit, [None]) for c in columns], pattern.keys)
         table, there = (emptied(pattern), False) if answer is None else (like(pattern, answer[0]), answer[1])
         return table, there if isinstance(there, list) else [there] * length(table)
 
+    def _together(self, json: bool) -> TogetherSolved:
+        """All of them at once."""
+        name = self.study.key, json
+        if name not in _written:
+            assert self.plan.row is not None
+            made = self.study.together(self.plan.row, json)
+            assert made is not None
+            _written.clear()
+            _written[name] = made
+        return _written[name].of(*self.study.part(self.shown))
+
     def _table_together(self) -> Table:
-        pattern = self.home.pattern
-        table, assembled, alone = _prepared(self.study, self.home, False).of(*part_of(self.study, self.shown))
+        pattern = self.plan.pattern
+        table, assembled, alone = self._together(False)
         v, n = assembled.shape
         columns: list[list[Any]] = [list(c.values) for c in like(pattern, table).columns]
         whole = assembled.ravel().tolist()
@@ -314,53 +407,3 @@ class Variants:
             answer = self.one(i, json and bool(alone[i]))
             if alone[i]:
                 yield i, answer
-
-
-def part_of(study: Study, shown: Rows) -> tuple[Any, Rows]:
-    """Variants as a part of a family, and their inputs as they are shown, (v or 1, n, k)."""
-    from virtualwork.family.family import Family
-    from virtualwork.family.part import Part as FamilyPart
-
-    m, v = study.mechanism, len(shown)
-    family = Family(m, study.in_si(shown))
-    own = study.inputs(m, None).whole
-    moved = {name.j for axis in study.moved.axes for name in axis.names} if study.moved is not None else set()  # type: ignore[union-attr]
-    si, seen = own.values[None], own.shown[None]
-    rates = family.rates(own.speed, own.acceleration)
-    # what each variant has of its own: a column of inputs, or another position in its file
-    for name, column in zip(study.names, shown.T, strict=True):
-        j = (
-            name.j
-            if isinstance(name, Driven)
-            else int(name.of.where[1])
-            if name.of.where[0] == "inputs"
-            else -1
-        )
-        if j < 0 or (j in moved and not isinstance(name, Driven)):
-            continue
-        numbers = np.radians(column) if name.unit == "deg" else np.asarray(column, dtype=float)
-        if isinstance(name, Driven) and name.order:
-            rates[name.order - 1][j] = numbers[:, None]
-        elif isinstance(name, Driven) or name.of.where[-1] == "value":
-            if len(si) == 1:
-                si, seen = (np.repeat(x, v, axis=0) for x in (si, seen))
-            value = Driven.of(m, j)
-            si[:, :, j] = numbers[:, None]
-            as_shown = column if isinstance(name, Driven) else [value.shown(x) for x in numbers.tolist()]
-            seen[:, :, j] = np.asarray(as_shown)[:, None]
-    return FamilyPart(m, family.dimensions, family.values, si, rates), seen
-
-
-_known: dict[tuple[str, bool], Together] = {}
-
-
-def _prepared(study: Study, home: Home, json: bool) -> Together:
-    """The formulas of a study, which a process writes down once."""
-    name = study.key, json
-    if name not in _known:
-        assert home.row is not None
-        made = study.together(home.row, json)
-        assert made is not None
-        _known.clear()
-        _known[name] = made
-    return _known[name]

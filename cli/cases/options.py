@@ -10,13 +10,13 @@ Arguments:
 """
 CASES = """
 Which poses, which mechanism:
-  at INPUT...  A pose: 60deg, 20mm or crank=60deg,arm=30deg; repeatable.
-  over RANGE...  0deg:360deg:1deg or 0deg:360deg/360 of the input, NAME=FROM:TO:STEP of any input or dimension; repeatable.
-  cases FILE.csv  Columns for inputs or dimensions (crank_deg, t_s, links.crank.B.x_mm), a row for each case.
+  at INPUT...  Input of a pose: 60deg, 20mm or crank=60deg,arm=30deg; repeatable.
+  over RANGE...  Range of the input, 0deg:360deg:1deg or 0deg:360deg/360; of any input or dimension, NAME=FROM:TO:STEP; repeatable.
+  cases FILE.csv  Table with a row for each case, a column for each input or dimension (crank_deg, t_s, links.crank.B.x_mm).
   set NAME=VALUE...  Change a dimension: links.crank.B.x=62mm; repeatable.
 """
 BRANCH = """
-  branch all|NUMBER  Every assembly, or one of them.
+  branch all|NUMBER  Every assembly, or one by its number.
 """
 WORKERS = """
   workers N  Processes for many variants.

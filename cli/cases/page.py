@@ -9,15 +9,13 @@ import numpy as np
 
 from cli.cases import poses
 from cli.cases.analysis import Analysis
-from cli.cases.case import Case
 from cli.cases.poses import column
-from cli.cases.study import PoseCase
 from cli.show.picture import shown
 from dalembert.page import Shown
 from dalembert.results.columns import Table
 from virtualwork import MechanismError, quantities
 from virtualwork.animation import JointForce, Series, moving_page
-from virtualwork.computing import ORDERS, computing_page
+from virtualwork.computing_page import ORDERS, computing_page
 from virtualwork.motion import Motion
 from virtualwork.quantities import Component
 
@@ -25,19 +23,18 @@ SWEEP = 361
 """Poses of a turn, where one pose was requested."""
 
 
-def of_poses(cases: Sequence[tuple[str, Case]], units: str | None, bare: Mapping[str, str]) -> bytes:
+def of_poses(analyses: Sequence[tuple[str, Analysis]], units: str | None, bare: Mapping[str, str]) -> bytes:
     """The page of all points and links: it computes itself where the formulas can be written into it, else it replays.
 
     Parameters
     ----------
-    cases : sequence of (variant, case)
+    analyses : sequence of (variant, analysis)
         The first is drawn in full, the others as ghosts.
     units : str, optional
         As --units has them.
     bare : mapping of kind to unit
         What the file's bare numbers mean.
     """
-    analyses = [(name, case.analysis) for name, case in cases if isinstance(case, PoseCase)]
     reason = ""
     if analyses:
         made = _computing(analyses, units, bare)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.cases.analysis import Analysis
-from cli.cases.quantities import cells_of, keys_of, solved
+from cli.cases.poses import cells_of, keys_of, solved
 from cli.show.picture import blank
 from cli.show.result import Section, Sheet
 from dalembert.angles import read_degrees
@@ -17,8 +17,8 @@ from dalembert.units import UNITS, from_si, written
 from virtualwork.formulas.kinematics import Angle
 from virtualwork.picture.over_input import curves_of, forces
 from virtualwork.picture.paper import on_paper
-from virtualwork.picture.quantities import Quantity as Drawn
-from virtualwork.picture.quantities import pace, unwrapped
+from virtualwork.picture.plot_quantities import PlotQuantity as Drawn
+from virtualwork.picture.plot_quantities import pace, unwrapped
 from virtualwork.quantities import Component, links, points
 
 if TYPE_CHECKING:

@@ -2,38 +2,33 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cli.cases.analysis import Analysis
-from cli.cases.quantities import (
-    TURNED,
-    bound,
-    bounds_of,
-    cells,
-    cells_of,
-    form_bounds,
-    in_rows,
-    keys_of,
-    nested,
-    solved,
-)
+from dalembert.angles import degrees
 from dalembert.results.columns import Column, Table
-from virtualwork.formulas.forces import JointMoment
+from virtualwork.formulas.forces import Force, JointMoment
+from virtualwork.formulas.kinematics import Angle
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.quantities import Component
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cli.cases.quantities import Numbers, Reals
     from dalembert.results.columns import Cell, Document
-    from virtualwork.formulas.quantity import Quantity
     from virtualwork.motion import Motion
 
+    Reals = NDArray[np.float64]
+    Numbers = Sequence[float | None]
+
+# of an input that was turned to radians and back, or to metres
+TURNED = 2 * float(np.finfo(float).eps)
 _UNIT = re.compile(r"_(m|m_s|m_s2|m_s3|deg|rad_s|rad_s2|rad_s3|N|N_m|kg|kg_m|kg_m2|J)\Z")
 
 
@@ -45,6 +40,110 @@ def column(header: str, values: Sequence[Cell], error: Callable[[], list[float]]
     return Column(header[: unit.start()], unit[1], values, error)
 
 
+# --- what they are ----------------------------------------------------------------------------------------------------
+def keys_of(wanted: Iterable[Component]) -> list[Quantity]:
+    """What they are asked for by, each once."""
+    return list(dict.fromkeys(key for each in wanted for key in (each.key, each.less) if key))
+
+
+def solved(motion: Motion, keys: Sequence[Quantity]) -> dict[Quantity, Any]:
+    """Quantities of a motion by their keys, (n,), in one pass."""
+    return dict(zip(keys, motion.values(keys), strict=True))
+
+
+def cells(values: Reals, finite: NDArray[np.bool_] | None = None) -> Numbers:
+    """Numbers as Python's own; None where there is none; no −0."""
+    finite = np.isfinite(values) if finite is None else finite
+    listed: list[float] = (values + 0.0).tolist()
+    if finite.all():
+        return listed
+    return [v if there else None for v, there in zip(listed, finite.tolist(), strict=True)]
+
+
+def cells_of(
+    wanted: Iterable[Component],
+    computed: Mapping[Quantity, Any],
+    n: int,
+    driven: Mapping[str, Reals],
+    where: NDArray[np.bool_] | None = None,
+) -> dict[Component, Numbers]:
+    """The numbers of n poses as they are shown.
+
+    Parameters
+    ----------
+    computed : mapping
+        What the motion has computed.
+    driven : mapping
+        Of driven links the angles as requested, degrees.
+    where : array (n,) of bool, optional
+        The poses that have any.
+    """
+    shown: dict[Component, Numbers] = {}
+    finite = np.ones(n, dtype=bool)
+    for each in wanted:
+        if not each.key:
+            # the moment of a pin is zero where there is a force in it
+            shown[each] = cells(np.zeros(n), finite)
+            continue
+        value = computed[each.key]
+        if each.less:
+            # where neither has a finite value, there is no difference
+            with np.errstate(invalid="ignore"):
+                value = value - computed[each.less]
+        # a vector is known where both its components are
+        finite = np.isfinite(value)
+        if each.link:
+            set_by_hand = each.link in driven
+            part = exact_degrees(driven[each.link]) if set_by_hand else degrees(np.exp(1j * value))
+        else:
+            part = each.of(value)
+            finite = finite & np.isfinite(part)
+        shown[each] = cells(part, finite if where is None else finite & where)
+    return shown
+
+
+def exact_degrees(angle: Reals) -> Reals:
+    """Degrees in [0, 360)."""
+    reduced = np.mod(angle, 360.0)
+    return np.where(reduced >= 360.0, 0.0, reduced)
+
+
+def form_bounds(motion: Motion, wanted: Iterable[Component], driven: Mapping[str, Reals]) -> None:
+    """Form the bounds of all numbers, which have most of the work in common."""
+    keys = keys_of(wanted)
+    moving = [key for key in keys if not key.is_force]
+    if len(moving) < len(keys):
+        motion.dynamics.error_estimate().together()
+    # an angle that was given is as it was given
+    motion.rounding.together(
+        [key for key in moving if not (isinstance(key, Angle) and key.is_angle and key.body in driven)]
+    )
+
+
+def bound(motion: Motion, key: Quantity, driven: Mapping[str, Reals]) -> Reals:
+    """Bound the error of a quantity, as it is shown."""
+    if isinstance(key, Force):
+        return np.asarray(key.read(motion.dynamics.error_estimate()))
+    if not key.is_angle:
+        return motion.rounding.of(key)
+    if not isinstance(key, Angle):
+        return np.asarray(np.degrees(motion.rounding.of(key)))
+    if key.body in driven:
+        return TURNED * np.abs(driven[key.body])
+    from dalembert.arithmetic.doubled import PI, Doubled
+
+    # what the degrees as they are shown round besides
+    value = motion.value(key)
+    off = (Doubled(value) * (180.0 / PI) - degrees(np.exp(1j * value))).value
+    return np.asarray(np.degrees(motion.rounding.of(key)) + np.abs(off - 360.0 * np.rint(off / 360.0)))
+
+
+def bounds_of(bounds: Reals) -> list[float]:
+    """Return bounds as Python's numbers; where there is none, no digit holds."""
+    return [math.inf if bound != bound else bound for bound in bounds.tolist()]
+
+
+# --- as a table ----
 def pose_keys(analysis: Analysis) -> tuple[str, ...]:
     """Return the columns that name a pose or a link in it."""
     return ("step", "branch", "link", *analysis.input_columns)
@@ -55,8 +154,8 @@ def table(analysis: Analysis, computed: Sequence[Mapping[Quantity, Any]] = ()) -
 
     `computed`: what the poses of each assembly have computed already; there are no bounds of it.
     """
-    wanted = analysis.tabled
-    n, shown, driven = analysis.inputs.n, analysis.inputs.whole.shown, analysis.set_angles
+    wanted, its = analysis.tabled, analysis.inputs.whole
+    n, shown, driven = len(its.shown), its.shown, analysis.set_angles
     every = computed or [solved(motion, keys_of(wanted)) for motion in analysis.motions]
     times = len(every)
     parts = [cells_of(wanted, each, n, driven) for each in every]
@@ -78,7 +177,7 @@ def table(analysis: Analysis, computed: Sequence[Mapping[Quantity, Any]] = ()) -
                 ]
         return [b for each in bounds for b in bounds_of(each)]  # type: ignore[arg-type]
 
-    columns = [Column("step", "", [*analysis.inputs.whole.steps] * times)]
+    columns = [Column("step", "", [*its.steps] * times)]
     if analysis.several:
         numbers = [str(assembly.number) for assembly in analysis.assemblies for _ in range(n)]
         columns.append(Column("branch", "", numbers))
@@ -222,6 +321,36 @@ def marks_of(analysis: Analysis, motion: Motion) -> list[list[str]]:
             for i in np.flatnonzero(np.abs(reach.apart(q, limit.input)) <= near):
                 result[i] += [word for word in ("limit", "dead point") if word not in result[i]]
     return result
+
+
+def nested(numbers: Mapping[Component, Numbers], n: int) -> dict[str, Any]:
+    """Columns of n poses where they stand in JSON."""
+    result: dict[str, Any] = {}
+    for each, values in numbers.items():
+        if each.path:
+            of = result
+            for name in each.path[:-1]:
+                of = of.setdefault(name, {})
+            of[each.path[-1]] = values
+    if "reactions" in result:
+        result["reactions"] = tuple(
+            {"joint": [joint] * n, "on": [on] * n, "from": [of] * n} | force
+            for (joint, on, of), force in result["reactions"].items()
+        )
+    return result
+
+
+def in_rows(tree: Any, n: int) -> Iterator[Any]:
+    """A tree of columns, its branches mappings and tuples, as n trees of their values, one after the other."""
+    if not isinstance(tree, (dict, tuple)):
+        return iter(tree)
+    if not tree:
+        return ({} if isinstance(tree, dict) else [] for _ in range(n))
+    rows = zip(*[in_rows(of, n) for of in (tree.values() if isinstance(tree, dict) else tree)], strict=True)
+    if isinstance(tree, tuple):
+        return map(list, rows)
+    names = tuple(tree)
+    return (dict(zip(names, row, strict=True)) for row in rows)
 
 
 # --- further tables ---------------------------------------------------------------------------

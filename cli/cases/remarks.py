@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.cases.analysis import Analysis
-from cli.cases.values import Driven, Varied
+from cli.cases.inputs import Driven, Varied
+from dalembert.angles import in_turn
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -175,7 +176,7 @@ def contact_lost(motion: Motion, drive: CamDrive) -> str:
         return text
     if off.speed == 0:
         return f"{text}: it does at rest too"
-    return f"{text}: at constant speed it does from {off.speed:.6g} rad/s on, first at {np.degrees(off.at) % 360:.6g} deg"
+    return f"{text}: at constant speed it does from {off.speed:.6g} rad/s on, first at {in_turn(np.degrees(off.at)):.6g} deg"
 
 
 def statements(analysis: Analysis) -> list[str]:

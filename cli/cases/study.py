@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
@@ -10,9 +10,7 @@ import numpy as np
 
 from cli.cases import poses, remarks
 from cli.cases.analysis import Analysis
-from cli.cases.call import naming
-from cli.cases.case import Case, Study
-from cli.cases.rows import like
+from cli.cases.case import Case, Study, like
 from cli.show.result import Result, Section, Sheet
 from cli.show.terminal import progress
 from dalembert.dataclass import dataclass, field, replace
@@ -133,9 +131,9 @@ class PoseCase(Case):
     def _at_guess(self, block: Analysis) -> Analysis:
         """The block's first pose, with the inputs where the guess has them: there the mechanism is assembled."""
         first = block.inputs.part(0, 1)
-        home = replace(block, inputs=replace(first, values=np.array([self.analysis.mechanism.at])))
-        home.assemblies = block.assemblies
-        return home
+        first_pose = replace(block, inputs=replace(first, values=np.array([self.analysis.mechanism.at])))
+        first_pose.assemblies = block.assemblies
+        return first_pose
 
     @cached_property
     def further(self) -> Further:
@@ -195,36 +193,38 @@ class PoseStudy(Study):
 
     def warnings(self) -> list[str]:
         """Rates without a speed, forces without a mass or a load."""
-        whole = Analysis(self.request, self.mechanism, self.inputs(self.mechanism, None))
-        return remarks.without_meaning(whole, self.names)
+        return remarks.without_meaning(self.own, self.names)
 
     def case(self, row: Rows | None = None) -> PoseCase:
         """A variant, or the mechanism itself."""
-        m = self.mechanism if row is None else self.variant(row)
-        return PoseCase(self, Analysis(self.request, m, self.inputs(m, row)))
+        return PoseCase(self, self.analysis(row))
 
     def together(self, row: Rows, json: bool) -> Together | None:
         """How variants are solved at once."""
-        from cli.cases.loop import part_of
         from cli.cases.together import Together
         from virtualwork.family.part import Solver
 
         if self.request.branch is not None or self.digits or (json and self.beside_each):
             return None
-        m = self.mechanism
         # a rate that only the variants have makes for more columns
-        request = self.request._replace(order=self.case(row).analysis.order)
-        made = Together(Analysis(request, m, self.inputs(m, None)), Solver(part_of(self, row[None])[0]), json)
+        request = self.request._replace(order=self.analysis(row).order)
+        made = Together(replace(self.own, request=request), Solver(self.part(row[None])[0]), json)
         return made if made.pays else None
+
+    def page(self, cases: Sequence[tuple[str, Case]], units: str | None) -> bytes:
+        """The page on which every mechanism moves."""
+        from cli.cases.page import of_poses
+
+        analyses = [(name, case.analysis) for name, case in cases if isinstance(case, PoseCase)]
+        return of_poses(analyses, units, self.bare)
 
     def in_blocks(self, show: ShowOptions) -> bool:
         """Whether the table alone is written: a block of poses at a time."""
-        return show.streams and (show.holds_one or self.case().analysis.is_long)
+        return show.streams and (show.holds_one or self.own.is_long)
 
     def check_size(self, show: ShowOptions, times: int) -> None:
         """Refuse more poses than the memory holds."""
-        whole = Analysis(self.request, self.mechanism, self.inputs(self.mechanism, None))
-        whole.check_size(json=show.as_json, table=show.needs_table, times=times)
+        self.own.check_size(json=show.as_json, table=show.needs_table, times=times)
 
     @property
     def beside_each(self) -> bool:
@@ -250,7 +250,6 @@ class PoseStudy(Study):
             sheets=lambda: [Sheet("", self.sections(a, tables), lambda: self.figure(a))],
             warnings=case.warnings(),
             failed=lambda: not any(a.assembled(motion).any() for motion in a.motions),
-            within=lambda: naming(a.file),
         )
 
     def sections(self, analysis: Analysis, tables: Mapping[str, Callable[[], Table]]) -> list[Section]:

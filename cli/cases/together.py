@@ -12,7 +12,7 @@ import numpy as np
 from cli.cases import poses
 from cli.cases.analysis import Analysis
 from cli.cases.inputs import Inputs
-from cli.cases.quantities import keys_of
+from cli.cases.poses import keys_of
 from cli.cases.remarks import pinned
 from virtualwork.family.part import ASSEMBLED, Part, Solver
 from virtualwork.formulas.forces import Effort, NewtonEuler

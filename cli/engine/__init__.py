@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,10 +11,7 @@ from cli.read import options
 from cli.show.output import command
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from cli.show.result import Result
-    from dalembert.results.way import Topic
 
 
 EXAMPLE = "inline-four"
@@ -22,11 +20,11 @@ Arguments:
   cylinders CYLINDERS  CSV with a row for each cylinder; - is standard input.
 What:
   speed SPEED  Speed of the crankshaft, such as 3000rpm.
-  order K  The highest order.
+  order K  Highest order.
 How: what balances it:
   counterweight_share SHARE  Counterweights for the rotating masses and this share of the reciprocating ones, such as 0.5.
-  plane NAME:Z:RADIUS  A plane of the counterweights, such as A:0mm:60mm, once or more; without: opposite each crank pin.
-  shaft ORDER:Z:with|against  A balance shaft at ORDER times the speed, with or against the crank, such as 2:150mm:against; repeatable.
+  plane NAME:Z:RADIUS  Plane of counterweights, such as A:0mm:60mm; repeatable (default: opposite each crank pin).
+  shaft ORDER:Z:with|against  Balance shaft at ORDER times the speed, with or against the crank: 2:150mm:against; repeatable.
 """
 
 
@@ -39,7 +37,8 @@ def run(
     plane: list[str] | None = None,
     shaft: list[str] | None = None,
 ) -> Result:
-    """Find the shaking forces and couples of an engine by exact orders, and what counterweights and balance shafts leave.
+    """Compute the shaking forces and couples of an engine by exact orders, and the residuals after counterweights and
+    balance shafts.
 
     CYLINDERS has the columns cylinder, crank_deg, bank_deg, z_*, throw_*, rod_*, reciprocating_* and rotating_* (masses); * is a
     unit. The crank pin stands at θ + crank_deg; bank_deg is the direction of the cylinder's axis, counter-clockwise from
@@ -47,7 +46,7 @@ def run(
     order and sense balance force and couple.
     """
     from cli.engine.cylinders import Engine, read_cylinders, read_shafts
-    from cli.engine.tables import METHOD, tables, warnings
+    from cli.engine.tables import METHOD, draw, tables, warnings, way
     from cli.read.planes import from_options
     from cli.show.result import Result
 
@@ -55,24 +54,15 @@ def run(
         raise options.bad("--speed", "expected the speed of the crankshaft, such as --speed 3000rpm")
     omega = options.needed("--speed", speed, "speed", positive=True)
     planes = None if plane is None else from_options(plane)
+    read = read_cylinders(cylinders)
     engine = Engine(
-        read_cylinders(cylinders), omega, order, counterweight_share, planes, read_shafts(shaft or [], order)
+        read, omega, order, counterweight_share, planes, read_shafts(shaft or [], order), read.pins
     )
 
-    def figure() -> Figure:
-        from cli.engine.tables import draw
-
-        return draw(engine)
-
-    def way() -> list[Topic]:
-        from cli.engine.tables import way
-
-        return way(engine)
-
     return Result(
-        way=way,
+        way=partial(way, engine),
         tables=tables(engine),
-        figure=figure,
+        figure=partial(draw, engine),
         method=METHOD,
         about={"title": "Balance of an engine"},
         warnings=[*engine.cylinders.table.warnings, *warnings(engine)],

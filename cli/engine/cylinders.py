@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing import correct
-from balancing.engine import LONGEST_RATIO, Forces, reciprocating_forces, shaft_unbalances, turning_force
+from balancing.engine import (
+    LONGEST_RATIO,
+    Forces,
+    opposite,
+    reciprocating_forces,
+    shaft_unbalances,
+    turning_force,
+)
 from cli.read import options
 from cli.read.planes import Planes
 from dalembert.angles import phasor
+from dalembert.arithmetic.shapes import as_array
 from dalembert.errors import DataError, quote
 from dalembert.tables.table import Table, read
 from dalembert.units import find_unit
@@ -37,6 +45,28 @@ class Cylinders:
     rotating: Real
     unbalance_unit: str
     length_unit: str
+
+    @cached_property
+    def pins(self) -> list[list[int]]:
+        """The cylinders of each crank pin."""
+        pins: dict[tuple[float, float], list[int]] = {}
+        for i, pin in enumerate(zip(self.z.tolist(), (self.crank % 360.0).tolist(), strict=True)):
+            pins.setdefault(pin, []).append(i)
+        return list(pins.values())
+
+    @property
+    def in_32_digits(self) -> Cylinders:
+        """The same cylinders with the decimals of the table as they are written."""
+        from cli.read.exact import as_written
+        from dalembert.arithmetic.shapes import in_32_digits
+
+        numbers: dict[str, Any] = {
+            name: as_written(self.table.numbers[name])
+            if name in self.table.numbers
+            else in_32_digits(getattr(self, name))
+            for name in ("crank", "bank", "z", "throw", "rod", "reciprocating", "rotating")
+        }
+        return replace(self, **numbers)
 
     @property
     def horizontal(self) -> bool:
@@ -154,6 +184,26 @@ class Engine:
     share: float | None
     planes: Planes | None
     shafts: list[Shaft]
+    pins: list[list[int]]
+    """The cylinders of each crank pin, which share its counterweight."""
+
+    @cached_property
+    def second(self) -> Engine:
+        """The same engine in numbers of 32 digits, with the decimals of the table and of the options as they are written."""
+        from cli.read.exact import array, rates
+
+        numbers: dict[str, Any] = {
+            "cylinders": self.cylinders.in_32_digits,
+            "speed": rates(self.speed),
+            "share": None if self.share is None else array(self.share),
+            "shafts": [replace(shaft, z=array(shaft.z)) for shaft in self.shafts],  # type: ignore[arg-type]
+        }
+        if self.planes is not None:
+            own: dict[str, Any] = {
+                name: array(x) for name in ("z", "radius") if (x := getattr(self.planes, name)) is not None
+            }
+            numbers["planes"] = replace(self.planes, **own)
+        return replace(self, **numbers)
 
     @cached_property
     def reciprocating(self) -> Forces:
@@ -175,23 +225,15 @@ class Engine:
         c = self.cylinders
         if self.share is None and self.planes is None:
             return None
-        bob = phasor((self.share or 0.0) * c.reciprocating * c.throw, c.crank, "deg")
+        share = 0.0 if self.share is None else self.share
+        bob = phasor(share * c.reciprocating * c.throw, c.crank, "deg")
         if self.planes is not None:
             z = np.zeros(1) if self.planes.z is None else self.planes.z
-            every, of_bob = (correct(u, c.z, z).unbalance for u in (self.rotating + bob, bob))
+            every, of_bob = (opposite(u, c.z, z) for u in (self.rotating + bob, bob))
             return Counterweights(self.planes.name, z, every, of_bob, self.planes.radius)
-        # cylinders that share a crank pin share its counterweight
-        pins: dict[tuple[float, float], list[int]] = {}
-        for i, pin in enumerate(zip(c.z.tolist(), (c.crank % 360.0).tolist(), strict=True)):
-            pins.setdefault(pin, []).append(i)
-        each = list(pins.values())
-        return Counterweights(
-            ["+".join(c.names[i] for i in pin) for pin in each],
-            np.array([z for z, _ in pins]),
-            np.array([-(self.rotating + bob)[pin].sum() for pin in each]),
-            np.array([-bob[pin].sum() for pin in each]),
-            None,
-        )
+        every, of_bob = (-np.stack([u[pin].sum() for pin in self.pins]) for u in (self.rotating + bob, bob))
+        names = ["+".join(c.names[i] for i in pin) for pin in self.pins]
+        return Counterweights(names, c.z[[pin[0] for pin in self.pins]], every, of_bob, None)
 
     @cached_property
     def on_the_crank(self) -> Forces:
@@ -207,10 +249,10 @@ class Engine:
     @cached_property
     def shaft_unbalances(self) -> Complex:
         """Of each shaft at θ = 0, kg·m."""
-        result = np.zeros(len(self.shafts), dtype=complex)
+        result = np.zeros_like(self.cylinders.z, dtype=complex, shape=len(self.shafts))
         for order, against in {(s.order, s.against) for s in self.shafts}:
             alike = [i for i, s in enumerate(self.shafts) if (s.order, s.against) == (order, against)]
-            z = [self.shafts[i].z for i in alike]
+            z = np.stack([as_array(self.shafts[i].z) for i in alike])
             result[alike] = shaft_unbalances(self.on_the_crank, z, self.speed, order, against)
         return result
 
@@ -230,7 +272,7 @@ class Engine:
 
     def idle(self, shaft: Shaft, unbalance: complex) -> str:
         """Say why a shaft has nothing to balance; empty where it has."""
-        limit = self.on_the_crank.rounding()[shaft.order - 1] / (shaft.order * self.speed) ** 2
+        limit = self.on_the_crank.negligible()[shaft.order - 1] / (shaft.order * self.speed) ** 2
         if abs(unbalance) > limit:
             return ""
         couple = self.on_the_crank.largest(couple=True)[shaft.order - 1] > 0

@@ -11,6 +11,7 @@ from balancing.engine import Forces, piston_orders, reciprocating_forces
 from cli.engine.cylinders import Engine
 from cli.show.picture import blank
 from dalembert.angles import degrees
+from dalembert.arithmetic.shapes import is_doubled
 from dalembert.drawing.amounts import prefixed
 from dalembert.drawing.polar import head
 from dalembert.drawing.sheet import plain, sheet
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cli.engine.cylinders import Complex, Counterweights, Engine, Real
+    from cli.engine.cylinders import Complex, Engine, Real
 
 
 METHOD = (
@@ -37,54 +38,71 @@ def tables(e: Engine) -> dict[str, Callable[[], Table]]:
     result: dict[str, Callable[[], Table]] = {"orders": lambda: orders(e), "rotating": lambda: rotating(e)}
     result |= {"counterweights": lambda: counterweights(e), "shafts": lambda: shafts(e)}
     result["residual_orders"] = lambda: residual(e)
-    weights = e.counterweights
-    return result | (
-        {"locomotive": lambda: locomotive(e, weights)}
-        if weights is not None and e.cylinders.horizontal
-        else {}
-    )
+    if e.counterweights is not None and e.cylinders.horizontal:
+        result["locomotive"] = lambda: locomotive(e)
+    return result
 
 
-def coefficients(e: Engine, forces: Forces) -> list[Column]:
+Of = Callable[[Engine], Any]
+"""A number of an engine, of floats or in 32 digits."""
+
+
+def one(e: Engine, name: str, dimension: str, of: Of, unit: str = "", place: str | None = "") -> Column:
+    """A quantity: its errors are by what it differs from the second run, in 32 digits."""
+    return number(name, dimension, of(e), unit, place=place, exact=lambda: of(e.second).doubled)
+
+
+def polar(e: Engine, name: str, dimension: str, of: Of, unit: str = "", angle: str = "angle") -> list[Column]:
+    """Sizes and angles of vectors."""
+    return [
+        one(e, name, dimension, lambda e: np.abs(of(e)), unit),
+        number(angle, "angle", degrees(of(e)), exact=lambda: of(e.second).vectors.degrees),
+    ]
+
+
+def coefficients(e: Engine, forces: Callable[[Engine], Forces]) -> list[Column]:
     """The coefficients of cos kθ and sin kθ of the force and the couple."""
     columns = []
     for name, dimension, couple in (("force", "force", False), ("couple", "torque", True)):
-        values = forces.coefficients(couple)
         for i, axis in enumerate("xy"):
             for j, part in enumerate(("cos", "sin")):
-                column = number(
-                    f"{name}_{axis}_{part}", dimension, values[:, i, j], error=_bound(forces, couple)
-                )
+
+                def of(e: Engine, couple: bool = couple, i: int = i, j: int = j) -> Any:
+                    return forces(e).coefficients(couple)[:, i, j]
+
+                column = one(e, f"{name}_{axis}_{part}", dimension, of)
                 column.place = f"{name}_{column.unit}.{axis}.{j}"
                 columns.append(column)
     return columns
 
 
-def _bound(forces: Forces, couple: bool) -> Callable[[], Real]:
-    return lambda: forces.rounding(couple)
-
-
-def largest(forces: Forces, prefix: str = "", place: str | None = "") -> list[Column]:
+def largest(
+    e: Engine, forces: Callable[[Engine], Forces], prefix: str = "", place: str | None = ""
+) -> list[Column]:
     """The largest force and couple of each order over a turn."""
     return [
-        number(
-            f"{prefix}{name}_max",
-            dimension,
-            forces.largest(couple),
-            error=_bound(forces, couple),
-            place=place,
-        )
-        for name, dimension, couple in (("force", "force", False), ("couple", "torque", True))
+        one(e, f"{prefix}force_max", "force", lambda e: forces(e).largest(), place=place),
+        one(e, f"{prefix}couple_max", "torque", lambda e: forces(e).largest(couple=True), place=place),
     ]
+
+
+def of_reciprocating(e: Engine) -> Forces:
+    """The forces of the reciprocating masses."""
+    return e.reciprocating
+
+
+def of_residual(e: Engine) -> Forces:
+    """All that shakes the frame."""
+    return e.residual
 
 
 def orders(e: Engine) -> Table:
     """A row for each order."""
     columns = [
         names("order", list(range(1, e.highest + 1))),
-        *largest(e.reciprocating),
-        *(largest(e.residual, "residual_", None) if e.balanced or e.rotating.any() else []),
-        *coefficients(e, e.reciprocating),
+        *largest(e, of_reciprocating),
+        *(largest(e, of_residual, "residual_", None) if e.balanced or e.rotating.any() else []),
+        *coefficients(e, of_reciprocating),
     ]
     above = "forces on the frame and couples about z = 0 of the reciprocating masses, coefficients of cos kθ and sin kθ:"
     return Table(columns, ("order",), "orders[]", above)
@@ -94,8 +112,8 @@ def residual(e: Engine) -> Table:
     """The orders after counterweights and shafts, the rotating masses included."""
     columns = [
         names("order", list(range(1, e.highest + 1))),
-        *largest(e.residual),
-        *coefficients(e, e.residual),
+        *largest(e, of_residual),
+        *coefficients(e, of_residual),
     ]
     kept = "reciprocating and rotating masses" + ", counterweights" * (e.counterweights is not None)
     above = f"{kept} and shafts together:" if e.shafts else f"{kept} together:"
@@ -105,18 +123,28 @@ def residual(e: Engine) -> Table:
 def rotating(e: Engine) -> Table:
     """The unbalance of the rotating masses at θ = 0."""
     c = e.cylinders
-    static, couple = (np.array([each.sum()]) for each in (e.rotating, e.rotating * c.z))
-    bounds = [8e-16 * len(c.names) * np.abs(each).sum() for each in (e.rotating, e.rotating * c.z)]
-    static, couple = (np.where(np.abs(v) > b, v, 0) for v, b in zip((static, couple), bounds, strict=True))
+
+    def total(e: Engine, z: Any) -> Any:
+        vectors = e.rotating * z
+        limit = 8e-16 * len(c.names) * np.abs(e.rotating * z).sum()
+        return (
+            vectors.sum()[None]
+            if is_doubled(vectors)
+            else np.where(np.abs(vectors.sum()) > limit, vectors.sum(), 0)[None]
+        )
+
     return Table(
         [
-            number("unbalance", "unbalance", np.abs(static), c.unbalance_unit),
-            number("angle", "angle", degrees(static)),
-            number("couple", "inertia", np.abs(couple)),
-            number("couple_angle", "angle", degrees(couple)),
+            *polar(e, "unbalance", "unbalance", lambda e: total(e, 1.0), c.unbalance_unit),
+            *polar(e, "couple", "inertia", lambda e: total(e, e.cylinders.z), angle="couple_angle"),
         ],
         place="rotating",
     )
+
+
+def of_weights(e: Engine) -> Any:
+    """The unbalances of the counterweights."""
+    return e.counterweights.unbalance  # type: ignore[union-attr]
 
 
 def counterweights(e: Engine) -> Table:
@@ -124,43 +152,49 @@ def counterweights(e: Engine) -> Table:
     weights = e.counterweights
     if weights is None:
         return Table([], place="counterweights[]", documented=[names("counterweight", [])])
-    unbalance = np.abs(weights.unbalance)
     columns = [
         names("counterweight", weights.names),
         number("z", "length", weights.z, e.cylinders.length_unit),
-        number("unbalance", "unbalance", unbalance, e.cylinders.unbalance_unit),
-        number("angle", "angle", degrees(weights.unbalance)),
+        *polar(e, "unbalance", "unbalance", of_weights, e.cylinders.unbalance_unit),
     ]
     if weights.radius is not None:
         mass = e.cylinders.table.numbers["reciprocating"].unit
-        columns.append(number("mass", "mass", unbalance / weights.radius, mass))
+
+        def masses(e: Engine) -> Any:
+            return np.abs(of_weights(e)) / e.planes.radius  # type: ignore[union-attr]
+
+        columns.append(one(e, "mass", "mass", masses, mass))
     return Table(columns, ("counterweight",), "counterweights[]", "at θ = 0")
 
 
 def shafts(e: Engine) -> Table:
     """A row for each."""
-    shaft_unbalances = e.shaft_unbalances
     columns = [
         names("order", [s.order for s in e.shafts]),
         number("z", "length", [s.z for s in e.shafts], e.cylinders.length_unit),
         names("direction", ["against" if s.against else "with" for s in e.shafts]),
-        number("unbalance", "unbalance", np.abs(shaft_unbalances), e.cylinders.unbalance_unit),
-        number("angle", "angle", degrees(shaft_unbalances)),
+        *polar(e, "unbalance", "unbalance", lambda e: e.shaft_unbalances, e.cylinders.unbalance_unit),
     ]
     if not e.shafts:
         return Table([], place="shafts[]", documented=columns)
     return Table(columns, ("order", "z", "direction"), "shafts[]", "at θ = 0")
 
 
-def locomotive(e: Engine, weights: Counterweights) -> Table:
+def locomotive(e: Engine) -> Table:
     """What a driver of a locomotive and the track feel of the first order."""
-    blow = float(np.abs(weights.for_reciprocating).max()) * e.speed**2
-    x = [np.hypot(*e.residual.coefficients(couple)[0, 0]) for couple in (False, True)]
+
+    def along(couple: bool) -> Of:
+        return lambda e: np.hypot(*e.residual.coefficients(couple)[0, 0])[None]
+
+    def blow(e: Engine) -> Any:
+        each = np.abs(e.counterweights.for_reciprocating)  # type: ignore[union-attr]
+        return each[[each.argmax()]] * e.speed**2
+
     return Table(
         [
-            number("tractive_effort", "force", [x[0]]),
-            number("swaying_couple", "torque", [x[1]]),
-            number("hammer_blow", "force", [blow]),
+            one(e, "tractive_effort", "force", along(False)),
+            one(e, "swaying_couple", "torque", along(True)),
+            one(e, "hammer_blow", "force", blow),
         ],
         place="locomotive",
         above="variation of the tractive effort and swaying couple about z = 0 (±, first order), hammer blow of one wheel (±)",
@@ -223,19 +257,19 @@ def draw(e: Engine) -> Figure:
                     values,
                     e.cylinders.names,
                     unit,
-                    f.rounding(couple),
+                    f.negligible(couple),
                     k,
                 )
     return figure
 
 
 def _polygon(
-    axes: Axes, title: str, vectors: Complex, names: list[str], unit: str, rounding: Real, k: int
+    axes: Axes, title: str, vectors: Complex, names: list[str], unit: str, negligible: Real, k: int
 ) -> None:
     """Draw vectors one behind the other."""
     factor, unit = prefixed(float(max(np.abs(vectors).max(initial=0.0), abs(vectors.sum()))), unit)
     ends = np.concatenate([[0.0], np.cumsum(vectors)]) * factor
-    total = complex(ends[-1]) if abs(vectors.sum()) > rounding[k] else 0.0
+    total = complex(ends[-1]) if abs(vectors.sum()) > negligible[k] else 0.0
     axes.set_title(f"{title}, {unit}", fontsize=9)
     middle = ends.mean()
     size = float(np.abs(ends[:, None] - ends[None, :]).max()) or 1.0

@@ -19,15 +19,13 @@ OPTIONS = f"{FILE}{CASES}{WORKERS}"
 def run(own: Options, show: ShowOptions) -> Result:
     """Find the positions in which a mechanism rests under its loads without effort, and whether stably.
 
-    About a stable position: the period of small oscillations, without dampers and friction.
-    --over or --cases of an input give the range that is searched; without them it is a whole turn, of a slide two sizes
-    of the mechanism either way.
+    A stable position has its period of small oscillations, without dampers and friction. --over or --cases of an
+    input set the range of the search (default: a whole turn; of a slide two sizes of the mechanism either way).
     """
-    from cli.cases.analysis import Request
     from cli.cases.call import Call
     from cli.equilibrium.rest import Equilibria
 
-    call = Call.of(own, show, Request(own.file))
+    call = Call.of(own, show)
     if own.at:
         from cli.read.options import bad
 
@@ -35,4 +33,4 @@ def run(own: Options, show: ShowOptions) -> Result:
             "--at",
             "equilibrium searches a range of the input: expected --over, such as --over 0deg:90deg:1deg",
         )
-    return call.result(call.study(Equilibria))
+    return call.result(Equilibria)

@@ -13,6 +13,7 @@ from cli.cases.case import TableCase, TableStudy
 from cli.cases.inputs import Inputs
 from cli.cases.ledger import Entry, entries_of, ledger
 from cli.cases.poses import column
+from dalembert.angles import in_turn
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.results.columns import Column, Table, names, number
 from dalembert.results.way import Topic, figures
@@ -63,7 +64,9 @@ class Rest(TableCase):
         one = len(m.inputs) == 1
         columns = []
         for j, (entry, header) in enumerate(zip(m.inputs, self.analysis.input_columns, strict=True)):
-            values = [e.inputs[j] if entry.is_slide else math.degrees(e.inputs[j]) % 360.0 for e in positions]
+            values = [
+                e.inputs[j] if entry.is_slide else in_turn(math.degrees(e.inputs[j])) for e in positions
+            ]
             place = self.analysis.input_names[entry.name]
             columns.append(column(header, values))
             columns[-1].place = place if one else f"inputs.{entry.name}.{place}"
@@ -125,10 +128,10 @@ class Equilibria(TableStudy):
 
     def case(self, row: Rows | None = None) -> Rest:
         """A variant, or the mechanism itself."""
-        m = self.mechanism if row is None else self.variant(row)
-        _ = m.assembly
+        analysis = self.analysis(row)
+        _ = analysis.mechanism.assembly
         ranged = self.moved is not None and self.moved.axes[0].option != "[input] law"
-        return Rest(Analysis(self.request, m, self.inputs(m, row)), ranged)
+        return Rest(analysis, ranged)
 
 
 def way(a: Analysis, positions: Sequence[Equilibrium]) -> list[Topic]:
@@ -148,7 +151,7 @@ def way(a: Analysis, positions: Sequence[Equilibrium]) -> list[Topic]:
         head = []
         for entry, value in zip(m.inputs, e.inputs, strict=True):
             key = a.input_names[entry.name]
-            shown = value if entry.is_slide else float(np.degrees(value)) % 360.0
+            shown = value if entry.is_slide else in_turn(math.degrees(value))
             one = len(m.inputs) == 1
             place = key if one else f"inputs.{entry.name}.{key}"
             name = "input" if one else f"{entry.name}_input"

@@ -28,7 +28,7 @@ METHOD = (
 
 OPTIONS = """
 Arguments:
-  name [NAME]  The example to write here.
+  name [NAME]  Example whose files are written into the current folder.
 """
 
 

@@ -23,11 +23,11 @@ OPTIONS = """
 Arguments:
   file FILE.toml  The exercise.
 What:
-  students NUMBER|ROSTER.csv  How many students, or a table with a column student; others are kept (default 1).
-  seed N  Random seed of the draws (default 1).
-  folder -o --output FOLDER  Where the sheets, answers.csv, key.csv, solutions.html and moodle.xml go.
-  page  Put the page that computes on each sheet: for practice, as it shows the answers too.
-  system --for prairielearn|numbas  Write the questions for this system too; repeatable.
+  students NUMBER|ROSTER.csv  Number of students, or a table with a column student; its other columns are kept.
+  seed N  Random seed of the drawn values.
+  folder -o --output FOLDER  Folder of the sheets, answers.csv, key.csv, solutions.html and moodle.xml.
+  page  Put a page that computes on each sheet, for practice: it shows the answers.
+  system --for prairielearn|numbas  Write the questions for this system in addition; repeatable.
 """
 SYSTEMS = ("prairielearn", "numbas")
 MOST = 2000
@@ -45,21 +45,20 @@ def _run(
 
     FILE.toml has command (what solves it), title, text with {links.crank.B.x} or {rotor.csv:W1.mass_kg} in it, a table
     [draw] of values by steps such as "50mm:80mm:5mm" or lists, and [[ask]] with quantity (a column of the command's
-    CSV), where (its key columns), figures, points, unit. Only variants that can be assembled, lie away from limits and
-    are well conditioned are drawn.
+    CSV), where (its key columns), figures, points, unit. Every drawn variant can be assembled, lies away from limits
+    and is well conditioned.
     """
     from cli.exercise.description import read_exercise
     from cli.exercise.drawings import figure, moving
     from cli.exercise.files import put
     from cli.exercise.mistakes import candidates
     from cli.exercise.moodle import moodle
-    from cli.exercise.sheets import answers_csv, filled, key_csv, sheet_page
+    from cli.exercise.sheets import answers_csv, filled, key_csv, sheet_page, tables
     from cli.exercise.solutions import solutions
     from cli.exercise.solving import workshop
-    from cli.exercise.tables import tables
     from cli.exercise.variants import variants
+    from cli.show.capture import options_of
     from cli.show.result import Result
-    from cli.show.taking import options_of
 
     if folder is None:
         raise options.bad("-o", "expected -o FOLDER, where the sheets go")

@@ -153,7 +153,7 @@ def _names(labels: Any, at: Any, xy: Any, ground: set[str]) -> Iterator[str]:
 
 def _varied(variant: Variant) -> Mechanism:
     """The mechanism with the variant's dimensions."""
-    from cli.cases.values import assigned
+    from cli.cases.axes import assigned
 
     described = variant.problem.workshop.described
     words = variant.problem.command

@@ -1,4 +1,4 @@
-"""Sheets, key, table of answers and solutions of an exercise."""
+"""Sheets, key, table of answers and solutions of an exercise; the key as a table."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from cli.exercise.solving import Sheet, Workshop
 from cli.exercise.variants import Variant
 from dalembert.errors import DataError, quote
 from dalembert.figures import written
+from dalembert.results.columns import Table, names
 from dalembert.units import parted
 from dalembert.units import written as unit_written
 
@@ -112,12 +113,6 @@ def label(ask: Ask) -> str:
 def figures_text(figures: int) -> str:
     """Return how many figures are asked for, in words."""
     return "1 significant figure" if figures == 1 else f"{figures} significant figures"
-
-
-def points_text(ask: Ask) -> str:
-    """Return the points of a question."""
-    number = f"{float(ask.points):g}"
-    return f"{number} point" if number == "1" else f"{number} points"
 
 
 def problem_html(variant: Variant, drawing: str) -> str:
@@ -229,3 +224,27 @@ def key_csv(exercise: Exercise, students: Sequence[Student], variants: Sequence[
         for answer in variant.answers
     ]  # fmt: skip
     return table_text(header, rows)
+
+
+def tables(
+    exercise: Exercise, students: Sequence[Student], variants: Sequence[Variant]
+) -> dict[str, Callable[[], Table]]:
+    """The tables of the result."""
+    rows = [
+        (student, answer)
+        for student, variant in zip(students, variants, strict=True)
+        for answer in variant.answers
+    ]
+    keys = exercise.keys
+    columns = [
+        names("student", [student.name for student, _ in rows]),
+        *(names(key, [answer.ask.where.get(key) for _, answer in rows]) for key in keys),
+        names("quantity", [answer.ask.quantity for _, answer in rows]),
+        names("unit", [answer.unit for _, answer in rows]),
+        names("answer", [written(answer.value, answer.ask.figures) for _, answer in rows]),
+        names("value", [answer.value for _, answer in rows]),
+        names("figures", [answer.ask.figures for _, answer in rows]),
+        names("points", [float(answer.ask.points) for _, answer in rows]),
+    ]
+    table = Table(columns, ["student", *keys, "quantity"], "key[]")
+    return {"key": lambda: table}

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from cli.exercise.answers import Solved
 from cli.exercise.description import Exercise, Value, cell_of, value_of
-from cli.show.taking import result_of
+from cli.show.capture import result_of
 from dalembert.errors import DataError, quote
 from dalembert.hints import nearest
 from dalembert.quantities import is_number

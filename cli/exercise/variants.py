@@ -13,7 +13,7 @@ from typing import Any
 from cli.exercise.answers import Answer, Solved
 from cli.exercise.description import Exercise, Value
 from cli.exercise.solving import Problem, Workshop
-from cli.show.taking import options_of
+from cli.show.capture import options_of
 from dalembert.errors import DataError
 from dalembert.figures import Right
 from dalembert.units import unit_name

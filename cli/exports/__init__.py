@@ -31,9 +31,9 @@ OPTIONS = """
 Arguments:
   file FILE.toml  The mechanism; - is standard input.
 Options:
-  output --output -o FILE  Ends in .dxf, .svg, .csv, .urdf, .sdf or .xml (MJCF).
-  at INPUT  The start pose, such as 60deg or crank=60deg,arm=30deg; else the file's own.
-  profile FOLLOWER  The profile of the cam that moves this slider or arm, in the cam's axes (.dxf, .svg, .csv).
+  output --output -o FILE  File to write: .dxf, .svg, .csv, .urdf, .sdf or .xml (MJCF).
+  at INPUT  Start pose, such as 60deg or crank=60deg,arm=30deg (default: the file's input).
+  profile FOLLOWER  Profile of the cam that moves this slider or arm, in the cam's axes (.dxf, .svg, .csv).
 """
 
 
@@ -42,14 +42,14 @@ def run(file: str, output: Path, at: str | None = None, profile: str | None = No
     """Write a mechanism for other programs: a drawing (DXF, SVG), curves (CSV), a robot (URDF, SDF, MJCF).
 
     A drawing shows the pose of the file's own input, and the curves over the travel of the input; a robot starts in that
-    pose, closed to the last digit. What a format cannot hold is named on standard error.
+    pose, closed to the last digit. Standard error names what the format cannot hold.
     """
     from cli.cases.axes import grids
     from cli.cases.call import load
     from cli.cases.inputs import of_one
+    from cli.exports.file import file_bytes
     from cli.exports.profile import SUFFIXES, of_follower
-    from cli.exports.profile import written as of_cam
-    from cli.exports.written import written
+    from cli.exports.profile import file_bytes as profile_bytes
     from cli.show.result import Result
     from virtualwork import MechanismError
 
@@ -68,9 +68,9 @@ def run(file: str, output: Path, at: str | None = None, profile: str | None = No
     name = "standard input" if file == "-" else Path(file).name
     try:
         if profile is not None:
-            data, notes = of_cam(m, of_follower(m, profile), suffix, name, bare)
+            data, notes = profile_bytes(m, of_follower(m, profile), suffix, name, bare)
         else:
-            data, notes = written(m, inputs, suffix, name, bare)
+            data, notes = file_bytes(m, inputs, suffix, name, bare)
     except MechanismError as error:
         raise DataError(f"{file}: {error}") from None
 

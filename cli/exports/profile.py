@@ -37,7 +37,7 @@ def of_follower(m: Description, name: str) -> CamDrive:
     return m.cam_drives[names[name]]
 
 
-def written(
+def file_bytes(
     m: Description, drive: CamDrive, suffix: str, file: str, bare: Mapping[str, str]
 ) -> tuple[bytes, list[str]]:
     """Return the profile as a file, and warnings; `bare` are the units of the mechanism's own file."""

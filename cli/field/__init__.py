@@ -27,39 +27,40 @@ OPTIONS = """
 Arguments:
   runs RUNS  CSV of runs; - is standard input.
 What:
-  influence FILE.csv  Stored coefficients, in place of trial runs.
-  runout FILE.csv  Run-out vectors: sensor, amplitude_*, phase_deg.
-  phase_lag  The instrument's phase lags.
+  influence FILE.csv  Stored influence coefficients, in place of trial runs.
+  runout FILE.csv  Run-out vectors to subtract: sensor, amplitude_*, phase_deg.
+  phase_lag  The phase of the instrument lags.
 How:
-  objective  Smallest squares or largest residual.
-  max_mass [PLANE=]MASS  Limit of each correction: 5g or A=5g.
-  max_residual AMPLITUDE  Limit of each residual, such as 76um.
-  from_here  Correct the rotor as it stands now.
-  reading_error 2%,2deg  Standard deviations of amplitude, phase.
-  grade GRADE  Tolerance: G6.3 (ISO 21940-11), API or MIL.
-  blades N  Split onto N places, evenly spaced.
-  save_influence FILE.csv  Store the coefficients.
-  page FILE.html  Write the machine's sheet: readings are typed in, corrections come out.
+  objective  Least sum of squares, or least maximum, of the residual vibration.
+  max_mass [PLANE=]MASS  Largest mass of each correction: 5g, or of one plane: A=5g.
+  max_residual AMPLITUDE  Largest residual vibration, such as 76um.
+  from_here  Give the trim: what to add to the rotor with the masses of its last run.
+  reading_error 2%,2deg  Standard deviations of amplitude and phase.
+  grade GRADE  Balance quality grade: G6.3 (ISO 21940-11), API or MIL.
+  blades N  Split the corrections onto N evenly spaced blades.
+  save_influence FILE.csv  Store the influence coefficients.
+Output:
+  page FILE.html  Write the machine's sheet, a page that computes: type readings, and the corrections follow.
 Further options (docs/commands.md describes them):
-  fit  Fit all runs, even where few are needed.
+  fit  Fit all runs together, initial vibration and coefficients.
   predict MASS@ANGLE,…  Predict a run: 10kg@-90deg or A=1g@0deg.
-  columns FILE.toml  Read columns by other headers: lines such as mass_g = "Masse", as --column has them.
+  columns FILE.toml  File of other headers: lines such as mass_g = "Masse".
   rotation  Direction of rotation seen against +z: phases lead in that direction, mass angles are ccw.
   exclude RUN  Leave a run out of the fit; repeatable.
-  method  By influence coefficients, or by amplitudes only (an initial run, then three trial runs in each plane).
-  monte_carlo N  Uncertainties from N drawn sets of readings, 40 at least.
+  method  Influence coefficients, or amplitudes only (an initial run, then three trial runs in each plane).
+  monte_carlo N  Compute the uncertainties from N drawn sets of readings, 40 or more.
   ridge NUMBER  Damp the corrections of nearly dependent planes, such as 0.1.
-  robust  In addition to the fit a robust one, on which outliers have little influence (Huber).
+  robust  Compute a robust fit in addition (Huber): outliers have little influence on it.
   speed SPEED  Highest service speed, such as 3000rpm, for --grade.
   rotor_mass MASS  Mass of the rotor, such as 120kg, for --grade.
   permissible UNBALANCE  Permissible residual unbalance in place of a grade.
   radius LENGTH  Radius of the trial masses, for the tolerance.
   positions ANGLES  Split the corrections onto these places: 0deg,30deg,60deg.
-  first ANGLE  Angle of the first of --blades.
-  numbering  Whether the blades are numbered in the angles' sense or against it.
+  first ANGLE  Angle of the first blade.
+  numbering  Blade numbers increase with the angles or against them.
   suggest  Suggest the next run within --max-mass that tells most about the corrections.
-  view  static-couple: the corrections of two planes as a static part and a couple.
-  zone_class  Zone A to D of ISO 10816-3 for velocities: group 1 (above 300 kW) or 2 (15 to 300 kW), rigid or flexible support.
+  view  static-couple: show the corrections of two planes as a static part and a couple.
+  zone_class  Show zone A to D of ISO 10816-3 for velocities: group 1 (above 300 kW) or 2 (15 to 300 kW), rigid or flexible support.
   workers N  Processes that solve many machines.
 """
 
@@ -168,10 +169,6 @@ def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -
     from cli.read.runs.reading import latest
     from cli.show.result import Result
 
-    if b.runs.fitted:
-        from cli.field.logs import check
-
-        check(b)
     remarks, day = warnings(b), latest(b.runs.table)
     made = tables(b, remarks)
 

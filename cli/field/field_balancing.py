@@ -32,7 +32,7 @@ from cli.field.request import Request, ceiling_in, limits_in, masses_at
 from cli.read.options import bad
 from cli.read.runs.runs import SHOWN, Complex, Group, Real, Runs
 from cli.read.runs.stored import Stored
-from dalembert.angles import degrees
+from dalembert.angles import degrees, in_turn
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.parts import in_parts
 from dalembert.errors import DataError
@@ -158,6 +158,10 @@ class FieldBalancing:
         for k, group in enumerate(runs.groups):
             for i, rotor in enumerate(group.rotors.tolist()):
                 self.place[rotor] = (k, i)
+        for solved in self.solved:
+            self.run_to_predict(solved.planes)
+        if request.suggest and not self.max_mass:
+            raise bad("--suggest", "needs --max-mass, the largest mass of the next run")
 
     # -- solving -------------------------------------------------------------------------------------------
 
@@ -252,6 +256,17 @@ class FieldBalancing:
                 raise bad("--max-mass", f"no plane {name}: expected one of {', '.join(planes)}")
         limit = np.array([bound.get(plane, bound.get("", np.inf)) for plane in planes])
         return limit if np.isfinite(limit).any() else None
+
+    def run_to_predict(self, planes: list[str]) -> Complex:
+        """Return the masses of the run to be predicted, (p,)."""
+        masses = dict(self.predict or {})
+        if "" in masses and len(planes) == 1 and planes[0] not in masses:
+            masses[planes[0]] = masses.pop("")
+        for name in masses:
+            if name not in planes:
+                wrong = f"no plane {name}" if name else "several planes"
+                raise bad("--predict", f"{wrong}: expected PLANE=MASS@ANGLE with one of {', '.join(planes)}")
+        return np.array([masses.get(plane, 0) for plane in planes], dtype=complex)
 
     def _correct(self, solved: Solved) -> None:
         """Find the corrections, the condition numbers, and for minimax the proven bounds."""
@@ -399,7 +414,7 @@ class FieldBalancing:
             return []
         masses = place(complex(w), np.radians(self.request.places)).masses.tolist()
         return [
-            (str(k + 1), self.request.places[k] % 360.0, mass) for k, mass in enumerate(masses) if mass > 0
+            (str(k + 1), in_turn(self.request.places[k]), mass) for k, mass in enumerate(masses) if mass > 0
         ]
 
     @property

@@ -96,24 +96,42 @@ class _Groups:
         sisters = self.sisters
         named = None if sisters is None else [sisters.key(name) for name in self.runs.rotors]
         for group in self.sorted.parts(named, self.stored is not None):
-            if self.runs.fitted:
-                self._log(group)
-            else:
-                self._trials(group)
+            for part in self._determined(group):
+                self._fit(part)
         self.runs.warnings += self.sorted.warnings
         if self.lost > SHOWN:
             self.runs.warnings.append(
                 f"… and {self.lost - SHOWN} further channels that the runs do not determine"
             )
 
-    def _add(self, group: Group) -> None:
-        self.runs.groups.append(group)
+    # -- which of them the runs determine ---------------------------------------------------------------------
 
-    # -- an initial run with trial runs ----------------------------------------------------------------------
+    def _determined(self, group: Group) -> list[Group]:
+        """Part a group into those whose runs determine the same channels; what they do not determine is left out."""
+        if group.trials:
+            # with nothing to spare nothing can be left out
+            self._complete(group)
+            self._means(group)
+            return [group]
+        if self.sisters is not None:
+            return [self._in_known_planes(group)]
+        present = np.isfinite(group.readings)
+        keep = determined(group.masses, present)
+        if keep.all():
+            return [group]
+        self._undetermined(group, keep)
+        # without channels that the runs do not determine, and without runs in which no other was read
+        left = (present & keep[:, None, :]).any(axis=2)
+        kinds, kind = np.unique(np.concatenate([keep, left], axis=1), axis=0, return_inverse=True)
+        order = np.argsort([np.argmax(kind == k) for k in range(len(kinds))]).tolist()
+        split = [(k, *np.split(kinds[k], [keep.shape[1]])) for k in order]
+        return [
+            group.only(*(np.flatnonzero(of) for of in (kind == k, lines, channels)))
+            for k, channels, lines in split
+        ]
 
-    def _trials(self, group: Group) -> None:
-        """Take an initial run with trial runs: a fit with nothing to spare, but for repeated readings."""
-        self._complete(group)
+    def _means(self, group: Group) -> None:
+        """Warn of sensors that were read more than once in a run."""
         of = self.runs.of(group.rotors[0])
         for trial in group.trials:
             many = np.isfinite(group.readings[0, trial.lines]).sum(axis=0).tolist()
@@ -122,17 +140,6 @@ class _Groups:
                 for channel, n in zip(group.channels, many, strict=True)
                 if n > 1
             ]
-        self._add(group)
-        if self.stored:
-            self._unused(group)
-        elif not self.request.four_run:
-            try:
-                group.fit = joint_fit(group.readings, group.masses)
-            except (DependentTrials, Undetermined) as error:
-                raise DataError(
-                    f"{self.runs.of(group.rotors[error.case[0]])}{_dependent(group, error)}"
-                ) from None
-        self._contradictions(group)
 
     def _complete(self, group: Group) -> None:
         """Refuse a trial run that lacks a channel of the initial one."""
@@ -188,33 +195,29 @@ class _Groups:
                 f"… and {len(contradictory) - SHOWN} further readings that contradict each other"
             )
 
-    # -- a log -----------------------------------------------------------------------------------------------
-
-    def _log(self, group: Group) -> None:
-        """Fit the runs of a log all at once."""
-        if self.sisters is not None:
-            self._fit(self._in_known_planes(group))
-            return
-        present = np.isfinite(group.readings)
-        keep = determined(group.masses, present)
-        if keep.all():
-            self._fit(group)
-            return
-        self._undetermined(group, keep)
-        # without channels that the runs do not determine, and without runs in which no other was read
-        left = (present & keep[:, None, :]).any(axis=2)
-        kinds, kind = np.unique(np.concatenate([keep, left], axis=1), axis=0, return_inverse=True)
-        for k in np.argsort([np.argmax(kind == k) for k in range(len(kinds))]).tolist():
-            channels, lines = np.split(kinds[k], [keep.shape[1]])
-            self._fit(group.only(*(np.flatnonzero(of) for of in (kind == k, lines, channels))))
+    # -- the fit ---------------------------------------------------------------------------------------------
 
     def _fit(self, group: Group) -> None:
-        """Fit a group, in the sense of the phase that its runs show."""
+        """Fit a group, in the sense of the phase that its runs show; none where the coefficients come from elsewhere."""
+        self.runs.groups.append(group)
+        if self.stored:
+            self._unused(group)
+        elif not self.request.four_run:
+            self._fit_runs(group)
+        self._contradictions(group)
+
+    def _fit_runs(self, group: Group) -> None:
+        """Fit initial vibration and coefficients to the runs of a group."""
         readings, masses, prior = group.readings, group.masses, None
         if self.sisters is not None:
             prior = self.sisters.before(self.runs.rotors[group.rotors[0]], group.channels, self.runs)
-        fit = self._fitted(readings, masses, prior)
-        if prior is None or determined(masses, np.isfinite(readings)).all():
+        try:
+            fit = self._fitted(readings, masses, prior)
+        except (DependentTrials, Undetermined) as error:
+            of = self.runs.of(group.rotors[error.case[0]])
+            raise DataError(f"{of}{_dependent(group, error)}") from None
+        # with nothing to spare the runs fit in either sense
+        if not group.trials and (prior is None or determined(masses, np.isfinite(readings)).all()):
             fit, group.lines.senses = _sense(
                 self.runs,
                 group.rotors,
@@ -227,7 +230,6 @@ class _Groups:
             before = group.exact
             group.exact = lambda: before().turned(turned)
         group.readings, group.fit, group.before = fit.readings, fit, prior
-        self._add(group)
 
     def _fitted(self, readings: Complex, masses: Complex, prior: Before | None) -> JointFit:
         """Fit runs, with coefficients that are stored from earlier ones."""

@@ -31,30 +31,10 @@ from dalembert.results.text import printed
 from dalembert.units import from_si, to_si
 
 
-def check(b: FieldBalancing) -> None:
-    """Refuse a prediction for planes that do not exist, and a next run without limits."""
-    for solved in b.solved:
-        run_to_predict(b, solved.planes)
-    if b.request.suggest and not b.max_mass:
-        raise bad("--suggest", "needs --max-mass, the largest mass of the next run")
-
-
-def run_to_predict(b: FieldBalancing, planes: list[str]) -> Complex:
-    """Return the masses of the run to be predicted, (p,)."""
-    masses = dict(b.predict or {})
-    if "" in masses and len(planes) == 1 and planes[0] not in masses:
-        masses[planes[0]] = masses.pop("")
-    for name in masses:
-        if name not in planes:
-            wrong = f"no plane {name}" if name else "several planes"
-            raise bad("--predict", f"{wrong}: expected PLANE=MASS@ANGLE with one of {', '.join(planes)}")
-    return np.array([masses.get(plane, 0) for plane in planes], dtype=complex)
-
-
 def predicted(b: FieldBalancing, solved: Solved) -> tuple[Complex, Real]:
     """What every channel should read in the run to be predicted, and one standard deviation, (g, s) each."""
     balance = solved.fitted
-    on = np.broadcast_to(run_to_predict(b, solved.planes), solved.corrections.shape)
+    on = np.broadcast_to(b.run_to_predict(solved.planes), solved.corrections.shape)
     return balance.fit.fitted(on[:, None])[:, 0], balance.vibration_deviation(on, reading=True)
 
 
@@ -224,7 +204,7 @@ def predicted_run(b: FieldBalancing) -> Table:
     value, deviation = rows.several(lambda solved: predicted(b, solved))
     columns = [*vibration(b, value), amplitude(b, "amplitude_uncertainty", deviation)]
     planes = b.solved[0].planes
-    above = f"a run with {masses_text(b, planes, run_to_predict(b, planes)) or 'no masses'} should read"
+    above = f"a run with {masses_text(b, planes, b.run_to_predict(planes)) or 'no masses'} should read"
     return rows.table(columns, READINGS, "predict[]", above)
 
 

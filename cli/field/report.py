@@ -332,7 +332,7 @@ def _on_places(b: FieldBalancing, w: complex) -> list[float]:
 def _history(b: FieldBalancing, rotor: Rotor) -> History:
     from balancing import region_factor
     from balancing.log_picture import History
-    from cli.field.logs import predicted, run_to_predict, suggested
+    from cli.field.logs import predicted, suggested
 
     solved, i, balance = rotor.solved, rotor.i, rotor.solved.fitted
     spreads, prediction, masses = [], None, None
@@ -341,7 +341,7 @@ def _history(b: FieldBalancing, rotor: Rotor) -> History:
         covariances = solved.covariance[i] * b.amount(1.0) ** 2
         spreads = list(zip(covariances, factors, strict=True))
     if b.predict is not None:
-        on = np.broadcast_to(run_to_predict(b, solved.planes), solved.corrections.shape)
+        on = np.broadcast_to(b.run_to_predict(solved.planes), solved.corrections.shape)
         prediction = predicted(b, solved)[0][i], balance.vibration_spread(on, reading=True)
     if b.request.suggest and (run := suggested(rotor)) is not None:
         masses = np.asarray(b.amount(run.masses))

@@ -166,55 +166,42 @@ class Rotor:
     @cached_property
     def last(self) -> LastRun | None:
         """Its last run, where that shows how well it is balanced; None where it was a trial run."""
-        group, request = self.group, self.b.request
-        if self.b.runs.fitted:
-            masses = self._runs
-            run = list(masses)[-1]
-            on = masses[run]
-            if not on.any() or sum(mass.any() for mass in masses.values()) <= len(self.planes):
-                return None
-            return LastRun(run, on, self._read(run))
-        if request.four_run or len(group.trials) < 2:
+        runs = self._runs
+        # of an excluded one nothing is known here
+        run = self.group.last[self.i] if self.group.last[self.i] in runs else list(runs)[-1]
+        if self.b.request.four_run or not runs[run].any():
             return None
-        if not (request.from_here and self.standing.any()):
+        # as many runs with masses as planes tell the coefficients
+        tried = sum(on.any() for on in runs.values()) <= len(self.planes)
+        if tried and not self.b.request.from_here:
             return None
-        return LastRun(group.last[self.i], self.standing, self.last_reading)
+        return LastRun(run, runs[run], self._read(run))
 
     @property
     def last_reading(self) -> Complex:
         """What was read in its last run, run-out off, (s,); NaN where a sensor was not read."""
-        group, run, initial = self.group, self.group.last[self.i], self.solved.initial[self.i]
-        if self.b.runs.fitted:
-            return self._read(run)
-        if len(group.trials) > 1 and group.trials[-1].run == run:
-            return np.asarray(group.means[self.i, -1] - self.b.runout(group))
-        bare = not group.standing[self.i].any()
-        return np.asarray(initial if bare else np.full_like(initial, np.nan))
+        return self._read(self.group.last[self.i])
 
     @property
     def first_reading(self) -> Complex | None:
         """What was read in the first run without masses, run-out off, (s,); None where there is no such run."""
-        if not self.b.runs.fitted:
-            return np.asarray(self.solved.initial[self.i])
         bare = next((run for run, on in self._runs.items() if not on.any()), None)
         return None if bare is None else self._read(bare)
 
     @property
     def _runs(self) -> dict[str, Complex]:
-        """The runs of its log, in order, and what was on the rotor in each."""
-        masses: dict[str, Complex] = {}
-        for j, run in enumerate(self.group.lines.of(self.i)):
-            masses[run] = self.solved.fit.masses[self.i, j]
-        return masses
+        """Its runs, in order, and what was on the rotor in each."""
+        return dict(zip(self.group.lines.of(self.i), self.group.masses[self.i], strict=True))
 
     def _read(self, run: str) -> Complex:
-        """The mean readings of a run of its log, run-out off."""
-        fit = self.solved.fit.machine(self.i)
+        """The mean readings of a run, run-out off; NaN where a sensor was not read."""
         rows = [j for j, name in enumerate(self.group.lines.of(self.i)) if name == run]
-        there = fit.present[rows]
-        sums = np.where(there, fit.readings[rows], 0).sum(axis=0)
-        mean = np.full_like(sums, np.nan)
-        np.divide(sums, there.sum(axis=0), out=mean, where=there.any(axis=0))
+        readings = self.group.readings[self.i, rows]
+        there = np.isfinite(readings)
+        mean = np.full(readings.shape[-1:], complex(np.nan))
+        np.divide(
+            np.where(there, readings, 0).sum(axis=0), there.sum(axis=0), out=mean, where=there.any(axis=0)
+        )
         return np.asarray(mean - self.b.runout(self.group))
 
     # -- its tolerance -------------------------------------------------------------------------------------

@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 
 EXAMPLE = "straight-line-fit"
 OPTIONS = f"""
-{FILE}  target TARGET.csv...  The target: columns H_x_mm, coupler_angle_deg, crank_torque_N_m, perhaps input_deg.
+{FILE}  target TARGET.csv...  The target: columns H_x_mm, coupler_angle_deg, crank_torque_N_m, optionally input_deg.
 {CASES}{WORKERS}
 What:
-  want NAME...  What meets it: H, coupler.angle, B.position, crank.torque; repeatable.
-  free NAME=LOW:HIGH...  A dimension to fit, with its bounds; repeatable.
+  want NAME...  Quantity that meets the target: H, coupler.angle, B.position, crank.torque; repeatable.
+  free NAME=LOW:HIGH...  Dimension to fit, with its bounds; repeatable.
   weight NAME=NUMBER...  Weight of a wanted quantity; repeatable.
-  keep QUANTITY>=VALUE...  What stays above or below a bound over the sweep: transmission>=40deg, H.y<=0.3m; repeatable.
+  keep QUANTITY>=VALUE...  Constraint over the sweep: transmission>=40deg, H.y<=0.3m; repeatable.
 How:
   starts N  Number of starting points (default 256).
   best N  Number of distinct solutions (default 1).
@@ -31,11 +31,11 @@ How:
 def run(own: Options, show: ShowOptions) -> Result:
     """Fit dimensions of a mechanism to a target: a path, a function of the input, a guided body, an effort.
 
-    Without a column for the input it is free at each row of the target, in order. -o FILE.toml writes the mechanism's
+    Without a column for the input, the input is free at each row of the target, and the rows keep their order. -o
+    FILE.toml writes the mechanism's
     file with the fitted numbers. --keep holds from the first to the last input of the target, over a whole turn where
     the input is free.
     """
-    from cli.cases.analysis import Request
     from cli.cases.call import Call, naming
     from cli.fit.fitting import STARTS, Fits, aims, bounds
     from cli.fit.targets import kept
@@ -47,14 +47,14 @@ def run(own: Options, show: ShowOptions) -> Result:
     ):
         if not value:
             raise bad(flag, f"missing: expected {example}")
-    call = Call.of(own, show, Request(own.file))
+    call = Call.of(own, show)
     call.refuse_inputs("the rows of the target have the inputs: expected a dimension, links.crank.B.x=...")
     with naming(own.file):
         targets = aims(call.mechanism, own.target, own.want, own.weight, call.remarks)
         free = bounds(call.mechanism, own.free, call.bare)
         keep = kept(call.mechanism, own.keep, call.bare)
     workers = 1 if call.varied is not None else call.workers
-    study = call.study(
+    return call.result(
         Fits,
         aims=targets,
         free=free,
@@ -64,4 +64,3 @@ def run(own: Options, show: ShowOptions) -> Result:
         best=own.best or 1,
         workers=workers,
     )
-    return call.result(study)

@@ -1,4 +1,4 @@
-"""Dimensions of which points, links and slides come nearest to a target, and the file with them in it."""
+"""Dimensions of which points, links and slides come nearest to a target, the file with them in it, the worked solution."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cli.cases.axes import assigned_paths, quantity
 from cli.cases.call import beside
 from cli.cases.case import Case, TableCase, TableStudy
-from cli.cases.values import Varied, assigned_paths, quantity
+from cli.cases.inputs import Varied
 from cli.fit.targets import targets, wanted, weights
 from cli.read import options
 from cli.show.picture import blank
@@ -21,6 +22,7 @@ from dalembert.angles import read_degrees
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError
 from dalembert.results.columns import ABSENT, Column, Table, names, number
+from dalembert.results.way import Topic, figures
 from dalembert.tables.files import read_bytes
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.dimensions import Dimension, value
@@ -103,7 +105,6 @@ class Fitted(TableCase):
 
     def way(self) -> list[Topic]:
         """What is minimised, and what is left."""
-        from cli.fit.way import way
 
         return way(self.best, self.table(), _misses_by_target([self.best], "fit"))
 
@@ -373,3 +374,16 @@ def _write(document: Any, dimension: Dimension, si: float, units: Units) -> None
         of[last] = f"{_shown(dimension, si)!r} {dimension.unit}".strip()
     else:
         of[last] = units.bare(si, dimension.kind)
+
+
+def way(best: Fit[Mechanism], solutions: Table, misses: Table) -> list[Topic]:
+    """The topics."""
+    parameters = {of.header: of.documented[0] for of in solutions.columns if of.keys[:1] == ("parameters",)}
+    text = [
+        "Σ weight²·|q(d) − q_target|² over all rows of the target is least over the free dimensions d within their bounds;"
+    ]
+    text.append(f"each start ends in a local minimum, the least of {best.starts} starts is taken:")
+    text += [f"  {path} = {figures(value)}" for path, value in parameters.items()]
+    topic = Topic("least squares", text, "Least squares", {"parameters": parameters, "starts": best.starts})
+    left = replace(misses, place="targets[]")
+    return [topic, Topic("misses", ["What is left of each target:", left], "Distances to the target")]

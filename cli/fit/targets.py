@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.cases.values import place_or_angle
+from cli.cases.axes import place_or_angle
 from cli.read import options
 from dalembert.errors import DataError
 from dalembert.hints import nearest

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from cli.read import options
@@ -9,10 +10,7 @@ from cli.show.output import command
 from dalembert.quantities import parse_number
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from cli.show.result import Result
-    from dalembert.results.way import Topic
 
 
 EXAMPLE = "flywheel-engine"
@@ -21,7 +19,7 @@ Arguments:
   table TABLE  CSV of torque over the angle of the shaft, whole turns; - is standard input.
 What:
   speed SPEED  Mean speed of the shaft, such as 600rpm.
-  fluctuation COEFFICIENT  Largest less smallest speed over the mean, such as 0.02 or 2%.
+  fluctuation COEFFICIENT  Largest minus smallest speed, over the mean speed, such as 0.02 or 2%.
 """
 
 
@@ -48,7 +46,7 @@ def run(table: str, speed: str | None = None, fluctuation: str | None = None) ->
     step. The rows span whole turns of the shaft, the last row included: 0 to 360 deg, or 0 to 720 deg of a four-stroke
     engine. The load is constant, the mean of the torque.
     """
-    from cli.flywheel.tables import METHOD, tables, warnings
+    from cli.flywheel.tables import METHOD, draw, tables, warnings, way
     from cli.flywheel.turns import read_torque
     from cli.show.result import Result
 
@@ -60,20 +58,10 @@ def run(table: str, speed: str | None = None, fluctuation: str | None = None) ->
     omega = options.needed("--speed", speed, "speed", positive=True)
     wheel = read_torque(table, omega, coefficient(fluctuation))
 
-    def figure() -> Figure:
-        from cli.flywheel.tables import draw
-
-        return draw(wheel)
-
-    def way() -> list[Topic]:
-        from cli.flywheel.tables import way
-
-        return way(wheel)
-
     return Result(
-        way=way,
+        way=partial(way, wheel),
         tables=tables(wheel),
-        figure=figure,
+        figure=partial(draw, wheel),
         method=METHOD,
         about={"title": "Flywheel"},
         warnings=[*wheel.table.warnings, *warnings(wheel)],

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cli.flywheel.turns import Flywheel
 from cli.show.picture import blank
+from dalembert.arithmetic.shapes import is_doubled
 from dalembert.drawing.curves import Curve, panel, spread
 from dalembert.drawing.sheet import sheet
-from dalembert.results.columns import Table, names, number
+from dalembert.results.columns import Column, Table, names, number
 from dalembert.results.way import Topic, figures
 
 if TYPE_CHECKING:
@@ -31,33 +32,33 @@ def tables(wheel: Flywheel) -> dict[str, Callable[[], Table]]:
     return {"flywheel": lambda: results(wheel), "energy": lambda: energy(wheel)}
 
 
+def one(wheel: Flywheel, name: str, dimension: str, of: Callable[[Flywheel], Any], unit: str = "") -> Column:
+    """A quantity: its errors are by what it differs from the second run, in 32 digits."""
+    return number(
+        name,
+        dimension,
+        np.atleast_1d(of(wheel)),
+        unit,
+        exact=lambda: np.atleast_1d(of(wheel.second)).doubled,  # type: ignore[attr-defined]
+    )
+
+
 def results(wheel: Flywheel) -> Table:
     """One row."""
-    c, unit = wheel.cycle, wheel.torque_unit
-    peak = int(np.argmax(np.abs(wheel.torque)))
-    turn = 2 * np.pi * wheel.turns
-
-    def one(name: str, dimension: str, value: float, error: float, shown: str = ""):  # type: ignore[no-untyped-def]
-        return number(name, dimension, [value], shown, lambda: np.array([error]))
-
+    unit, peak = wheel.torque_unit, int(np.argmax(np.abs(wheel.torque)))
     columns = [
-        one("mean_torque", "torque", c.mean, c.rounding / turn, unit),
-        one("work", "energy", c.work, c.rounding),
-        one("energy_fluctuation", "energy", c.fluctuation, 2 * c.rounding),
-        one(
-            "flywheel_inertia",
-            "inertia",
-            wheel.inertia,
-            2 * c.rounding / (wheel.coefficient * wheel.speed**2),
-        ),
-        number("peak_torque", "torque", wheel.torque[[peak]], unit),
-        number("peak_torque_angle", "angle", wheel.angle[[peak]]),
-        number("mean_power", "power", [c.mean * wheel.speed]),
+        one(wheel, "mean_torque", "torque", lambda w: w.cycle.mean, unit),
+        one(wheel, "work", "energy", lambda w: w.cycle.work),
+        one(wheel, "energy_fluctuation", "energy", lambda w: w.cycle.fluctuation),
+        one(wheel, "flywheel_inertia", "inertia", lambda w: w.inertia),
+        one(wheel, "peak_torque", "torque", lambda w: w.torque[peak], unit),
+        one(wheel, "peak_torque_angle", "angle", lambda w: w.angle[peak]),
+        one(wheel, "mean_power", "power", lambda w: w.cycle.mean * w.speed),
     ]
     if not wheel.constant:
         columns += [
-            number("fastest_angle", "angle", [np.degrees(c.fastest)]),
-            number("slowest_angle", "angle", [np.degrees(c.slowest)]),
+            one(wheel, "fastest_angle", "angle", lambda w: w.cycle.fastest * 180.0 / np.pi),
+            one(wheel, "slowest_angle", "angle", lambda w: w.cycle.slowest * 180.0 / np.pi),
         ]
     turns = "one turn" if wheel.turns == 1 else f"{wheel.turns} turns"
     return Table(columns, place="", above=f"over {turns} of the shaft, against a constant load:", documented=[names("turns", [wheel.turns])])  # fmt: skip
@@ -65,11 +66,15 @@ def results(wheel: Flywheel) -> Table:
 
 def energy(wheel: Flywheel) -> Table:
     """A row for each row of the table: E, from zero at the first."""
-    E = wheel.cycle.energy
+
+    def stored(w: Flywheel) -> Any:
+        E = w.cycle.energy
+        return E if is_doubled(E) else np.where(np.abs(E) > w.cycle.negligible, E, 0.0)
+
     columns = [
-        number("angle", "angle", wheel.angle),
-        number("torque", "torque", wheel.torque, wheel.torque_unit),
-        number("energy", "energy", np.where(np.abs(E) > wheel.cycle.rounding, E, 0.0)),
+        one(wheel, "angle", "angle", lambda w: w.angle),
+        one(wheel, "torque", "torque", lambda w: w.torque, wheel.torque_unit),
+        one(wheel, "energy", "energy", stored),
     ]
     return Table(columns, ("angle_deg",), "cycle[]", "of the flywheel, from zero in the first row")
 
@@ -111,7 +116,7 @@ def draw(wheel: Flywheel) -> Figure:
     over = wheel.torque - c.mean
     here = over[k] + share * (over[k + 1] - over[k])
     values = c.energy[k] + (over[k] + here) / 2 * np.radians(fine - angle[k])
-    second = panel(below, fine, [Curve("energy", values)], "energy of the flywheel", "J", c.rounding)
+    second = panel(below, fine, [Curve("energy", values)], "energy of the flywheel", "J", c.negligible)
     low, high = float(values.min()), float(values.max())
     scale = below.lines[0].get_ydata()
     if low < high:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from functools import cached_property
 from math import ceil, floor, pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from balancing.flywheel import TorqueCycle, torque_cycle
+from dalembert.arithmetic.shapes import is_doubled
 from dalembert.errors import DataError
 from dalembert.tables.table import Numbers, Table, read
 from dalembert.units import to_si
@@ -35,9 +37,25 @@ class Flywheel:
     coefficient: float
 
     @cached_property
+    def second(self) -> Flywheel:
+        """The same in numbers of 32 digits, with the decimals of the table and of the options as they are written."""
+        from cli.read.exact import array, as_written, rates
+
+        angle, torque = (self.table.numbers[name] for name in ("angle", "torque"))
+        exact: dict[str, Any] = {
+            "angle": _in_degrees(as_written(angle), angle.unit, self.turns),
+            "torque": as_written(torque),
+            "speed": rates(self.speed),
+            "coefficient": array(self.coefficient),
+        }
+        return replace(self, **exact)
+
+    @cached_property
     def cycle(self) -> TorqueCycle:
         """Work, fluctuation of energy."""
-        return torque_cycle(np.radians(self.angle), self.torque)
+        return torque_cycle(
+            self.angle * pi / 180.0 if is_doubled(self.angle) else np.radians(self.angle), self.torque
+        )
 
     @property
     def inertia(self) -> float:
@@ -63,12 +81,17 @@ def read_torque(path: str, speed: float, coefficient: float) -> Flywheel:
     falls = np.concatenate([[False], np.diff(angle.values) < 0])
     table.reject(falls, "angle", "an angle that is not less than that of the row before")
     turns = _whole_turns(table, angle)
-    degrees = angle.values
-    if angle.unit != "deg":
-        # radians are written rounded: the ends are those of whole turns
-        share = (angle.values - angle.values[0]) / (angle.values[-1] - angle.values[0])
-        degrees = np.degrees(angle.si[0]) + 360.0 * turns * share
+    shown = angle.values if angle.unit == "deg" else np.degrees(angle.si)
+    degrees = _in_degrees(shown, angle.unit, turns)
     return Flywheel(table, degrees, turns, torque.si, torque.unit, speed, coefficient)
+
+
+def _in_degrees(angle: Any, unit: str, turns: int) -> Any:
+    """Return angles in degrees whose ends are whole turns apart: radians are written rounded."""
+    if unit == "deg":
+        return angle
+    share = (angle - angle[0]) / (angle[-1] - angle[0])
+    return angle[0] + 360.0 * turns * share
 
 
 def _whole_turns(table: Table, angle: Numbers) -> int:

@@ -8,9 +8,6 @@ from cli.cases.options import BRANCH, CASES, FILE, WORKERS, Options
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from cli.cases.case import Case
     from cli.show.commands import ShowOptions
     from cli.show.result import Result
 
@@ -18,14 +15,14 @@ EXAMPLE = "door-closer"
 OPTIONS = f"""
 {FILE}{CASES}{BRANCH}{WORKERS}
 What:
-  only NAME,...  Only these: crank.torque,B.coupler.fx,shaking.fx,H.x.
-  flywheel NUMBER  Flywheel inertia for this speed fluctuation: 0.02.
-  counterweights LINK,...  Counterweights on these links for the least shaking force.
-  find NAME  Find this dimension: input.speed, links.crank.B.x; the pose is one.
-  so_that QUANTITY=VALUE  What it is to give: B.vx=3m_s, crank.torque=12.
+  only NAME,...  Show only these quantities: crank.torque,B.coupler.fx,shaking.fx,H.x.
+  flywheel NUMBER  Compute the flywheel for this fluctuation of speed, such as 0.02.
+  counterweights LINK,...  Compute counterweights on these links for the least shaking force.
+  find NAME  Dimension to find at one pose: input.speed, links.crank.B.x.
+  so_that QUANTITY=VALUE  With --find: value of a quantity, such as B.vx=3m_s or crank.torque=12.
 Output:
-  page FILE(.html)  Write a page on which the mechanism moves, with arrows.
-  states FILE(.csv)  Write the states of all links: what dalembert work reads.
+  page FILE(.html)  Write a page that computes: the mechanism moves, with its forces as arrows.
+  states FILE(.csv)  Write the states of all links, as dalembert work reads them.
 """
 
 
@@ -34,22 +31,13 @@ def run(own: Options, show: ShowOptions) -> Result:
     """Compute the forces of a planar mechanism: effort at the inputs, joint forces, shaking force.
 
     The loads of FILE.toml act: gravity, forces, torques, springs, friction and the inertia of its masses. The table has
-    a row for each pose. Over a whole cycle also mean, peak, r.m.s., power and energy.
+    a row for each pose. A whole cycle gives mean, peak, r.m.s., power and energy in addition.
     """
-    from cli.cases.analysis import Request, branch, names
+    from cli.cases.analysis import names
     from cli.cases.call import Call
     from cli.forces.cycle import Forces, checked
 
     weights = names(own.counterweights, "--counterweights", "names of links, such as crank, rocker")
-    request = Request(own.file, names(own.only), None, branch(own.branch), forces=True)
-    call = Call.of(own, show, request)
-    call.check_names()
+    call = Call.of(own, show, forces=True)
     checked(call, own.flywheel, weights, own.states)
-    study = call.study(Forces, flywheel=own.flywheel, counterweights=weights, states=own.states)
-
-    def page(cases: Sequence[tuple[str, Case]]) -> bytes:
-        from cli.cases.page import of_poses
-
-        return of_poses(cases, show.units, call.bare)
-
-    return call.result(study, own.page, page)
+    return call.result(Forces, flywheel=own.flywheel, counterweights=weights, states=own.states)

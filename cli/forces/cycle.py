@@ -13,6 +13,7 @@ from cli.cases.case import Case
 from cli.cases.study import Further, PoseCase, PoseStudy
 from cli.read.options import bad
 from cli.show.result import Result
+from dalembert.angles import degrees, in_turn
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table, names, number
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.cases.analysis import Analysis
-    from cli.cases.axes import Grid
     from cli.cases.call import Call
+    from cli.cases.inputs import Grid
     from cli.show.commands import ShowOptions
     from dalembert.results.way import Topic
 
@@ -201,7 +202,7 @@ def cycle_of(analysis: Analysis, coefficient: float | None) -> tuple[Table, str]
 
 def _in_turns(angle: float, turns: int | None) -> float:
     """An angle in degrees, within the whole turns of a cycle."""
-    return math.degrees(angle) % (360.0 * max(1, abs(turns or 1)))
+    return in_turn(math.degrees(angle), max(1, abs(turns or 1)))
 
 
 def counterweights(analysis: Analysis, links: list[str]) -> dict[str, Table]:
@@ -219,9 +220,7 @@ def counterweights(analysis: Analysis, links: list[str]) -> dict[str, Table]:
     columns = [
         names("link", list(weights)),
         number("mass_radius", "unbalance", [abs(w) for w in weights.values()]),
-        number(
-            "angle", "angle", [math.degrees(math.atan2(w.imag, w.real)) % 360.0 for w in weights.values()]
-        ),
+        number("angle", "angle", [degrees(w) for w in weights.values()]),
         *rows,
     ]
     above = "mass times radius from the pivot of the link, angle from its x-axis; shaking force of inertia"

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cli.cases.analysis import Analysis
-from cli.cases.poses import column, pose_keys
-from cli.cases.quantities import bound, bounds_of, cells, cells_of, keys_of, solved
+from cli.cases.poses import bound, bounds_of, cells, cells_of, column, keys_of, pose_keys, solved
 from dalembert.results.columns import Table
 from virtualwork.formulas.forces import Applied, AppliedMoment
 from virtualwork.formulas.kinematics import Angle, Point, Slide, Turn
@@ -25,7 +24,7 @@ from virtualwork.quantities import FORCE, LINK, POINT, links, vector
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cli.cases.quantities import Numbers
+    from cli.cases.poses import Numbers
     from dalembert.results.columns import Cell
     from virtualwork.formulas.quantity import Quantity
     from virtualwork.motion import Motion

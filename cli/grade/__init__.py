@@ -15,9 +15,9 @@ EXAMPLE = "exercise-slider-crank"
 OPTIONS = """
 Arguments:
   file FILE.toml  The exercise.
-  answers ANSWERS  The answers, as answers.csv with its column answer filled in; - is standard input.
+  answers ANSWERS  answers.csv with its column answer filled in; - is standard input.
 What:
-  key KEY.csv  The numbers of each student (default: key.csv in the folder of the answers).
+  key KEY.csv  Numbers of each student (default: key.csv in the folder of the answers).
 """
 
 

@@ -7,7 +7,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.imports.words import KINDS
+from cli.imports.messages import KINDS
 from cli.read.options import bad
 from cli.show.output import reported
 from dalembert.errors import DataError
@@ -32,8 +32,8 @@ OPTIONS = """
 Arguments:
   file FILE  The other program's file, or its link in quotes; - is standard input.
 Options:
-  output --output -o FILE.toml  Where to write it; else standard output.
-  kind --from  The program it is from; else told by the content.
+  output --output -o FILE.toml  File to write (default: standard output).
+  kind --from  Program of the file (default: recognized by the content).
 """
 
 
@@ -41,8 +41,9 @@ Options:
 def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Result:
     """Read a mechanism of another program: PMKS text and links, PMKS+ links, MotionGen, Linkage, linkage_sim, FreeCAD sketches, planar robots (URDF, SDF, MJCF).
 
-    What is written is a file for `dalembert mechanism`. The links' axes are parallel to the ground's in the drawn pose,
-    which is that of input 0; a robot's keep their own. What is not imported is named on standard error. Several mechanisms in one file
+    The result is a file for `dalembert mechanism`. In the drawn pose, which is that of input 0, the links' axes are
+    parallel to the ground's; links of a robot keep their own axes. Standard error names what was not imported.
+    Several mechanisms in one file
     become FILE-1.toml, FILE-2.toml and so on.
     """
     from cli.imports.assembled import described

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
 
-from cli.imports.words import damaged
+from cli.imports.messages import damaged
 from cli.read.names import Groups, unused
 from dalembert.units import to_si
 

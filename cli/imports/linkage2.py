@@ -21,7 +21,7 @@ from cli.imports.drawn import (
     finite,
     place,
 )
-from cli.imports.words import damaged
+from cli.imports.messages import damaged
 from cli.read.names import Groups, unused
 from dalembert.errors import DataError
 

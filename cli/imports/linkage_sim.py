@@ -18,7 +18,7 @@ from cli.imports.drawn import (
     exact,
     place,
 )
-from cli.imports.words import damaged
+from cli.imports.messages import damaged
 from cli.read.names import unused
 from dalembert.errors import DataError
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from cli.imports.drawn import GROUND, Drawing, Drive, Place, Slide, direction, place
-from cli.imports.words import damaged
+from cli.imports.messages import damaged
 from dalembert.errors import DataError
 
 LENGTHS = ("mm", "cm", "m", "in", "ft")

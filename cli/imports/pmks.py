@@ -26,7 +26,7 @@ from cli.imports.drawn import (
     finite,
     place,
 )
-from cli.imports.words import damaged
+from cli.imports.messages import damaged
 from dalembert.errors import DataError, quote
 
 TYPES = ("R", "P", "RP", "G")

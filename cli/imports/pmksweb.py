@@ -17,7 +17,7 @@ from itertools import takewhile
 from urllib.parse import unquote
 
 from cli.imports.drawn import GROUND, Drawing, Drive, Load, Place, Slide, direction, exact, finite, place
-from cli.imports.words import damaged
+from cli.imports.messages import damaged
 from dalembert.errors import DataError
 
 # a link of before 2022

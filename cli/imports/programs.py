@@ -10,7 +10,7 @@ from urllib.parse import unquote
 
 from cli.imports import freecad, linkage2, linkage_sim, motiongen, pmks, pmksweb, robots
 from cli.imports.drawn import Drawing
-from cli.imports.words import unknown
+from cli.imports.messages import unknown
 from cli.read.robots import ROOTS, read_robot
 from cli.read.robots.elements import LARGEST_FILE
 from dalembert.errors import DataError

@@ -1,4 +1,4 @@
-"""Results of index balancing: the two parts, how well the readings agree; the worked solution."""
+"""Results of index balancing: the two parts, how well the readings agree; the picture, the worked solution."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from dalembert.results.columns import Column, Table, apart, names, number
 from dalembert.results.way import Topic, figures, vector_text
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
     from cli.index.readings import Complex, Positions
@@ -160,3 +161,21 @@ def way(p: Positions) -> list[Topic]:
         Topic("vectors", text, "Vectors of the readings", {"unit": unit}),
         Topic("parts", numbers, "Rotor and mandrel", head),
     ]
+
+
+def draw(p: Positions) -> Figure:
+    """Draw the readings, their residuals, and the two parts."""
+    from balancing.picture import indexed
+    from cli.show.picture import blank
+
+    figure = blank()
+    indexed(
+        p.shown(p.readings),
+        p.shown(p.parts.residuals),
+        complex(p.shown(p.parts.rotor)),
+        complex(p.shown(p.parts.mounting)),
+        p.quantity,
+        p.spoken_unit,
+        figure=figure,
+    )
+    return figure

@@ -15,7 +15,7 @@ EXAMPLE = "watt-six-bar"
 OPTIONS = f"""
 {FILE}{CASES}{WORKERS}
 What:
-  only NAME,...  Also count the operations of these alone: H.x,coupler.omega,crank.torque.
+  only NAME,...  Count the operations of these quantities in addition: H.x,coupler.omega,crank.torque.
 """
 
 
@@ -23,16 +23,14 @@ What:
 def run(own: Options, show: ShowOptions) -> Result:
     """Inspect a planar mechanism: mobility, groups, Grashof classes, limits, dead and change points, strokes.
 
-    Speaks of the whole range of the input: --over, --cases and --set change dimensions. On a terminal also the order
-    in which the mechanism is solved.
+    The results hold for the whole range of the input. --over, --cases and --set change dimensions. A terminal shows
+    the order of solution in addition.
     """
-    from cli.cases.analysis import Request, names
     from cli.cases.call import Call
     from cli.inspect.character import Inspection
 
-    call = Call.of(own, show, Request(own.file, names(own.only), forces=True))
-    call.check_names()
+    call = Call.of(own, show, forces=True)
     call.refuse_inputs(
         "inspect speaks of the whole range of the input: expected a dimension, links.crank.B.x=..."
     )
-    return call.result(call.study(Inspection))
+    return call.result(Inspection)

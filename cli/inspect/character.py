@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cli.cases import quantities
 from cli.cases.analysis import Analysis
 from cli.cases.case import TableCase, TableStudy
-from cli.cases.poses import listed
+from cli.cases.poses import keys_of, listed
 from cli.cases.study import METHOD
+from dalembert.angles import in_turn
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.results.columns import Table, finite, names
 from dalembert.results.way import Topic, figures
@@ -95,9 +95,9 @@ class Inspection(TableStudy):
 
     def case(self, row: Rows | None = None) -> Character:
         """A variant, or the mechanism itself."""
-        m = self.mechanism if row is None else self.variant(row)
-        _ = m.assembly
-        return Character(Analysis(self.request, m, self.inputs(m, row).part(0, 1)))
+        analysis = self.analysis(row)
+        _ = analysis.mechanism.assembly
+        return Character(replace(analysis, inputs=analysis.inputs.part(0, 1)))
 
 
 class Statement(NamedTuple):
@@ -163,7 +163,7 @@ def _cams(check: Check) -> Statement:
         off = check.lift_off(number)
         if off is not None:
             entry["lift_off_speed_rad_s"] = finite(off.speed)
-            entry["lift_off_at_deg"] = math.degrees(off.at) % 360.0
+            entry["lift_off_at_deg"] = in_turn(math.degrees(off.at))
         entries.append(entry)
     rows = [(key, str(entry["name"]), entry[key]) for entry in entries for key in list(entry)[1:]]
     return Statement("cams", entries, rows)  # type: ignore[arg-type]
@@ -234,7 +234,7 @@ def operations(analysis: Analysis) -> Table:
     keys: list[Quantity] = []
     counts: dict[str, int] = {}
     if analysis.request.only is not None:
-        named = quantities.keys_of([*analysis.places, *analysis.forces])
+        named = keys_of([*analysis.places, *analysis.forces])
         if motion.poses.takes(named):
             counts[", ".join(analysis.request.only)] = motion.poses.operations(named)
     for order, what in enumerate(("positions", "with velocities", "with accelerations")[: 3 if moves else 1]):

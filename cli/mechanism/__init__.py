@@ -8,9 +8,6 @@ from cli.cases.options import BRANCH, CASES, FILE, WORKERS, Options
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from cli.cases.case import Case
     from cli.show.commands import ShowOptions
     from cli.show.result import Result
 
@@ -18,15 +15,15 @@ EXAMPLE = "klann"
 OPTIONS = f"""
 {FILE}{CASES}{BRANCH}{WORKERS}
 What:
-  only NAME,...  Only these: H.x,coupler.omega; H is all of H.
-  order position|velocity|acceleration|jerk  How far to differentiate (default: as the input's rates give).
-  newton  Newton-Raphson on all loops at once, with its iterates.
-  find NAME  Find this dimension: input.speed, links.crank.B.x; the pose is one.
-  so_that QUANTITY=VALUE  What it is to give: B.vx=3m_s, crank.torque=12.
+  only NAME,...  Show only these quantities: H.x,coupler.omega; H is all of H.
+  order position|velocity|acceleration|jerk  Highest derivative (default: the highest that the input's rates give).
+  newton  Solve all loops at once by Newton-Raphson, and show the iterates.
+  find NAME  Dimension to find at one pose: input.speed, links.crank.B.x.
+  so_that QUANTITY=VALUE  With --find: value of a quantity, such as B.vx=3m_s or crank.torque=12.
 Output:
-  page FILE(.html)  Write a page on which the mechanism moves.
+  page FILE(.html)  Write a page that computes: the mechanism moves, and its dimensions can be dragged.
 Further options (docs/commands.md describes them):
-  schema  Print the JSON Schema of FILE.toml; needs no FILE.
+  schema  Print the JSON Schema of FILE.toml; no FILE is needed.
 """
 
 
@@ -48,19 +45,7 @@ def run(own: Options, show: ShowOptions) -> Result:
     FILE.toml describes ground, links, slots, sliders, gears, input and guess. The table has a row for each pose: its
     input, every point and link, or those of --only.
     """
-    from cli.cases.analysis import ORDERS, Request, branch, names
     from cli.cases.call import Call
     from cli.mechanism.newton import Poses
 
-    order = None if own.order is None else ORDERS.index(own.order)
-    request = Request(own.file, names(own.only), order, branch(own.branch))
-    call = Call.of(own, show, request)
-    call.check_names()
-    study = call.study(Poses, newton=own.newton)
-
-    def page(cases: Sequence[tuple[str, Case]]) -> bytes:
-        from cli.cases.page import of_poses
-
-        return of_poses(cases, show.units, call.bare)
-
-    return call.result(study, own.page, page)
+    return Call.of(own, show).result(Poses, newton=own.newton)

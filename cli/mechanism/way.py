@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.cases.poses import over_poses, pose_head
-from dalembert.angles import read_degrees
+from dalembert.angles import in_turn, read_degrees
 from dalembert.results.columns import Column, Table, names
 from dalembert.results.way import Topic, figures, vector_text
 from virtualwork.textbook.combinations import sense
@@ -123,7 +123,7 @@ def _pair(z: complex) -> list[float]:
 def _unknowns(m: Any, group: Group, root: Root) -> Document:
     return {
         **{
-            f"{body}_deg": float(read_degrees(a)) % 360.0
+            f"{body}_deg": in_turn(float(read_degrees(a)))
             for body, a in zip(group.angles, root.angles, strict=True)
         },
         **{f"{m.guides[g].point}_m": s for g, s in zip(group.slides, root.slides, strict=True)},

@@ -30,30 +30,30 @@ OPTIONS = """
 Arguments:
   corrections MASS@ANGLE ...  Corrections to ADD, such as 83.5g@308.87deg; or a FILE that dalembert field wrote (CSV, JSON, workbook).
 What:
-  rotor NAME  The rotor, of a file.
-  plane NAME  The plane, of a file.
-  positions ANGLES  Where masses can go, such as 292.5deg,315deg.
-  blades N  So many places, evenly spaced, numbered from 1.
-  max_mass MASS  Limit of each place, such as 5g.
+  rotor NAME  With a FILE: rotor to place.
+  plane NAME  With a FILE: plane to place.
+  positions ANGLES  Angles where masses can go, such as 292.5deg,315deg.
+  blades N  Number of blades, evenly spaced, numbered from 1.
+  max_mass MASS  Largest mass of each place, such as 5g.
 How: weights as they are:
-  stock MASSES  Weights in stock, such as 1g,2g,5g; one a place; the fewest that come within 1 % of the correction, at most three.
-  weights MASSES  Weights of fixed mass that stand at any angle, such as 4g,4g: the angle of each.
-  max_pieces N  Largest number of weights from stock in all: least error, in place of the fewest within 1 %.
+  stock MASSES  Weights in stock, such as 1g,2g,5g: uses the fewest within 1 % of the correction, at most three.
+  weights MASSES  Weights of fixed mass at any angle, such as 4g,4g: gives the angle of each.
+  max_pieces N  Largest number of weights from stock: gives the least error, in place of the fewest weights.
 How: elsewhere:
-  at_radius R  Radius the corrections were found for.
-  to_radius R  Radius the masses go to.
-  at_z Z  Where along the shaft the corrections were found for.
-  to_z Z1:Z2  Carry them over to these planes, with the same force and moment.
+  at_radius R  Radius of the corrections.
+  to_radius R  Radius of the masses.
+  at_z Z  Axial position of the corrections.
+  to_z Z1:Z2  Axial positions of the new planes: force and moment stay equal.
 How: drilling:
-  drill DIAMETER  Remove material instead, by drilling opposite.
-  density DENSITY  Density of the material drilled, such as 7850kg_m3.
-  remove  The vectors are material to REMOVE already: drill there, not opposite.
+  drill DIAMETER  Diameter of holes: removes material opposite the corrections.
+  density DENSITY  Density of the drilled material, such as 7850kg_m3.
+  remove  The corrections are material to REMOVE: drill at their angles, not opposite.
 Further options (docs/commands.md describes them):
   first ANGLE  Angle of the first blade.
-  numbering  Whether the blades are numbered in the angles' sense or against it.
-  pieces N  How many weights from stock go on one place.
+  numbering  Blade numbers increase with the angles or against them.
+  pieces N  Largest number of weights from stock on one place.
   drill_point ANGLE  Point angle of the drill, such as 118deg; 180deg is flat.
-  max_depth DEPTH  Deepest hole; more are drilled at a place if needed.
+  max_depth DEPTH  Largest depth of a hole; a place gets more holes if necessary.
 """
 
 
@@ -85,10 +85,16 @@ def run(
 ) -> Result:
     """Put a correction where masses can go: holes, blades, weights in stock, another radius, drilling.
 
-    Several corrections are combined first. Without --positions or --blades the result is the one mass. Of a file each
-    rotor's plane is placed by itself.
+    Several corrections are added as vectors first. Without --positions or --blades the result is one mass. In a FILE
+    each plane of each rotor is placed on its own.
     """
     every = read_corrections(corrections, rotor, plane)
+    stated = (
+        []
+        if remove or not every[0].removed
+        else [f"{corrections[0]}: its corrections are material to remove"]
+    )
+    remove = remove or every[0].removed
     radii = read_radii(at_radius, to_radius)
     drilled = read_drill(drill, density, drill_point, max_depth)
     in_stock, fixed = read_weights("--stock", stock), read_weights("--weights", weights)
@@ -136,7 +142,8 @@ def run(
         method=METHOD,
         sheets=None if alone else lambda: map(sheet, placings),
         about={"title": "Placement of a correction"},
-        warnings=[
+        warnings=stated
+        + [
             text if alone else f"{placing.of.name}: {text}"
             for placing in placings
             for text in placing.warnings

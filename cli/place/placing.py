@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from balancing import Placement, drill_depth, place, place_from_stock, place_weights, transfer
 from cli.place.corrections import Correction, Drill, Request
-from dalembert.angles import degrees, phasor
+from dalembert.angles import degrees, in_turn, phasor
 from dalembert.errors import DataError
 from dalembert.units import from_si, to_si
 
@@ -74,7 +74,7 @@ class Placing:
         if opposite:
             self.warnings.append("material is drilled out opposite (+180°) to the mass that would be added")
         self.masses = [
-            Placed(share, i, float(mass), share.places[i] % 360.0, *_drilled(float(mass), request.drill))
+            Placed(share, i, float(mass), in_turn(share.places[i]), *_drilled(float(mass), request.drill))
             for share in self.shares
             for i, mass in enumerate(share.placed.masses)
             if mass > 0
@@ -125,7 +125,12 @@ class Placing:
             )
 
         try:
-            placed = choose(request.max_pieces) if request.max_pieces is not None else self._few(goal, choose)
+            if request.max_pieces is None:
+                placed = self._few(goal, choose)
+            else:
+                placed = choose(request.max_pieces)
+                most = request.max_pieces
+                self._far(f"at most {most} weight{'s' * (most != 1)} leave{'s' * (most == 1)}", placed)
         except ValueError as error:
             raise DataError(f"--stock: {error}") from None
         if len(angles) > 2 and placed.bound == 0 and abs(placed.error) > 1e-12 * abs(goal):
@@ -144,15 +149,24 @@ class Placing:
         used = next(k for k, one in enumerate(placed) if abs(one.error) <= least)
         more = len(placed)
         error, further = (abs(one.error) for one in (placed[used], choose(more)))
-        if goal and further < least:
-            weights = f"{used} weight{'s' * (used != 1)}"
-            leave = (
-                f"{weights} leave{'s' * (used == 1)} an error of {self.text(error)} ({error / abs(goal):.2%})"
-            )
+        weights = f"{used} weight{'s' * (used != 1)} leave{'s' * (used == 1)}"
+        if goal and further < error - 1e-12 * abs(goal):
             self.warnings.append(
-                f"{leave}; with {more} it would be {self.text(further)} (--max-pieces {more})"
+                f"{weights} {self._missed(placed[used])}; with {more} it would be {self.text(further)} (--max-pieces {more})"
             )
+        else:
+            self._far(weights, placed[used], "; one more leaves no less")
         return placed[used]
+
+    def _missed(self, placed: Placement) -> str:
+        """The error of weights from stock, and its share of the correction."""
+        error = abs(placed.error)
+        return f"an error of {self.text(error)} ({error / abs(placed.target):.2%})"
+
+    def _far(self, weights: str, placed: Placement, more: str = "") -> None:
+        """Warn where weights from stock do not come near the correction."""
+        if abs(placed.error) > ENOUGH * abs(placed.target):
+            self.warnings.append(f"{weights} {self._missed(placed)}{more}")
 
     def _turned(self, goal: complex, weights: list[float]) -> tuple[list[float], Placement]:
         """Turn weights of fixed mass: their angles, and what they are together."""

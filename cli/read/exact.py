@@ -95,3 +95,26 @@ def cosine_and_sine(angle: Numbers, rows: Sequence[int]) -> tuple[DoubledArray, 
     """Cosines and sines of rows of a column of angles."""
     unit = turns(replace(angle, values=np.nan_to_num(angle.values[list(rows)])))
     return DoubledArray.of(unit.x), DoubledArray.of(unit.y)
+
+
+def long_column(numbers: Numbers) -> DoubledArray:
+    """A long column of a file, in its unit, as it is written: whole numbers over a power of ten, where they have 15 figures at most.
+
+    >>> import numpy as np
+    >>> x = long_column(Numbers("t_s", "s", np.array([0.1, 12.25]), "time"))
+    >>> float(x.low[0]), float(x.low[1])
+    (-5.551115123125783e-18, 0.0)
+    """
+    values = numbers.values
+    for places in range(16):
+        whole = np.rint(values * 10.0**places)
+        if (np.abs(whole) < 2.0**53).all() and (whole / 10.0**places == values).all():
+            exact: DoubledArray = DoubledArray(whole) / DoubledArray(10.0**places)
+            return exact
+    return plain(values)
+
+
+def as_written(numbers: Numbers) -> DoubledArray:
+    """A column of a file, in SI, as it is written; angles in degrees."""
+    exact = DoubledArray.of(doubled_array(numbers.exact, numbers.values.shape))
+    return exact * 180.0 / pi if numbers.dimension == "angle" and numbers.unit != "deg" else exact

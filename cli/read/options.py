@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
+from dalembert.angles import in_turn
 from dalembert.errors import DataError
 
 if TYPE_CHECKING:
@@ -150,7 +151,7 @@ def places(
         raise bad("--blades", "expected --positions or --blades, not both")
     if blades is not None:
         start, way = in_degrees("--first", first), -1 if numbering == "against" else 1
-        return [(start + way * (360.0 * k / blades)) % 360.0 for k in range(blades)]
+        return [in_turn(start + way * (360.0 * k / blades)) for k in range(blades)]
     if numbering == "against":
         raise bad(
             "--numbering", "speaks of --blades: --positions are numbered in the order in which they stand"
@@ -158,7 +159,7 @@ def places(
     if positions is None:
         return None
     chosen = [in_degrees("--positions", part) for part in positions.split(",")]
-    turned = sorted(angle % 360.0 for angle in chosen)
+    turned = sorted(in_turn(angle) for angle in chosen)
     for one, other in zip(turned, [*turned[1:], turned[0] + 360.0], strict=True):
         if len(turned) > 1 and other - one < 1e-7:
             raise bad("--positions", f"two positions at {one:g}deg")
@@ -192,32 +193,30 @@ def exact_places(
     return [start + way * Fraction(360 * k, blades) for k in range(blades)]
 
 
-def plane_vector(flag: str, text: str) -> complex:
-    """Read `X,Y` in SI as x + iy."""
-    from dalembert.quantities import parse_number
-
-    parts = text.split(",")
-    try:
-        if len(parts) != 2:
-            raise ValueError
-        return complex(parse_number(parts[0]), parse_number(parts[1]))
-    except ValueError:
-        raise bad(flag, f"'{text}': expected two numbers X,Y, such as 0,-9.81") from None
+def plane_vector(flag: str, text: str, dimension: str) -> complex:
+    """Read `X,Y` as x + iy, in units as `vector` does."""
+    return complex(*components(flag, text, dimension, 2))
 
 
 def vector(flag: str, text: str | None, dimension: str) -> tuple[float, float, float] | None:
     """Read `x,y,z` in SI, or in the units that stand with the numbers; a unit behind the last serves all without one."""
     if text is None:
         return None
+    x, y, z = components(flag, text, dimension, 3)
+    return x, y, z
+
+
+def components(flag: str, text: str, dimension: str, count: int) -> list[float]:
+    """Read one, two or three numbers between commas, in units as `vector` does."""
     parts = [part.strip() for part in text.split(",")]
-    if len(parts) != 3:
-        raise bad(flag, f"'{text}': expected three numbers x,y,z")
+    expected = ("a number", "two numbers X,Y", "three numbers x,y,z")[count - 1]
+    if len(parts) != count:
+        raise bad(flag, f"'{text}': expected {expected}")
     try:
         numbers = [_number_and_unit(part, dimension) for part in parts]
     except ValueError as error:
-        raise bad(flag, f"'{text}': expected three numbers x,y,z: {error}") from None
-    x, y, z = (_in_si(value, dimension, unit or numbers[2][1]) for value, unit in numbers)
-    return x, y, z
+        raise bad(flag, f"'{text}': expected {expected}: {error}") from None
+    return [_in_si(value, dimension, unit or numbers[-1][1]) for value, unit in numbers]
 
 
 def _number_and_unit(text: str, dimension: str) -> tuple[float, str]:
@@ -262,10 +261,10 @@ class Steps(NamedTuple):
         return np.array([(self.first + k * self.each) / self.below for k in i.tolist()])
 
 
-def steps(flag: str, text: str, read: Callable[[str], float], example: str) -> Steps:
+def steps(flag: str, text: str, read: Callable[[list[str]], list[float]], example: str) -> Steps:
     """Read `START:STOP:STEP` or `START:STOP/N` (N equal steps); a step that divides the range includes its end.
 
-    `read` reads one of the three.
+    `read` reads the two or three.
     """
     from fractions import Fraction
 
@@ -280,7 +279,7 @@ def steps(flag: str, text: str, read: Callable[[str], float], example: str) -> S
     if len(parts) != (2 if count else 3):
         raise bad(flag, f"'{text}': expected START:STOP:STEP or START:STOP/N, such as {example}")
     # the decimals that the numbers print as, exactly: 50mm and a step of 1mm are 0.051, not 0.051000000000000004
-    start, stop, *by = [Fraction(repr(read(part))) for part in parts]
+    start, stop, *by = [Fraction(repr(value)) for value in read(parts)]
     if count is None:
         if by[0] == 0 or (stop - start) * by[0] < 0:
             raise bad(flag, f"'{text}': a step of {parts[2]} never gets from {parts[0]} to {parts[1]}")
@@ -297,7 +296,7 @@ def grid(
     flag: str, text: str, read: Callable[[str], float], what: str, example: str, most: int = STATES
 ) -> list[float]:
     """The values of such a range; `what` is counted, `most` of them at most."""
-    first, each, below, n = steps(flag, text, read, example)
+    first, each, below, n = steps(flag, text, lambda parts: [*map(read, parts)], example)
     if n - 1 > most:
         raise bad(flag, f"'{text}': {float(n - 1):.3g} {what}: expected at most {most}")
     return [(first + i * each) / below for i in range(n)]

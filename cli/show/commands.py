@@ -16,7 +16,7 @@ import typer
 from typer.core import TyperCommand
 
 from cli.read.about import HEAD
-from cli.show.taking import take
+from cli.show.capture import take
 from dalembert.dataclass import dataclass
 
 if TYPE_CHECKING:
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 
 SHARED = """
 What:
-  column NAME=HEADER  Read column HEADER as NAME; repeatable.
+  column NAME=HEADER  Read the column HEADER as NAME; repeatable.
 Output:
   json  Print one JSON document, SI units, full precision.
   output -o --output FILE  Write to FILE (.csv .json .xlsx .parquet .md .tex).
   plot FILE  Draw a picture (.svg, .png or .pdf).
-  expect FILE.csv  Check the result against expected values.
+  expect FILE.csv  Compare the result with expected values.
   steps  Show the worked solution: equations with their numbers.
-  digits  Print only the digits that hold against rounding.
+  digits  Print only the digits that rounding has not touched.
   units UNIT,...  Units of the columns: mm,g,deg,N_mm,rpm.
   report FILE  Write a report (.html or .md): data, results, method.
 Further options (docs/commands.md describes them):
@@ -273,6 +273,8 @@ class Command(TyperCommand):
         try:
             return super().parse_args(ctx, args)
         except Exception as error:
+            if isinstance(error, typer.BadParameter):
+                error.message = in_plain_words(error.message)
             # of a NoSuchOption the option
             option = getattr(error, "option_name", None)
             # one of its own lacks its value
@@ -303,7 +305,8 @@ class Command(TyperCommand):
             record = param.get_help_record(ctx)
             if record is not None:
                 heading = "Arguments" if param.param_type_name == "argument" else "Options"
-                rows[place.get(param.name or "", heading)].append(record)
+                flags, words = record
+                rows[place.get(param.name or "", heading)].append((flags, _RANGE.sub(_span, words)))
         return {heading: records for heading, records in rows.items() if records}
 
     def format_options(self, ctx, formatter) -> None:  # type: ignore[no-untyped-def]
@@ -322,6 +325,39 @@ class Command(TyperCommand):
         if self.example:
             with formatter.section(f"Example (dalembert examples {self.example} writes its files here)"):
                 formatter.write(f"  {self.call_of(self.example)}\n")
+
+
+# the parser's own words for a value that is no number, or out of range
+_TYPES = {
+    "integer": "a whole number",
+    "int range": "a whole number",
+    "float": "a number",
+    "float range": "a number",
+}
+_NO_NUMBER = re.compile(r"('.*') is not a valid (integer|int range|float range|float)\.?", re.DOTALL)
+_RANGE = re.compile(r"(?:(\d+)(?:\.0)?<=)?x([<>]=)(\d+)(?:\.0)?")
+_OUTSIDE = re.compile(rf"(\S+) is not in the range ({_RANGE.pattern})\.?")
+
+
+def _span(match: re.Match[str]) -> str:
+    """A range of numbers, as help and messages say it."""
+    least, sign, bound = match.groups()
+    return f"from {least} to {bound}" if least else f"from {bound} on" if sign == ">=" else f"at most {bound}"
+
+
+def in_plain_words(message: str) -> str:
+    """Say what the parser has against a value as all other messages do.
+
+    >>> in_plain_words("'abc' is not a valid int range.")
+    "'abc': expected a whole number"
+    >>> in_plain_words("-1 is not in the range x>=1."), in_plain_words("0 is not in the range 1<=x<=100.")
+    ('-1: expected a number from 1 on', '0: expected a number from 1 to 100')
+    """
+    if match := _NO_NUMBER.fullmatch(message):
+        return f"{match[1]}: expected {_TYPES[match[2]]}"
+    if match := _OUTSIDE.fullmatch(message):
+        return f"{match[1]}: expected a number {_RANGE.sub(_span, match[2])}"
+    return message
 
 
 def with_help(options: str, example: str, call_of: Callable[[str], str]) -> type[Command]:

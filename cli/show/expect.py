@@ -17,7 +17,7 @@ from dalembert.quantities import is_number, parse_number
 from dalembert.results.columns import Column, Table
 from dalembert.results.text import printed
 from dalembert.tables.table import read
-from dalembert.units import UNITS, column_dimensions, dimensions, find_unit, parted, to_si
+from dalembert.units import column_dimensions, common_dimension, find_unit, to_si
 from dalembert.units import from_si as to_unit
 
 if TYPE_CHECKING:
@@ -109,14 +109,9 @@ def _partner(header: str, table: Table) -> tuple[str, str] | None:
     for column in table.columns:
         if column.header.lower() == header.lower():
             return column.header, column.unit
-    base, unit = parted(header)
     for column in table.columns:
-        if (
-            unit
-            and column.name.lower() == base.lower()
-            and column.unit
-            and dimensions(column.unit) & dimensions(unit)
-        ):
+        base, unit = header[: len(column.name) + 1], header[len(column.name) + 1 :]
+        if base.lower() == f"{column.name.lower()}_" and common_dimension(unit, column.unit) is not None:
             return column.header, unit
     return None
 
@@ -148,9 +143,8 @@ def _conversion(unit: str, into: str) -> Callable[[float], float]:
     """What turns a number of a unit into another unit of the same dimension."""
     if unit == into:
         return float
-    dimension = min(dimensions(unit) & dimensions(into), key=list(UNITS).index)
-    own = find_unit(dimension, unit)
-    assert own is not None
+    dimension = common_dimension(unit, into) or ""
+    own = find_unit(dimension, unit) or ""
     return lambda x: float(to_unit(to_si(x, dimension, own), dimension, into))
 
 

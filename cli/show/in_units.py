@@ -10,7 +10,7 @@ import numpy as np
 
 from cli.read.options import bad
 from dalembert.hints import nearest
-from dalembert.units import LISTED, UNITS, Scaled, dimensions, find_unit, from_si, to_si, unit_name
+from dalembert.units import UNITS, Scaled, dimensions, find_unit, from_si, to_si, unit_name
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,7 +34,7 @@ def chosen_units(text: str) -> dict[str, str]:
     for part in text.split(","):
         word = unit_name(part)
         fitting = {d: unit for d in _DIMENSIONS if (unit := find_unit(d, word))}
-        if not any(unit in LISTED[d] for d, unit in fitting.items()) and dimensions(word):
+        if not any(unit in UNITS[d] for d, unit in fitting.items()) and dimensions(word):
             # a unit of vibration, such as mil
             fitting = {}
         if not word or not fitting:
@@ -46,7 +46,7 @@ def chosen_units(text: str) -> dict[str, str]:
             )
             raise bad(
                 "--units",
-                f"'{part.strip()}' is no unit of a column: expected such as mm,g,deg,N_mm,rpm{hint}",
+                f"'{part.strip()}' is no unit of a column: expected units such as mm,g,deg,N_mm,rpm{hint}",
             )
         for dimension, unit in fitting.items():
             if chosen.setdefault(dimension, unit) != unit:

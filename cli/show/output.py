@@ -55,13 +55,14 @@ def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
     """Write the requested files, print the result; status 1 if an expectation is not met, or nothing was found."""
     from dalembert.tables.headers import check_renamed
 
-    if options.form == ".toml" and result.toml is None:
+    form = options.form
+    if form == ".toml" and result.toml is None:
         raise typer.BadParameter(
             f"'{options.output}' has no known suffix: expected {', '.join(FORMS)}", param_hint="-o"
         )
     if result.blocks is not None:
         check_renamed()
-        _stream(result, options)
+        _stream(result, options, form)
         return
     if options.steps:
         result = _with_way(result)
@@ -256,7 +257,7 @@ def _in_chosen_units(result: Result, units: str | None) -> Result:
     )
 
 
-def _stream(result: Result, options: ShowOptions) -> None:
+def _stream(result: Result, options: ShowOptions, form: str) -> None:
     """Write a table that comes in parts."""
     from cli.show.blocks import stream
     from cli.show.files import refuse_inputs, write_all
@@ -268,7 +269,7 @@ def _stream(result: Result, options: ShowOptions) -> None:
         chosen_units(options.units)
     refuse_inputs([path for path in (options.output, *result.beside) if path is not None])
     write_all(result.beside)
-    unknown = stream(result, options.form, options.output, options.units, options.digits)
+    unknown = stream(result, form, options.output, options.units, options.digits)
     _warn([*result.warnings, *result.late_warnings(), *_unknown(unknown)], options)
     if result.failed():
         raise typer.Exit(1)

@@ -24,7 +24,7 @@ from dalembert.results.columns import Column, Table
 from dalembert.results.text import BAD, GOOD, Grid, has_names, heading, in_blocks, printed
 from dalembert.tables.files import load, named
 from dalembert.tables.sources import open_source
-from dalembert.units import UNITS, parted, written
+from dalembert.units import LISTED, parted, written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -188,7 +188,7 @@ def _spaced(text: str) -> str:
     """Write quantities as people do: `12kg` as 12 kg, `1480rpm` as 1480 rpm."""
 
     def spoken(part: str) -> str:
-        for dimension in UNITS:
+        for dimension in LISTED:
             try:
                 _, unit = parse_quantity(part, dimension)
             except ValueError:

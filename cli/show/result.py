@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from cli.read.seeking import Found
+    from cli.read.root_search import Found
     from cli.show.bars import Bars
     from dalembert.results.columns import Document, Json
     from dalembert.results.way import Topic

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,13 +13,12 @@ if TYPE_CHECKING:
     from cli.show.result import Result
     from cli.signal.recording import Recording
     from dalembert.results.columns import Table
-    from dalembert.results.way import Topic
 
 OPTIONS = """
 Arguments:
   recording FILE  CSV of a recording: t_s, mark (or tacho), A_um …; - is standard input.
 What:
-  pulses N  Pulses of the mark in one turn.
+  pulses N  Number of pulses of the mark in one turn.
 """
 
 
@@ -33,17 +33,12 @@ def run(
     vibration for each sensor: A_um, B_um, acceleration_m_s2. The rows of the result are readings for dalembert field.
     """
     from cli.show.result import Result
-    from cli.signal.recording import read_signal
+    from cli.signal.recording import read_signal, way
 
     read = read_signal(recording, pulses)
 
-    def way() -> list[Topic]:
-        from cli.signal.recording import way
-
-        return way(read)
-
     return Result(
-        way=way,
+        way=partial(way, read),
         tables={"signal": lambda: vectors(read)},
         head={"amplitude_unit": read.unit},
         about={"title": "Vibration once per turn"},
@@ -56,18 +51,30 @@ def vectors(recording: Recording) -> Table:
     import numpy as np
 
     from dalembert.angles import degrees
+    from dalembert.arithmetic.doubled_vectors import off
     from dalembert.results.columns import Column, Table, names, number
 
     of, unit = recording.vectors, recording.unit
     rows = len(recording.sensors)
     size = np.abs(of.vector)
+
+    def sizes() -> Any:
+        return off(size, recording.second.vector.vectors.size)
+
+    def deviations() -> Any:
+        return off(of.deviation, recording.second.deviation.doubled)
+
     return Table(
         [
             names("sensor", recording.sensors),
-            number("speed", "speed", [of.speed] * rows, "rpm"),
-            Column("amplitude", unit, size, None, "amplitude", size),
-            number("phase", "angle", degrees(of.vector)),
-            Column("amplitude_uncertainty", unit, of.deviation, None, "amplitude_uncertainty", of.deviation),
+            number("speed", "speed", [of.speed] * rows, "rpm", exact=lambda: recording.second.speed.doubled),
+            Column("amplitude", unit, size, sizes, "amplitude", size),
+            number(
+                "phase", "angle", degrees(of.vector), exact=lambda: recording.second.vector.vectors.degrees
+            ),
+            Column(
+                "amplitude_uncertainty", unit, of.deviation, deviations, "amplitude_uncertainty", of.deviation
+            ),
             names("turns", [of.turns] * rows),
         ],
         keys=("sensor",),

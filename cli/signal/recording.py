@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +16,7 @@ from dalembert.errors import DataError
 from dalembert.results.way import Topic, figures
 from dalembert.tables.sources import open_source
 from dalembert.tables.table import read
-from dalembert.units import find_unit
+from dalembert.units import amplitude_kind, find_unit
 
 MARKS = ("mark", "tacho", "keyphasor", "pulse", "trigger")
 
@@ -26,6 +29,13 @@ class Recording:
     unit: str
     vectors: OncePerTurn
     warnings: list[str]
+    exact: Callable[[], tuple[Any, ...]]
+    """The recording in 32 digits, of the decimals as they are written."""
+
+    @cached_property
+    def second(self) -> Any:
+        """The vectors in 32 digits."""
+        return self.vectors.second_run(self.exact())
 
 
 def read_signal(path: str, pulses: int) -> Recording:
@@ -58,6 +68,12 @@ def read_signal(path: str, pulses: int) -> Recording:
         raise DataError(
             f"{path}: the vibration is in {', '.join(sorted(set(units.values())))}: expected one unit"
         )
+    tag = amplitude_kind(next(iter(units.values())))[1]
+    if tag in ("_pp", "_rms"):
+        raise DataError(
+            f"{path}: the vibration is in {next(iter(units.values()))}: samples are values of an instant, and the amplitude "
+            f"that comes out is a peak: expected a unit without {tag}"
+        )
     table = read(
         path, numbers={time: "time", **dict.fromkeys(marking, "number"), **dict.fromkeys(units, "amplitude")}
     )
@@ -83,7 +99,19 @@ def read_signal(path: str, pulses: int) -> Recording:
             f"{table.file}: the mark rises between two samples, in the middle as taken: phases hold to "
             f"± {np.degrees(vectors.phase_resolution):.2g}°; more samples in a turn makes them more exact"
         )
-    return Recording(sensors, next(iter(units.values())), vectors, table.warnings)
+
+    def exact() -> tuple[Any, ...]:
+        from cli.read.exact import long_column
+        from dalembert.units import UNITS
+
+        above, below = UNITS["time"][t.unit]
+        level, tacho = (
+            long_column(table.numbers[name]) if name else None for name in (mark, (more or [""])[0])
+        )
+        signals: Any = np.stack([long_column(table.numbers[name]) for name in units], axis=1)
+        return long_column(t) * float(above) / float(below), signals, level, pulses, tacho
+
+    return Recording(sensors, next(iter(units.values())), vectors, table.warnings, exact)
 
 
 def way(recording: Recording) -> list[Topic]:

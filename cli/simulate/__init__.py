@@ -15,12 +15,12 @@ EXAMPLE = "double-pendulum"
 OPTIONS = f"""
 {FILE}{CASES}{BRANCH}{WORKERS}
 What:
-  only NAME,...  These quantities in addition: H.x,coupler.omega; H is all of H.
-  forces  The joint forces, too.
+  only NAME,...  Show these quantities in addition: H.x,coupler.omega; H is all of H.
+  forces  Show the joint forces in addition.
 How:
-  time START:STOP:STEP  The times in seconds: 0:10:0.01 or 0:10/1000; needed.
+  time START:STOP:STEP  Times in seconds: 0:10:0.01 or 0:10/1000; required.
   accuracy NUMBER  Wanted error of the inputs (default 1e-9).
-  until INPUT=VALUE  End where an input has a value: crank=90deg.
+  until INPUT=VALUE  Stop where an input reaches a value: crank=90deg.
 Output:
   page FILE(.html)  Write a page that replays the motion.
 """
@@ -30,21 +30,17 @@ Output:
 def run(own: Options, show: ShowOptions) -> Result:
     """Simulate a mechanism whose inputs are released: its motion in time under the loads of FILE.toml.
 
-    The inputs start at the first time with the file's angle (or position) and speed; --at, --over and --cases set where
-    they start. The table has a row for each time: the inputs, the energy, and what --only names.
+    The inputs start at the first time with the file's angle (or position) and speed; --at, --over and --cases set
+    other starts. The table has a row for each time: the inputs, the energy, and what --only names.
     """
-    from cli.cases.analysis import Request, branch, names
     from cli.cases.call import Call
     from cli.read.options import bad
-    from cli.simulate.motion import Simulation, page, times_and_accuracy
+    from cli.simulate.motion import Simulation, times_and_accuracy
 
     if own.time is None:
         raise bad("--time", "expected the times, such as --time 0:10:0.01")
     if own.until is not None and own.page is not None and (own.over or own.cases):
         raise bad("--until", "expected no --page: its variants have one clock; --set shows one of them")
     times, accuracy = times_and_accuracy(own.time, own.accuracy)
-    request = Request(own.file, names(own.only), 2, branch(own.branch), forces=own.forces)
-    call = Call.of(own, show, request).started()
-    call.check_names()
-    study = call.study(Simulation, times=times, accuracy=accuracy, until=own.until)
-    return call.result(study, own.page, lambda cases: page(cases, show.units), len(times))
+    call = Call.of(own, show, 2, forces=own.forces).started()
+    return call.result(Simulation, times=times, accuracy=accuracy, until=own.until)

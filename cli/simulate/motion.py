@@ -13,8 +13,7 @@ import numpy as np
 from cli.cases.analysis import Analysis
 from cli.cases.axes import input_values
 from cli.cases.case import Case, TableCase, TableStudy
-from cli.cases.poses import column
-from cli.cases.quantities import bounds_of, cells, in_rows, keys_of, nested
+from cli.cases.poses import bounds_of, cells, column, in_rows, keys_of, nested
 from cli.read import options
 from cli.show.picture import shown as on_page
 from cli.show.terminal import progress_in_time
@@ -279,8 +278,7 @@ class Simulation(TableStudy):
 
     def case(self, row: Rows | None = None) -> Motion:
         """A variant, or the mechanism itself."""
-        m = self.mechanism if row is None else self.variant(row)
-        motion = Motion(self, Analysis(self.request, m, self.inputs(m, row)), alone=row is None)
+        motion = Motion(self, self.analysis(row), alone=row is None)
         if len(motion.analysis.assemblies) > 1:
             raise options.bad("--branch", "simulate follows one assembly: expected its number")
         return motion
@@ -288,6 +286,26 @@ class Simulation(TableStudy):
     def size(self, json: bool, together: bool) -> int:
         """How many variants a part has."""
         return TOGETHER if self.at_once else ONE_BY_ONE
+
+    @property
+    def frames(self) -> int:
+        """How many states of a variant the page shows."""
+        return len(self.times)
+
+    def page(self, cases: Sequence[tuple[str, Case]], units: str | None) -> bytes:
+        """The page of motions under forces: that which goes on for longest is drawn in full, the others as ghosts."""
+        from virtualwork.animation import moving_page
+
+        series = []
+        for name, case in cases:
+            # a variant that cannot be simulated is named by the remarks
+            with suppress(MechanismError) if name else nullcontext():
+                assert isinstance(case, Motion)
+                series.append(case.series(name, units))
+        if not series:
+            raise MechanismError("--page: no variant can be simulated, and there is nothing to draw")
+        series.sort(key=lambda one: -one.poses.n)
+        return moving_page(series[0].mechanism.name, series, time="t_s").html.encode()
 
     @property
     def at_once(self) -> bool:
@@ -341,22 +359,6 @@ def _lanes(study: Simulation, shown: Rows) -> Iterator[tuple[Case | None, list[s
             Lane(runs.times[i, there], trusted(values, runs.unknown[i, there]), runs.energy_drift[i, there]),
             remarks,
         )
-
-
-def page(cases: Sequence[tuple[str, Case]], units: str | None) -> bytes:
-    """The page of motions under forces: that which goes on for longest is drawn in full, the others as ghosts."""
-    from virtualwork.animation import moving_page
-
-    series = []
-    for name, case in cases:
-        # a variant that cannot be simulated is named by the remarks
-        with suppress(MechanismError) if name else nullcontext():
-            assert isinstance(case, Motion)
-            series.append(case.series(name, units))
-    if not series:
-        raise MechanismError("--page: no variant can be simulated, and there is nothing to draw")
-    series.sort(key=lambda one: -one.poses.n)
-    return moving_page(series[0].mechanism.name, series, time="t_s").html.encode()
 
 
 # --- numbers over time ------------------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,10 +14,7 @@ from cli.show.commands import ShowOptions, suffix_among
 from cli.show.output import command
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from cli.show.result import Result
-    from dalembert.results.way import Topic
 
 
 class Method(StrEnum):
@@ -39,15 +37,15 @@ Arguments:
   body BODY.toml  The body and its state; - is standard input.
 What:
   time START:STOP:STEP  Times in seconds, such as 0:10:0.01 or 0:10/1000.
-  at T  A time, s; may be repeated.
-  find NAME  Find this number of the file: omega.z, inertia.3, top.mgl, a top's tilt.
-  so_that QUANTITY=VALUE  What it is to give: slow=0.5rad_s, momentum.z=2.
-  only NAME,...  Only these: omega, attitude, momentum, energy, drift, period, nutation_period, cones, steady.
+  at T  Time, s; repeatable.
+  find NAME  Number of the file to find: omega.z, inertia.3, top.mgl, or a top's tilt.
+  so_that QUANTITY=VALUE  With --find: value of a result, such as slow=0.5rad_s or momentum.z=2.
+  only NAME,...  Show only these results: omega, attitude, momentum, energy, drift, period, nutation_period, cones, steady.
 How:
-  method  Default: exact wherever a closed form exists, else integrate.
-  integrator  For integration; the splitting is for a symmetric top.
+  method  Closed form, or integration (default: exact wherever a closed form exists).
+  integrator  Method of integration; the splitting is for a symmetric top.
 Output: of the rotation:
-  page FILE.html  Write a page that moves to FILE: play, slider, curves, values.
+  page FILE.html  Write a page that replays the rotation, with curves and values.
 """
 
 
@@ -65,16 +63,16 @@ def run(
     *,
     show: ShowOptions,
 ) -> Result:
-    """Turn a body through time: angular velocity, attitude, momentum and energy at any instant.
+    """Compute the rotation of a body in time: angular velocity, attitude, momentum and energy at any instant.
 
     BODY.toml holds inertia = [I1, I2, I3] (or a 3 × 3 matrix, or parts = "parts.csv"), kg·m²; omega in body axes,
-    rad/s; attitude = [w, x, y, z], body to space (default [1, 0, 0, 0]); if wanted a table [top] with mgl in N·m
+    rad/s; attitude = [w, x, y, z], body to space (default [1, 0, 0, 0]); optionally a table [top] with mgl in N·m
     (then inertia is about the fixed point, the axis is body z and gravity acts along -z of space), or torque =
     [x, y, z] in N·m with frame = "body" or "space".
     """
     import numpy as np
 
-    from cli.read.seeking import pair
+    from cli.read.root_search import pair
     from cli.show.result import Result, with_found
     from cli.spin import tables
     from cli.spin.rotation import Rotation, read_body
@@ -94,14 +92,11 @@ def run(
     rotation = Rotation(turning, np.array(times), method.value if method else None, integrator.value)
     sought, solution = pair(find, so_that), None
     if sought is not None:
-        from cli.spin.seeking import find as search
+        from cli.spin.find import find as search
 
         rotation, solution = search(rotation, *sought)
         turning = rotation.body
     rotation.states  # noqa: B018  faults of the data are errors before anything is shown
-
-    def figure() -> Figure:
-        return tables.draw(rotation)
 
     def moving() -> bytes:
         from cli.show.picture import shown
@@ -111,16 +106,11 @@ def run(
         made = turning_page(turning.name, turning.inertia, turning.omega, table, turning.mgl is not None)
         return made.html.encode()
 
-    def way() -> list[Topic]:
-        from cli.spin.way import way
-
-        return way(rotation)
-
     result = Result(
-        way=way,
+        way=partial(tables.way, rotation),
         tables=tables.tables(rotation, chosen),
         head={"method": "exact" if rotation.exact else rotation.integrator},
-        figure=figure,
+        figure=partial(tables.draw, rotation),
         beside={} if page is None else {page: moving},
         method=tables.METHOD,
         about={"title": turning.name or "Rotation in time"} | turning.about,

@@ -1,4 +1,4 @@
-"""What is computed of a rotation: the states, what is constant, the picture and the page."""
+"""What is computed of a rotation: the states, what is constant, the picture, the page, the worked solution."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ import numpy as np
 from cli.show.picture import blank
 from cli.spin.rotation import Rotation
 from dalembert.results.columns import Column, Table, names, number, vector
+from dalembert.results.way import Topic, figures
+from rigidbody3d.attitude import rotate
 from rigidbody3d.picture.rotation import rotation as draw_rotation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.spin.rotation import Array
+    from cli.spin.rotation import Array, Rotation
 
 METHOD = (
     "Free rotation and tops in closed form by Jacobi's elliptic functions (Landau and Lifshitz, Mechanics, §37; Goldstein, "
@@ -141,3 +143,50 @@ def _fine(r: Rotation) -> Array:
         ends[1] = ends[0] + (r.period or (2 * np.pi / size if size else 1.0))
     turns = (ends[1] - ends[0]) * size / (2 * np.pi)
     return np.linspace(ends[0], ends[1], int(np.clip(60 * turns, 600, 6000 if r.exact else 2000)))
+
+
+def way(r: Rotation) -> list[Topic]:
+    """The topics."""
+    g = r.body
+    tensor = np.asarray(g.inertia, dtype=float)
+    tensor = np.diag(tensor) if tensor.ndim == 1 else tensor
+    w = np.asarray(g.omega, dtype=float)
+    h = tensor @ w
+    space = rotate(g.attitude, h)
+    energy = float(w @ h) / 2
+    start = [
+        f"H = I·ω = ({', '.join(figures(float(v)) for v in h)}) kg·m²/s in body axes, |H| = {figures(float(np.linalg.norm(h)))}",
+        f"H = ({', '.join(figures(float(v)) for v in space)}) kg·m²/s in space axes",
+        f"T = ω·H/2 = {figures(energy)} J",
+    ]
+    head = {
+        "momentum_body_kg_m2_s": [float(v) + 0.0 for v in h],
+        "momentum_kg_m2_s": [float(v) + 0.0 for v in space],
+        "kinetic_energy_J": energy,
+    }
+    result = [Topic("start", start, "At time zero", head)]
+    if g.torque is not None:
+        law = ["Ḣ = M: momentum and energy change with the torque; I·ω̇ = M − ω × I·ω (Euler)."]
+    elif g.mgl is not None:
+        law = [
+            "Weight about the fixed point: H about the vertical, H about the axis of a symmetric top, and T + mgl·cos θ stay."
+        ]
+    else:
+        law = ["No torque: H in space and T stay; I·ω̇ = −ω × I·ω (Euler), so that ω moves on the polhode."]
+    law += [f"  drift of {of}: {figures(value)}" for of, value in r.drift.items() if value is not None]
+    result.append(Topic("constants", law, "What stays constant", {"drift": dict(r.drift)}))
+    cones = r.cones()
+    if cones is not None:
+        text = [
+            "A body of revolution: ω and its axis turn about H with H/I_t (precession), the body about its axis with the spin.",
+            *(f"  {key.rpartition('_')[0] if key.endswith('_deg') else key[:-6]}: {figures(value)} {'°' if key.endswith('_deg') else 'rad/s'}" for key, value in cones.items() if value is not None),
+        ]  # fmt: skip
+        result.append(Topic("cones", text, "Cones", dict(cones)))
+    steady = r.steady()
+    if steady is not None:
+        text = ["Steady precession at the present tilt: (I_t·cos θ)·ψ̇² − I_a·ω_z·ψ̇ + mgl = 0 has two roots."]
+        text += [
+            f"  {key[:-6]}: {figures(value)} rad/s" for key, value in steady.items() if value is not None
+        ]
+        result.append(Topic("steady precession", text, "Steady precession", dict(steady)))
+    return result

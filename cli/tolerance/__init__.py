@@ -15,37 +15,34 @@ EXAMPLE = "tolerances"
 OPTIONS = f"""
 {FILE}{CASES}{WORKERS}
 What:
-  only NAME,...  Only these: H.x,coupler.angle,crank.torque; H is all of H.
-  order position|velocity|acceleration|jerk  How far to differentiate (default: as the input's rates give).
+  only NAME,...  Show only these quantities: H.x,coupler.angle,crank.torque; H is all of H.
+  order position|velocity|acceleration|jerk  Highest derivative (default: the highest that the input's rates give).
   draws N  Number of mechanisms drawn within the tolerances.
   seed N=0  Random seed of --draws.
-  distribution normal|uniform=normal  Distribution of --draws; a limit is three standard deviations, or the end.
+  distribution normal|uniform=normal  Distribution of --draws: normal (a limit is three standard deviations) or uniform (a limit is an end).
 """
 
 
 @declared_command(OPTIONS, Options)
 def run(own: Options, show: ShowOptions) -> Result:
-    """Compute what the [tolerances] of FILE.toml do to the motion: worst case, standard deviation, shares.
+    """Compute the effect of the [tolerances] of FILE.toml on the motion: worst case, standard deviation, shares.
 
-    The first order is from exact derivatives; --draws solves drawn mechanisms. The table has a row for each pose.
+    Worst case and standard deviation are of first order, from exact derivatives. --draws solves drawn mechanisms in
+    addition. The table has a row for each pose.
     """
-    from cli.cases.analysis import ORDERS, Request, names
+    from cli.cases.analysis import unknown
     from cli.cases.call import Call
-    from cli.cases.quantities import unknown
     from cli.read.options import bad
     from cli.tolerance.spread import Spreads
     from virtualwork.quantities import places
 
     if own.draws is not None and own.draws < 2:
         raise bad("--draws", f"{own.draws}: expected two or more drawn mechanisms")
-    order = None if own.order is None else ORDERS.index(own.order)
-    call = Call.of(own, show, Request(own.file, names(own.only), order))
+    call = Call.of(own, show)
     only = call.request.only
     if only is not None and unknown(places(call.mechanism, 3, only), only) is not None:
         call.request = call.request._replace(forces=True)
-    call.check_names()
     workers = 1 if call.varied is not None else call.workers
-    study = call.study(
+    return call.result(
         Spreads, draws=own.draws or 0, seed=own.seed, distribution=own.distribution, workers=workers
     )
-    return call.result(study)

@@ -11,7 +11,7 @@ import numpy as np
 from cli.cases import poses
 from cli.cases.analysis import Analysis
 from cli.cases.case import TableCase, TableStudy
-from cli.cases.quantities import cells, keys_of
+from cli.cases.poses import cells, keys_of
 from cli.cases.study import METHOD
 from cli.read.options import processes
 from dalembert.dataclass import dataclass, field
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.cases.case import Rows
-    from cli.cases.quantities import Reals
+    from cli.cases.poses import Reals
     from cli.show.commands import ShowOptions
     from dalembert.results.way import Topic
 
@@ -280,20 +280,17 @@ class Spreads(TableStudy):
         """Rates without a speed, forces without a mass or a load."""
         from cli.cases import remarks
 
-        whole = Analysis(self.request, self.mechanism, self.inputs(self.mechanism, None))
-        return remarks.without_meaning(whole, self.names)
+        return remarks.without_meaning(self.own, self.names)
 
     def case(self, row: Rows | None = None) -> Tolerances:
         """A variant, or the mechanism itself."""
-        m = self.mechanism if row is None else self.variant(row)
-        analysis = Analysis(self.request, m, self.inputs(m, row))
+        analysis = self.analysis(row)
         _ = analysis.motions
         return Tolerances(self, analysis)
 
     def check_size(self, show: ShowOptions, times: int) -> None:
         """Refuse more poses than the memory holds."""
-        whole = Analysis(self.request, self.mechanism, self.inputs(self.mechanism, None))
-        whole.check_size(json=show.as_json, table=show.needs_table, times=times)
+        self.own.check_size(json=show.as_json, table=show.needs_table, times=times)
 
 
 def _sample(its: Drawn) -> dict[str, Reals]:

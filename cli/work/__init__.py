@@ -29,11 +29,11 @@ def run(states: str, gravity: str | None = None, ledger: bool = False) -> Result
 
     STATES has one row per link (and per step): link, mass_*, inertia_*, vx_* vy_* and ax_* ay_* of the centre of
     mass, omega_*, alpha_*, the applied force fx_* fy_* with the velocity fvx_* fvy_* of its point, torque_*; * is
-    a unit: mass_kg, vx_m_s, omega_rad_s, torque_N_m. Empty cells are zero (fv: the centre of mass's). One force or
+    a unit: mass_kg, vx_m_s, omega_rad_s, torque_N_m. Empty cells are zero; an empty fv is the velocity of the centre of mass. One force or
     torque cell holds ?; several unknowns are marked ?NAME and need as many velocity fields, distinguished by a
     column field.
     """
-    g = 0j if gravity is None else options.plane_vector("--gravity", gravity)
+    g = 0j if gravity is None else options.plane_vector("--gravity", gravity, "acceleration")
     from cli.show.result import Result
     from cli.work.power import WorkBalance
     from cli.work.states import read_states

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cli.work.states import Cell, Real, StateTable, Unknown
+from dalembert.arithmetic.doubled import Doubled
 from dalembert.errors import DataError
 from dalembert.results.columns import finite
-from virtualwork.textbook.link_states import KINDS, Balance, LinkStates, UnitLoad, balance
+from virtualwork.textbook.link_states import KINDS, Again, Balance, LinkStates, UnitLoad, balance
+
+
+def _unit_load(x: Any, y: Any, torque: Any) -> UnitLoad:
+    force = np.zeros_like(x, dtype=complex)
+    force.real, force.imag = x, y
+    return UnitLoad(force, torque)
 
 
 class Term(NamedTuple):
@@ -24,7 +31,7 @@ class Term(NamedTuple):
     kind: str
     power: float | None
     error: float = 0.0
-    """Bound of the power's rounding error, where it was asked for."""
+    """The power's rounding error, on request."""
 
 
 @dataclass
@@ -38,17 +45,16 @@ class WorkBalance:
     def __post_init__(self) -> None:
         self.where: dict[int, tuple[int, int]] = {}
         self.groups: list[tuple[LinkStates, Balance]] = []
+        self.places: list[tuple[list[int], NDArray[np.intp]]] = []
         sizes: dict[int, list[int]] = {}
         for index, step in enumerate(self.states.steps):
             sizes.setdefault(len(step.fields), []).append(index)
         for k, members in sizes.items():
             rows = self._places(members, k)
-            arrays = {
-                name: np.where(rows >= 0, value[rows], 0.0) for name, value in self.states.values.items()
-            }
-            states = self._link_states(arrays, np.zeros(rows.shape))
+            self.places.append((members, rows))
+            states = self._link_states(self.states.values, rows)
             with np.errstate(over="ignore", invalid="ignore"):
-                solved = balance(states, self._patterns(members, rows))
+                solved = balance(states, [_unit_load(*of) for of in self._patterns(members, rows)])
             if not (np.isfinite(solved.power).all() and np.isfinite(solved.value[solved.determined]).all()):
                 raise DataError(f"{self.states.table.file}: the powers are too large to be computed with")
             for place, index in enumerate(members):
@@ -56,16 +62,20 @@ class WorkBalance:
             self.groups.append((states, solved))
         self._warn_of_undetermined()
 
-    def _link_states(self, arrays: dict[str, Real], zero: Real) -> LinkStates:
-        def vector(x: str, y: str) -> NDArray[np.complex128] | complex:
-            if x not in arrays and y not in arrays:
-                return 0j
-            z = np.zeros(zero.shape, dtype=complex)
-            z.real, z.imag = arrays.get(x, 0.0), arrays.get(y, 0.0)
+    def _link_states(self, values: Mapping[str, Any], rows: NDArray[np.intp]) -> LinkStates:
+        """Return the states of rows of the table, of floats or in 32 digits; −1 is no row."""
+        arrays = {name: np.where(rows >= 0, value[rows], 0.0) for name, value in values.items()}
+        zero = np.zeros(rows.shape)
+
+        def vector(x: str, y: str) -> Any:
+            a, b = (arrays.get(name, zero) + zero for name in (x, y))
+            z = np.zeros_like(a + b, dtype=complex)
+            # both of one kind of number
+            z.real, z.imag = a + 0.0 * b, b + 0.0 * a
             return z
 
         return LinkStates(
-            velocity=vector("vx", "vy") + zero,
+            velocity=vector("vx", "vy"),
             omega=arrays.get("omega", zero),
             mass=arrays.get("mass", 0.0),
             inertia=arrays.get("inertia", 0.0),
@@ -87,24 +97,20 @@ class WorkBalance:
                 places[i, j, : len(rows)] = rows
         return places[:, 0] if k == 1 else places
 
-    def _patterns(self, members: list[int], rows: NDArray[np.intp]) -> list[UnitLoad]:
-        """Return each unknown's unit load on the rows of every step."""
+    def _patterns(self, members: list[int], rows: NDArray[np.intp]) -> list[Real]:
+        """Return what each unknown is per unit on the rows of every step: force along x and y, torque, (3, ...)."""
         k = len(self.states.steps[members[0]].fields)
-        loads = [(np.zeros(rows.shape, dtype=complex), np.zeros(rows.shape)) for _ in range(k)]
-        unit = {"fx": 1.0, "fy": 1j}
+        loads = [np.zeros((3, *rows.shape)) for _ in range(k)]
         for i, index in enumerate(members):
             place = {row: at for at, row in np.ndenumerate(rows[i]) if row >= 0}
             by_cell: dict[tuple[str, int], list[int]] = {}
             for row in place:
                 by_cell.setdefault((self.states.links[row], self.states.occurrence[row]), []).append(row)
-            for unknown, (force, torque) in zip(self.states.steps[index].unknowns, loads, strict=True):
+            for unknown, load in zip(self.states.steps[index].unknowns, loads, strict=True):
                 for cell in unknown.cells:
                     for row in by_cell[cell.link, cell.occurrence]:
-                        if cell.quantity == "torque":
-                            torque[(i, *place[row])] += cell.factor
-                        else:
-                            force[(i, *place[row])] += unit[cell.quantity] * cell.factor
-        return [UnitLoad(force, torque) for force, torque in loads]
+                        load[(("fx", "fy", "torque").index(cell.quantity), i, *place[row])] += cell.factor
+        return loads
 
     def _warn_of_undetermined(self) -> None:
         """Name each unknown that no equation holds; where nothing is determined, that is an error."""
@@ -147,16 +153,16 @@ class WorkBalance:
         """Return the states that a step is among, and what balances them."""
         return self.groups[self.where[index][0]]
 
-    def terms(self, index: int, *, bounds: bool = False) -> Iterator[Term]:
-        """Yield the terms of a step, with the bounds of their errors where these are asked for."""
+    def terms(self, index: int, *, errors: bool = False) -> Iterator[Term]:
+        """Yield the terms of a step, with their rounding errors on request."""
         step = self.states.steps[index]
         group, place = self.where[index]
         states, solved = self.groups[group]
         single = len(step.fields) == 1
-        wrong = self.term_bounds[group] if bounds else {}
+        wrong = self.term_errors[group] if errors else {}
 
         def error(kind: str, at: tuple[int, ...]) -> float:
-            return float(wrong[kind][at]) if bounds else 0.0
+            return float(wrong[kind][at]) if errors else 0.0
 
         for f, (of, rows) in enumerate(step.fields.items()):
             here: tuple[int, ...] = (place,) if single else (place, f)
@@ -176,30 +182,41 @@ class WorkBalance:
                     yield Term(of, unknown.cells[0].link, "unknown", power, error("unknown", (place, f, j)))
 
     @cached_property
-    def term_bounds(self) -> list[dict[str, Real]]:
-        """Bounds of the rounding errors of each group's powers by kind, and of its unknowns' powers."""
+    def second(self) -> list[tuple[LinkStates, Again]]:
+        """The states of each group and what balances them in 32 digits, of the decimals of the table as they are written."""
+        from cli.read.exact import plain
+        from dalembert.arithmetic.doubled_arrays import DoubledComplex
+
         groups = []
-        for (states, solved), value in zip(self.groups, self.bounds, strict=True):
-            assert solved.given is not None
-            unit = np.stack([states.unit_power_error_estimate(of) for of in solved.given[1]], axis=-1)
-            unit = unit[..., None, :] if solved.value.shape[-1] == 1 else unit
-            # of an unknown that does no work there is no bound: infinity times nothing
-            with np.errstate(invalid="ignore"):
-                unknown = np.abs(solved.coefficient) * value[..., None, :]
-            wrong = {kind: states.term_error_estimate(kind) for kind in states.terms}
-            groups.append(wrong | {"unknown": unknown + unit * np.abs(solved.value)[..., None, :]})
+        for (members, rows), (_, solved) in zip(self.places, self.groups, strict=True):
+            states = self._link_states(self.states.exact, rows)
+            gravity: Any = DoubledComplex(plain(self.gravity.real), plain(self.gravity.imag))
+            states = replace(states, gravity=gravity)
+            unknowns = [_unit_load(*map(plain, of)) for of in self._patterns(members, rows)]
+            groups.append((states, solved.second_run((states, unknowns))))
         return groups
 
     @cached_property
-    def bounds(self) -> list[Real]:
-        """Bounds of the rounding errors of each group's unknowns."""
-        return [solved.error_estimate() for _, solved in self.groups]
+    def term_errors(self) -> list[dict[str, Real]]:
+        """The rounding errors of each group's powers by kind, and of its unknowns' powers."""
+        groups = []
+        for (states, solved), (exact, again) in zip(self.groups, self.second, strict=True):
+            wrong = {kind: states.error_estimate(kind, exact) for kind in states.terms}
+            groups.append(wrong | {"unknown": again.unknown_power.off(solved.unknown_power)})
+        return groups
 
-    def unknown_bounds(self, index: int) -> list[float]:
-        """Bounds of the rounding errors of a step's unknowns."""
-        group, place = self.where[index]
-        errors: list[float] = self.bounds[group][place].tolist()
-        return errors
+    def exact_unknowns(self) -> Doubled:
+        """The load of each cell of all unknowns in 32 digits, (cells,)."""
+        from cli.read.exact import plain
+
+        cells = [
+            self.second[group][1].value[place, j] * plain(cell.factor)
+            for group, place, step in ((*self.where[i], step) for i, step in enumerate(self.states.steps))
+            for j, unknown in enumerate(step.unknowns)
+            for cell in unknown.cells
+        ]
+        both: Any = np.stack(cells)
+        return both.doubled  # type: ignore[no-any-return]
 
     def sums(self, index: int) -> list[float]:
         """The sum of the powers of each velocity field of a step, W."""

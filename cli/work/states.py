@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +78,23 @@ class StateTable:
     warnings: list[str]
 
     @property
+    def exact(self) -> dict[str, Any]:
+        """The numbers in 32 digits, in SI, of the decimals as they are written; what is blank is zero."""
+        from cli.read.exact import column
+
+        rows = range(self.table.rows)
+        values: dict[str, Any] = {name: column(x, rows) for name, x in self.table.numbers.items()}
+        for axis in "xy":
+            name = f"fv{axis}"
+            if name in self.values:
+                center = values.get(f"v{axis}", np.zeros(self.table.rows))
+                given = (
+                    self.table.numbers[name].values if name in values else np.full(self.table.rows, np.nan)
+                )
+                values[name] = np.where(np.isnan(given), center, values.get(name, center))
+        return values
+
+    @property
     def links(self) -> list[str]:
         """The link of each row."""
         return self.table.texts["link"]
@@ -99,7 +116,11 @@ def read_states(path: str) -> StateTable:
             )
     for quantity in ("mass", "inertia"):
         if quantity in table.numbers:
-            table.reject(table.numbers[quantity].values < 0, quantity, f"a {quantity} that is not negative")
+            table.reject(
+                table.numbers[quantity].values < 0,
+                quantity,
+                f"{'an' if quantity == 'inertia' else 'a'} {quantity} that is not negative",
+            )
     warnings: list[str] = []
     values = {name: column.si for name, column in table.numbers.items()}
     for name, value in values.items():

@@ -46,20 +46,12 @@ def unknowns(w: WorkBalance) -> Table:
     if any(unknown.name for _, unknown, *_ in cells):
         keys.append(names("unknown", [unknown.name or None for _, unknown, *_ in cells], "name"))
 
-    def error(load: str) -> Callable[[], list[float]]:
-        return lambda: [
-            abs(bound * cell.factor) if cell.quantity == load else 0.0
-            for i, step in enumerate(instants)
-            for unknown, bound in zip(step.unknowns, w.unknown_bounds(i), strict=True)
-            for cell in unknown.cells
-        ]
-
     loads = []
     for load in LOADS:
         if any(quantity == load for _, quantity in table.marks):
             si = [np.nan if value is None or cell.quantity != load else value for _, _, cell, value in cells]
             unit = table.numbers[load].unit
-            loads.append(number(load, COLUMNS[load], si, unit, error(load), place=None))
+            loads.append(number(load, COLUMNS[load], si, unit, place=None, exact=w.exact_unknowns))
     documented = [
         names("quantity", [LOADS[cell.quantity] for _, _, cell, _ in cells]),
         names("value", [value for *_, value in cells]),
@@ -87,7 +79,7 @@ def ledger(w: WorkBalance) -> Table:
     rows = _terms(w)
 
     def error() -> list[float]:
-        return [term.error for i in range(len(w.states.steps)) for term in w.terms(i, bounds=True)]
+        return [term.error for i in range(len(w.states.steps)) for term in w.terms(i, errors=True)]
 
     named = _named(w, rows)
     power = number("power", "power", [term.power or 0.0 for _, term in rows], error=error, place=None)

@@ -25,7 +25,8 @@ class Numpy:
 
     upper = staticmethod(upper)
     place = staticmethod(sines.place)
-    entry0, entry1, entry2, entry3 = (partial(sines.entry, row) for row in range(4))
+    # a partial in a class is bound as a method from Python 3.14 on
+    entry0, entry1, entry2, entry3 = (staticmethod(partial(sines.entry, row)) for row in range(4))
 
     @staticmethod
     def binade(x: Any) -> Any:

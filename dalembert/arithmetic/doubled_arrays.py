@@ -18,8 +18,14 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.doubled import PI, Doubled
-from dalembert.arithmetic.doubled_functions import DOUBLED
-from dalembert.arithmetic.doubled_vectors import OWN, total
+from dalembert.arithmetic.doubled_functions import (
+    DOUBLED,
+    direction,
+    exponential,
+    logarithm,
+    root,
+)
+from dalembert.arithmetic.doubled_vectors import OWN, Vectors, total
 
 Array = NDArray[np.float64]
 
@@ -95,6 +101,15 @@ class DoubledArray(NDArrayOperatorsMixin):
     def T(self) -> DoubledArray:
         return DoubledArray(self.high.T, self.low.T)
 
+    @property
+    def real(self) -> DoubledArray:
+        """Itself, as of numpy's real arrays."""
+        return self
+
+    def conj(self) -> DoubledArray:
+        """Itself, as of numpy's real arrays."""
+        return self
+
     def __len__(self) -> int:
         return len(self.high)
 
@@ -119,19 +134,34 @@ class DoubledArray(NDArrayOperatorsMixin):
         summed = DoubledArray.of(total(Doubled(self.high, self.low), axis))
         return _each(np.expand_dims, summed, axis) if keepdims else summed
 
+    def __float__(self) -> float:
+        return float(self.value)
+
+    def astype(self, kind: Any) -> NDArray[Any]:
+        """The nearest numbers of a kind of numpy's."""
+        return self.value.astype(kind)
+
     def max(self, axis: Any = None, keepdims: bool = False) -> Array:
         """The largest, to 16 digits: sizes."""
         return np.asarray(self.high.max(axis=axis, keepdims=keepdims))
 
     def argmax(self, axis: int | None = None) -> Any:
         """Where the largest is."""
-        return self.high.argmax(axis=axis)
+        largest = self.high == self.high.max(axis=axis, keepdims=True)
+        return np.where(largest, self.low, -np.inf).argmax(axis=axis)
+
+    def argmin(self, axis: int | None = None) -> Any:
+        """Where the smallest is."""
+        return (-self).argmax(axis)
 
     def any(self) -> bool:
         """Whether one is not zero."""
         return bool(self.high.any())
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, out: Any = None, **_: Any) -> Any:
+        if any(map(_is_complex, inputs)):
+            work = _COMPLEX.get(ufunc)
+            return NotImplemented if work is None else work(*map(_complex, inputs))
         work = _UFUNCS.get(ufunc)
         if work is None or method != "__call__":
             return NotImplemented
@@ -141,7 +171,9 @@ class DoubledArray(NDArrayOperatorsMixin):
         out[0][...] = result
         return out[0]
 
-    def __array_function__(self, function: Any, _: Any, args: Any, kwargs: Any) -> Any:
+    def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
+        if DoubledComplex in types:
+            return NotImplemented
         if function in _OWN:
             return _OWN[function](*args, **kwargs)
         if function in _LAYOUT:
@@ -149,35 +181,134 @@ class DoubledArray(NDArrayOperatorsMixin):
         return NotImplemented
 
 
-class DoubledComplex:
+class DoubledComplex(NDArrayOperatorsMixin):
     """x + iy of doubled arrays, for formulas of complex arrays.
 
     >>> z = DoubledComplex(DoubledArray(1.0), DoubledArray(2.0))
-    >>> (z * z.conj()).real.value
-    array(5.)
+    >>> (z * z.conj()).real.value, (1j * z).value
+    (array(5.), array(-2.+1.j))
     """
+
+    dtype = np.dtype(object)
 
     def __init__(self, real: Any, imag: Any) -> None:
         self.real, self.imag = real, imag
+
+    @classmethod
+    def of(cls, z: Vectors | ArrayLike) -> DoubledComplex:
+        """Vectors of 32 digits, or complex floats exactly."""
+        z = z if isinstance(z, Vectors) else Vectors.of(z)
+        return cls(DoubledArray.of(z.x), DoubledArray.of(z.y))
+
+    @property
+    def high(self) -> NDArray[np.complex128]:
+        """The upper parts."""
+        return self.value
+
+    @property
+    def value(self) -> NDArray[np.complex128]:
+        """The nearest complex floats."""
+        z = np.empty(self.shape, dtype=complex)
+        z.real, z.imag = self.real.value, self.imag.value
+        return z
+
+    @property
+    def vectors(self) -> Vectors:
+        """The same for functions of `Vectors`."""
+        return Vectors(self.real.doubled, self.imag.doubled)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return np.broadcast_shapes(self.real.shape, self.imag.shape)
+
+    @property
+    def ndim(self) -> int:
+        return len(self.shape)
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, index: Any) -> DoubledComplex:
+        return DoubledComplex(self.real[index], self.imag[index])
+
+    def __setitem__(self, index: Any, value: Any) -> None:
+        new = _complex(value)
+        self.real[index], self.imag[index] = new.real, new.imag
 
     def conj(self) -> DoubledComplex:
         """The conjugate."""
         return DoubledComplex(self.real, -self.imag)
 
-    def __mul__(self, other: DoubledComplex | DoubledArray) -> DoubledComplex:
-        if isinstance(other, DoubledComplex):
-            return DoubledComplex(
-                self.real * other.real - self.imag * other.imag,
-                self.real * other.imag + self.imag * other.real,
-            )
-        return DoubledComplex(self.real * other, self.imag * other)
+    def sum(self, axis: int = -1) -> DoubledComplex:
+        """The sum along an axis, in pairs."""
+        return DoubledComplex(self.real.sum(axis), self.imag.sum(axis))
+
+    def any(self) -> bool:
+        """Whether one is not zero."""
+        return bool(self.real.any() or self.imag.any())
+
+    def off(self, value: ArrayLike) -> Array:
+        """Return by how much complex floats differ from these, and what 32 digits do not tell."""
+        z = np.asarray(value, dtype=complex)
+        return np.asarray(np.hypot(self.real.off(z.real), self.imag.off(z.imag)))
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **_: Any) -> Any:
+        work = _COMPLEX.get(ufunc)
+        return NotImplemented if work is None or method != "__call__" else work(*map(_complex, inputs))
+
+    def __array_function__(self, function: Any, _: Any, args: Any, kwargs: Any) -> Any:
+        if function is np.sum:
+            return args[0].sum(**kwargs)
+        if function is np.shape:
+            return args[0].shape
+        if function not in _LAYOUT:
+            return NotImplemented
+        return DoubledComplex(*(_each(function, *_parts(args, name), **kwargs) for name in ("real", "imag")))
+
+
+def _is_complex(x: Any) -> bool:
+    return isinstance(x, (complex, DoubledComplex)) or (isinstance(x, np.ndarray) and x.dtype.kind == "c")
+
+
+def _complex(x: Any) -> DoubledComplex:
+    if isinstance(x, DoubledComplex):
+        return x
+    if _is_complex(x):
+        return DoubledComplex.of(x)
+    return DoubledComplex(_entering(x), DoubledArray(np.zeros(np.shape(x))))
+
+
+def _parts(x: Any, name: str) -> Any:
+    """The real or the imaginary parts of what a function of arrays is called with."""
+    if isinstance(x, (list, tuple)):
+        return [_parts(each, name) for each in x]
+    return getattr(x, name) if isinstance(x, DoubledComplex) else x
+
+
+def _quotient(a: DoubledComplex, b: DoubledComplex) -> DoubledComplex:
+    above, below = a * b.conj(), b.real * b.real + b.imag * b.imag
+    return DoubledComplex(above.real / below, above.imag / below)
+
+
+_COMPLEX: dict[Any, Callable[..., Any]] = {
+    np.add: lambda a, b: DoubledComplex(a.real + b.real, a.imag + b.imag),
+    np.subtract: lambda a, b: DoubledComplex(a.real - b.real, a.imag - b.imag),
+    np.multiply: lambda a, b: DoubledComplex(
+        a.real * b.real - a.imag * b.imag, a.real * b.imag + a.imag * b.real
+    ),
+    np.true_divide: _quotient,
+    np.negative: lambda z: DoubledComplex(-z.real, -z.imag),
+    np.conjugate: lambda z: z.conj(),
+    np.absolute: lambda z: np.hypot(z.real, z.imag),
+}
 
 
 @lru_cache(maxsize=256)
 def _constant(x: float) -> Doubled:
-    """A constant of a formula as it is written: a short decimal, or π times a power of two."""
-    if x and abs(math.frexp(x / math.pi)[0]) == 0.5:
-        return PI * (x / math.pi)
+    """A constant of a formula as it is written: a short decimal, or a simple fraction of π."""
+    share = Fraction(x / math.pi).limit_denominator(360) if math.isfinite(x) else Fraction(0)
+    if 0 < abs(share.numerator) <= 360 and abs(float(share) * math.pi - x) <= 2.0**-52 * abs(x):
+        return PI * Doubled.of(share)
     return Doubled.of(Fraction(repr(x))) if len(repr(x)) < 9 and math.isfinite(x) else Doubled(x)
 
 
@@ -193,7 +324,7 @@ def _entering(x: Any) -> Any:
 
 def _each(function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
     """A function that lays numbers out anew, of the upper and of the lower parts."""
-    places = (1, 2) if function is np.where else range(len(args)) if function is np.broadcast_arrays else (0,)
+    places = _PLACES.get(function, (0,))
     both = []
     for upper in (True, False):
         parts = [_part(x, upper) if i in places else x for i, x in enumerate(args)]
@@ -234,10 +365,6 @@ def _chosen(a: DoubledArray, b: DoubledArray, first: Any) -> DoubledArray:
     return DoubledArray(np.where(first, a.high, b.high), np.where(first, a.low, b.low))
 
 
-def _root(x: Doubled) -> Doubled:
-    return DOUBLED.sqrt(Doubled(np.asarray(x.high), x.low))
-
-
 def _hypot(a: DoubledArray, b: DoubledArray) -> DoubledArray:
     # by a power of two near the larger: no square underflows
     size = np.exp2(np.floor(np.log2(np.maximum(np.maximum(np.abs(a.high), np.abs(b.high)), 1e-290))))
@@ -245,21 +372,24 @@ def _hypot(a: DoubledArray, b: DoubledArray) -> DoubledArray:
     return np.sqrt(x * x + y * y) * size  # type: ignore[no-any-return]
 
 
-def _angle(y: Doubled, x: Doubled) -> Doubled:
-    angle = DOUBLED.atan2(*(Doubled(np.asarray(part.high), part.low) for part in (y, x)))
-    # on the axes, and with the sign of a zero, as floats have it
-    plain = np.arctan2(y.high, x.high)
-    turns = plain / np.pi
-    exact = PI * turns
-    whole = (y.high == 0) | (x.high == 0)
-    return Doubled(np.where(whole, exact.high, angle.high), np.where(whole, exact.low, angle.low))
+def _power(x: DoubledArray, y: DoubledArray) -> DoubledArray:
+    """Whole powers, by squares."""
+    left = np.abs(y.high).astype(np.int64)
+    result: DoubledArray = x * 0.0 + np.ones(np.shape(left))
+    square = x
+    while left.any():
+        result = _chosen(result * square, result, left % 2 > 0)
+        square, left = square * square, left // 2
+    return _chosen(1.0 / result, result, y.high < 0) if (y.high < 0).any() else result
 
 
-def _power(x: DoubledArray, y: DoubledArray) -> Any:
-    result = x
-    for _ in range(int(y.high) - 1):
-        result = result * x
-    return result
+def _running(step: Callable[[DoubledArray, DoubledArray], DoubledArray], x: DoubledArray) -> DoubledArray:
+    """The running sums or products along the first axis: of 1, 2, 4 … numbers before each."""
+    apart = 1
+    while apart < len(x):
+        x = _each(np.concatenate, [x[:apart], step(x[apart:], x[:-apart])])
+        apart *= 2
+    return x
 
 
 def _product(a: DoubledArray, b: DoubledArray) -> Any:
@@ -279,41 +409,16 @@ def _cross(a: Any, b: Any) -> Any:
     return np.stack([y * Z - z * Y, z * X - x * Z, x * Y - y * X], axis=-1)
 
 
+def _zeros(like: DoubledArray, dtype: Any = float, shape: Any = None) -> Any:
+    shape = like.shape if shape is None else shape
+    real, imag = (DoubledArray(np.zeros(shape), np.zeros(shape)) for _ in range(2))
+    return DoubledComplex(real, imag) if dtype is complex else real
+
+
 def _rint(x: DoubledArray) -> DoubledArray:
     near = np.rint(x.high)
     rest = x - near
     return DoubledArray(near + np.where(rest > 0.5, 1.0, np.where(rest < -0.5, -1.0, 0.0)))
-
-
-def exponential(x: Any) -> Any:
-    """e to the power of doubled numbers (...): 2ᵏ times the 2¹⁰-th power of a short series.
-
-    >>> float(exponential(DoubledArray(1.0)).low)
-    1.4456468917292502e-16
-    """
-    x = _entering(x)
-    k = np.rint(x.high / math.log(2))
-    # less k·ln 2, in 2¹⁰ parts
-    r = (x - LN2 * k) / 1024.0
-    # e^r - 1, so that no digit of a small r is lost
-    less = r
-    for n in range(9, 1, -1):
-        less = r + less * r / n if n == 9 else r * (1.0 + less / n)
-    for _ in range(10):
-        less = less * (less + 2.0)
-    power = np.exp2(np.clip(k, -1022, 1022))
-    e = less + 1.0
-    return DoubledArray(e.high * power, e.low * power)
-
-
-LN2 = DoubledArray(0.6931471805599453, 2.3190468138462996e-17)
-
-
-def logarithm(x: Any) -> Any:
-    """The natural logarithm of positive doubled numbers (...), by a step of Newton's."""
-    near = np.log(x.high)
-    left = x * exponential(DoubledArray(-near)) - 1.0
-    return left - left * left / 2.0 + near
 
 
 _UFUNCS: dict[Any, Callable[..., Any]] = {
@@ -325,22 +430,24 @@ _UFUNCS: dict[Any, Callable[..., Any]] = {
     np.absolute: _of(abs),
     np.square: _of(lambda x: x * x),
     np.power: _power,
-    np.sqrt: _of(_root),
+    np.sqrt: _of(root),
     np.hypot: _hypot,
     np.sin: _of(DOUBLED.sin),
     np.cos: _of(DOUBLED.cos),
-    np.arctan2: _of(_angle),
-    np.arctan: _of(lambda x: _angle(x, Doubled(1.0 + 0.0 * x.high))),
+    np.arctan2: _of(direction),
+    np.arctan: _of(lambda x: direction(x, Doubled(1.0 + 0.0 * x.high))),
     np.copysign: lambda x, y: _chosen(x, -x, np.signbit(x.high) == np.signbit(y.high)),
     np.minimum: lambda a, b: _chosen(a, b, a < b),
     np.maximum: lambda a, b: _chosen(a, b, a > b),
-    np.arcsinh: lambda x: np.copysign(logarithm(np.abs(x) + np.sqrt(x * x + 1.0)), x),
-    np.cosh: lambda x: (exponential(x) + exponential(-x)) / 2.0,
-    np.tanh: lambda x: np.copysign(1.0 - 2.0 / (exponential(np.abs(x) * 2.0) + 1.0), x),
+    np.exp: _of(exponential),
+    np.log: _of(logarithm),
+    np.arcsinh: lambda x: np.copysign(np.log(np.abs(x) + np.sqrt(x * x + 1.0)), x),
+    np.cosh: lambda x: (np.exp(x) + np.exp(-x)) / 2.0,
+    np.tanh: lambda x: np.copysign(1.0 - 2.0 / (np.exp(np.abs(x) * 2.0) + 1.0), x),
     np.degrees: lambda x: x * 180.0 / math.pi,
     np.rint: _rint,
+    np.fmod: lambda x, y: x - y * np.trunc((x / y).value),
     # of whole numbers
-    np.fmod: lambda x, y: DoubledArray(np.fmod(x.high, y.high)),
     np.remainder: lambda x, y: DoubledArray(np.remainder(x.high, y.high)),
     np.isfinite: lambda x: np.isfinite(x.high),
     np.isinf: lambda x: np.isinf(x.high),
@@ -364,33 +471,23 @@ _LAYOUT = {
     np.diagonal,
     np.expand_dims,
     np.atleast_1d,
-    np.zeros_like,
-    np.empty_like,
+    np.choose,
+}
+
+_PLACES: dict[Any, Iterable[int]] = {
+    np.where: (1, 2),
+    np.choose: (1,),
+    np.broadcast_arrays: range(99),
 }
 
 _OWN: dict[Any, Callable[..., Any]] = {
     np.cross: _cross,
     np.sum: lambda x, axis=-1, **_: x.sum(axis),
+    np.empty_like: _zeros,
+    np.zeros_like: _zeros,
+    np.diff: lambda x: x[1:] - x[:-1],
+    np.cumsum: lambda x: _running(lambda a, b: a + b, x),
+    np.cumprod: lambda x: _running(lambda a, b: a * b, x),
     np.shape: lambda x: x.shape,
     np.ndim: lambda x: x.ndim,
 }
-
-
-def exactly(numbers: Iterable[Fraction], shape: tuple[int, ...]) -> DoubledArray:
-    """Exact numbers as a doubled array of this shape."""
-    each = [Doubled.of(x) for x in numbers]
-    return DoubledArray(
-        np.array([x.high for x in each]).reshape(shape), np.array([x.low for x in each]).reshape(shape)
-    )
-
-
-def by_fractions(formula: Callable[..., Fraction], *numbers: DoubledArray) -> DoubledArray:
-    """A formula of arrays of one shape in fractions, number by number: what cancels in it is exact.
-
-    >>> by_fractions(lambda a, b: a - b, DoubledArray([1.0], [1e-30]), DoubledArray([1.0])).value
-    array([1.e-30])
-    """
-    rows = [
-        [Fraction(a) + Fraction(b) for a, b in zip(x.high.flat, x.low.flat, strict=True)] for x in numbers
-    ]
-    return exactly([formula(*row) for row in zip(*rows, strict=True)], numbers[0].shape)

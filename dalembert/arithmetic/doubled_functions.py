@@ -8,13 +8,14 @@ tape in 32 digits is written down.
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from dalembert.arithmetic.arrays import NUMPY
-from dalembert.arithmetic.doubled import Doubled, quick
+from dalembert.arithmetic.doubled import PI, Doubled, quick
 from dalembert.arithmetic.exact import two_sum
 from dalembert.arithmetic.recorded import RECORDED
 from dalembert.arithmetic.sines import STEP, nearest
@@ -143,3 +144,47 @@ def _turned(there: Doubled, *more: Doubled) -> Doubled:
 
 
 DOUBLED = DoubledKind()
+
+
+def root(x: Doubled) -> Doubled:
+    """The square root of an array."""
+    return DOUBLED.sqrt(Doubled(np.asarray(x.high), x.low))
+
+
+def direction(y: Doubled, x: Doubled) -> Doubled:
+    """The angle of arrays of vectors; on the axes, and with the sign of a zero, as floats have it."""
+    angle = DOUBLED.atan2(*(Doubled(np.asarray(part.high), part.low) for part in (y, x)))
+    exact = PI * (np.arctan2(y.high, x.high) / np.pi)
+    whole = (y.high == 0) | (x.high == 0)
+    return Doubled(np.where(whole, exact.high, angle.high), np.where(whole, exact.low, angle.low))
+
+
+LN2 = Doubled(0.6931471805599453, 2.3190468138462996e-17)
+
+
+def exponential(x: Doubled) -> Doubled:
+    """e to the power of arrays: 2ᵏ times the 2¹⁰-th power of a short series.
+
+    >>> float(exponential(Doubled(1.0)).low)
+    1.4456468917292502e-16
+    """
+    k = np.rint(x.high / math.log(2))
+    # less k·ln 2, in 2¹⁰ parts
+    r = (x - LN2 * k) / 1024.0
+    # e^r - 1, so that no digit of a small r is lost
+    less = r
+    for n in range(9, 1, -1):
+        less = r + less * r / n if n == 9 else r * (1.0 + less / n)
+    for _ in range(10):
+        less = less * (less + 2.0)
+    power = np.exp2(np.clip(k, -1022, 1022))
+    e = less + 1.0
+    return Doubled(e.high * power, e.low * power)
+
+
+def logarithm(x: Doubled) -> Doubled:
+    """The natural logarithm of arrays of positive numbers, by a step of Newton's."""
+    near = np.log(x.high)
+    left = x * exponential(Doubled(-near)) - 1.0
+    result: Doubled = left - left * left / 2.0 + near
+    return result

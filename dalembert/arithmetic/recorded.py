@@ -11,10 +11,10 @@ from __future__ import annotations
 import cmath
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from dalembert.arithmetic.tape import Operation, Tape, shortened
+from dalembert.arithmetic.tape import Operation, Tape, performed, reached, shortened
 
 Number = Any
 """A float, a complex, a `Real` or a `Complex`."""
@@ -45,9 +45,13 @@ class Recorder:
 
     def node(self, kind: str, *arguments: Any) -> int:
         """The number of an operation, which is written down if it is new."""
-        if kind in ("add", "mul") and arguments[0] > arguments[1]:
-            arguments = (arguments[1], arguments[0])
-        operation = (kind, *arguments)
+        return self._numbered((kind, *arguments))
+
+    def pair(self, kind: str, a: int, b: int) -> int:
+        """The same of a sum or product, whose arguments may change places."""
+        return self._numbered((kind, a, b) if a <= b else (kind, b, a))
+
+    def _numbered(self, operation: Operation) -> int:
         number = self._known.get(operation)
         if number is None:
             number = self._known[operation] = len(self.operations)
@@ -59,6 +63,24 @@ class Recorder:
         turned = self._known.get(("sub", b, a))
         return Real(self, self.node("sub", a, b)) if turned is None else Real(self, turned, True)
 
+    def opposite(self, number: int) -> int | None:
+        """The operation with the same value but for the sign, where it is a difference or has a constant factor; None if there is none.
+
+        >>> recorder = Recorder()
+        >>> x = recorder.input("x")
+        >>> recorder.opposite((x * 2.0).number), recorder.opposite((-x * 2.0).settled) == (x * 2.0).number
+        (None, True)
+        """
+        kind, *of = self.operations[number]
+        if kind == "sub":
+            return self._known.get(("sub", of[1], of[0]))
+        for factor, other in (of, of[::-1]) if kind == "mul" else ():
+            which, *value = self.operations[factor]
+            const = self._known.get(("const", -value[0])) if which == "const" else None
+            if const is not None:
+                return self._known.get(("mul", min(const, other), max(const, other)))
+        return None
+
     def tape(self, outputs: Mapping[str, Number]) -> Tape:
         """The tape of named results; a plain float is a constant.
 
@@ -68,6 +90,37 @@ class Recorder:
             Where an output is complex: its parts are two outputs.
         """
         return shortened(self.operations, self.numbers(outputs))
+
+    def again(self, outputs: Sequence[int], inputs: Sequence[Mapping[str, Number]]) -> list[list[Number]]:
+        """The values of operations where some inputs, each time the same, have other values; nothing else is done again.
+
+        >>> recorder = Recorder()
+        >>> x, y = recorder.input("x"), recorder.input("y")
+        >>> z = x * x + x * y
+        >>> [[at_one], [at_zero]] = recorder.again([z.number], [{"y": 1.0}, {"y": 0.0}])
+        >>> recorder.tape({"z": z, "at y = 1": at_one, "at y = 0": at_zero}).cost
+        4
+        """
+        known = [self.node("input", name) for name in inputs[0]]
+        below: dict[int, Operation] = {}
+        for number in reached(self.operations, outputs, known):
+            operation = self.operations[number]
+            if number in known or (
+                operation[0] not in ("const", "input") and not below.keys().isdisjoint(operation[1:])
+            ):
+                below[number] = operation
+        result = []
+        for enters in inputs:
+            values: dict[int, Number] = {}
+            for number, (kind, *of) in below.items():
+                if kind == "input":
+                    values[number] = enters[of[0]]
+                else:
+                    values[number] = performed(
+                        kind, [values[a] if a in values else Real(self, a) for a in of], RECORDED
+                    )
+            result.append([values[number] if number in values else Real(self, number) for number in outputs])
+        return result
 
     def numbers(self, outputs: Mapping[str, Number]) -> list[tuple[str, int]]:
         """The operations that have the values of named results; see `tape`."""
@@ -88,9 +141,11 @@ def lifted(recorder: Recorder, value: Number) -> Real:
 
 
 def _plain(value: Number) -> bool:
-    # numpy's scalars are instances of float or offer __float__ without being recorded numbers
-    return isinstance(value, (int, float)) or (
-        not isinstance(value, (Real, Complex, complex)) and hasattr(value, "__float__")
+    # most are floats. numpy's scalars are instances of float or offer __float__ without being recorded numbers
+    return (
+        type(value) is float
+        or isinstance(value, (int, float))
+        or (not isinstance(value, (Real, Complex, complex)) and hasattr(value, "__float__"))
     )
 
 
@@ -120,7 +175,7 @@ class Real:
             for factor, other in (of, of[::-1]):
                 which, *value = self.recorder.operations[factor]
                 if which == "const":
-                    return self.recorder.node("mul", self.recorder.node("const", -value[0]), other)
+                    return self.recorder.pair("mul", self.recorder.node("const", -value[0]), other)
         return self.recorder.node("neg", self.number)
 
     @property
@@ -168,15 +223,18 @@ class Real:
         return Real(self.recorder, self.recorder.node("cos", self.number))
 
     def __add__(self, other: Number) -> Number:
-        if isinstance(other, (Complex, complex)):
+        if type(other) is Real:
+            o = other
+        elif isinstance(other, (Complex, complex)):
             if isinstance(other, Constant):
                 return self + other.recorded
             return Complex(self + other.real, other.imag)
-        if _plain(other) and other == 0:
+        elif _plain(other) and other == 0:
             return self
-        o = lifted(self.recorder, other)
+        else:
+            o = lifted(self.recorder, other)
         if self.negative == o.negative:
-            return Real(self.recorder, self.recorder.node("add", self.number, o.number), self.negative)
+            return Real(self.recorder, self.recorder.pair("add", self.number, o.number), self.negative)
         if self.number == o.number:
             return 0.0
         first, second = (o, self) if self.negative else (self, o)
@@ -191,6 +249,8 @@ class Real:
         return -self + other
 
     def __mul__(self, other: Number) -> Number:
+        if type(other) is Real:
+            return self.times(other)
         if isinstance(other, (Complex, complex)):
             if isinstance(other, Constant):
                 return self * other.recorded
@@ -200,10 +260,12 @@ class Real:
                 return 0.0
             if abs(other) == 1:
                 return self if other > 0 else -self
-        o = lifted(self.recorder, other)
-        return Real(
-            self.recorder, self.recorder.node("mul", self.number, o.number), self.negative != o.negative
-        )
+        return self.times(lifted(self.recorder, other))
+
+    def times(self, other: Real) -> Real:
+        """The product with a recorded number."""
+        number = self.recorder.pair("mul", self.number, other.number)
+        return Real(self.recorder, number, self.negative != other.negative)
 
     __rmul__ = __mul__
 
@@ -242,6 +304,8 @@ class Real:
 
 def product(a: Number, b: Number) -> Number:
     """a·b, nothing where one is exactly nothing."""
+    if type(a) is Real and type(b) is Real:
+        return a.times(b)
     return 0.0 if (_plain(a) and a == 0) or (_plain(b) and b == 0) else a * b
 
 
@@ -272,13 +336,15 @@ class Complex:
         return Complex(-self.real, -self.imag)
 
     def __add__(self, other: Number) -> Complex:
-        other = bare(other)
+        if type(other) is not Complex:
+            other = bare(other)
         return Complex(self.real + other.real, self.imag + other.imag)
 
     __radd__ = __add__
 
     def __sub__(self, other: Number) -> Complex:
-        other = bare(other)
+        if type(other) is not Complex:
+            other = bare(other)
         return Complex(self.real - other.real, self.imag - other.imag)
 
     def __rsub__(self, other: Number) -> Complex:
@@ -286,9 +352,10 @@ class Complex:
         return Complex(other.real - self.real, other.imag - self.imag)
 
     def __mul__(self, other: Number) -> Complex:
-        other = bare(other)
-        if isinstance(other, Real) or _plain(other):
-            return Complex(product(self.real, other), product(self.imag, other))
+        if type(other) is not Complex:
+            other = bare(other)
+            if isinstance(other, Real) or _plain(other):
+                return Complex(product(self.real, other), product(self.imag, other))
         a, b, c, d = self.real, self.imag, other.real, other.imag
         return Complex(product(a, c) - product(b, d), product(a, d) + product(b, c))
 
@@ -388,7 +455,7 @@ class Recorded:
         """The number itself, its zero without a sign: what is recorded has the sign of a zero anyhow."""
         if not isinstance(x, Real):
             return x + 0.0
-        return Real(x.recorder, x.recorder.node("add", x.settled, lifted(x.recorder, 0.0).number))
+        return Real(x.recorder, x.recorder.pair("add", x.settled, lifted(x.recorder, 0.0).number))
 
     @staticmethod
     def join(real: Number, imag: Number) -> Number:

@@ -23,11 +23,21 @@ def as_array(x: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(x, dtype=float)
 
 
-def in_32_digits(x: ArrayLike) -> Any:
-    """Return the same numbers as a `DoubledArray`."""
-    from dalembert.arithmetic.doubled_arrays import DoubledArray
+def as_vectors(x: ArrayLike) -> NDArray[np.complex128]:
+    """Return an array of complex numbers x + iy; one of 32 digits stays as it is."""
+    if is_doubled(x):
+        doubled: NDArray[np.complex128] = x
+        return doubled
+    return np.asarray(x, dtype=complex)
 
-    return x if is_doubled(x) else DoubledArray(x)
+
+def in_32_digits(x: ArrayLike) -> Any:
+    """Return the same numbers as a `DoubledArray`; complex ones as a `DoubledComplex`."""
+    from dalembert.arithmetic.doubled_arrays import DoubledArray, DoubledComplex
+
+    if is_doubled(x):
+        return x
+    return DoubledComplex.of(x) if np.iscomplexobj(x) else DoubledArray(x)
 
 
 def filled(shape: Shape, value: float, like: NDArray[np.float64]) -> NDArray[np.float64]:

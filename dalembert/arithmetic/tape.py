@@ -87,8 +87,8 @@ class Tape:
     v6 = x * y
     norm: v5
     product: v6
-    >>> tape.cost, tape.pruned(["product"]).cost
-    (5, 1)
+    >>> tape.cost
+    5
     """
 
     operations: tuple[Operation, ...]
@@ -162,17 +162,6 @@ class Tape:
             else:
                 hangs.append(0 if kind == "const" else reduce(or_, (hangs[a] for a in arguments)))
         return hangs
-
-    def pruned(self, names: Iterable[str]) -> Tape:
-        """The tape of some of the outputs, in the requested order, with only what they depend on.
-
-        Raises
-        ------
-        KeyError
-            Where an output of that name is not on the tape.
-        """
-        outputs = dict(self.outputs)
-        return shortened(self.operations, [(name, outputs[name]) for name in names])
 
     def on(self, inputs: Mapping[str, Any], kind: Kind) -> dict[str, Any]:
         """The outputs, worked out operation by operation on any kind of number."""

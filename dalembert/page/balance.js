@@ -67,7 +67,8 @@ solveSheet = () => {
     if (sheet.couple) {
       set("couple.unbalance", "couple size");
       set("couple.angle", "couple angle", true);
-      set("residual.couple", "left couple");
+      // of a plane whose place is not stated there is none
+      if (sheet.placed) set("residual.couple", "left couple");
     }
     sheet.modes?.names.forEach((name, k) => {
       set(`mode ${name}.unbalance`, `mode ${k} size`);

@@ -69,7 +69,8 @@ def table_text(columns: Mapping[str, Values], keys: Sequence[str] = (), width: i
     for name, column in columns.items():
         cells = [name, *printed(name, column)]
         longest = max(map(len, cells))
-        laid[name] = [cell.ljust(longest) if has_names(column) else cell.rjust(longest) for cell in cells]
+        aligned = str.ljust if has_names(column) else str.rjust
+        laid[name] = [aligned(cell, longest) for cell in cells]
     return "\n".join(
         "".join("  ".join(row).rstrip() + "\n" for row in zip(*(laid[name] for name in block), strict=True))
         for block in in_blocks({name: len(cells[0]) for name, cells in laid.items()}, keys, width)

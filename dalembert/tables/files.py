@@ -6,6 +6,7 @@ import os
 import sys
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from dalembert.errors import DataError
 
@@ -48,6 +49,8 @@ def note(path: str | Path) -> Path:
 def load(path: str | Path) -> bytes:
     """Read a file, or standard input for `-`; OSError or ValueError where it cannot be."""
     name = str(path)
+    if not name:
+        raise ValueError("expected the name of a file")
     if name in _held:
         return _held[name]
     file = note(path)
@@ -59,12 +62,34 @@ def load(path: str | Path) -> bytes:
 
 def read_bytes(path: str) -> tuple[str, bytes]:
     """Read a file: what messages call it, and what it holds."""
-    file = "standard input" if path == "-" else path
+    file = "standard input" if path == "-" else path or "''"
     try:
         return file, load(path)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise DataError(f"{file}: {reason}") from None
+
+
+def read_toml(path: str) -> tuple[str, dict[str, Any]]:
+    """Read a TOML file: what messages call it, and what it holds.
+
+    Raises
+    ------
+    DataError
+        The file cannot be read, is no text, or is no valid TOML.
+    """
+    import tomllib
+
+    file, data = read_bytes(path)
+    try:
+        return file, tomllib.loads(data.decode("utf-8-sig"))
+    except UnicodeDecodeError:
+        raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
+    except RecursionError:
+        raise DataError(f"{file}: no valid TOML: nested too deeply") from None
+    except ValueError as error:
+        # a TOMLDecodeError, or a number of thousands of digits
+        raise DataError(f"{file}: no valid TOML: {error}") from None
 
 
 def is_input(path: str | Path) -> bool:

@@ -18,7 +18,7 @@ import numpy as np
 
 from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError, quote
-from dalembert.quantities import number_expected, parse_number
+from dalembert.quantities import is_number, number_expected, parse_number
 from dalembert.tables.headers import Heading, find_columns, offers, spellings
 from dalembert.tables.sources import Source, open_source
 from dalembert.units import LARGEST, UNITS, to_si
@@ -297,6 +297,19 @@ def _pointed(text: str) -> str:
     return text.replace(",", ".")
 
 
+def _number_expected(text: str, decimal_comma: bool) -> str:
+    """Say what was expected in place of a cell.
+
+    >>> _number_expected("3,4", False)
+    'a number: decimal commas need columns separated by ; or tabs'
+    """
+    if decimal_comma:
+        return WITH_COMMA
+    if text.count(",") == 1 and "." not in text and is_number(text.replace(",", ".")):
+        return "a number: decimal commas need columns separated by ; or tabs"
+    return number_expected(text)
+
+
 def _read_small(source: Source, table: Table, columns: Sequence[_Column], marker: str) -> None:
     width = len(source.header)
     rows: list[list[str]] = []
@@ -304,7 +317,7 @@ def _read_small(source: Source, table: Table, columns: Sequence[_Column], marker
         if len(record) != width:
             if len(record) < width or any(cell.strip() for cell in record[width:]):
                 raise DataError(
-                    f"{source.file}: row {len(rows) + 1} (line {line}): found {len(record)} cells, expected {width}"
+                    f"{source.file}: row {len(rows) + 1} (line {line}): found {len(record)} cell{'s' * (len(record) != 1)}, expected {width}"
                 )
             record = record[:width]
         rows.append(record)
@@ -326,7 +339,7 @@ def _read_small(source: Source, table: Table, columns: Sequence[_Column], marker
                     try:
                         values[i] = parse_number(_pointed(text) if decimal_comma else text)
                     except ValueError:
-                        expected = WITH_COMMA if decimal_comma else number_expected(text)
+                        expected = _number_expected(text, decimal_comma)
                         raise table.error(i, each.header, written[each.place][i], expected) from None
             table.numbers[each.name] = Numbers(each.header, each.unit, values, each.dimension)
 

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dalembert.arithmetic.recorded import RECORDED, Complex, Number, Real, Recorder
-from dalembert.arithmetic.tape import Tape
+from dalembert.arithmetic.tape import Tape, shortened
 
 
 def recorded(formula: object, *names: str) -> Tape:
@@ -44,10 +44,11 @@ def test_what_no_output_hangs_on_is_not_on_the_tape() -> None:
     recorder = Recorder()
     a, b = recorder.input("a"), recorder.input("b")
     tape = recorder.tape({"sum": a + b, "root": (a * a * b).sqrt()})
-    assert tape.pruned(["sum"]).cost == 1
-    assert tape.pruned(["root", "sum"]).names == ("root", "sum")
-    with pytest.raises(KeyError):
-        tape.pruned(["nothing"])
+    rows = dict(tape.outputs)
+    assert shortened(tape.operations, [("sum", rows["sum"])]).cost == 1
+    both = shortened(tape.operations, [(name, rows[name]) for name in ("root", "sum")])
+    assert both.names == ("root", "sum")
+    assert both.cost == tape.cost
 
 
 def test_tapes_compare_travel_and_keep_their_key_between_processes() -> None:

@@ -273,3 +273,14 @@ def test_every_public_name_is_there() -> None:
     )
     with pytest.raises(AttributeError, match="no attribute 'imbalance'"):
         balancing.imbalance  # noqa: B018
+
+
+def test_sizes_that_have_no_answer_are_refused() -> None:
+    """They gave NaN, inf and a negative mass."""
+    with pytest.raises(ValueError, match="too large"):
+        correct([1e300, 1e300], [0, 1], [0, 1])
+    with pytest.raises(ValueError, match="too large"):
+        correct([1, 1], [0, 1e200], [0, 1e200])
+    for radius in (0, -0.1, np.nan):
+        with pytest.raises(ValueError, match="the radius must be positive"):
+            correct([1, 1], [0, 1], [0, 1]).mass(radius)

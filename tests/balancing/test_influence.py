@@ -276,3 +276,10 @@ def test_beyond_the_range_of_squares(size: float) -> None:
     assert np.abs(found - w).max() < 1e-14
     with pytest.raises(DependentPlanes):
         least_squares(np.array([[1, 0], [1, 0]]) * size, [size, size])
+
+
+def test_no_rotor_at_all() -> None:
+    """An empty batch is answered by an empty one."""
+    influence, initial = np.zeros((0, 3, 2)), np.zeros((0, 3))
+    assert least_squares(influence, initial).corrections.shape == (0, 2)
+    assert condition_number(influence).shape == (0,)

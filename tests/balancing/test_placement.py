@@ -122,3 +122,11 @@ def test_transfer_keeps_force_and_moment() -> None:
         there = transfer(u, z, p)
         assert there.sum() == pytest.approx(u.sum())
         assert there @ p == pytest.approx(u @ z)
+
+
+def test_weights_from_stock_on_a_thousand_places() -> None:
+    """It took minutes: each of 300 000 sums carried a cell for every place. The nearest places to 308.87° are 308.88° and 308.52°."""
+    places = np.radians(np.arange(1000) * 0.36)
+    choice = place_from_stock(0.0835 * np.exp(1j * np.radians(308.87)), places, [0.001, 0.002], max_pieces=2)
+    assert np.flatnonzero(choice.masses).tolist() == [857, 858]
+    assert choice.masses[857:859].tolist() == [0.002, 0.002]

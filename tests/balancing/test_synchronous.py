@@ -75,7 +75,7 @@ def test_the_uncertainty_of_the_mean_is_that_of_many_recordings() -> None:
     ("t", "mark", "says"),
     [
         ([0, 1, 1, 2], [0, 1, 0, 1], "rise from row to row"),
-        ([0, 1, 2, 3], [0, 1, 1, 0], "rises 1 times"),
+        ([0, 1, 2, 3], [0, 1, 1, 0], "rises 1 time:"),
         ([0, 1, 2, 3], [0, 1, 0, 1], "four at least"),
     ],
 )

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cli.exports.written import written
+from cli.exports.file import file_bytes
 from tests.four_bars import body, four_bar
 from virtualwork import Mechanism
 
@@ -121,7 +121,7 @@ def home(m: Mechanism) -> tuple[float, ...]:
 
 def exported(m: Mechanism, suffix: str, inputs: tuple[float, ...] | None = None) -> bytes:
     units = {"length": "mm", "angle": "deg"}
-    return written(m, home(m) if inputs is None else inputs, suffix, "file.toml", units)[0]
+    return file_bytes(m, home(m) if inputs is None else inputs, suffix, "file.toml", units)[0]
 
 
 def moved(m: Mechanism, inputs: Any) -> Any:

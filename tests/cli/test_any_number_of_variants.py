@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cli.cases.analysis import Request
-from cli.cases.axes import Grid, grids, listed
+from cli.cases.axes import grids
+from cli.cases.inputs import Grid, Varied, listed
 from cli.cases.loop import Loop
-from cli.cases.values import Varied
 from cli.forces.cycle import Forces
 from cli.mechanism.newton import Poses
 from virtualwork import Mechanism

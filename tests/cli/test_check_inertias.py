@@ -151,7 +151,7 @@ def test_every_format_by_the_command(name: str, text: str, tmp_path: Path, dalem
 @pytest.mark.parametrize(
     ("text", "arguments", "status", "said"),
     [
-        (link("0.01 0.01 0.02"), ["--omega", "1,2,3"], 2, "expected no motion and no shaft"),
+        (link("0.01 0.01 0.02"), ["--omega", "1,2,3"], 2, "goes with no option of a motion or a shaft"),
         ("part,shape,mass_kg\na,point,1\n", [], 1, "no valid XML"),
         ('<robot name="r"><link name="a"/></robot>', [], 1, "no link has an inertia"),
         (link("0.01 ten 0.02"), [], 1, "link 'arm', inertia iyy: found 'ten', expected a finite number"),

@@ -137,8 +137,10 @@ def test_a_fit_of_all_runs(turn: str, fewest: int, dalembert: Dalembert) -> None
             x0, alpha = mp.lu_solve(a.H * a, a.H * y)
             top, below = top - mp.conj(alpha) * x0, below + abs(alpha) ** 2
         check(row, top / below, fewest)
-    if fewest < 12:
-        assert len(row["mass_g"]) < len(full["mass_g"]) - 2
+        # as many digits as are right, or one fewer
+        mass = 1000 * abs(top / below)
+        right = -mp.log10(abs(mp.mpf(full["mass_g"]) / mass - 1))
+        assert len(row["mass_g"].replace(".", "").strip("0")) >= right - 1
 
 
 def test_four_runs(dalembert: Dalembert) -> None:

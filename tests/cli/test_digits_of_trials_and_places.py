@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
+import math
 from pathlib import Path
 from typing import Any
 
 import mpmath as mp
 import pytest
 
+from benchmarks.truth.machines import even_marks, once_per_turn, shaking, turning_moments
 from tests.cli.test_digits_of_balancing import holds, rows, vector
 from tests.conftest import Dalembert
 
@@ -168,3 +171,86 @@ def test_blades_that_are_filled(dalembert: Dalembert) -> None:
         ):
             text = next(row["mass_oz"] for row in placed if row["position"] == name)
             holds(text, true, 12)
+
+
+def test_an_engine(dalembert: Dalembert) -> None:
+    """Two cylinders of a V, whose forces nearly cancel along one axis: orders from the angles of the table as written."""
+    table = [
+        ("0.1", "60", "10.1", "45.3", "150.7", "500.3"),
+        ("119.9", "-60.1", "-40.7", "45.3", "150.7", "499.9"),
+    ]
+    text = (
+        "crank_deg,bank_deg,z_mm,throw_mm,rod_mm,reciprocating_g\n" + "\n".join(map(",".join, table)) + "\n"
+    )
+    printed = rows(dalembert("engine", "-", "--speed", "2999.3rpm", "--order", "4", "--digits", stdin=text))
+    with mp.workdps(45):
+        cylinders = [[mp.mpf(x) / (1 if i < 2 else 1000) for i, x in enumerate(row)] for row in table]
+        forces, couples = shaking(cylinders, mp.mpf("2999.3") * mp.pi / 30, 4)
+        for k in (0, 1, 3):
+            for name, row in (("force", forces[k]), ("couple", couples[k])):
+                heads = [
+                    f"{name}_{axis}_{part}_N{'_m' * (name == 'couple')}"
+                    for axis in "xy"
+                    for part in ("cos", "sin")
+                ]
+                for head, true in zip(heads, row, strict=True):
+                    holds(printed[k][head], true, 12)
+
+
+def test_counterweights_and_shafts_of_an_engine(dalembert: Dalembert) -> None:
+    text = "crank_deg,bank_deg,z_mm,throw_mm,rod_mm,reciprocating_g,rotating_g\n0.3,90,0,45.1,150,500,400.7\n"
+    options = "--counterweight-share", "0.3", "--plane", "A:-0.1in:60mm", "--plane", "B:7mm:61mm"
+    both = dalembert("engine", "-", "--speed", "1000rpm", *options, "--digits", "--text", stdin=text)
+    json_too = dalembert("engine", "-", "--speed", "1000rpm", *options, "--json", stdin=text)
+    assert both.returncode == 0
+    weights = json.loads(json_too.stdout)["counterweights"]
+    with mp.workdps(45):
+        u = (mp.mpf("0.4007") + mp.mpf("0.15")) * mp.mpf("0.0451")
+        a, b = mp.mpf("-0.00254"), mp.mpf("0.007")
+        for weight, true in zip(weights, (u * b / (b - a), -u * a / (b - a)), strict=True):
+            assert abs(weight["unbalance_kg_m"] - true) < 1e-15
+            assert abs(weight["angle_deg"] - mp.mpf("180.3")) < 1e-12
+
+
+@pytest.mark.parametrize("unit", ["deg", "rad"])
+def test_a_flywheel(unit: str, dalembert: Dalembert) -> None:
+    angles = {"deg": ["0", "30.1", "200.7", "360"], "rad": ["0", "0.5253", "3.5029", "6.283185307"]}[unit]
+    torque = ["10.3", "700.9", "-90.1", "10.3"]
+    text = f"angle_{unit},torque_lbf_ft\n" + "\n".join(map(",".join, zip(angles, torque, strict=True))) + "\n"
+    (row,) = rows(
+        dalembert("flywheel", "-", "--speed", "600.1rpm", "--fluctuation", "0.7%", "--digits", stdin=text)
+    )
+    with mp.workdps(45):
+        share = [(mp.mpf(x) - mp.mpf(angles[0])) / (mp.mpf(angles[-1]) - mp.mpf(angles[0])) for x in angles]
+        foot_pound = mp.mpf("0.3048") * mp.mpf("4.4482216152605")
+        true = turning_moments([2 * mp.pi * x for x in share], [mp.mpf(x) * foot_pound for x in torque])
+        holds(row["work_J"], true["work"], 14)
+        holds(row["mean_torque_lbf_ft"], true["mean"] / foot_pound, 14)
+        speed = mp.mpf("600.1") * mp.pi / 30
+        holds(row["flywheel_inertia_kg_m2"], true["fluctuation"] / (mp.mpf("0.007") * speed**2), 13)
+
+
+def test_a_recording(dalembert: Dalembert) -> None:
+    """A vibration with a second order, in milliseconds; the mark is a ramp, or has two levels."""
+    times = [mp.mpf(i) * mp.mpf("0.7") for i in range(90)]
+    x = [f"{3 * math.cos(0.33 * i + 1) + math.sin(0.66 * i):.3f}" for i in range(90)]
+    ramp = [f"{math.sin(0.33 * i - 0.2):.4f}" for i in range(90)]
+    level = ["1" if math.sin(0.33 * i - 0.2) > 0.4 else "0" for i in range(90)]
+    for mark in (ramp, level):
+        text = "t_ms,mark,A_um\n" + "".join(f"{0.7 * i:.1f},{mark[i]},{x[i]}\n" for i in range(90))
+        (row,) = rows(dalembert("signal", "-", "--digits", stdin=text))
+        with mp.workdps(45):
+            t, v, m = [at / 1000 for at in times], [mp.mpf(one) for one in x], [mp.mpf(one) for one in mark]
+            half = (min(m) + max(m)) / 2
+            rises = [i for i in range(89) if m[i] < half <= m[i + 1]]
+            if mark is level:
+                last = max(i for i in range(89) if m[i] >= half > m[i + 1])
+                rises = [i for i in rises if i < last]
+                marks = even_marks([t[i] for i in rises], [t[i + 1] for i in rises])
+            else:
+                marks = [t[i] + (half - m[i]) / (m[i + 1] - m[i]) * (t[i + 1] - t[i]) for i in rises]
+            mean, deviation = once_per_turn(t, v, marks, 3)
+            holds(row["amplitude_um"], abs(mean), 13)
+            holds(row["phase_deg"], mp.degrees(mp.arg(mean)) % 360, 13, 360)
+            holds(row["amplitude_uncertainty_um"], deviation, 10)
+            holds(row["speed_rpm"], 60 * mp.mpf(len(marks) - 1) / (marks[-1] - marks[0]), 13)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -132,3 +133,29 @@ def test_names_stand_beside_the_verdicts(dalembert: Dalembert, rotor: Path) -> N
     lines = rotor.with_name("check.csv").read_text().splitlines()
     assert lines[0] == "row,column,value,expected,error,verdict,student"
     assert [line.rpartition(",")[2] for line in lines[1:]] == ["Ana", "Bo"]
+
+
+def test_expected_values_in_units_of_choice(dalembert: Dalembert, tmp_path: Path, rotor: Path) -> None:
+    """What --units printed was refused as no column of the result, where its unit is not one of the usual ones."""
+    (tmp_path / "expected.csv").write_text(
+        dalembert("balance", str(rotor), *TWO, "--units", "mg_mm,t").stdout.replace(
+            "unbalance_mg", "Unbalance_mg"
+        )
+    )
+    done = dalembert("balance", str(rotor), *TWO, "--expect", str(tmp_path / "expected.csv"))
+    assert done.returncode == 0, done.stderr
+
+
+def test_energies_and_torques_have_units_of_their_own(dalembert: Dalembert) -> None:
+    """`--units kJ` made kilojoules of torques, and left energies in joules."""
+    table = "angle_deg,torque_N_m\n0,10\n180,30\n360,10\n"
+    for units, headers in (("kJ,kW", "N_m kJ kW"), ("N_mm", "N_mm J W")):
+        done = dalembert(
+            "flywheel", "-", "--speed", "600rpm", "--fluctuation", "0.02", "--units", units, stdin=table
+        )
+        shown = dict(zip(*csv.reader(done.stdout.splitlines()), strict=True))
+        torque, energy, power = headers.split()
+        assert float(shown[f"mean_torque_{torque}"]) == (20 if torque == "N_m" else 20e3)
+        joules = float(shown[f"work_{energy}"]) * (1000 if energy == "kJ" else 1)
+        watts = float(shown[f"mean_power_{power}"]) * (1000 if power == "kW" else 1)
+        assert (joules, watts) == pytest.approx((40 * math.pi, 400 * math.pi), rel=1e-15)

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from cli.exports.written import written
+from cli.exports.file import file_bytes
 from cli.imports.assembled import described
 from cli.imports.drawn import settle
 from cli.imports.programs import read
@@ -102,7 +102,7 @@ def comes_back(seed: int, suffix: str) -> bool:
     m = drawn.mechanism
     if regularity(drawn) < 1e-2 or not moved(m, np.array([m.at])).assembled.all():
         return False
-    data, notes = written(m, m.at, suffix, "file.toml", {})
+    data, notes = file_bytes(m, m.at, suffix, "file.toml", {})
     _, (read_back,) = read("file", data, None)
     parts = settle(read_back)
     undriven = [note for note in notes if "no pin joins" in note and "instead" not in note]

@@ -41,6 +41,10 @@ def test_the_command_gives_the_rows_of_a_log(dalembert: Dalembert, tmp_path: Pat
     assert bad.returncode == 1
     assert "no column mark" in bad.stderr
     assert dalembert("field", "--signal", "s.csv").returncode == 2
+    # the amplitude is a peak: it was given out as µm peak to peak, half of it
+    (tmp_path / "pp.csv").write_text("\n".join(["t_s,mark,A_um_pp,B_um_pp", *lines[1:]]) + "\n")
+    bad = dalembert("signal", "pp.csv")
+    assert (bad.returncode, "expected a unit without _pp" in bad.stderr) == (1, True)
 
 
 def test_a_tacho_with_several_pulses(dalembert: Dalembert, tmp_path: Path) -> None:

@@ -52,6 +52,15 @@ def test_the_last_run_with_corrections_has_its_zone(dalembert: Dalembert) -> Non
     assert rotor["zones"][0].keys() == {"sensor", "speed_rad_s", "before_zone", "predicted_zone"}
 
 
+def test_the_last_run_is_judged_alike_whether_all_runs_are_fitted(dalembert: Dalembert) -> None:
+    """With --from-here the last run is one with corrections, of an initial run with trial runs and of a log."""
+    text = FAN.replace("amplitude_um", "amplitude_mm_s")
+    call = ("field", "-", "--json", "--zone-class", "1-rigid", "--from-here")
+    trials, log = (document(dalembert(*call, *more, stdin=text))["rotors"][0] for more in ([], ["--fit"]))
+    assert "measured_zone" in trials["zones"][0]
+    assert trials["zones"] == log["zones"]
+
+
 def test_what_is_no_velocity_is_refused(dalembert: Dalembert) -> None:
     for machine in ("2-rigid", "3-rigid"):
         done = dalembert("field", "-", "--zone-class", machine, stdin=FAN)

@@ -11,9 +11,9 @@ import pyarrow.parquet
 import pytest
 
 from cli.cases.analysis import Request
-from cli.cases.axes import Grid, grids, listed
+from cli.cases.axes import grids
+from cli.cases.inputs import Grid, Varied, listed
 from cli.cases.loop import Loop, as_it_is
-from cli.cases.values import Varied
 from cli.mechanism.newton import Poses
 from dalembert.errors import DataError
 from virtualwork import Mechanism

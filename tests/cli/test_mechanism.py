@@ -218,7 +218,7 @@ def test_standard_input_and_pictures(dalembert: Dalembert, tmp_path: Path) -> No
 
 BAD = {
     "unit": ("B = [2, 0]", 'B = ["2 kg", 0]', ["[links.crank] points.B", "'2 kg'", "length"]),
-    "table": ("[input]", "[inputt]", ["unknown table 'inputt'", "did you mean 'input'"]),
+    "table": ("[input]", "[inputt]", ["unknown table or key 'inputt'", "did you mean 'input'"]),
     "key": ("speed = 1", "sped = 1", ["[input]", "'sped'", "'speed'"]),
     "guess name": ("rocker = 2.0", "roker = 2.0", ["[guess] roker", "did you mean 'rocker'"]),
     "driven name": ('link = "crank"', 'link = "krank"', ["[input] link", "'krank'"]),

@@ -59,6 +59,21 @@ def test_a_table_of_masses(dalembert: Dalembert, tmp_path: Path, browser: Any) -
 
 
 @pytest.mark.slow
+def test_a_plane_whose_place_is_not_stated(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """What its correction leaves of the couple was that of a plane at z = 0."""
+    assert (
+        dalembert(
+            "balance", RIUL[0], "--plane", "A:20mm", "--center-z", "45mm", "--page", "b.html"
+        ).returncode
+        == 0
+    )
+    page = Computing(browser, tmp_path / "b.html")
+    assert page.get("couple.unbalance") > 0
+    assert math.isnan(page.get("residual.couple"))
+    assert page.faults() == []
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "how",
     [

@@ -36,6 +36,12 @@ def test_blades(dalembert: Dalembert) -> None:
     assert shifted["masses"][0]["angle_deg"] == 10
 
 
+def test_a_place_just_below_zero_stands_at_zero_not_at_360(dalembert: Dalembert) -> None:
+    # -1e-15 % 360 is 360.0
+    found = document(dalembert("place", "3g@0deg", "--positions=-1e-15deg", "--json"))
+    assert [m["angle_deg"] for m in found["masses"]] == [0.0]
+
+
 def test_blades_numbered_against_the_angles(dalembert: Dalembert) -> None:
     """Same masses at the same angles; the blade at 360° − θ has θ's number, and the first stays where it is."""
     vector = ["83.5g@308.87deg", "--blades", "16", "--json"]
@@ -156,3 +162,25 @@ def test_other_planes(dalembert: Dalembert, tmp_path: Path) -> None:
         assert abs(sum(parts) - share * np.exp(1j * np.radians(40))) < 1e-16
     assert dalembert("place", "12g@40deg", "--to-z", "0mm:90mm").returncode == 2
     assert dalembert("place", "12g@40deg", "--at-z", "1mm", "--to-z", "0mm:0mm").returncode == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "warning"),
+    [
+        (
+            ("--positions", "0deg,90deg"),
+            "2 weights leave an error of 3.586 g (71.72%); one more leaves no less",
+        ),
+        (("--blades", "8", "--max-pieces", "1"), "at most 1 weight leaves an error of 4 g (80.00%)"),
+        (
+            ("--blades", "8", "--max-mass", "0.5g"),
+            "0 weights leave an error of 5 g (100.00%); one more leaves no less",
+        ),
+    ],
+)
+def test_weights_from_stock_that_do_not_come_near(
+    options: tuple[str, ...], warning: str, dalembert: Dalembert
+) -> None:
+    """The error stood in JSON alone: 1 g on each of 0° and 90° is 1.414 g of 5 g."""
+    found = document(dalembert("place", "5g@45deg", "--stock", "1g", *options, "--json"))
+    assert found["warnings"] == [warning]

@@ -264,3 +264,20 @@ def test_virtual_displacements_are_named_and_not_taken_for_rest(
     # beside velocities such a column is one of the keeper's own
     both = "link,dx_mm,vx_mm_s,omega_rad_s,fx_N,torque_N_m\n2,1,,2,,?\n4,3,5,,-10,\n"
     assert dalembert("work", "-", stdin=both).returncode == 0
+
+
+def test_rows_of_a_run_that_contradict_each_other(dalembert: Dalembert) -> None:
+    """One `yes` kept the mass, whatever the other rows of the run had; the weight of the sensor's first row counted alone."""
+
+    def field(head: str, *ends: str) -> subprocess.CompletedProcess[str]:
+        rows = ["0,1,3.4,116,,,", "0,2,2,10,,,", "1,1,1.8,42,A,2,0", "1,2,2.5,33,A,2,0"]
+        return dalembert(
+            "field", "-", stdin=table(*map(",".join, zip(rows, ends, strict=True)), head=f"{HEAD},{head}")
+        )
+
+    done = field("trial_kept", "", "", "yes", "no")
+    assert (done.returncode, "the same as elsewhere in run 1" in done.stderr) == (1, True)
+    assert field("trial_kept", "", "", "", "yes").returncode == 0
+    done = field("weight", "1", "3", "2", "3")
+    assert (done.returncode, "found '2', expected 1 as elsewhere for this sensor" in done.stderr) == (1, True)
+    assert field("weight", "1", "3", "1", "3").stdout == field("weight", "", "", "1", "3").stdout

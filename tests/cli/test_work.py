@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 from pathlib import Path
 
+import mpmath as mp
 import pytest
 
 from tests.conftest import Dalembert
@@ -172,3 +175,34 @@ def test_the_ledger_can_be_checked_beside_the_unknowns(dalembert: Dalembert, tmp
     (tmp_path / "expected.csv").write_text("step,field,link,kind,power_W\n1,p,c,applied torque,10\n")
     (tmp_path / "fields.csv").write_text(FIELDS)
     assert dalembert("work", "fields.csv", "--expect", "expected.csv").returncode == 0
+
+
+def test_digits_of_two_unknowns_in_any_units(dalembert: Dalembert) -> None:
+    """Two velocity fields that hardly differ, decimals that no float has, a share of an unknown."""
+    table = (
+        "step,field,link,mass_g,vx_mm_s,vy_mm_s,ax_m_s2,omega_rpm,torque_N_m,fx_lbf\n"
+        "1,p,a,300.1,0.1,0.7,0.3,30.1,?T,?F*0.7\n1,p,b,,0.3,,,20.3,0.9,1.1\n"
+        "1,q,a,300.1,0.1001,0.7,0.3,30.2,?T,?F*0.7\n1,q,b,,0.3,,,20.3,0.9,1.1\n"
+    )
+    done = dalembert("work", "-", "--gravity", "0.1,-9.81", "--digits", stdin=table)
+    assert done.returncode == 0, done.stderr
+    with mp.workdps(40):
+        rpm, pound = mp.pi / 30, mp.mpf("4.4482216152605")
+        mass, b = mp.mpf("0.3001"), mp.mpf("0.3") / 1000
+        rows, right = mp.matrix(2, 2), mp.matrix(2, 1)
+        for i, (vx, omega) in enumerate((("0.1", "30.1"), ("0.1001", "30.2"))):
+            v, w = mp.mpf(vx) / 1000, mp.mpf(omega) * rpm
+            rows[i, 0], rows[i, 1] = w, v * mp.mpf("0.7")
+            of_a = mass * ((mp.mpf("0.1") - mp.mpf("0.3")) * v - mp.mpf("9.81") * mp.mpf("0.7") / 1000)
+            right[i] = -(of_a + mp.mpf("0.9") * mp.mpf("20.3") * rpm + mp.mpf("1.1") * pound * b)
+        torque, force = mp.lu_solve(rows, right)
+        printed = list(csv.DictReader(io.StringIO(done.stdout)))
+        for text, true in (
+            (next(row["torque_N_m"] for row in printed if row["torque_N_m"]), torque),
+            (next(row["fx_lbf"] for row in printed if row["fx_lbf"]), force * mp.mpf("0.7") / pound),
+        ):
+            places = len(text.lower().split("e")[0].lstrip("-").replace(".", "").strip("0"))
+            assert places >= 10
+            assert abs(mp.mpf(text) - true) <= mp.mpf(10) ** (
+                mp.floor(mp.log10(abs(true))) - places + 1
+            ) / 2 * mp.mpf("1.000001")

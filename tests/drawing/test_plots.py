@@ -15,7 +15,7 @@ from matplotlib.projections.polar import PolarAxes
 from balancing import LogBalance, correct, joint_fit, least_squares, place
 from rigidbody3d import Body, FreeBody, Shaft, Top, compose, integrate
 from virtualwork import DescriptionError, LinkStates, Mechanism, UnitLoad, balance
-from virtualwork.picture.quantities import quantities
+from virtualwork.picture.plot_quantities import plot_quantities
 
 MOMENT = np.array([9 * 0.030, 6 * 0.050]) * np.exp(1j * np.radians([60, 210]))
 ON = np.array([[0], [1], [1j], [-1]])
@@ -196,7 +196,7 @@ def test_noise_is_drawn_as_zero() -> None:
     """A parallelogram's coupler does not turn: what rounding leaves of its ω and α is zero in the picture."""
     bars = Mechanism.from_toml(str(files("cli") / "examples/parallelogram/parallelogram.toml"))
     motion = bars.motion(np.linspace(0, 4 * np.pi, 91))
-    for found in quantities(motion.poses, ["coupler.omega", "coupler.alpha"]):
+    for found in plot_quantities(motion.poses, ["coupler.omega", "coupler.alpha"]):
         axes = motion.plot_curves(found.name, figure=Figure())[0]
         assert not np.any(axes.lines[0].get_ydata())
 

@@ -231,3 +231,14 @@ def test_quaternions_and_scipy() -> None:
     assert angle_between(from_scipy(to_scipy(q)), q).max() < 1e-15
     assert angle_between(from_matrix(to_matrix(q)), q).max() < 2e-15
     np.testing.assert_allclose(np.einsum("nij,nj->ni", to_matrix(q), v), rotate(q, v), atol=1e-14)
+
+
+@pytest.mark.parametrize("power", [-900, 900])
+def test_moments_of_any_size(power: int) -> None:
+    """Their squares left the range of numbers, and the state had no number: it depends on their ratios alone."""
+    moments, omega, times = np.array([1.0, 2.0, 2.5]), [0.1, 2.0, 0.1], [0.0, 3.0]
+    body, scaled = FreeBody(moments, omega), FreeBody(np.ldexp(moments, power), omega)
+    for quantity in ("omega", "attitude"):
+        np.testing.assert_array_equal(getattr(scaled.at(times), quantity), getattr(body.at(times), quantity))
+    np.testing.assert_array_equal(scaled.momentum, np.ldexp(body.momentum, power))
+    assert (scaled.period, scaled.energy) == (body.period, np.ldexp(body.energy, power))

@@ -166,3 +166,7 @@ def test_a_rotation_beside_which_the_weight_is_nothing_is_refused() -> None:
     state = Top([0.002, 0.002, 0.0008], 0.1962, [0, 1e25, 60]).at(np.linspace(0, 2e-24, 21))
     assert (np.abs(state.energy - state.energy[0]) <= 2 * state.error_estimate("energy")).all()
     assert (state.error_estimate("energy") < 1e-13 * state.energy).all()
+
+
+def test_no_top_at_all() -> None:
+    assert Top([1, 1, 0.5], 1.0, np.zeros((0, 3))).at([0.0, 1.0]).attitude.shape == (0, 2, 4)

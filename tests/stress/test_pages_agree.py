@@ -15,7 +15,7 @@ from tests.computed_pages import machines
 from tests.node import needs_node
 from virtualwork import Mechanism
 from virtualwork.branch.assembly import Assembly
-from virtualwork.computing import ORDERS
+from virtualwork.computing_page import ORDERS
 from virtualwork.describe import MechanismError
 from virtualwork.describe.dimensions import changed, dimensions, value
 from virtualwork.motion import Motion

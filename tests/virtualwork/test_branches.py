@@ -42,6 +42,20 @@ def test_a_parallelogram_stays_one(crank, ground, scale):
     assert np.degrees(Check(m.assembly).change_points) == pytest.approx([0, 180], abs=1e-10)
 
 
+def test_an_input_that_is_no_number_hides_no_change_point():
+    """The condition behind the point at 180° is the parallelogram's; it was the antiparallelogram's beside a NaN."""
+    m = four_bar(1.0, 3.0, 1.0, 3.0, 60, 0, 60)
+    motion = m.motion([np.nan, 4.0])
+    condition = motion.poses.condition
+    assert motion.assembled.tolist() == [False, True]
+    assert np.isnan(condition[0])
+    assert condition[1] == pytest.approx(m.motion(4.0).poses.condition[0], rel=1e-14)
+    assert four_bar(1.0, 3.0, 1.0, 3.0, 60, 0, 60).motion([np.nan, np.nan]).assembled.tolist() == [
+        False,
+        False,
+    ]
+
+
 @pytest.mark.parametrize("apart", [0.0, 1e-15, 1e-12, 1e-8, 1e-4, 0.02])
 def test_at_a_change_point_the_velocity_is_the_exact_limit(apart):
     motion = four_bar(2, 5, 2, 5, 60, 0, 60).motion(math.pi + apart, speed=1.0, acceleration=0.0)

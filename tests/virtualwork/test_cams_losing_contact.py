@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,8 @@ def test_lift_off_is_where_the_contact_force_vanishes() -> None:
         assert (motion.dynamics.contact(0)[0] > 0) == (factor < 1)
 
 
-def test_a_run_says_from_when_on_a_cam_would_have_to_pull() -> None:
+@pytest.mark.parametrize("sense", [1, -1])
+def test_a_run_says_from_when_on_a_cam_would_have_to_pull(sense: int) -> None:
     """By energy: ω² = 2(E - k y²/2)/(J + m s'²); the follower is pressed by k y + m(s'' ω² + s' α), and t = ∫dθ/ω."""
     from scipy.integrate import quad
     from scipy.optimize import brentq
@@ -65,22 +67,28 @@ def test_a_run_says_from_when_on_a_cam_would_have_to_pull() -> None:
         alpha = -(mass * slope * bend * square + k * y * slope) / (whole + mass * slope**2)
         return k * y + mass * (bend * square + slope * alpha)
 
-    q = np.linspace(0, 2 * math.pi, 20001)
+    # backwards from a whole turn
+    begin = 0.0 if sense > 0 else 2 * math.pi
+    q = begin + sense * np.linspace(0, 2 * math.pi, 20001)
     first = int(np.argmax(press(q) < 0))
     assert first > 1
     there = brentq(lambda x: float(press(x)), q[first - 1], q[first], xtol=1e-15)
+    turns = drive.lift.first + np.add.outer(2 * math.pi * np.arange(-1, 2), drive.lift.knots)
+    inside = [x for x in turns.ravel() if min(begin, there) < x < max(begin, there)]
+    knots = sorted({begin, *inside, there}, reverse=sense < 0)
     time = sum(
-        quad(lambda x: 1 / float(omega(x)), *part, epsabs=0, epsrel=1e-13)[0]
-        for part in ((0, 0.2), (0.2, there))
+        abs(quad(lambda x: 1 / float(omega(x)), *part, epsabs=0, epsrel=1e-13)[0]) for part in pairwise(knots)
     )
 
-    run = m.simulate([0.0, 0.5 * time, 3 * time], angle=0.0, speed=start, accuracy=1e-11)
+    run = m.simulate([0.0, 0.5 * time, 3 * time], angle=begin, speed=sense * start, accuracy=1e-11)
     assert len(run.warnings) == 1
     assert run.warnings[0].startswith("contact lost at ")
     assert float(run.warnings[0].split()[3]) == pytest.approx(time, rel=1e-8)
     assert "cam cam-F" in run.warnings[0]
-    assert not m.simulate([0.0, 0.9 * time], angle=0.0, speed=start).warnings
+    assert not m.simulate([0.0, 0.9 * time], angle=begin, speed=sense * start).warnings
     # as slowly as the spring allows, and each of several variants by itself
-    assert not m.simulate([0.0, 0.1], angle=0.0, speed=1.0).warnings
-    runs = m.vary({"links.follower.mass": [1e-6, 0.4]}).simulate([0.0, 2 * time], angle=0.0, speed=start)
+    assert not m.simulate([0.0, 0.1], angle=begin, speed=sense * 1.0).warnings
+    runs = m.vary({"links.follower.mass": [1e-6, 0.4]}).simulate(
+        [0.0, 2 * time], angle=begin, speed=sense * start
+    )
     assert [bool(runs.warnings.get(i)) for i in range(2)] == [False, True]

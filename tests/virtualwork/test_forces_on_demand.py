@@ -17,17 +17,17 @@ from virtualwork.formulas.block import Block
 
 def test_what_is_formed_for_one_joint_force_serves_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
     """The loop's forces are written down once, however the joint forces are asked for; of one pose they are formed once."""
-    from virtualwork.formulas.load_paths import Solved
+    from virtualwork.formulas.load_paths import LoopForces
 
     count = 0
-    solve = Solved.form
+    solve = LoopForces.form
 
-    def counted(self: Solved, block: Block) -> Any:
+    def counted(self: LoopForces, block: Block) -> Any:
         nonlocal count
         count += 1
         return solve(self, block)
 
-    monkeypatch.setattr(Solved, "form", counted)
+    monkeypatch.setattr(LoopForces, "form", counted)
     sweep = np.linspace(0.0, 6.0, 20_000)  # three blocks
     m = four_bar(gravity=-9.81j)
     motion = m.motion(sweep, 10.0)

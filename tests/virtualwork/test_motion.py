@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -228,3 +229,13 @@ def test_every_assembly_of_a_group_without_a_closed_form(random_mechanism):
             from virtualwork.formulas.positions import loop
 
             assert abs(np.ravel(loop(closure, state))[0]) < 1e-12 * m.size
+
+
+@pytest.mark.parametrize("kind", ["four-bar", "triad"])
+def test_a_motion_of_no_poses_has_no_numbers(kind: str, random_mechanism: Any) -> None:
+    motion = random_mechanism(kind, np.random.default_rng(2)).motion(np.array([]))
+    link = next(iter(motion.mechanism.links))
+    pin = next(iter(motion.mechanism.links[link].points))
+    assert motion.assembled.shape == motion.effort.shape == motion.link(link).alpha.shape == (0,)
+    assert motion.point(pin).jerk.shape == (0, 2)
+    assert motion.point(pin).error_estimate(0).shape == (0,)

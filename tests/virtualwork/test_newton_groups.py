@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from dalembert.arithmetic.tape import Tape
 from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
-from virtualwork.formulas.newton import Iterate, newton
+from virtualwork.formulas import group_loops
+from virtualwork.formulas.group_loops import Loops
+from virtualwork.formulas.lanes import Lanes
+from virtualwork.formulas.newton import newton
 from virtualwork.formulas.numbers import inverse_norm, solve, solve_columns, stack
 from virtualwork.formulas.positions import State
 from virtualwork.study.newton_table import all_at_once
@@ -125,28 +130,91 @@ def four_bar() -> Mechanism:
 
 
 def test_a_damped_step_never_widens_the_gap() -> None:
-    """From anywhere that leads home: the gap falls from row to row of the table, and no angle turns by more than a radian in a step."""
+    """From anywhere that leads home: the gap falls from step to step, and no angle turns by more than a radian in one."""
     m = four_bar()
     merged, group = m.assembly.merged
+    loops = m.assembly.loops(group)
     rng = np.random.default_rng(0)
     closed = 0
     for _ in range(40):
-        st = State([np.array([m.at[0]])], many=True)
+        st = State([np.array([m.at[0]])])
         for step in merged.steps[: merged.steps.index(group)]:
             m.assembly.run([step], st)
-        table: list[Iterate] = []
         start = rng.uniform(-math.pi, math.pi, (1, 2))
-        with np.errstate(all="ignore"):
-            _, found = newton(group, st, start, m.size, table=table)
+        x, found = newton(loops, st, start, m.size)
         if not found[0]:  # in a valley of the gap no twelfth halving falls any further
             continue
         closed += 1
-        gaps = np.array([row.residual for row in table])
+        steps = [loops.search(st, start, m.size, limit) for limit in range(61)]
+        assert [to.tolist() for to, _ in (steps[0], steps[-1])] == [start.tolist(), x.tolist()]
+        gaps = np.array([gap[0] for _, gap in steps])
         assert (gaps[1:] <= gaps[:-1] * (1 + 1e-12) + 1e-13 * m.size).all()
-        turned = np.abs(np.diff([row.unknowns for row in table], axis=0))
+        turned = np.abs(np.diff([to[0] for to, _ in steps], axis=0))
         assert turned.max() <= 1 + 1e-12
-        assert [row.k for row in table] == list(range(1, len(table) + 1))
     assert closed >= 30
+
+
+def known(m: Mechanism, q: object) -> tuple[Loops, State]:
+    """All loops of a mechanism at once, and what they depend on at inputs."""
+    merged, group = m.assembly.merged
+    st = State([q])
+    m.assembly.run(merged.steps[: merged.steps.index(group)], st)
+    return m.assembly.loops(group), st
+
+
+def test_many_poses_close_as_each_of_them_alone() -> None:
+    """By numpy and on floats, with a pose that does not close and one whose input is no number."""
+    m = four_bar()
+    q = np.array([0.3, 1.0, np.nan, 2.0])
+    start = np.array([[0.5, 1.2], [0.3, 1.0], [0.3, 1.0], [np.nan, 1.0]])
+    loops, st = known(m, q)
+    x, closed = newton(loops, st, start, m.size)
+    assert closed.tolist() == [True, True, False, False]
+    for i in range(4):
+        alone, own = newton(*known(m, float(q[i])), start[i : i + 1], m.size)
+        assert own[0] == closed[i]
+        if closed[i]:
+            assert np.abs(alone[0] - x[i]).max() < 1e-15
+            assert m.motion(q[i]).link("coupler").angle == pytest.approx(x[i, :1], abs=1e-15)
+
+
+def test_a_part_of_a_sweep_has_the_digits_of_the_whole() -> None:
+    """Few poses are searched for one by one on floats; not those that are a part of many."""
+    m = triad()
+    q = np.linspace(1.2, 1.8, 300)
+    whole = Lanes(m.assembly, q)
+    part = Lanes(m.assembly, q[40:45], block_of=len(q))
+    assert part.assembled.all()
+    assert part.angle("coupler").tolist() == whole.angle("coupler")[40:45].tolist()
+
+
+@pytest.mark.parametrize("many", [False, True])
+def test_a_step_whose_system_is_not_on_the_tape_is_the_same(
+    many: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Groups of more unknowns than `WHOLE` take each step from LAPACK: step for step the same search."""
+    m = four_bar()
+    q = np.full(20, 0.9) if many else 0.9
+    start = np.random.default_rng(1).uniform(-math.pi, math.pi, (20 if many else 1, 2))
+    loops, st = known(m, q)
+    monkeypatch.setattr(group_loops, "WHOLE", 1)
+    monkeypatch.setattr(group_loops, "_topology", group_loops.Topology)
+    other = Loops(loops.group)
+    for limit in range(12):
+        (x, gap), (y, left) = (each.search(st, start, m.size, limit) for each in (loops, other))
+        assert x == pytest.approx(y, abs=1e-9)
+        assert gap == pytest.approx(left, abs=1e-9)
+
+
+def test_groups_of_other_dimensions_have_the_same_tape() -> None:
+    """A tape holds the topology alone; what is nothing is left out of it, and makes another one."""
+
+    def tape(rocker: complex) -> Tape:
+        m = replace(four_bar(), links={**four_bar().links, "rocker": Link({"D": 0j, "C": rocker})})
+        return m.assembly.loops(m.assembly.plan.groups[0]).tape
+
+    assert tape(80) is tape(81.5)
+    assert tape(80) is not tape(80 + 1j)
 
 
 def test_all_at_once_says_how_far_another_assembly_is() -> None:

@@ -68,6 +68,19 @@ def test_a_pinion_moves_its_rack_by_its_radius(radius: float, angle: float) -> N
     assert motion.effort == pytest.approx(motion.dynamics.generalized[:, 0])
 
 
+def test_a_rack_on_an_arm_that_is_driven_on_another_stands_at_its_guess() -> None:
+    m = Mechanism(
+        {"O": 0j},
+        {"arm": Link({"O": 0j, "A": 1 + 0j}), "fore": Link({"A": 0j}), "bar": Link({"P": 0j})},
+        guides=[Guide("P", "bar", on="fore", through=0.25j, turned=0.0)],
+        racks=[Rack("arm", "P", 0.5)],
+        inputs=[Input("arm", value=0.25), Input("fore", on="arm", value=math.pi / 2)],
+        guess=Guess((0.0, math.pi / 2), {}, {"P": 0.75 + 2j}),
+    )
+    motion = m.motion([[0.0, math.pi / 2], [0.0, math.pi / 2 - 0.5]])
+    assert np.allclose(motion.slide("P").position, [2.0, 2.25], rtol=0, atol=1e-15)
+
+
 def test_a_rack_turns_its_pinion() -> None:
     m = rack(
         inputs=Input(slider="R", value=0.0, speed=0.3, acceleration=4.0), guess=Guess(angles={"pinion": 0.5})

@@ -21,6 +21,30 @@ def test_parts_of_another_kind():
         Mechanism({"O": 0j}, ARM, inputs=Input("arm"), guides=[Guide("P", "arm"), {"point": "P"}])
 
 
+@pytest.mark.parametrize("shape", [(3, 4), (4, 2), (1, 3), (2, 3, 1)])
+def test_one_input_in_several_axes(shape):
+    m = four_bar()
+    for of in (m, m.vary({"links.crank.B.x": [0.03, 0.04]})):
+        with pytest.raises(ValueError, match=r"angle: expected .*shape \(n,\) for one input, found"):
+            of.motion(np.zeros(shape))
+        assert of.motion(np.zeros((4, 1))).assembled.shape[-1] == 4
+
+
+@pytest.mark.parametrize("n", [1, 5])
+def test_arrays_that_change_after_the_call_change_nothing(n):
+    m = four_bar()
+    angle, speed, lengths = np.linspace(1, 2, n), np.full(n, 3.0), np.array([0.03, 0.04])
+    expected = m.motion(angle.copy(), speed=speed.copy()), m.vary({"links.crank.B.x": lengths.copy()})
+    motion, family = m.motion(angle, speed=speed), m.vary({"links.crank.B.x": lengths})
+    swept = family.motion(angle, speed=speed)
+    again = expected[1].motion(angle.copy(), speed=speed.copy())
+    for changed in (angle, speed, lengths, motion.assembled, motion.condition):
+        changed[:] = 0
+    assert motion.assembled.all()
+    assert np.array_equal(motion.link("rocker").omega, expected[0].link("rocker").omega)
+    assert np.array_equal(swept.link("rocker").omega, again.link("rocker").omega)
+
+
 @pytest.mark.parametrize("name", ["speed", "acceleration"])
 def test_rates_of_another_length_than_the_angle(name):
     m, rates = four_bar(), {"speed": 1.0, "acceleration": 0.0}

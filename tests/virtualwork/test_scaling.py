@@ -87,8 +87,8 @@ def test_what_is_sent_of_a_part_is_the_numbers_of_its_variants():
     part = family(10_000).motion(np.linspace(0, 6, 12)).part
     sizes = [len(pickle.dumps(part.some(slice(0, v)))) for v in (1, 1001, 10_000)]
     assert sizes[0] < 8000
-    assert sizes[1] - sizes[0] == pytest.approx(8 * 4 * 1000, abs=16)
-    assert sizes[2] - sizes[0] == pytest.approx(8 * 4 * 9999, abs=16)
+    assert sizes[1] - sizes[0] == pytest.approx(8 * 4 * 1000, abs=64)
+    assert sizes[2] - sizes[0] == pytest.approx(8 * 4 * 9999, abs=64)
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ from virtualwork import Gear, Guess, Input, Link, Mechanism, Spring, TorsionSpri
 from virtualwork.describe.dimensions import dimensions, value
 from virtualwork.describe.parts import Force, Torque
 from virtualwork.family.sensitivity import Sensitivities
-from virtualwork.family.written import Written
+from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.formulas.forces import Effort, JointForce, NewtonEuler
 from virtualwork.formulas.kinematics import Angle, Point
 
@@ -78,7 +78,7 @@ def compare(m, motion):
     of = Sensitivities(motion.assembly, motion.poses)
     found = of.of(keys, dims)
     largest = sizes(m, dims, of.values(keys), found)
-    written = Written(motion.assembly, dims, (True, True, False), own_signs=False, settled=False)
+    written = VariedFormulas(motion.assembly, dims, (True, True, False), own_signs=False, settled=False)
     tape = written.tape(keys)
     given = {d.path: float(value(m, d.path).real) for d in dims}
     given |= motion.poses.entering([n for n in tape.inputs if n not in given])

@@ -27,7 +27,7 @@ from virtualwork import (
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.dimensions import changed, dimensions
 from virtualwork.describe.file import Entry, File
-from virtualwork.describe.forms import Body, Place, Quantity
+from virtualwork.describe.forms import Body, Place, Scalar
 from virtualwork.describe.keys import Part, check, declared, keys_of, read_fields, table_keys
 from virtualwork.describe.parts import PARTS, TABLES, Friction, Polar
 from virtualwork.describe.text import table_of, toml_text, written
@@ -189,7 +189,7 @@ class Rack(Part):
 
     link: str = declared(Body(ground=False), "the rack")
     pinion: str = declared(Body(), "the toothed link", default="ground")
-    radius: float = declared(Quantity("length", negative=False), "of the pinion", default=0.05)
+    radius: float = declared(Scalar("length", negative=False), "of the pinion", default=0.05)
     at: complex = declared(Place("link"), "a point of the pitch line", default=0j)
 
 

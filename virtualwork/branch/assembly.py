@@ -57,6 +57,11 @@ class Assembly(Choice):
         """What has been written down of it on tapes."""
         return {}
 
+    @cached_property
+    def together(self) -> dict[Any, Any]:
+        """What one pose brings with a first request, by that request."""
+        return {}
+
     # --- along the input ------------------------------------------------------------------------------------------
     @cached_property
     def track(self) -> Track:
@@ -137,11 +142,4 @@ class Assembly(Choice):
 
     def state(self, inputs: tuple[float, ...]) -> State:
         """Positions of one pose, as Python numbers."""
-        st = State(list(inputs))
-        try:
-            self.run(self.plan.steps, st)
-        except ZeroDivisionError:
-            st = State([np.array([q]) for q in inputs], many=True)
-            with np.errstate(all="ignore"):
-                self.run(self.plan.steps, st)
-        return st
+        return self.track.pose(self.plan.steps, inputs)

@@ -8,7 +8,7 @@ branches; at k > 2 it is linear in the free (k−1)-th rate. So the branch goes 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import factorial
@@ -43,6 +43,9 @@ class Along(Passage, Protocol):
 
     def run(self, steps: Iterable[Step], st: State) -> None:
         """Work out positions, each group on its branch."""
+
+    def pose(self, steps: Iterable[Step], inputs: Sequence[float], singular: bool = False) -> State:
+        """What steps make of one pose."""
 
 
 @dataclass(frozen=True)
@@ -165,7 +168,7 @@ def _nearest(way: Along, group: Group, q0: float, span: float, share: float) -> 
     """The series that the closed form follows within a span around a change point, and how far they are apart."""
     choice = way.assembly
     nodes = span * share * chebyshev_nodes(12) * way.length / (2 * np.pi)
-    st = State([q0 + nodes], many=True)
+    st = State([q0 + nodes])
     way.run(choice.needed(choice.plan.writes(group)), st)
     weights = _at_centre(nodes)
     turn, slide = [], []

@@ -12,6 +12,7 @@ from dalembert.arithmetic.records import Record, record
 from dalembert.dataclass import dataclass, field
 from virtualwork.describe.description import Description
 from virtualwork.formulas.closed_forms import Case
+from virtualwork.formulas.group_loops import Loops
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.positions import State, principal, run
 from virtualwork.plan.order import plan
@@ -62,6 +63,17 @@ class Choice(Record):
         if group.name not in self.cases:
             self.cases[group.name] = Case(group)
         return self.cases[group.name]
+
+    @cached_property
+    def systems(self) -> dict[Group, Loops]:
+        """The loops of groups without a closed form, and of all groups at once, that are ready to be solved."""
+        return {}
+
+    def loops(self, group: Group) -> Loops:
+        """The loops of a group over its unknowns, made ready once."""
+        if group not in self.systems:
+            self.systems[group] = Loops(group)
+        return self.systems[group]
 
     @cached_property
     def seeds(self) -> dict[str, tuple[Reals, Reals]]:

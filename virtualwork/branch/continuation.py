@@ -12,9 +12,10 @@ import numpy as np
 
 from virtualwork.branch.change_point import Along, put
 from virtualwork.branch.sampling import chebyshev_nodes, real_roots
-from virtualwork.formulas.newton import gaps, newton, settle, singular, write_unknowns
-from virtualwork.formulas.numbers import SINGULAR, Number, Reals, solve, stack, stack_rows
-from virtualwork.formulas.positions import State, columns
+from virtualwork.formulas.group_loops import write_unknowns
+from virtualwork.formulas.newton import newton, settle, singular
+from virtualwork.formulas.numbers import SINGULAR, Number, Reals, solve, stack_rows
+from virtualwork.formulas.positions import State
 from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.winding import NODES
 from virtualwork.plan.steps import Group
@@ -41,13 +42,16 @@ class Continuation:
         self.assembly = track.assembly
         self.size = self.assembly.mechanism.size
         self.before = self.assembly.before(group)
+        self.loops = self.assembly.loops(group)
         self.ends: list[tuple[float, int]] = []
         self._crossed: list[tuple[float, float]] = []
         self._found: dict[tuple[float, float], float] = {}
         x = np.asarray(self.assembly.starts[group.name], dtype=float)
         q = track.start
-        rate, det = self._rate(self._state(q, x))
+        rate, det = self._rate(self._state(q), x)
         self.q, self.x, self.rate, self.det = [q], [x], [rate], [det]
+        # as arrays, until more are laid down
+        self._nodes: tuple[Reals, Reals, Reals] = (np.empty(0),) * 3
         self.stopped = {1: False, -1: False}
         # the last one that was taken
         self.step = {1: np.inf, -1: np.inf}
@@ -55,30 +59,29 @@ class Continuation:
         self.upright: tuple[float, float, float] | None = None
         self._begin_upright()
 
-    def _state(self, q: float, x: Reals | None = None) -> State:
-        """What the group depends on at one input; its own unknowns too, where they are given."""
-        st = State([np.array([q])], many=True)
-        with np.errstate(all="ignore"):
-            self.track.run(self.before, st)
-        if x is not None:
-            write_unknowns(self.group, st, x[None])
-        return st
+    @property
+    def nodes(self) -> tuple[Reals, Reals, Reals]:
+        """The nodes in the order of their inputs: these, (n,), unknowns and rates, (n, unknowns)."""
+        if len(self._nodes[0]) != len(self.q):
+            self._nodes = np.array(self.q), np.array(self.x), np.array(self.rate)
+        return self._nodes
 
-    def _rate(self, st: State) -> tuple[Reals, float]:
-        """dx/dq and the determinant (its sign is the branch) at a pose whose unknowns are written."""
-        rates, dets = self._rates(st, 1)
+    def _state(self, q: float) -> State:
+        """What the group depends on at one input."""
+        return self.track.pose(self.before, (q,))
+
+    def _rate(self, st: State, x: Reals) -> tuple[Reals, float]:
+        """dx/dq and the determinant (its sign is the branch) at one pose, of unknowns x (unknowns,)."""
+        rates, dets = self._rates(st, x[None])
         return rates[0], float(dets[0])
 
-    def _rates(self, st: State, n: int) -> tuple[Reals, Reals]:
-        """The same at n poses, (n, unknowns) and (n,)."""
-        d = Rates(self.assembly.plan, st, [[1.0]], self.track)
-        d.advance(self.before, 1)
-        jacobian = stack(columns(self.group, st), n)
-        right = stack_rows(d.right_side(self.group, 1), n)
+    def _rates(self, st: State, x: Reals) -> tuple[Reals, Reals]:
+        """The same at n poses, (n, unknowns) and (n,), of unknowns x (n, unknowns)."""
+        _, jacobian, right = self._linear(st, x)
         rate = solve(jacobian, -right)
         if jacobian.shape[1] == jacobian.shape[2]:
             return rate, np.asarray(np.linalg.det(jacobian))
-        det = np.full(n, np.nan)
+        det = np.full(len(x), np.nan)
         good = np.isfinite(jacobian).all(axis=(1, 2))
         det[good] = np.prod(np.linalg.svd(jacobian[good], compute_uv=False), axis=1)
         return rate, det
@@ -93,7 +96,7 @@ class Continuation:
         unit = np.where(np.arange(len(x)) < len(self.group.angles), 1.0, self.size)
         if np.abs(self.rate[0] / unit).max(initial=0.0) * self.track.length < STEEP:
             return
-        jacobian, along, _ = self._linear(q, x)
+        _, (jacobian,), (along,) = self._linear(self._state(q), x[None])
         if jacobian.shape[0] != jacobian.shape[1] or not np.isfinite(jacobian).all():
             return
         u, s, vt = np.linalg.svd(jacobian * unit / self.size)
@@ -105,7 +108,7 @@ class Continuation:
         if len(starts) < 2 or not starts[0][0] < q < starts[1][0]:
             return
         low, high = starts
-        beside = [(to, at, *self._rate(self._state(to, at))) for to, at in (low, high)]
+        beside = [(to, at, *self._rate(self._state(to), at)) for to, at in (low, high)]
         # of coordinates that were rounded: a fold between the two is not stepped over
         if s[-1] > UPRIGHT * s[0] and len({np.sign(det) for *_, det in beside} | {np.sign(self.det[0])}) > 1:
             return
@@ -118,20 +121,27 @@ class Continuation:
         self.rate[1], self.det[1] = np.zeros(len(x)), self.det[0]
         self.upright = (low[0], q, high[0])
 
-    def _linear(self, q: float, x: Reals) -> tuple[Reals, Reals, Reals]:
-        """The Jacobian of the loops, their change with the input, and their gaps at one pose."""
-        st = self._state(q, x)
+    def _linear(self, st: State, x: Reals) -> tuple[Reals, Reals, Reals]:
+        """The gaps of the loops, their Jacobian, and their change with the input, of unknowns x (n, unknowns)."""
+        gap, jacobian = self.loops.over(st)(x)
+        try:
+            return gap, jacobian, self._moved(st, x)
+        except (ZeroDivisionError, OverflowError):
+            return gap, jacobian, self._moved(self.track.pose(self.before, st.inputs, singular=True), x)
+
+    def _moved(self, st: State, x: Reals) -> Reals:
+        """The change of the loops with the input, (n, 2·loops), of unknowns x (n, unknowns)."""
+        write_unknowns(self.group, st, x)
         d = Rates(self.assembly.plan, st, [[1.0]], self.track)
         d.advance(self.before, 1)
-        right = stack_rows(d.right_side(self.group, 1), 1)[0]
-        return stack(columns(self.group, st), 1)[0], right, stack_rows(gaps(self.group, st), 1)[0]
+        return stack_rows(d.right_side(self.group, 1), len(x))
 
     def _beside(self, q: float, x: Reals, null: Reals, unit: Reals) -> tuple[float, Reals] | None:
         """Go a way along a null vector, and close the loops there by the unknowns and the input (Newton-Raphson)."""
         for way in WAYS:
             to, at = q, x + way * null * unit
             for _ in range(12):
-                jacobian, along, gap = self._linear(to, at)
+                (gap,), (jacobian,), (along,) = self._linear(self._state(to), at[None])
                 bordered = np.block([[jacobian, along[:, None]], [null / unit, 0.0]])
                 rest = np.append(gap, null / unit @ (at - x) - way)
                 if not np.isfinite(bordered).all():
@@ -167,11 +177,11 @@ class Continuation:
             np.concatenate([own[None], its[some][::side]])
             for own, its in ((np.array(self.q[end]), q), (self.x[end], x))
         )
-        st = State([q], many=True)
+        st = State([q])
         with np.errstate(all="ignore"):
             self.track.run(self.before, st)
-            x, closed = newton(self.group, st, x, self.size, limit=8)
-            rate, det = self._rates(st, len(q))
+            x, closed = newton(self.loops, st, x, self.size, limit=8)
+            rate, det = self._rates(st, x)
             x[0], rate[0] = self.x[end], self.rate[end]
             far = np.maximum(np.abs(x[:-1]), self.size)
             far[:, : len(self.group.angles)] = 1.0
@@ -214,9 +224,9 @@ class Continuation:
             guess = x + side * step * rate
             st = self._state(to)
             with np.errstate(all="ignore"):
-                solution, closed = newton(self.group, st, guess[None], self.size, limit=8)
+                solution, closed = newton(self.loops, st, guess[None], self.size, limit=8)
             if closed[0]:
-                new, det = self._rate(st)
+                new, det = self._rate(st, solution[0])
                 # a slide that runs away is measured by itself
                 far = np.maximum(np.abs(x), self.size)
                 far[: len(self.group.angles)] = 1.0
@@ -231,17 +241,17 @@ class Continuation:
                     return
             step /= 2
         self.stopped[side] = True
-        limit = self._end_before(q, q + 2 * side * step, x)
+        limit = self._end_before(q, q + 2 * side * step)
         self.ends.append((self._limit(side) if limit is None else limit, -side))
 
     def singular(self) -> bool:
         """Whether the Jacobian is singular at all nodes."""
         some = np.unique(np.linspace(0, len(self.q) - 1, 24).astype(int))
-        st = State([np.array(self.q)[some]], many=True)
+        q, x, _ = self.nodes
+        st = State([q[some]])
         with np.errstate(all="ignore"):
             self.track.run(self.before, st)
-            write_unknowns(self.group, st, np.array(self.x)[some])
-        return singular(self.group, st, len(some))
+        return singular(self.loops.over(st)(x[some])[1])
 
     @property
     def crossings(self) -> list[float]:
@@ -257,7 +267,7 @@ class Continuation:
                 nodes = chebyshev_nodes(12)
                 x = self.unknowns(centre + half * nodes)
                 places = zip((centre + half * nodes).tolist(), x, strict=True)
-                det = [self._rate(self._state(q, row))[1] for q, row in places]
+                det = [self._rate(self._state(q), row)[1] for q, row in places]
                 # a pose between the two that does not close: no more is known
                 if not np.isfinite(det).all():
                     self._found[a, b] = centre
@@ -270,7 +280,7 @@ class Continuation:
 
     def unknowns(self, q: Reals) -> Reals:
         """The group's unknowns at inputs q, (n, unknowns)."""
-        st = State([q], many=True)
+        st = State([q])
         with np.errstate(all="ignore"):
             self.track.run(self.before, st)
             self.close(st)
@@ -303,19 +313,19 @@ class Continuation:
                 for j in range(len(x)):
                     put(x, j, here, rate[j])
 
-    def _end_before(self, inside: float, beyond: float, x: Reals) -> float | None:
+    def _end_before(self, inside: float, beyond: float) -> float | None:
         """The limit between two inputs of what the group depends on, to the last bit; None where that goes on."""
-        if self._reaches(beyond, x):
+        if self._reaches(beyond):
             return None
         while True:
             middle = (inside + beyond) / 2
             if middle in (inside, beyond):
                 return inside
-            inside, beyond = (middle, beyond) if self._reaches(middle, x) else (inside, middle)
+            inside, beyond = (middle, beyond) if self._reaches(middle) else (inside, middle)
 
-    def _reaches(self, q: float, x: Reals) -> bool:
+    def _reaches(self, q: float) -> bool:
         """Whether all that the group depends on is assembled at an input."""
-        return bool(np.isfinite(stack_rows(gaps(self.group, self._state(q, x)), 1)).all())
+        return bool(self.loops.stands(self._state(q)))
 
     def _limit(self, side: int) -> float:
         """The limit itself: det² is smooth in the input there and goes to zero; extrapolated from the last nodes."""
@@ -360,7 +370,7 @@ class Continuation:
     def close(self, st: State) -> None:
         """Close the group at a state's poses."""
         q = self.in_period(np.atleast_1d(np.asarray(st.inputs[0], dtype=float)))
-        nodes, x, rate = np.array(self.q), np.array(self.x), np.array(self.rate)
+        nodes, x, rate = self.nodes
         if len(nodes) == 1:
             start = x[0] + np.outer(q - nodes[0], np.nan_to_num(rate[0]))
             inside = np.ones(len(q), dtype=bool)
@@ -393,12 +403,11 @@ class Continuation:
                 root = np.sqrt(np.maximum((limit - q[beyond]) / left, 0.0))[:, None]
                 start[beyond] = x[end] + 2 * rate[end] * left * (1 - root)
                 inside |= beyond
-        many = st if st.many else st.copy(many=True)
         start[~inside] = np.nan
         with np.errstate(all="ignore"):
-            solution, closed = newton(self.group, many, start, self.size)
+            solution, closed = newton(self.loops, st, start, self.size)
             if self.group.name in self.track.folded:
-                solution = settle(self.group, many, solution, self.size)
+                solution = settle(self.loops, st, solution, self.size)
                 st.folded.add(self.group.name)
         if self.upright is not None:
             at = np.abs(q - middle) <= FINEST**2 * self.track.length

@@ -15,8 +15,10 @@ from virtualwork.branch.phases import Phases
 from virtualwork.describe import AssemblyError, MechanismError, MobilityError, ParallelGuidesError
 from virtualwork.describe.description import Description, known_by_guess
 from virtualwork.formulas.closed_forms import Case
-from virtualwork.formulas.numbers import Number, cross, dot, stack, stack_rows
-from virtualwork.formulas.positions import State, columns, principal, run
+from virtualwork.formulas.group_loops import Loops, unknowns, write_unknowns
+from virtualwork.formulas.newton import newton
+from virtualwork.formulas.numbers import Number, cross, dot
+from virtualwork.formulas.positions import State, principal, run
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Step, Turn
 
@@ -50,6 +52,7 @@ class _Chooser:
         self.warnings: list[str] = []
         self.phases: dict[int, float] = {}
         self.cases: dict[str, Case] = {}
+        self.systems: dict[Group, Loops] = {}
         # of the first input: 1 rad, or the mechanism's size
         self.unit = m.size if m.inputs[0].is_slide else 1.0
 
@@ -78,6 +81,7 @@ class _Chooser:
         """What is chosen so far."""
         result = make(self.m, self.plan, self.signs, self.starts, 1, warnings, self.phases)
         result.cases.update(self.cases)
+        result.systems.update(self.systems)
         return result
 
     def _singular(self, st: State) -> bool:
@@ -87,7 +91,8 @@ class _Chooser:
                 if not st.margin.get(group.name, 0.0) > 1e-12:
                     return True
             else:
-                jacobian = stack(columns(group, st), 1)[0]
+                x = np.array([unknowns(group, st)], dtype=float)
+                _, (jacobian,) = self.systems[group].over(st)(x)
                 jacobian[:, : len(group.angles)] /= self.m.size
                 if not np.isfinite(jacobian).all() or not np.linalg.cond(jacobian) < 1e9:
                     return True
@@ -292,21 +297,19 @@ class _Chooser:
 
     # --- groups with no closed form -------------------------------------------------------------------------------
     def _newton(self, group: Group, st: State) -> Any:
-        # a mechanism whose groups all have a closed form does not load these
+        # a mechanism whose groups all have a closed form does not load this
         from virtualwork.branch.solutions import every_solution, guessed_unknowns
-        from virtualwork.formulas.newton import gaps, newton, write_unknowns
 
-        many = st.copy(many=True)
-        why = ""
-        start = guessed_unknowns(group, many, self.angles, self.points, self.m, self.plan.directions)
+        loops, why = self.systems.setdefault(group, Loops(group)), ""
+        start = guessed_unknowns(group, st.copy(), self.angles, self.points, self.m, self.plan.directions)
         if start is not None:
-            x, closed = newton(group, many, start, self.m.size)
+            x, closed = newton(loops, st, start, self.m.size)
             if closed[0]:
                 write_unknowns(group, st, x)
                 return x[0]
-            left = float(np.linalg.norm(stack_rows(gaps(group, many), 1)))
+            left = float(np.linalg.norm(loops.over(st)(x)[0]))
             why = f": from the guess on its loops stay {left:.6g} m apart"
-        result = every_solution(group, many, self.m.size)
+        result = every_solution(loops, st, self.m.size)
         if len(result) == 0 and len(group.angles) + len(group.slides) < 2 * len(group.closures):
             raise MobilityError(
                 f"{group.name}: more constraints than unknowns, and they contradict each other: a structure, or lengths "

@@ -9,9 +9,10 @@ import numpy as np
 
 from virtualwork.branch.change_point import Along
 from virtualwork.branch.continuation import FINEST
-from virtualwork.formulas.newton import newton, write_unknowns
-from virtualwork.formulas.numbers import Complexes, Reals, solve, stack, stack_rows
-from virtualwork.formulas.positions import State, columns, unwound
+from virtualwork.formulas.group_loops import write_unknowns
+from virtualwork.formulas.newton import newton
+from virtualwork.formulas.numbers import Complexes, Reals, solve, stack_rows
+from virtualwork.formulas.positions import State, unwound
 from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.winding import counted, straight_lines
 from virtualwork.plan.steps import Group, Step
@@ -34,12 +35,12 @@ def along_lines(track: Along, group: Group, st: State) -> None:
     while left.any():
         i = np.flatnonzero(left)
         to = np.minimum(gone[i] + step[i], 1.0)
-        trial = State(list((at + to[:, None] * way[i]).T), many=True)
+        trial = State(list((at + to[:, None] * way[i]).T))
         moved = (to - gone[i])[:, None]
         with np.errstate(all="ignore"):
             track.run(before, trial)
             start = x[i] + moved * slope[i]
-            solution, ok = newton(group, trial, start, m.size, limit=8)
+            solution, ok = newton(assembly.loops(group), trial, start, m.size, limit=8)
             far = np.where(angles, 1.0, np.maximum(np.abs(x[i]), m.size))
             change = np.abs((solution - x[i]) / far).max(axis=1, initial=0.0)
             new = _slope(track, group, before, at + to[:, None] * way[i], way[i], solution)
@@ -59,13 +60,15 @@ def along_lines(track: Along, group: Group, st: State) -> None:
 
 def _slope(track: Along, group: Group, before: Sequence[Step], inputs: Reals, way: Reals, x: Reals) -> Reals:
     """dx of a group's unknowns where every input changes by its way; none where it is singular."""
-    st, n = State(list(inputs.T), many=True), len(x)
+    st, n = State(list(inputs.T)), len(x)
     with np.errstate(all="ignore"):
         track.run(before, st)
         write_unknowns(group, st, x)
         d = Rates(track.assembly.plan, st, [[rate] for rate in way.T])
         d.advance(before, 1)
-        return np.nan_to_num(solve(stack(columns(group, st), n), -stack_rows(d.right_side(group, 1), n)))
+        loops = track.assembly.loops(group)
+        _, jacobian = loops.over(st)(x)
+        return np.nan_to_num(solve(jacobian, -stack_rows(d.right_side(group, 1), n)))
 
 
 def wind_along_lines(track: Along, group: Group, st: State, bodies: Collection[str]) -> None:
@@ -78,7 +81,7 @@ def wind_along_lines(track: Along, group: Group, st: State, bodies: Collection[s
     before = assembly.before(group)
 
     def rotations(inputs: list[Reals]) -> Complexes:
-        trial = State(list(inputs), many=True)
+        trial = State(list(inputs))
         track.run(before, trial)
         case.solve(trial, sign, size)
         n = len(inputs[0])

@@ -91,7 +91,7 @@ class Pace:
         from virtualwork.formulas.rates import Rates
 
         ways = []
-        st = State([np.array([self.assembly.mechanism.at[0]])], many=True)
+        st = State([np.array([self.assembly.mechanism.at[0]])])
         with np.errstate(all="ignore"):
             for group in self.assembly.plan.groups:
                 before = self.assembly.before(group)

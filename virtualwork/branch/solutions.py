@@ -11,7 +11,8 @@ import numpy as np
 from virtualwork.branch.choice import Choice
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.newton import gaps, newton, write_unknowns
+from virtualwork.formulas.group_loops import Loops, gaps, write_unknowns
+from virtualwork.formulas.newton import newton
 from virtualwork.formulas.numbers import Number, dot, stack, stack_rows
 from virtualwork.formulas.positions import State, columns
 from virtualwork.plan.steps import Group
@@ -73,26 +74,24 @@ def _origin(body: str, z: Number, turn: Number, points: Mapping[str, Number], m:
     return None
 
 
-def every_solution(group: Group, st: State, size: float) -> Any:
+def every_solution(loops: Loops, st: State, size: float) -> Any:
     """Every assembly of a Newton group at one input, by damped Newton from many starts spread evenly.
 
     A systematic multi-start (Kronecker sequence of the generalised golden ratio): it finds what it finds, and does
     not prove that there is no other.
     """
-    n = len(group.angles) + len(group.slides)
+    na = len(loops.group.angles)
+    n = na + len(loops.group.slides)
     starts = min(4096, 128 * n)
     g = 1.0
     for _ in range(64):
         g = (1 + g) ** (1 / (n + 1))
     u = (0.5 + np.outer(np.arange(1, starts + 1), g ** -np.arange(1.0, n + 1))) % 1.0
     x0 = np.empty((starts, n))
-    na = len(group.angles)
     x0[:, :na] = u[:, :na] * 2 * np.pi
     x0[:, na:] = (2 * u[:, na:] - 1) * size
-    many = st.copy(many=True)
-    many.inputs = [np.full(starts, np.ravel(q)[0]) for q in st.inputs]
     with np.errstate(all="ignore"):
-        x, closed = newton(group, many, x0, size)
+        x, closed = newton(loops, st, x0, size)
     x = x[closed]
     if not len(x):
         return x
@@ -134,7 +133,7 @@ def _combinations(chosen: Choice) -> list[tuple[dict[str, int], dict[str, Any]]]
                 chosen.run_untracked([step], st)
                 after.append((st, signs, starts))
             elif step.kind == "Newton":
-                for x in every_solution(step, st, m.size):
+                for x in every_solution(chosen.loops(step), st, m.size):
                     trial = st.copy()
                     write_unknowns(step, trial, x[None])
                     after.append((trial, signs, starts | {step.name: tuple(map(float, x))}))

@@ -9,7 +9,7 @@ pose's branch follows from the number of change points between the guess and it:
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +30,7 @@ from virtualwork.branch.sampling import (
     refined,
     touched,
     turns_far,
+    vanishes,
 )
 from virtualwork.describe import MechanismError
 from virtualwork.formulas.numbers import Complexes, Number, Reals
@@ -89,6 +90,16 @@ class Track:
         """Work out positions, step by step, each group on its branch."""
         run(steps, st, self.close, self.assembly.plain)
 
+    def pose(self, steps: Iterable[Step], inputs: Sequence[float], singular: bool = False) -> State:
+        """What steps make of one pose, as Python numbers; as arrays (1,) at a singular place, where Python divides by zero."""
+        st = State([np.array([q]) for q in inputs]) if singular else State(list(inputs))
+        try:
+            with np.errstate(all="ignore"):
+                self.run(steps, st)
+        except (ZeroDivisionError, OverflowError):
+            return self.pose(steps, inputs, singular=True)
+        return st
+
     def close(self, group: Group, st: State) -> None:
         """Close the loops of one group."""
         if group.kind == "Newton":
@@ -102,7 +113,7 @@ class Track:
             if group.name in self.changes:
                 mend(self.changes[group.name], group, st)
         else:
-            case.solve(st, self.assembly.signs[group.name], size, group.name in self.folded)
+            case.solve(st, None if group.name in self.folded else self.assembly.signs[group.name], size)
         bodies = self.assembly.geared.intersection(group.members)
         if bodies and not self.active:
             from virtualwork.branch.lines import wind_along_lines
@@ -217,7 +228,7 @@ class Track:
         at = self.assembly.mechanism.at
         golden = np.sqrt(np.arange(2.0, 2 + len(at)))
         off = (np.multiply.outer(np.arange(1.0, 25), golden) % 1.0 - 0.5) * 0.1 * self.length
-        st = State([a + off[:, j] for j, a in enumerate(at)], many=True)
+        st = State([a + off[:, j] for j, a in enumerate(at)])
         with np.errstate(all="ignore"):
             for s in self.plan.steps:
                 if isinstance(s, Group) and s.kind == "Newton":
@@ -227,7 +238,7 @@ class Track:
                     case, size = self.assembly.case(s), self.assembly.mechanism.size
                     if vanishes(st.margin[s.name], depths(case, st, size)[1]):
                         self._fold(s.name)
-                        case.solve(st, 1, size, folded=True)
+                        case.solve(st, None, size)
 
     def warnings(self) -> tuple[str, ...]:
         """The assembly's warnings, and the groups that are singular in every pose in what was covered."""
@@ -261,7 +272,7 @@ class Track:
         uneven = partial(turns_far, np.array([*ratios.values()], dtype=float))
 
         def look(q: Reals) -> Complexes:
-            st = State([q], many=True)
+            st = State([q])
             self.run(self.plan.steps, st)
             rows = [np.broadcast_to(st.turn[body], q.shape) for body in ratios]
             return np.array(rows, dtype=complex).reshape(len(rows), len(q))
@@ -277,16 +288,21 @@ class Track:
     # --- looking ahead ------------------------------------------------------------------------------------------
     def margin(self, group: Group, q: Reals) -> Reals:
         """The group's radicand at inputs q, on the branch known so far."""
-        st = State([q], many=True)
+        st = State([q])
         with np.errstate(all="ignore"):
             self.run(self.assembly.needed(self.plan.writes(group)), st)
         return np.broadcast_to(st.margin[group.name], q.shape).astype(float)
+
+    def margin_at(self, group: Group, q: float) -> float:
+        """The group's radicand at one input."""
+        st = self.pose(self.assembly.needed(self.plan.writes(group)), (q,))
+        return float(np.ravel(st.margin[group.name])[0])
 
     def _scan(self, a: float, b: float) -> None:
         """Look through the inputs from a to b, group by group in their order."""
         step = (b - a) / SAMPLES
         q: Reals = a + step * (np.arange(-3, SAMPLES + 3, dtype=float) + 0.5)
-        st = State([q], many=True)
+        st = State([q])
         waiting: list[Step] = []
         looked: Looked = {}
         for s in self.plan.steps:
@@ -385,7 +401,7 @@ class Track:
 
         Near an end of the input all groups behind it are looked at in the same places.
         """
-        fresh: tuple[State, set[int]] = State([q], many=True), set()
+        fresh: tuple[State, set[int]] = State([q]), set()
         # grids of fast loops are long, and each group's own
         st, done = looked.setdefault(q.tobytes(), fresh) if len(q) <= 2 * SAMPLES else fresh
         new = [step for step in steps if id(step) not in done]
@@ -395,7 +411,7 @@ class Track:
 
     def _angle(self, body: str, q: Reals) -> Reals:
         """A body's angle at inputs q, but for whole turns."""
-        st = State([q], many=True)
+        st = State([q])
         self.run(self.assembly.needed((f"angle:{body}",)), st)
         return np.broadcast_to(np.angle(st.turn[body]), q.shape)
 
@@ -442,10 +458,3 @@ class Track:
             from virtualwork.branch.lines import along_lines
 
             along_lines(self, group, st)
-
-
-def vanishes(margin: Number, noise: float) -> bool:
-    """Whether a radicand is zero to rounding wherever there is one."""
-    m = np.abs(np.atleast_1d(margin))
-    m = m[np.isfinite(m)]
-    return len(m) > 4 and bool((m <= noise).all())

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Hashable
 
-from dalembert.hints import nearest
+from dalembert.hints import choices
 
 
 class MechanismError(ValueError):
@@ -38,4 +38,4 @@ def require(name: object, names: Collection[object], where: str, noun: str) -> N
     virtualwork.describe.DescriptionError: [[forces]] 1 link: unknown link 'crnak'; did you mean 'crank'?
     """
     if not isinstance(name, Hashable) or name not in names:
-        raise DescriptionError(f"{where}: unknown {noun} '{name}'{nearest(str(name), map(str, names))}")
+        raise DescriptionError(f"{where}: unknown {noun} '{name}'{choices(str(name), map(str, names))}")

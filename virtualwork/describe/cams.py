@@ -18,7 +18,7 @@ from dalembert.arithmetic.varied import direction, heading, root
 from dalembert.dataclass import dataclass, field
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.curves import LiftTable
-from virtualwork.describe.forms import Body, Choice, FollowerPoint, Nested, PointName, Quantity
+from virtualwork.describe.forms import Body, Choice, FollowerPoint, Nested, PointName, Scalar
 from virtualwork.describe.keys import Part, check, declared
 from virtualwork.describe.laws import Lift, Segment, pieces, spans, splined
 from virtualwork.describe.points import as_number
@@ -42,7 +42,7 @@ class Cam(Part):
 
     cam: str = declared(Body(ground=False), "the link that is the cam")
     base_radius: float = declared(
-        Quantity("length"), "the radius of its base circle, which the follower touches at lift zero"
+        Scalar("length"), "the radius of its base circle, which the follower touches at lift zero"
     )
     slider: str | None = declared(
         FollowerPoint(), "the point of the slider or slot that is the follower", default=None
@@ -60,7 +60,7 @@ class Cam(Part):
         Choice(SENSES), "which way the arm turns as it rises: ccw or cw", default="ccw", beside="follower"
     )
     face: str = declared(Choice(FACES), "what touches the cam: knife, roller or flat", default="knife")
-    roller_radius: float | None = declared(Quantity("length"), "the radius of the roller", default=None)
+    roller_radius: float | None = declared(Scalar("length"), "the radius of the roller", default=None)
     law: tuple[Segment, ...] | None = declared(
         Nested(Segment), "segments of the lift over one turn of the cam", default=None
     )

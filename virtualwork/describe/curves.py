@@ -14,7 +14,7 @@ from dalembert.tables.sources import table_rows
 from dalembert.units import LARGEST
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.file import Entry
-from virtualwork.describe.forms import QUANTITY, TEXT, Form, Quantity, Schema
+from virtualwork.describe.forms import SCALAR, TEXT, Form, Scalar, Schema
 from virtualwork.describe.units import SI, Units, wrong
 
 N = TypeVar("N", float, complex)
@@ -125,13 +125,13 @@ class ForceTable(Curve):
 class TorqueOrTable(Form):
     """A torque, or a table of it over the time, or over the angle or speed of its link: a CSV with torque_N_m."""
 
-    torque = Quantity("torque")
+    torque = Scalar("torque")
 
     def dimension(self, slides: bool) -> str:
         return "torque"
 
     def schema(self) -> Schema:
-        return {"anyOf": [QUANTITY, TEXT]}
+        return {"anyOf": [SCALAR, TEXT]}
 
     def fields(self, name: str, value: Any, where: str, entry: Entry) -> dict[str, Any]:
         # a text that does not begin with a number names a file

@@ -317,9 +317,13 @@ def known_by_guess(m: Description) -> tuple[dict[str, float], dict[str, complex]
 
     angles = dict(m.guess.angles)
     points = dict(m.ground) | dict(m.guess.points)
-    for j, e in enumerate(m.inputs):
-        if e.link is not None and e.on == GROUND:
-            angles[e.link] = m.at[j]
+    driven = {e.link: (e.on, at) for e, at in zip(m.inputs, m.at, strict=True) if e.link is not None}
+    # exact where each is driven on the next one, down to the ground
+    exact = {GROUND: 0.0}
+    for _ in driven:
+        exact |= {link: exact[on] + at for link, (on, at) in driven.items() if on in exact}
+    del exact[GROUND]
+    angles |= exact
     for g in m.guides:
         if g.turned is not None and g.on == GROUND:
             angles.setdefault(g.link, g.angle + g.turned)
@@ -328,6 +332,9 @@ def known_by_guess(m: Description) -> tuple[dict[str, float], dict[str, complex]
     before = -1
     while len(angles) + len(points) > before:
         before = len(angles) + len(points)
+        for name, (on, angle) in driven.items():
+            if on in angles:
+                angles.setdefault(name, angles[on] + angle)
         for name, link in m.links.items():
             here = [p for p in link.points if p in points]
             if name not in angles and len(here) >= 2:

@@ -142,7 +142,8 @@ def named(m: Description, path: str, every: Mapping[str, Dimension] | None = Non
     if held:
         more = f" and {len(held) - 4} more" if len(held) > 4 else ""
         raise DescriptionError(f"'{path}' is no single number: expected one of {', '.join(held[:4])}{more}")
-    raise DescriptionError(f"unknown dimension '{path}'{nearest(path, every)}")
+    hint = nearest(path, every) or f": expected its path in the file, such as {next(iter(every), 'links')}"
+    raise DescriptionError(f"unknown dimension '{path}'{hint}")
 
 
 def value(m: Description, path: str) -> float | complex:

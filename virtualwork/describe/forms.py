@@ -17,7 +17,7 @@ from virtualwork.describe.units import SI, Units, wrong
 Schema = dict[str, Any]
 
 # a number, perhaps with its unit behind it; both stand in the definitions of the schema
-QUANTITY: Schema = {"$ref": "#/$defs/quantity"}
+SCALAR: Schema = {"$ref": "#/$defs/quantity"}
 PAIR: Schema = {"$ref": "#/$defs/pair"}
 TEXT: Schema = {"type": "string"}
 
@@ -93,7 +93,7 @@ def whole(number: float) -> float:
 
 
 @dataclass(eq=False, repr=False)
-class Quantity(Form):
+class Scalar(Form):
     """A number with a dimension; `sliding` is that of a part that slides, `negative` whether it may be below zero."""
 
     turning: str
@@ -108,7 +108,7 @@ class Quantity(Form):
         return self.sliding if slides and self.sliding else self.turning
 
     def schema(self) -> Schema:
-        return QUANTITY
+        return SCALAR
 
     def read(self, value: Any, where: str, entry: Entry) -> float:
         return entry.file.units.number(value, self.dimension(entry.slides), where)
@@ -158,7 +158,7 @@ class Lengths(Form):
         return "length"
 
     def schema(self) -> Schema:
-        return {"type": "array", "items": QUANTITY, "minItems": self.count, "maxItems": self.count}
+        return {"type": "array", "items": SCALAR, "minItems": self.count, "maxItems": self.count}
 
     def read(self, value: Any, where: str, entry: Entry) -> tuple[float, ...]:
         if not isinstance(value, list) or len(value) != self.count:

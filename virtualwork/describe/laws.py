@@ -19,7 +19,7 @@ from typing import Any
 
 from dalembert.dataclass import dataclass
 from virtualwork.describe import DescriptionError
-from virtualwork.describe.forms import Choice, Quantity
+from virtualwork.describe.forms import Choice, Scalar
 from virtualwork.describe.keys import declared
 from virtualwork.describe.points import as_number
 
@@ -117,19 +117,19 @@ class Segment:
     """
 
     start: float | None = declared(
-        Quantity("angle"),
+        Scalar("angle"),
         "the cam's angle at its beginning; default: the end of the one before",
         default=None,
         name="from",
     )
     end: float | None = declared(
-        Quantity("angle"),
+        Scalar("angle"),
         "the cam's angle at its end; default, of the last alone: a turn after the first begins",
         default=None,
         name="to",
     )
     rise: float | None = declared(
-        Quantity("angle", sliding="length"),
+        Scalar("angle", sliding="length"),
         "by how much the follower rises, negative: returns; left out of one segment: what closes the turn",
         default=None,
     )

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Literal
 from dalembert.dataclass import dataclass
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.file import GROUND
-from virtualwork.describe.forms import Body, Flag, Lengths, Quantity, RackPoint, TwoBodies
+from virtualwork.describe.forms import Body, Flag, Lengths, RackPoint, Scalar, TwoBodies
 from virtualwork.describe.keys import Part, declared
 
 # the angle of a body by its name, the slide of a guide by its number
@@ -69,7 +69,7 @@ class Gear(Part):
     collection: ClassVar = "gears"
 
     links: tuple[str, str] = declared(TwoBodies(), "the two toothed links")
-    ratio: float = declared(Quantity("number"), "speed of the second over that of the first, against the arm")
+    ratio: float = declared(Scalar("number"), "speed of the second over that of the first, against the arm")
     arm: str = declared(Body(), "the link that carries both", default=GROUND)
 
     def check(self, where: str) -> None:
@@ -132,7 +132,7 @@ class Rack(Part):
     gear: str = declared(Body(ground=False), "the toothed wheel")
     slider: str = declared(RackPoint(), "the point of the slider or slot that moves with it")
     radius: float = declared(
-        Quantity("length"), "its pitch radius: the slide moves by radius times the turn of the wheel"
+        Scalar("length"), "its pitch radius: the slide moves by radius times the turn of the wheel"
     )
 
     def check(self, where: str) -> None:

@@ -28,7 +28,7 @@ from virtualwork.describe.forms import (
     Pair,
     Place,
     PointName,
-    Quantity,
+    Scalar,
     TwoBodies,
 )
 from virtualwork.describe.keys import Key, Part, declared
@@ -66,10 +66,10 @@ class Link(Record):
         "named points in the link's own axes; links that share a name are pinned there",
         needed=False,
     )
-    mass: float = declared(Quantity("mass", negative=False), "the mass, kg", default=0.0)
+    mass: float = declared(Scalar("mass", negative=False), "the mass, kg", default=0.0)
     center: complex = declared(Pair("length"), "the centre of mass in the link's own axes", default=0j)
     inertia: float = declared(
-        Quantity("inertia", negative=False),
+        Scalar("inertia", negative=False),
         "the moment of inertia about the centre of mass, kg m2",
         default=0.0,
     )
@@ -134,10 +134,10 @@ class Guide(Part):
         Place("on"), "a point of the line: a name on that link or [x, y]", default=0j
     )
     angle: float = declared(
-        Quantity("angle"), "the direction of the line against the carrier's x-axis", default=0.0
+        Scalar("angle"), "the direction of the line against the carrier's x-axis", default=0.0
     )
     turned: float | None = declared(
-        Quantity("angle"), "the link's x-axis against the line", default=None, absent=0.0, table="sliders"
+        Scalar("angle"), "the link's x-axis against the line", default=None, absent=0.0, table="sliders"
     )
 
     def __post_init__(self) -> None:
@@ -181,14 +181,14 @@ class Input(Part):
         DrivenPoint(), "the point of the slot or slider that is driven by its position", default=None
     )
     value: float | None = declared(
-        Quantity("angle"),
+        Scalar("angle"),
         "the angle of the link in the file's own pose",
         default=None,
         name="angle",
         beside="link",
         also=(
             Key(
-                Quantity("length"),
+                Scalar("length"),
                 "the position of the slider in the file's own pose",
                 name="position",
                 beside="slider",
@@ -196,15 +196,15 @@ class Input(Part):
         ),
     )
     speed: float | None = declared(
-        Quantity("speed", sliding="velocity"), "the speed: rad/s of a link, m/s of a slider", default=None
+        Scalar("speed", sliding="velocity"), "the speed: rad/s of a link, m/s of a slider", default=None
     )
     acceleration: float | None = declared(
-        Quantity("angular acceleration", sliding="acceleration"),
+        Scalar("angular acceleration", sliding="acceleration"),
         "the acceleration: rad/s2 of a link, m/s2 of a slider",
         default=None,
     )
     jerk: float | None = declared(
-        Quantity("angular jerk", sliding="jerk"),
+        Scalar("angular jerk", sliding="jerk"),
         "the jerk: rad/s3 of a link, m/s3 of a slider",
         default=None,
     )
@@ -339,9 +339,9 @@ class Spring(Part):
     between: tuple[tuple[str, complex | str], tuple[str, complex | str]] = declared(
         Ends(), "its ends: two points such as crank.B and ground.D"
     )
-    stiffness: float = declared(Quantity("stiffness"), "N/m", default=0.0)
-    free_length: float = declared(Quantity("length"), "the length without force", default=0.0)
-    damping: float = declared(Quantity("damping"), "of a damper beside the spring, N s/m", default=0.0)
+    stiffness: float = declared(Scalar("stiffness"), "N/m", default=0.0)
+    free_length: float = declared(Scalar("length"), "the length without force", default=0.0)
+    damping: float = declared(Scalar("damping"), "of a damper beside the spring, N s/m", default=0.0)
 
 
 @dataclass(frozen=True)
@@ -357,10 +357,10 @@ class TorsionSpring(Part):
     links: tuple[str, str] = declared(
         TwoBodies(), "the two links; its angle is the second's less the first's"
     )
-    stiffness: float = declared(Quantity("torsional stiffness"), "N m/rad", default=0.0)
-    free_angle: float = declared(Quantity("angle"), "the angle without torque", default=0.0)
+    stiffness: float = declared(Scalar("torsional stiffness"), "N m/rad", default=0.0)
+    free_angle: float = declared(Scalar("angle"), "the angle without torque", default=0.0)
     damping: float = declared(
-        Quantity("torsional damping"), "of a damper beside the spring, N m s/rad", default=0.0
+        Scalar("torsional damping"), "of a damper beside the spring, N m s/rad", default=0.0
     )
     turns: int = 0
 
@@ -374,7 +374,7 @@ class Motor(Part):
 
     carrier: str = declared(Body(), "the link that carries it")
     drives: str = declared(Body(ground=False), "the link that it drives")
-    mass: float = declared(Quantity("mass"), "its mass, which joins the carrier, kg", default=0.0)
+    mass: float = declared(Scalar("mass"), "its mass, which joins the carrier, kg", default=0.0)
     center: complex = declared(Pair("length"), "its centre in the carrier's axes", default=0j)
 
 
@@ -386,8 +386,8 @@ class Friction(Part):
     collection: ClassVar = "friction"
 
     joint: str = declared(PointName(), "the point of the pin or guide")
-    coefficient: float = declared(Quantity("number"), "the coefficient of friction")
-    radius: float = declared(Quantity("length"), "the radius of the pin; 0 in a guide", default=0.0)
+    coefficient: float = declared(Scalar("number"), "the coefficient of friction")
+    radius: float = declared(Scalar("length"), "the radius of the pin; 0 in a guide", default=0.0)
 
 
 PARTS: tuple[type[Part], ...] = (

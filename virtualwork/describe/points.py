@@ -8,9 +8,9 @@ from types import MappingProxyType
 from typing import Any
 
 from dalembert.dataclass import dataclass
-from dalembert.hints import nearest
+from dalembert.hints import choices
 from virtualwork.describe import DescriptionError
-from virtualwork.describe.forms import Form, Quantity
+from virtualwork.describe.forms import Form, Scalar
 from virtualwork.describe.keys import declared
 
 Point = complex | tuple[float, float] | Sequence[float]
@@ -71,8 +71,8 @@ class Polar:
     """A point of a link by its distance and direction from another point of it, in the link's axes, m and rad."""
 
     origin: str = declared(Form(), "another point of this link", name="from")
-    length: float = declared(Quantity("length"), "the distance from there")
-    angle: float = declared(Quantity("angle"), "its direction against the link's x-axis")
+    length: float = declared(Scalar("length"), "the distance from there")
+    angle: float = declared(Scalar("angle"), "its direction against the link's x-axis")
 
     @property
     def arm(self) -> complex:
@@ -104,7 +104,7 @@ def placed(points: Mapping[str, Point | Polar]) -> Mapping[str, complex]:
             point, at = next((p, at) for p, at in waiting.items() if isinstance(at, Polar))
             if at.origin not in waiting:
                 raise DescriptionError(
-                    f"points.{point} from: unknown point '{at.origin}'{nearest(at.origin, points)}"
+                    f"points.{point} from: unknown point '{at.origin}'{choices(at.origin, points)}"
                 )
             raise DescriptionError(f"points.{point} from: '{at.origin}' itself is placed from '{point}'")
         for point in ready:

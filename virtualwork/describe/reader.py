@@ -57,7 +57,7 @@ def read_text(
 
 def _parts(file: File) -> dict[str, Any]:
     """Every part of the mechanism, under the name that `Description` gives it."""
-    require_keys(file.data, {*FILE, *TABLES}, "the file", "table")
+    require_keys(file.data, {*FILE, *TABLES}, "the file", "table or key")
     units = file.data.get("units", {})
     require_keys(units, UNITS, "[units]", "key")
     file.units = Units(units)
@@ -73,7 +73,9 @@ def _parts(file: File) -> dict[str, Any]:
             entry = Entry(file, place_of(table, i, len(rows)), row)
             lists[kind.collection].append(kind(**read_fields(entry, keys)))
     if not lists["inputs"]:
-        raise DescriptionError("[input]: missing; nothing drives the mechanism")
+        raise DescriptionError(
+            "[input]: missing: nothing drives the mechanism; expected a table [input] with link or slider"
+        )
     inputs = [part for part in lists["inputs"] if isinstance(part, Input)]
     return {
         "ground": ground,

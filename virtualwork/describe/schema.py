@@ -6,7 +6,7 @@ from typing import Any
 
 from dalembert.quantities import expected
 from virtualwork.describe.description import FILE, UNITS
-from virtualwork.describe.forms import PAIR, QUANTITY, TEXT, Free, Nested, Pair, Quantity, Schema
+from virtualwork.describe.forms import PAIR, SCALAR, TEXT, Free, Nested, Pair, Scalar, Schema
 from virtualwork.describe.keys import Key, Keys, table_keys
 from virtualwork.describe.parts import TABLES, Guess, Link, Polar
 
@@ -37,7 +37,7 @@ def schema() -> Schema:
         "required": [*file["required"], "input"],
         "$defs": {
             "quantity": number,
-            "pair": {"type": "array", "items": QUANTITY, "minItems": 2, "maxItems": 2},
+            "pair": {"type": "array", "items": SCALAR, "minItems": 2, "maxItems": 2},
         },
     }
 
@@ -68,7 +68,7 @@ def _table(keys: Keys) -> Schema:
 
 
 def _description(key: Key) -> str:
-    if isinstance(key.form, (Quantity, Pair)):
+    if isinstance(key.form, (Scalar, Pair)):
         return f"{key.meaning} ({expected(key.form.dimension(slides=False))})"
     return key.meaning
 
@@ -94,10 +94,10 @@ def _free(name: str) -> Schema:
         "ground": lambda: _each(PAIR),
         "points": lambda: _each({"anyOf": [PAIR, _table(table_keys(Polar))]}),
         "links": lambda: _each(_table(table_keys(Link))) | {"minProperties": 1},
-        "guess": lambda: _table(table_keys(Guess)) | _each({"anyOf": [QUANTITY, PAIR]}),
-        "inputs": lambda: {"anyOf": [QUANTITY, {"type": "array", "items": QUANTITY}, _each(QUANTITY)]},
+        "guess": lambda: _table(table_keys(Guess)) | _each({"anyOf": [SCALAR, PAIR]}),
+        "inputs": lambda: {"anyOf": [SCALAR, {"type": "array", "items": SCALAR}, _each(SCALAR)]},
         # quoted paths, or their words as tables
-        "tolerances": lambda: _each({"anyOf": [QUANTITY, {"type": "object"}]}),
+        "tolerances": lambda: _each({"anyOf": [SCALAR, {"type": "object"}]}),
     }
     form: Schema = forms[name]()
     return form

@@ -13,7 +13,7 @@ from virtualwork.describe import DescriptionError
 from virtualwork.describe.curves import Rows, TorqueOrTable
 from virtualwork.describe.description import FILE, Description
 from virtualwork.describe.file import require_keys
-from virtualwork.describe.forms import Free, Nested, Pair, Quantity
+from virtualwork.describe.forms import Free, Nested, Pair, Scalar
 from virtualwork.describe.keys import keys_of, table_keys
 from virtualwork.describe.parts import PARTS, TABLES, Guess, Input, Link
 from virtualwork.describe.units import SI, Units
@@ -90,7 +90,7 @@ def toml_text(m: Description, length: str = "m", angle: str = "rad") -> str:
 
         exact = Exact(units)
         limits = {path: (named(m, path)[0].kind, limit) for path, limit in m.tolerances.items()}
-        tree["tolerances"] = {path: Quantity(kind).text(v, exact) for path, (kind, v) in limits.items()}
+        tree["tolerances"] = {path: Scalar(kind).text(v, exact) for path, (kind, v) in limits.items()}
     return written(tree | {"units": units})
 
 
@@ -171,10 +171,10 @@ def _link(link: Link, units: Units) -> Table:
 def _guess(guess: Guess, inputs: tuple[Input, ...], units: Units) -> Table:
     table: Table = {}
     if guess.at is not None:
-        of_input = Quantity("angle", sliding="length")
+        of_input = Scalar("angle", sliding="length")
         at = [of_input.text(q, units, e.is_slide) for q, e in zip(guess.at, inputs, strict=True)]
         table["at"] = at[0] if len(at) == 1 else at
-    table |= {name: Quantity("angle").text(angle, units) for name, angle in guess.angles.items()}
+    table |= {name: Scalar("angle").text(angle, units) for name, angle in guess.angles.items()}
     return table | {name: Pair("length").text(z, units) for name, z in guess.points.items()}
 
 
@@ -194,7 +194,7 @@ def written(tree: Mapping[str, Any]) -> str:
 
 
 def _tables(tree: Mapping[str, Any]) -> Iterator[tuple[str, Table]]:
-    require_keys(tree, {*FILE, *TABLES}, "the file", "table")
+    require_keys(tree, {*FILE, *TABLES}, "the file", "table or key")
     whole = {key: tree[key] for key in ("name", "source", "note", "gravity") if key in tree}
     if whole:
         yield "", whole

@@ -27,7 +27,7 @@ from dalembert.arithmetic.recorded import Number, Recorder, bare, lifted
 from dalembert.arithmetic.varied import Precise, Varied
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, dimensions, value
-from virtualwork.formulas.newton import gaps, unknowns
+from virtualwork.formulas.group_loops import gaps, unknowns
 from virtualwork.formulas.numbers import Written
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.quantity import Quantity

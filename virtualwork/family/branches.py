@@ -17,7 +17,7 @@ from dalembert.arithmetic.engines import run, run_grid
 from virtualwork.branch.guess import BESIDE, informed
 from virtualwork.branch.sampling import TURNED
 from virtualwork.describe.description import Description
-from virtualwork.family.written import CHOICE, CLOSE, DIP, TOLD, Written
+from virtualwork.family.varied_formulas import CHOICE, CLOSE, DIP, TOLD, VariedFormulas
 from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.loops import Margin
 from virtualwork.formulas.numbers import Reals
@@ -36,13 +36,13 @@ LANES = 1 << 18
 
 
 def chosen(
-    written: Written, m: Description, numbers: Mapping[str, Reals], n: int, low: Reals, high: Reals
+    written: VariedFormulas, m: Description, numbers: Mapping[str, Reals], n: int, low: Reals, high: Reals
 ) -> tuple[dict[str, Reals], Mask]:
     """The sign of each closed form of each variant, (n,), and which variants go by them over their inputs, (n,).
 
     Parameters
     ----------
-    written : Written
+    written : VariedFormulas
         With the signs as inputs.
     m : Description
     numbers : mapping of path to array (n,)
@@ -78,13 +78,13 @@ def chosen(
 
 
 def signs(
-    written: Written, m: Description, numbers: Mapping[str, Any], n: int
+    written: VariedFormulas, m: Description, numbers: Mapping[str, Any], n: int
 ) -> tuple[dict[str, Reals], Mask]:
     """The sign of each closed form of each variant, (n,), and which variants tell theirs.
 
     Parameters
     ----------
-    written : Written
+    written : VariedFormulas
         With the signs as inputs.
     m : Description
     numbers : mapping of path to number or array (n,)
@@ -113,7 +113,7 @@ def signs(
     return chosen, decided
 
 
-def at_guess(written: Written, m: Description, numbers: Mapping[str, Any], n: int) -> dict[str, Reals]:
+def at_guess(written: VariedFormulas, m: Description, numbers: Mapping[str, Any], n: int) -> dict[str, Reals]:
     """The radicand of each closed form of each variant at the input of the guess, (n,), by the group's name."""
     with np.errstate(all="ignore"):
         result = run(written.choice, {**numbers, **_inputs(m)})
@@ -130,7 +130,7 @@ def _inputs(m: Description) -> dict[str, float]:
 
 
 def meet_on_the_way(
-    written: Written, m: Description, entering: Mapping[str, Any], n: int, low: Reals, high: Reals
+    written: VariedFormulas, m: Description, entering: Mapping[str, Any], n: int, low: Reals, high: Reals
 ) -> Mask:
     """Which variants may have a change point over their inputs from low to high, (n,) or (1,) each.
 
@@ -159,7 +159,7 @@ def meet_on_the_way(
 
 
 def stays_within(
-    written: Written,
+    written: VariedFormulas,
     m: Description,
     entering: Mapping[str, Any],
     key: Quantity,
@@ -175,7 +175,7 @@ def stays_within(
     return result
 
 
-def samples(written: Written, m: Description, span: float) -> int:
+def samples(written: VariedFormulas, m: Description, span: float) -> int:
     """How many samples of a way are looked at, of a turn at most; the more the faster a gear turns a body."""
     fast = max((abs(k) for t in turns(written.plan.steps) for _, k in t.angle.inputs), default=1.0)
     return (
@@ -184,7 +184,7 @@ def samples(written: Written, m: Description, span: float) -> int:
     )
 
 
-def _levers(written: Written) -> list[str]:
+def _levers(written: VariedFormulas) -> list[str]:
     """The bodies that a guide along them turns, however fast, where other loops follow from them."""
     plan, levers = written.plan, []
     for group in plan.groups:
@@ -195,7 +195,7 @@ def _levers(written: Written) -> list[str]:
 
 
 def _along(
-    written: Written, m: Description, entering: Mapping[str, Any], n: int, low: Reals, high: Reals
+    written: VariedFormulas, m: Description, entering: Mapping[str, Any], n: int, low: Reals, high: Reals
 ) -> Iterator[tuple[slice, dict[str, Any], Reals]]:
     """Some variants at a time, what is known of them, and inputs on their way, (samples, variants or 1)."""
     count = _count(written, m, low, high)
@@ -206,7 +206,7 @@ def _along(
         yield here, _of(entering, here), _way(m, first, last, count)
 
 
-def _count(written: Written, m: Description, low: Reals, high: Reals) -> int:
+def _count(written: VariedFormulas, m: Description, low: Reals, high: Reals) -> int:
     """How many samples of the longest way are looked at."""
     return samples(written, m, float(np.max(high - low, initial=0.0)))
 
@@ -228,7 +228,7 @@ def _across(entering: Mapping[str, Any]) -> dict[str, Any]:
     return {name: values[:, None] if np.ndim(values) else values for name, values in entering.items()}
 
 
-def _sampled(written: Written, key: Quantity, entering: Mapping[str, Any], q: Reals, n: int) -> Reals:
+def _sampled(written: VariedFormulas, key: Quantity, entering: Mapping[str, Any], q: Reals, n: int) -> Reals:
     """A quantity at inputs (samples, n or 1): (samples, n)."""
     tape = written.tape([key])
     shape = len(q), n

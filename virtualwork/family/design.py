@@ -23,7 +23,7 @@ from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, by_path, changed
 from virtualwork.family.branches import meet_on_the_way, samples, signs, with_signs
 from virtualwork.family.part import Part, Solver, assembled, parts
-from virtualwork.family.written import Written
+from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.formulas.forces import Effort
 from virtualwork.formulas.kinematics import Angle, Point, Slide
 from virtualwork.formulas.lanes import Lanes
@@ -66,7 +66,7 @@ class Design:
         self._first = Solver(Part(self.mechanism, self.dimensions, own, np.zeros((1, 1, 1)), self._at_rates))
         self._paths = [d.path for d in self.dimensions]
         self._alone = Alone(self.mechanism, self.dimensions, self.keys, self.rates)
-        if forces and not self._first.takes(self.keys):
+        if forces and (mechanism.friction or not self._first.takes(self.keys)):
             raise DescriptionError(
                 "the effort has no derivatives here: friction, redundant joints and tables over an angle or a speed of a link "
                 "are of each pose"
@@ -266,7 +266,7 @@ class Alone:
         self._last: tuple[bytes, Assembly | None] | None = None
 
     @cached_property
-    def written(self) -> Written | None:
+    def written(self) -> VariedFormulas | None:
         """The formulas; None where a gear's phase depends on links that have to be placed first, or every pose is singular.
 
         And where the mechanism's own dimensions cannot be put together.
@@ -278,7 +278,7 @@ class Alone:
         if own.folded:
             return None
         moves = tuple(bool(rate) for rate in self.rates)
-        result = Written(own, self.dimensions, moves, own_signs=True, settled=False)
+        result = VariedFormulas(own, self.dimensions, moves, own_signs=True, settled=False)
         return None if result.open_gears else result
 
     def values(self, x: Reals, q: Reals) -> Reals:
@@ -291,7 +291,7 @@ class Alone:
             return self._rows(self.written, x, poses)
         return table(poses.values(self.keys))
 
-    def _rows(self, written: Written | None, x: Reals, poses: Lanes) -> Reals:
+    def _rows(self, written: VariedFormulas | None, x: Reals, poses: Lanes) -> Reals:
         """What is asked for, from the tape."""
         of = [name for key in self.keys for name in key.names]
         if written is None:

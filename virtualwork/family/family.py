@@ -25,16 +25,17 @@ from numpy.typing import ArrayLike, NDArray
 from dalembert.arithmetic.engines import as_part
 from dalembert.arithmetic.guard import Lock, guarded, own_lock
 from dalembert.arithmetic.parts import in_parts
+from dalembert.hints import choices
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, by_path, changed, dimensions, named, value
 from virtualwork.describe.parts import Point, as_point
-from virtualwork.family.kept import answer, forget
 from virtualwork.family.part import ASSEMBLED, LANES, Part, room
+from virtualwork.family.solver_cache import answer, forget
 from virtualwork.formulas.forces import Effort, Reaction
 from virtualwork.formulas.numbers import Number, Reals, real_array, xy
-from virtualwork.formulas.poses import check_rate
+from virtualwork.formulas.poses import as_inputs, check_rate
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.parts_of_motion import LinkRates, PointRates, SlideRates
 from virtualwork.plan.steps import joints
@@ -154,15 +155,9 @@ class Family:
 
     def inputs(self, angle: ArrayLike | None) -> Reals:
         """(v or 1, n, k)."""
-        k = len(self.mechanism.inputs)
         if angle is None:
             return np.stack(self.own("value"), axis=-1)[:, None, :]
-        q = real_array("angle", angle)
-        if k == 1:
-            return q.reshape(1, -1, 1)
-        if q.shape != (k,) and (q.ndim != 2 or q.shape[1] != k):
-            raise ValueError(f"angle: expected shape (n, {k}) for {k} inputs, found {q.shape}")
-        return q.reshape(1, -1, k)
+        return as_inputs(angle, len(self.mechanism.inputs))[None]
 
     def rates(self, *requested: ArrayLike | None) -> list[list[Number]]:
         """Speed, acceleration, jerk of each input: a number, or an array that broadcasts to (v, n)."""
@@ -174,7 +169,7 @@ class Family:
                     [r if np.ndim(r) == 0 else float(r[0]) if (r == r[0]).all() else r[:, None] for r in own]
                 )
                 continue
-            r = np.asarray(rate, dtype=float)
+            r = real_array(name, rate)
             k = len(self.mechanism.inputs)
             if r.ndim == 0:
                 rates.append([float(r)] * k)
@@ -269,6 +264,10 @@ class FamilyMotion:
         """A quantity by its key, (v, n)."""
         return self.values([key])[0].copy()
 
+    def vector(self, key: Quantity) -> Reals:
+        """A vector by its key, (v, n, 2)."""
+        return xy(self.value(key))
+
     @cached_property
     def assembled(self) -> NDArray[np.bool_]:
         """(v, n) bool: which poses of which variants can be assembled."""
@@ -304,7 +303,7 @@ class FamilyMotion:
         """
         points = self.part.mechanism.points
         if name not in points:
-            raise DescriptionError(f"no point is named '{name}'")
+            raise DescriptionError(f"no point is named '{name}'{choices(name, points)}")
         return PointOfFamily(self, *points[name], name)
 
     def at(self, link: str, point: Point | str) -> PointOfFamily:
@@ -322,7 +321,7 @@ class FamilyMotion:
             Where there is no link of that name.
         """
         if name not in self.part.mechanism.links:
-            raise DescriptionError(f"no link is named '{name}'")
+            raise DescriptionError(f"no link is named '{name}'{choices(name, self.part.mechanism.links)}")
         return LinkOfFamily(self, name)
 
     def slide(self, name: str) -> SlideRates:
@@ -350,4 +349,4 @@ class FamilyMotion:
         """
         if not any(j.name == joint and on in j.bodies for j in joints(self.part.mechanism)):
             raise DescriptionError(f"link '{on}' has no joint at '{joint}'")
-        return xy(self.value(Reaction(joint, on)))
+        return self.vector(Reaction(joint, on))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from threading import Lock
 from typing import Any
 
@@ -21,7 +21,9 @@ from virtualwork.describe import MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, by_path, changed
 from virtualwork.family.branches import at_guess, chosen, stays_within, with_signs
-from virtualwork.family.written import Written
+from virtualwork.family.friction import friction_of
+from virtualwork.family.varied_formulas import VariedFormulas
+from virtualwork.formulas.forces import Force
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.loops import Closed, Twist
 from virtualwork.formulas.numbers import Number, Reals, leave_out
@@ -120,6 +122,7 @@ class Solver:
                 self.written, self.moves = like.written, like.moves
         self.reasons: dict[int, str] = {}
         self._poses: dict[int, Lanes | None] = {}
+        self._frictions: dict[Any, Reals] = {}
 
     @cached_property
     def assembly(self) -> Assembly | None:
@@ -139,7 +142,7 @@ class Solver:
         return tuple(name in varied or any(np.any(rate) for rate in order) for name, order in rates)
 
     @cached_property
-    def written(self) -> Written | None:
+    def written(self) -> VariedFormulas | None:
         """The formulas with the dimensions as inputs; None where the branch is more than signs."""
         m = self.part.mechanism
         own = self.assembly
@@ -152,8 +155,8 @@ class Solver:
         fixed = tuple(d for d in self.part.dimensions if d.where[0] != "inputs")
         key = "family", fixed, self.moves
         if key not in own.recordings:
-            own.recordings[key] = Written(own, fixed, self.moves, own_signs=True)
-        result: Written = own.recordings[key]
+            own.recordings[key] = VariedFormulas(own, fixed, self.moves, own_signs=True)
+        result: VariedFormulas = own.recordings[key]
         return None if result.open_gears else result
 
     @cached_property
@@ -229,15 +232,19 @@ class Solver:
         return result, alone
 
     def takes(self, keys: Sequence[Quantity]) -> bool:
-        """Whether the tape has such quantities: friction iterates, redundant statics and twists are of each variant."""
+        """Whether the tape has such quantities: redundant statics and twists are of each variant."""
         m, written = self.part.mechanism, self.written
         if written is None:
             return False
         if all(not key.is_force for key in keys):
             return True
-        if m.friction or any(table.axis != "input" for table in written.recording.tables):
+        if any(table.axis != "input" for table in written.recording.tables):
             # what a table gives is known beforehand where it is over the input
             return False
+        if m.friction:
+            # where nothing moves, that is said of each
+            of = written.recording.forces
+            return bool(of.case.contacts) and not of.redundant
         return written.recording.takes(keys)
 
     def _taken(self, keys: Sequence[Quantity]) -> Mask:
@@ -283,6 +290,7 @@ class Solver:
                 x[:] = 0.0
             elif x is not first[key]:
                 x[:] = first[key]
+        self._leave_out_locked(keys, to, rows)
         near = np.arange(0)
         if not sound.all():
             unsound = np.flatnonzero(~sound)
@@ -317,7 +325,28 @@ class Solver:
         for key, here in zip(keys, values, strict=True):
             if gaps[closed[key]].any():
                 leave_out(here, gaps[closed[key]])
+        self._leave_out_locked(keys, values, rows)
         return values, near
+
+    def _leave_out_locked(
+        self, keys: Sequence[Quantity], values: Sequence[Any], rows: NDArray[np.intp] | slice
+    ) -> None:
+        """Leave out the forces of poses that friction locks."""
+        rubbed = [x for key, x in zip(keys, values, strict=True) if isinstance(key, Force) and key.is_rubbed]
+        if rubbed and self.part.mechanism.friction:
+            locked = np.asarray(np.isnan(self._friction(rows)).any(axis=0))
+            for x in rubbed if locked.any() else ():
+                leave_out(x, locked)
+
+    def _friction(self, rows: NDArray[np.intp] | slice) -> Reals:
+        """The friction of each contact of some variants on the tape, (c, v, n); NaN where the joints lock."""
+        name = rows.indices(self.part.shape[0]) if isinstance(rows, slice) else rows.tobytes()
+        if name not in self._frictions:
+            assert self.written is not None
+            shape = len(self.part.values[rows]), self.part.shape[1]
+            enter = partial(self._entering, rows=rows)
+            self._frictions[name] = friction_of(self.written, enter, shape)
+        return self._frictions[name]
 
     def _entering(self, name: str, rows: NDArray[np.intp] | slice) -> Any:
         """An input of the tape for some variants: a number, or what broadcasts to (v, n)."""
@@ -327,6 +356,8 @@ class Solver:
             return float(sign[0]) if (sign == sign[0]).all() else sign[:, None]
         if name in self._given:
             return self._given[name][rows, None]
+        if kind == "friction":
+            return self._friction(rows)[int(group)]
         if kind == "near":
             # a torsion spring that counts no whole turns
             return 0.0
@@ -417,4 +448,4 @@ def seeds_of(own: Assembly, low: float, high: float) -> Seeds:
         except MechanismError:
             return {}
         ways = own.track.continuations
-        return {name: (np.array(way.q), np.array(way.x)) for name, way in ways.items()}
+        return {name: way.nodes[:2] for name, way in ways.items()}

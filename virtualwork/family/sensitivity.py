@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 
 from dalembert.arithmetic.engines import run
+from dalembert.arithmetic.engines.doubled import Answer, compared
+from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.guard import guarded
-from dalembert.arithmetic.rounding import CONSTANT, UNIT_ROUNDOFF, bounds_of_few
-from dalembert.arithmetic.tape import Tape
+from dalembert.arithmetic.tape import Operation, Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.dimensions import Dimension, named, value
-from virtualwork.family.written import Written
+from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import leave_out
 from virtualwork.formulas.quantity import Quantity
@@ -28,8 +29,8 @@ from virtualwork.formulas.recording import NAMES
 # so many poses are looked at for whether a quantity varies
 LOOKED_AT = 8
 GOLDEN = (5**0.5 - 1) / 2
-# relative: what is read from decimals, turned to radians, or found by iteration
-OFF = 8 * UNIT_ROUNDOFF
+# relative: what is read from decimals, turned to radians, or found by iteration; and by how much it is moved to see what that does
+OFF, NUDGE = 4 * EPS, 2.0**-30
 # what an input's own numbers are called on the tape
 ENTERS = dict(zip(("value", "speed", "acceleration", "jerk"), NAMES, strict=True))
 
@@ -40,7 +41,7 @@ class Sensitivities:
 
     def __init__(self, assembly: Assembly, poses: Lanes) -> None:
         self.assembly, self.poses, self.lock = assembly, poses, assembly.lock
-        self._written: dict[tuple[Dimension, ...], Written] = {}
+        self._written: dict[tuple[Dimension, ...], VariedFormulas] = {}
 
     def dimension(self, path: str) -> Dimension:
         """The one number that a path names.
@@ -100,8 +101,8 @@ class Sensitivities:
         """Which quantities vary at all with these dimensions: of each its parts, x and y of what is complex.
 
         What is constant, as a coordinate across its slide is, has derivatives of nothing but rounding. So a quantity
-        varies if along one direction of all dimensions its derivative is anywhere larger than the bound of its own
-        rounding error.
+        varies if along one direction of all dimensions its derivative is anywhere larger than its own rounding error, by
+        a second run in 32 digits, and than what the rounding of the numbers that enter makes of it.
         """
         there = np.flatnonzero(self.poses.assembled)
         if not len(there):
@@ -116,19 +117,21 @@ class Sensitivities:
             name: np.asarray(value, dtype=float)[rows] if np.ndim(value) else np.full(len(rows), value)
             for name, value in self._given(tape, every).items()
         }
-        off = {f"off {name}": OFF * np.abs(value) for name, value in entering.items()}
-        parts = [name for key in keys for name in key.names]
-        errors = {name: f"off {name}" for name in entering}
-        bounds = bounds_of_few(tape, entering | off, errors, parts, CONSTANT)
-        with np.errstate(invalid="ignore"):
-            varies = {name: bool(np.any(np.abs(bounds[name]) > bounds[f"error({name})"])) for name in parts}
-        return [tuple(varies[name] for name in key.names) for key in keys]
+        with np.errstate(all="ignore"):
+            slopes = {name: np.broadcast_to(x, len(rows)) for name, x in dict(run(tape, entering)).items()}
+            own, _ = compared(tape, entering, {Answer((name,)): [x] for name, x in slopes.items()})
+            moved = _moved(tape, entering, slopes)
+            varies = {
+                name: bool(np.any(np.abs(x) > error + moved[name]))
+                for (name, x), error in zip(slopes.items(), own, strict=True)
+            }
+        return [tuple(varies.get(name, False) for name in key.names) for key in keys]
 
     def values(self, keys: Sequence[Quantity]) -> list[Any]:
         """The quantities themselves, (n,)."""
         return self.poses.values(list(keys))
 
-    def _formulas(self, dimensions: tuple[Dimension, ...]) -> Written:
+    def _formulas(self, dimensions: tuple[Dimension, ...]) -> VariedFormulas:
         if dimensions not in self._written:
             own = {d.where[-1] for d in dimensions if d.where[0] == "inputs"}
             moves = tuple(
@@ -137,11 +140,13 @@ class Sensitivities:
             )
             inner = [d for d in dimensions if d.where[0] != "inputs"]
             # which signs change on the way is known once the way was looked over
-            _ = self.poses.states()
-            self._written[dimensions] = Written(self.assembly, inner, moves, own_signs=False, settled=False)
+            self.poses.cover()
+            self._written[dimensions] = VariedFormulas(
+                self.assembly, inner, moves, own_signs=False, settled=False
+            )
         return self._written[dimensions]
 
-    def _refuse(self, keys: Sequence[Quantity], written: Written) -> None:
+    def _refuse(self, keys: Sequence[Quantity], written: VariedFormulas) -> None:
         m = self.assembly.mechanism
         if not written.placed:
             raise MechanismError(
@@ -154,3 +159,28 @@ class Sensitivities:
                 raise MechanismError("sensitivity: forces with friction are not differentiated")
             if any(key.is_joint_force for key in keys) and written.recording.forces.redundant:
                 raise MechanismError("sensitivity: redundant joint forces are not differentiated")
+
+
+def _moved(tape: Tape, entering: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """By how much the outputs of a tape, (n,), move with the rounding of every number that enters, and of its constants."""
+    inputs = dict(entering)
+    operations: list[Operation] = []
+    for kind, *arguments in tape.operations:
+        if kind == "const" and not (arguments[0] * 1024).is_integer():
+            kind, arguments = "input", [f"constant {len(operations)}"]
+            inputs[arguments[0]] = float(tape.operations[len(operations)][1])
+        operations.append((kind, *arguments))
+    n = len(next(iter(values.values())))
+    # a block of lanes for each number, in which that one is moved
+    lanes = {}
+    for i, (name, x) in enumerate(inputs.items()):
+        lanes[name] = np.tile(np.broadcast_to(x, n), (len(inputs), 1))
+        lanes[name][i] *= 1 + NUDGE
+        lanes[name] = lanes[name].ravel()
+    found = run(Tape(tuple(operations), tape.outputs), lanes)
+    return {
+        name: OFF
+        / NUDGE
+        * np.abs(np.reshape(np.broadcast_to(found[name], n * len(inputs)), (-1, n)) - x).sum(axis=0)
+        for name, x in values.items()
+    }

@@ -155,6 +155,9 @@ class Table(Protocol):
     def over(self, q: Number) -> Number:
         """What the table gives there."""
 
+    def slope(self, q: Number) -> Number:
+        """How steep the table is there."""
+
     def alike(self, other: Any) -> bool:
         """Whether another load gives the same force everywhere."""
 
@@ -192,6 +195,10 @@ class Block:
     def table(self, load: Table) -> Number:
         """What a table gives."""
         return load.over(load.place_in(self))
+
+    def slope(self, load: Table) -> Number:
+        """How steep a table is."""
+        return load.slope(load.place_in(self))
 
     @property
     def time(self) -> Number:

@@ -17,7 +17,7 @@ import numpy as np
 from dalembert.arithmetic.recorded import RECORDED
 from dalembert.arithmetic.varied import rotation
 from dalembert.dataclass import dataclass
-from virtualwork.formulas.numbers import ONE, Folded, Kind, Number, cross
+from virtualwork.formulas.numbers import ONE, Kind, Number, cross
 from virtualwork.formulas.positions import State, tied
 from virtualwork.plan.steps import Angle, Group, Term
 
@@ -91,6 +91,11 @@ def missing(kind: str, w: Number, v: Number, u: Number) -> Number:
     return -1.0
 
 
+def _root(radicand: Number, sign: Number, kind: Kind) -> Number:
+    """The root of a radicand with its sign; zero, without its noise, where two assemblies meet in every pose (no sign)."""
+    return 0.0 * radicand if sign is None else sign * kind.sqrt(radicand)
+
+
 def two_angles(
     w: Number, v1: Number, v2: Number, sign: Number, kind: Kind = ONE
 ) -> tuple[Number, Number, Number]:
@@ -102,7 +107,7 @@ def two_angles(
     Parameters
     ----------
     w, v1, v2 : complex
-    sign : ±1
+    sign : ±1, or None
         +1: V2·e^{iφ2} is counter-clockwise from V1·e^{iφ1} (their vector product is positive).
 
     Returns
@@ -124,7 +129,7 @@ def two_angles(
     radicand = (outer * outer - d2) * (d2 - inner * inner)
     half = 0.5 / d2
     # the apex lies at a − ih from the start: seen from V1, the turn to V2 has the sign asked for
-    t = kind.join((d2 + outer * inner) * half, kind.sqrt(radicand) * (half * -sign))
+    t = kind.join((d2 + outer * inner) * half, _root(radicand, sign, kind) * -half)
     arm = t * w
     return arm * (-1 / v1), (arm - w) * (1 / v2), radicand * (0.25 / (r1 * r2) / (r1 * r2))
 
@@ -151,7 +156,7 @@ def angle_and_slide(
     seen = w * u.conjugate()
     r, y = abs(v), -seen.imag
     radicand = (r - y) * (r + y)
-    x = sign * kind.sqrt(radicand)
+    x = _root(radicand, sign, kind)
     return kind.join(x, y) * u / v, -seen.real - x, radicand / (r * r)
 
 
@@ -176,7 +181,7 @@ def turning_slide(
     seen = v * u.conjugate()
     p, q = seen.real, seen.imag
     radicand = (w.conjugate() * w).real - q * q
-    x = sign * kind.sqrt(radicand)
+    x = _root(radicand, sign, kind)
     return -w / (kind.join(x, q) * u), x - p, radicand / (length * length)
 
 
@@ -287,10 +292,9 @@ class Case:
         w, (v, u) = self.offset(st), self.vectors(st)
         return gap_of(self.group.kind, self.group.angles, complex(w), complex(v), complex(u))
 
-    def solve(self, st: State, sign: Number, size: float, folded: bool = False) -> None:
-        """Write the group's rotations and slides into the state; `folded`: its two assemblies meet in every pose."""
-        group = self.group
-        kind: Kind = Folded(st.kind) if folded else st.kind
+    def solve(self, st: State, sign: Number, size: float) -> None:
+        """Write the group's rotations and slides into the state; without a sign its two assemblies meet in every pose."""
+        group, kind = self.group, st.kind
         w = self.offset(st)
         if st.many and isinstance(w, complex):
             # between points that stand: as in any array, what is divided by zero is infinite
@@ -310,7 +314,7 @@ class Case:
             else:
                 st.slide[group.slides[i]] = value
         st.margin[group.name] = margin
-        if folded:
+        if sign is None:
             st.folded.add(group.name)
         for tie in group.ties:
             tied(tie, st)

@@ -1,4 +1,4 @@
-"""Contact forces of cams as quantities: what balances all that bears on a follower's coordinate, along the normal."""
+"""Contact forces of cams as force terms: what balances all that bears on a follower's coordinate, along the normal."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from collections.abc import Iterable
 
 from dalembert.dataclass import dataclass
 from virtualwork.formulas.block import Block
+from virtualwork.formulas.force_terms import Combination, ForceTerm
 from virtualwork.formulas.numbers import Number, cross
-from virtualwork.formulas.quantities import Combination, Quantity
 from virtualwork.formulas.touches import Touch
 from virtualwork.plan.steps import Path
 
 
 @dataclass(frozen=True, eq=False)
-class Lifted(Quantity):
+class Lifted(ForceTerm):
     """What bears on the coordinate of a follower, as it bears on its cam's angle: times y′."""
 
     touch: Touch
@@ -23,12 +23,12 @@ class Lifted(Quantity):
         value = self.of.value(block)
         return 1.0, None if value is None else self.touch.rate(block.st, 1) * value
 
-    def reads(self) -> Iterable[Quantity | None]:
+    def reads(self) -> Iterable[ForceTerm | None]:
         return self.of
 
 
 @dataclass(frozen=True, eq=False)
-class ContactForce(Quantity):
+class ContactForce(ForceTerm):
     """The contact force on the follower: what balances all that bears on its coordinate, along the normal."""
 
     touch: Touch
@@ -39,16 +39,16 @@ class ContactForce(Quantity):
         value = self.of.value(block)
         return 1.0, None if value is None else value * self.touch.at(block.st).unit()
 
-    def reads(self) -> Iterable[Quantity | None]:
+    def reads(self) -> Iterable[ForceTerm | None]:
         return self.of
 
 
 @dataclass(frozen=True, eq=False)
-class ContactMoment(Quantity):
+class ContactMoment(ForceTerm):
     """The moment of the contact force on the follower about a point that moves with `path`."""
 
     touch: Touch
-    force: Quantity
+    force: ForceTerm
     path: Path
 
     def form(self, block: Block) -> tuple[float, Number]:
@@ -59,5 +59,5 @@ class ContactMoment(Quantity):
             self.touch.axis(block.st) - block.st.at(self.path) + self.touch.at(block.st).place(), force
         )
 
-    def reads(self) -> Iterable[Quantity | None]:
+    def reads(self) -> Iterable[ForceTerm | None]:
         return (self.force,)

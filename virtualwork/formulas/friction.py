@@ -8,14 +8,20 @@ P + Qφ the two may cancel.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.arithmetic.recorded import bare
+from dalembert.arithmetic.tape import Tape
+from virtualwork.formulas.forces import Bearing, SlippingRate
 from virtualwork.formulas.locking import balanced
-from virtualwork.formulas.numbers import Complexes, Reals, solve
+from virtualwork.formulas.numbers import Complexes, Number, Reals, solve
 from virtualwork.formulas.positions import BLOCK
+from virtualwork.formulas.quantity import Quantity
+from virtualwork.formulas.recording import Recording
 
 # exchanges at most; each gains a factor of some μ r / l
 LIMIT = 200
@@ -25,36 +31,86 @@ NEAR = 1e-8
 STEPS, CLOSE, FAR = 4, 8e-14, 1e-9
 
 
-def settled(bears: Callable[[Reals], Complexes], arms: Reals) -> tuple[Reals, int]:
+def written(recording: Recording, more: Sequence[Quantity] = ()) -> Tape:
+    """The tape that the friction of all contacts is solved from, and more quantities.
+
+    `rate 0` and `arm 0` of the first contact, and the force that it bears: `bears 0 x` without friction, `bears 0 x 1` with a unit
+    of the second contact's alone. The forces are not there where statics is redundant: what enters depends on the friction.
+    """
+    recorder, contacts = recording.recorder, recording.forces.case.contacts
+    each = range(len(contacts))
+    outputs = recording.outputs(more)
+    for n, (joint, _, _, coefficient, radius) in enumerate(contacts):
+        outputs[f"rate {n}"] = recording.value(SlippingRate(n))
+        outputs[f"arm {n}"] = bare(coefficient) * (bare(radius) if joint.guide is None else 1.0)
+    if not recording.forces.redundant:
+        forces: dict[str, Number] = {}
+        for n in each:
+            value = recording.value(Bearing(n))
+            forces |= {f"bears {n} x": value.real, f"bears {n} y": value.imag}
+        numbers = dict(recorder.numbers(forces))
+        units = (None, *each)
+        enter = [{f"friction {n}": float(n == unit) for n in each} for unit in units]
+        for unit, values in zip(units, recorder.again(list(numbers.values()), enter), strict=True):
+            last = "" if unit is None else f" {unit}"
+            outputs |= {name + last: value for name, value in zip(numbers, values, strict=True)}
+    return recorder.tape(outputs)
+
+
+def read(
+    rows: Mapping[str, Any], c: int, n: int, bears: Callable[[Reals], Complexes]
+) -> tuple[Reals, Complexes, Complexes]:
+    """What `settled` begins with, from a run of the tape: of c contacts in n lanes."""
+    arms = np.empty((c, n))
+    for k in range(c):
+        arms[k] = rows[f"arm {k}"] * np.sign(rows[f"rate {k}"])
+
+    def forces(unit: int | None) -> Complexes:
+        if "bears 0 x" not in rows:
+            friction = np.zeros((c, n))
+            friction[() if unit is None else unit] = float(unit is not None)
+            return bears(friction)
+        last = "" if unit is None else f" {unit}"
+        result: Complexes = np.empty((c, n), complex)
+        for k in range(c):
+            result[k].real, result[k].imag = rows[f"bears {k} x{last}"], rows[f"bears {k} y{last}"]
+        return result
+
+    with np.errstate(all="ignore"):
+        free = forces(None)
+        per: Complexes = np.empty((c, c, n), complex)
+        for k in range(c):
+            per[k] = forces(k) - free
+    return arms, free, per
+
+
+def settled(
+    arms: Reals, free: Complexes, per: Complexes, bears: Callable[[Reals], Complexes]
+) -> tuple[Reals, int]:
     """The friction of each contact (c, n), NaN where the joints lock; and how often it was exchanged for the forces.
 
     Parameters
     ----------
-    bears : function of friction (c, n) to the forces (c, n) that the contacts bear, complex
-        Linear in each pose's own.
     arms : array (c, n)
         The largest friction over the force, with the sign of the rate; 0 where nothing slides.
+    free : array (c, n)
+        The forces P that the contacts bear without friction, complex.
+    per : array (c, c, n)
+        What a unit of each contact's friction adds to all.
+    bears : function of friction (c, n) to the forces (c, n)
+        Linear in each pose's own.
 
     Examples
     --------
-    A force 3 + φ that its own friction unloads, and one that locks:
+    A force 3 + φ that its own friction unloads, and one 3 − φ that it loads so much that it locks:
 
-    >>> friction, _ = settled(lambda phi: np.array([[3.0, 3.0]]) + np.array([[1.0, -1.0]]) * phi, np.array([[0.5, 1.5]]))
+    >>> p, q = np.full((1, 2), 3 + 0j), np.array([[[1 + 0j, -1]]])
+    >>> friction, _ = settled(np.array([[0.5, 1.5]]), p, q, lambda phi: p + q[0] * phi)
     >>> friction.tolist()
     [[-1.0, nan]]
     """
-    c, n = arms.shape
-    if not c:
-        return np.zeros((c, n)), 0
+    phi, n, count = np.zeros(arms.shape), arms.shape[1], 0
     with np.errstate(all="ignore"):
-        phi = np.zeros((c, n))
-        free = bears(phi)
-        per: Complexes = np.empty((c, c, n), complex)
-        for k in range(c):
-            unit = np.zeros((c, n))
-            unit[k] = 1.0
-            per[k] = bears(unit) - free
-        count = 0
         for i in range(0, n, BLOCK):
             rows = slice(i, i + BLOCK)
             phi[:, rows], exchanges = _exchanged(arms[:, rows], free[:, rows], per[:, :, rows])

@@ -17,6 +17,8 @@ from virtualwork.formulas.recording import Recording
 # operations that a value must spare those who ask later: what it takes to write an array and to read it
 WORTH = 10
 COSTS = {"sin": 10, "cos": 10, "atan2": 10, "div": 3, "sqrt": 3}
+# operations that a value may cost beside what is requested, to be left for later requests
+FEW = 2
 # operations of a recording up to which it is looked through at every new request
 LONGEST = 8000
 
@@ -39,14 +41,24 @@ class Later:
 
 def later(recording: Recording, keys: Sequence[Quantity], formed: Container[int]) -> Later:
     """The tape of quantities from the values of operations that are known, and what it leaves besides."""
+    recorder = recording.recorder
     with recording.lock:
-        outputs = recording.recorder.numbers(recording.outputs(keys))
-        operations = recording.recorder.operations
-    below = reached(operations, (number for _, number in outputs), formed)
+        outputs = recorder.numbers(recording.outputs(keys))
+        operations = recorder.operations
+        below = reached(operations, (number for _, number in outputs), formed)
+        # what is known with the other sign is not worked out anew
+        turned = {number: recorder.opposite(number) for number in below if number not in formed}
+    signs = {a: b for a, b in turned.items() if b is not None and b in formed and b < a}
+    if signs:
+        operations = [("neg", signs[k]) if k in signs else of for k, of in enumerate(operations)]
+        below = reached(operations, (number for _, number in outputs), formed)
     takes = {number: f"kept {k}" for k, number in enumerate(number for number in below if number in formed)}
     worth = _worth_keeping(recording, operations) if len(operations) <= LONGEST else set()
+    others = (number for number in worth.difference(below) if number not in formed)
+    near = {number for number in others if _is_near(operations, number, set(below))}
     leaves = {
-        f"left {k}": number for k, number in enumerate(sorted(worth.intersection(below) - takes.keys()))
+        f"left {k}": number
+        for k, number in enumerate(sorted((near | worth.intersection(below)) - takes.keys()))
     }
     tape = shortened(operations, [*outputs, *leaves.items()], takes)
     return Later(tape, {name: number for number, name in takes.items()}, leaves)
@@ -66,6 +78,12 @@ def _worth_keeping(recording: Recording, operations: Sequence[Operation]) -> set
             cost = 0
         costs.append(min(cost, WORTH))
     return result
+
+
+def _is_near(operations: Sequence[Operation], number: int, known: set[int]) -> bool:
+    """Whether a value costs few operations where others are known: the other link of a group that has been solved."""
+    needed = reached(operations, [number], known)
+    return sum(k not in known and operations[k][0] not in ("const", "input") for k in needed) <= FEW
 
 
 def _numbers(value: Number) -> Iterator[int]:

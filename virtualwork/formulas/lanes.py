@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from dalembert.arithmetic.choice import wanted
 from dalembert.arithmetic.engines import as_part, run
@@ -19,7 +18,7 @@ from virtualwork.formulas.forces import Effort, Force, Generalized
 from virtualwork.formulas.numbers import leave_out
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.solving import Solving
-from virtualwork.formulas.tapes import Turning, cut, ready, taped
+from virtualwork.formulas.tapes import cut, ready, taped
 from virtualwork.plan.steps import Step
 
 if TYPE_CHECKING:
@@ -38,16 +37,8 @@ class Lanes(Solving):
     Parameters are those of `Poses`.
     """
 
-    def __init__(
-        self,
-        branch: Turning,
-        angle: ArrayLike | None = None,
-        speed: ArrayLike | None = None,
-        acceleration: ArrayLike | None = None,
-        jerk: ArrayLike | None = None,
-        block_of: int | None = None,
-    ) -> None:
-        super().__init__(branch, angle, speed, acceleration, jerk, block_of)
+    def _begin(self) -> None:
+        super()._begin()
         self.known: dict[Quantity, Any] = {}
         # which quantities of one pose come from the tape
         self._taped: dict[Quantity, bool] = {}

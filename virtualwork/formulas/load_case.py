@@ -12,6 +12,7 @@ from functools import cached_property
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND, Force, Spring, Torque, TorsionSpring
+from virtualwork.formulas.force_terms import Combination, ForceTerms
 from virtualwork.formulas.loads import (
     Constant,
     Follower,
@@ -19,11 +20,9 @@ from virtualwork.formulas.loads import (
     InertiaForce,
     InertiaTorque,
     Load,
-    SpringEnd,
     Tabled,
-    TorsionEnd,
 )
-from virtualwork.formulas.quantities import Combination, Quantities
+from virtualwork.formulas.springs import SpringEnd, TorsionEnd
 from virtualwork.plan.steps import Joint, Path, Place, Plan, Term, joints, path_reads
 from virtualwork.plan.sums import combined
 
@@ -36,7 +35,7 @@ class LoadCase:
 
     def __init__(self, mechanism: Description, plan: Plan, moves: bool) -> None:
         self.mechanism, self.plan, self.moves = mechanism, plan, moves
-        self.quantities = Quantities()
+        self.force_terms = ForceTerms()
         self._paths: dict[tuple[str, complex], Path] = {}
         self._places = {step.node: step for step in plan.steps if isinstance(step, Place)}
 
@@ -199,10 +198,10 @@ class LoadCase:
             )  # as many vectors as with the point, and the turning alone
             base = None
         if base is not None and base not in self._fixed:
-            result.add(Combination({self.quantities.second("node", base): 1.0}))
+            result.add(Combination({self.force_terms.second("node", base): 1.0}))
         for t in terms:
             if t.body != GROUND or t.slide is not None:
-                result.add(Combination({self.quantities.second("turn", t.body, t.slide): t.z}))
+                result.add(Combination({self.force_terms.second("turn", t.body, t.slide): t.z}))
         return result
 
     @cached_property

@@ -1,4 +1,4 @@
-"""What bears on what: from the loads on the links to the loops, the joints and the inputs, as combinations of quantities.
+"""What bears on what: from the loads on the links to the loops, the joints and the inputs, as combinations of force terms.
 
 The order of solution places every body by one joint of a tree and closes loops at the others. A force at
 P = P[base] + Σ z·s·e^{iθ} bears on the base as it is, on each angle with its lever, (z s e^{iθ}) × F, on each slide
@@ -30,9 +30,9 @@ from virtualwork.describe.meshes import Coordinate
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.contacts import ContactForce, ContactMoment, Lifted
+from virtualwork.formulas.force_terms import Carried, Combination, ForceTerm, Transmitted, in_order
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.numbers import Number, dot
-from virtualwork.formulas.quantities import Carried, Combination, Quantity, Transmitted, in_order
 from virtualwork.formulas.touches import Touch, Touches
 from virtualwork.plan.joint_forces import Order, Side
 from virtualwork.plan.steps import Group, Place, Term, Turn, key_of
@@ -40,9 +40,9 @@ from virtualwork.plan.steps import Group, Place, Term, Turn, key_of
 # lever (None: the point itself), sign, source of the force
 Hung = tuple[Term | None, float, tuple[str, Any]]
 
-# a combination on its way down a chain of links is formed where it has more quantities than this, and is one from there
+# a combination on its way down a chain of links is formed where it has more terms than this, and is one from there
 LONG = 4
-# groups; forming a quantity of one calls for that of the next, some ten calls deep for each
+# groups; forming a term of one calls for that of the next, some ten calls deep for each
 DEEP = 20
 
 
@@ -50,13 +50,13 @@ class LoadPaths:
     """The loads of a mechanism on its tree, its loops and its joints; made once for an assembly."""
 
     def __init__(self, case: LoadCase) -> None:
-        self.case, self.quantities = case, case.quantities
+        self.case, self.force_terms = case, case.force_terms
         self.mechanism, self.plan = case.mechanism, case.plan
         self.order = Order(self.mechanism, self.plan)
         self._deep = max(len(self.plan.groups), len(self.mechanism.links)) > DEEP
         self._known: dict[Any, Combination] = {}
         self._on_group: dict[str, list[Combination]] = {}
-        self._first: dict[Quantity, list[Quantity]] = {}
+        self._first: dict[ForceTerm, list[ForceTerm]] = {}
         self._sides: dict[Side, Combination] = {}
         self._hung: dict[str, list[Hung]] = {}
         self._tied: dict[str, list[tuple[Coordinate, float]]] = {}
@@ -119,7 +119,7 @@ class LoadPaths:
     def _source(self, source: tuple[str, Any], free: bool) -> Combination:
         kind, of = source
         if kind == "load":
-            return of.combination(self.quantities)  # type: ignore[no-any-return]
+            return of.combination(self.force_terms)  # type: ignore[no-any-return]
         if kind == "point":
             return self.node(of, free=free)
         return Combination() if free else Combination({self.multiplier(*of): 1.0})
@@ -132,7 +132,7 @@ class LoadPaths:
             for _, sign, source in self._hung.get(f"point:{node}", ()):
                 total.add(self._source(source, free), sign)
             self._known[key] = (
-                Combination({self.quantities(Transmitted, total): 1.0}) if len(total) > LONG else total
+                Combination({self.force_terms(Transmitted, total): 1.0}) if len(total) > LONG else total
             )
         return self._known[key]
 
@@ -152,8 +152,8 @@ class LoadPaths:
                 force.add(self._source(source, free), t.z.conjugate())
             total = Combination() if along else self.torque(key.removeprefix("angle:"), free=free)
             for (body, slide), force in levers.items():
-                total.add(self.quantities.lever(body, slide, force, along))
-            self._known[name] = self.quantities.total(total)
+                total.add(self.force_terms.lever(body, slide, force, along))
+            self._known[name] = self.force_terms.total(total)
         return self._known[name]
 
     def with_ties(self, key: str, without: Group | None) -> Combination:
@@ -164,18 +164,18 @@ class LoadPaths:
         for touch, sign in self.touches.turned_by(key):
             lifted = self.with_ties(touch.coordinate, without)
             if lifted:
-                total.add(Combination({self.quantities(Lifted, touch, lifted): sign}))
+                total.add(Combination({self.force_terms(Lifted, touch, lifted): sign}))
         return total
 
     def push(self, touch: Touch) -> Combination:
         """What a cam does along the coordinate of its follower: it balances all that bears on that."""
         return self.with_ties(touch.coordinate, None).times(-1.0)
 
-    def contact(self, touch: Touch) -> Quantity:
+    def contact(self, touch: Touch) -> ForceTerm:
         """The contact force of a cam on its follower."""
         key = "contact", touch.drive.number
         if key not in self._known:
-            of = self.quantities(ContactForce, touch, self.push(touch))
+            of = self.force_terms(ContactForce, touch, self.push(touch))
             self._known[key] = Combination({of: 1.0})
         return next(iter(self._known[key]))  # type: ignore[return-value]
 
@@ -201,7 +201,7 @@ class LoadPaths:
             total.add(Combination({self.contact(touch): sign}))
         for load in self.case.everything:
             if load.body == body and load.path is not None:
-                total.add(load.combination(self.quantities))
+                total.add(load.combination(self.force_terms))
         return total
 
     def torque(self, body: str, *, free: bool = False) -> Combination:
@@ -209,10 +209,10 @@ class LoadPaths:
         total = Combination()
         for load in self.case.everything:
             if load.body == body and load.path is None:
-                total.add(load.combination(self.quantities))
+                total.add(load.combination(self.force_terms))
         for carrying, j, sign in () if free else self.case.carried:
             if carrying == body:
-                total.add(Combination({self.quantities(Carried, j): sign}))
+                total.add(Combination({self.force_terms(Carried, j): sign}))
         return total
 
     def moment(
@@ -237,24 +237,24 @@ class LoadPaths:
         for load in self.case.everything:
             if load.body == body and load.path is not None:
                 direction = 0j if load.rail is None else self.plan.directions[load.rail]
-                at(load.place, load.rail, direction, load.combination(self.quantities))
+                at(load.place, load.rail, direction, load.combination(self.force_terms))
         for entry in sides:
             at(*entry)
         total = self.torque(body)
         for touch, sign in self.touches.on(body) if touched else ():
-            acts = self.quantities(ContactMoment, touch, self.contact(touch), self.case.path(body, about))
+            acts = self.force_terms(ContactMoment, touch, self.contact(touch), self.case.path(body, about))
             total.add(Combination({acts: sign}))
         for slide, force in levers.items():
-            total.add(self.quantities.lever(body, slide, force))
+            total.add(self.force_terms.lever(body, slide, force))
         return total
 
     # --- joints -------------------------------------------------------------------------------------------------
-    def multiplier(self, group: Group, loop: int) -> Quantity:
+    def multiplier(self, group: Group, loop: int) -> ForceTerm:
         """λ of a loop, as a row."""
         key = "loop", group.name, loop
         if key not in self._known:
-            solved = self.quantities(Solved, self, group)
-            self._known[key] = Combination({self.quantities(Multiplier, solved, loop): 1.0})
+            solved = self.force_terms(LoopForces, self, group)
+            self._known[key] = Combination({self.force_terms(Multiplier, solved, loop): 1.0})
         return next(iter(self._known[key]))  # type: ignore[return-value]
 
     def side(self, side: Side) -> Combination:
@@ -277,7 +277,7 @@ class LoadPaths:
         bodies = self.order.by_key[joint].bodies
         if kind == "joint" and len(bodies) == 2:
             return self.side((joint, bodies[0] if bodies[1] == body else bodies[1])).times(-1.0)
-        return Combination({self.quantities(SideForce, self, side): 1.0})
+        return Combination({self.force_terms(SideForce, self, side): 1.0})
 
     def balance(self, side: Side) -> Combination:
         """The force of a joint on a body from ΣF = 0 of the body or of the pin."""
@@ -328,8 +328,8 @@ class LoadPaths:
             for guide, mesh in self.order.along.items():
                 share = self.mechanism.meshes[mesh].torques.get(body, 0.0)
                 if share:
-                    total.add(Combination({self.quantities(ToothForce, self, guide): share}))
-            self._known[key] = self.quantities.total(total)
+                    total.add(Combination({self.force_terms(ToothForce, self, guide): share}))
+            self._known[key] = self.force_terms.total(total)
         return self._known[key]
 
     def tooth(self, mesh: int) -> Combination:
@@ -337,7 +337,7 @@ class LoadPaths:
         rack = self.mechanism.meshes[mesh]
         assert rack.guide is not None
         if self.order.along.get(rack.guide) == mesh:
-            return Combination({self.quantities(ToothForce, self, rack.guide): 1.0})
+            return Combination({self.force_terms(ToothForce, self, rack.guide): 1.0})
         return self.couple("rack", mesh)
 
     def couple(self, kind: str, i: int) -> Combination:
@@ -352,14 +352,14 @@ class LoadPaths:
 
 
 @dataclass(frozen=True, eq=False)
-class Solved(Quantity):
+class LoopForces(ForceTerm):
     """The forces λ at the loop joints of a group: its Jacobian, transposed, solved for what bears on its unknowns."""
 
     paths: LoadPaths
     group: Group
     lasts = True
 
-    def reads(self) -> Iterable[Quantity | None]:
+    def reads(self) -> Iterable[ForceTerm | None]:
         return [row for load in self.paths.on_group(self.group) for row in load]
 
     def form(self, block: Block) -> tuple[float, Number]:
@@ -388,21 +388,21 @@ class Solved(Quantity):
 
 
 @dataclass(frozen=True, eq=False)
-class Multiplier(Quantity):
+class Multiplier(ForceTerm):
     """The force λ at one loop joint of a group."""
 
-    solved: Quantity
+    solved: ForceTerm
     loop: int
 
     def form(self, block: Block) -> tuple[float, Number]:
         return 1.0, block.formed(self.solved)[1][self.loop]
 
-    def reads(self) -> Iterable[Quantity | None]:
+    def reads(self) -> Iterable[ForceTerm | None]:
         return (self.solved,)
 
 
 @dataclass(frozen=True, eq=False)
-class SideForce(Quantity):
+class SideForce(ForceTerm):
     """The force of a joint on a body from ΣF = 0."""
 
     paths: LoadPaths
@@ -414,12 +414,12 @@ class SideForce(Quantity):
         block.names.add(f"{joint} on {body}")
         return 1.0, self.paths.balance(self.side).value(block)
 
-    def reads(self) -> Iterable[Quantity | None]:
+    def reads(self) -> Iterable[ForceTerm | None]:
         return self.paths.balance(self.side)
 
 
 @dataclass(frozen=True, eq=False)
-class ToothForce(Quantity):
+class ToothForce(ForceTerm):
     """The tooth force of a rack, as the force along the guide of its slide."""
 
     paths: LoadPaths
@@ -437,6 +437,6 @@ class ToothForce(Quantity):
         rail = plan.directions[self.guide]
         return sign, dot(force, rail if g.on == GROUND else rail * block.st.turn[g.on])
 
-    def reads(self) -> Iterable[Quantity | None]:
+    def reads(self) -> Iterable[ForceTerm | None]:
         g = self.paths.mechanism.guides[self.guide]
         return self.paths.side((f"guide:{self.guide}", g.link if g.link != GROUND else g.on))

@@ -8,16 +8,14 @@ a pair one side carries the work of both.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from dalembert.dataclass import dataclass, field
 from virtualwork.describe import DescriptionError
-from virtualwork.describe.parts import GROUND, Spring, TorsionSpring
+from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
-from virtualwork.formulas.numbers import TOGETHER, Complexes, Number, Reals, dot, minus, plus, times
-from virtualwork.formulas.quantities import Combination, Given, Quantities, Turned
+from virtualwork.formulas.force_terms import Combination, ForceTerms, LoadTerm, Turned
+from virtualwork.formulas.numbers import Complexes, Number, Reals, dot, plus, times
 from virtualwork.formulas.rates import Rates
 from virtualwork.plan.steps import Path, path_reads
 
@@ -55,11 +53,11 @@ class Load:
         """Its value over a block: complex N, or N·m; None where it is zero."""
         raise NotImplementedError
 
-    def combination(self, quantities: Quantities) -> Combination:
-        """Its value as constants times quantities."""
+    def combination(self, force_terms: ForceTerms) -> Combination:
+        """Its value as constants times force terms."""
         if self.mate is not None:
-            return self.mate.combination(quantities).times(-1.0)
-        return Combination({quantities(Given, self): 1.0})
+            return self.mate.combination(force_terms).times(-1.0)
+        return Combination({force_terms(LoadTerm, self): 1.0})
 
     def reads(self) -> set[str]:
         """What it depends on: `angle:BODY`, `slide:GUIDE`, `point:NODE`."""
@@ -139,7 +137,7 @@ class Constant(Load):
     def form(self, block: Block) -> Number:
         return self.amount
 
-    def combination(self, quantities: Quantities) -> Combination:
+    def combination(self, force_terms: ForceTerms) -> Combination:
         return Combination({None: self.amount})
 
     def potential(self, block: Block) -> Number:
@@ -159,8 +157,8 @@ class Follower(Load):
     def form(self, block: Block) -> Number:
         return self.amount * block.st.turn[self.body]
 
-    def combination(self, quantities: Quantities) -> Combination:
-        return Combination({quantities(Turned, self.body, None): self.amount})
+    def combination(self, force_terms: ForceTerms) -> Combination:
+        return Combination({force_terms(Turned, self.body, None): self.amount})
 
     def turned(self, block: Block, rates: Rates) -> Number:
         turning = angle_rate(rates, self.body, 1)
@@ -240,156 +238,23 @@ class Tabled(Load):
         first = angle_rate(rates, self.body, 1)
         if self.path is not None or self.axis != "angle" or first is None:
             return total
-        return plus(total, self._steep(block).real * first * first)
+        return plus(total, block.slope(self).real * first * first)
 
-    def _steep(self, block: Block) -> Number:
-        """The slope of the table."""
-        at, force, q = self._in_cycle(self.place_in(block))
+    def slope(self, q: Number) -> Number:
+        """The slope of the table at places of it."""
+        at, force, q = self._in_cycle(q)
         place = np.clip(np.searchsorted(at, q, side="right") - 1, 0, len(at) - 2)
-        return complex(np.diff(force)[place] / np.diff(at)[place])
+        values = np.diff(force)[place] / np.diff(at)[place]
+        return values if values.ndim else complex(values)
 
     def turned(self, block: Block, rates: Rates) -> Number:
         """Its derivative over the input, in ground axes."""
-        steep = self._steep(block)
+        steep = block.slope(self)
         if not self.link_axes:
             return steep
         turning = block.by[0].angle[self.body][0]
         along = steep * block.st.turn[self.body]
         return along if turning is None else along + 1j * turning * block.formed(self)
-
-
-@dataclass(frozen=True, eq=False)
-class SpringSide(Load):
-    """One side of a spring and damper between two bodies; the one that carries the work moves by the whole displacement."""
-
-    spring: Spring | TorsionSpring = field(kw_only=True)
-
-    def stretch(self, block: Block) -> Number:
-        """How far the spring is from free."""
-        raise NotImplementedError
-
-    def pull(self, block: Block) -> Number:
-        """The spring's own part of its value."""
-        raise NotImplementedError
-
-    def damped(self, block: Block) -> Number:
-        """The damper's part."""
-        raise NotImplementedError
-
-    def form(self, block: Block) -> Number:
-        return plus(self.pull(block), self.damped(block))
-
-    def elastic(self, block: Block) -> Number:
-        return self.work(self.pull(block), self.displacement(block, 0)) if self.carries else None
-
-    def wasted(self, block: Block, j: int) -> Number:
-        return self.work(self.damped(block), self.displacement(block, j)) if self.carries else None
-
-    def potential(self, block: Block) -> Number:
-        if not self.carries:
-            return None
-        stretch = self.stretch(block)
-        return 0.5 * self.spring.stiffness * stretch * stretch
-
-
-@dataclass(frozen=True, eq=False)
-class SpringEnd(SpringSide):
-    """What a spring and damper pulls at one end: toward the other with k(l − l₀) + c·l̇."""
-
-    spring: Spring = field(kw_only=True)
-    other: Path = field(kw_only=True)
-
-    def reads(self) -> set[str]:
-        return super().reads() | path_reads(self.other)
-
-    def _between(self, of: Any) -> Number:
-        """The vector from this end to the other, or its rate."""
-        return minus(of(self.other), of(self.path))
-
-    def _inverse(self, block: Block, d: Number) -> Number:
-        """1/l; NaN where the spring has no length, and its pull no direction."""
-        length = block.kind.sqrt(d.real * d.real + d.imag * d.imag)
-        return block.kind.inverse(length, TOGETHER * block.setting.mechanism.size)
-
-    def stretch(self, block: Block) -> Number:
-        return abs(self._between(block.position)) - self.spring.free_length
-
-    def pull(self, block: Block) -> Number:
-        s = self.spring
-        if not s.stiffness:
-            return None
-        d = self._between(block.position)
-        if not s.free_length:
-            # the pull is k·d: no direction is needed, and none is asked for at zero length
-            return s.stiffness * d
-        return s.stiffness * (1 - s.free_length * self._inverse(block, d)) * d
-
-    def damped(self, block: Block) -> Number:
-        rate = self._between(block.velocity) if self.spring.damping else None
-        if rate is None:
-            return None
-        d = self._between(block.position)
-        inverse = self._inverse(block, d)
-        return (self.spring.damping * dot(d, rate) * (inverse * inverse)) * d
-
-    def displacement(self, block: Block, j: int) -> Number:
-        if not self.carries:
-            return None
-        moved = self._between(lambda path: block.coefficient(path, j))
-        return None if moved is None else -moved
-
-    def second(self, block: Block, rates: Rates) -> Number:
-        """−k[(1 − l₀/l)(d′·d′ + d·d″) + l₀(d·d′)²/l³]."""
-        s, d1 = self.spring, self._between(lambda path: rates.vector(path, 1))
-        if not self.carries or not s.stiffness or d1 is None:
-            return None
-        d, d2 = self._between(block.position), self._between(lambda path: rates.vector(path, 2))
-        share: Number = 1.0
-        bend: Number = 0.0
-        if s.free_length:
-            inverse = self._inverse(block, d)
-            share, bend = 1 - s.free_length * inverse, s.free_length * inverse**3 * dot(d, d1) ** 2
-        return -s.stiffness * (share * plus(dot(d1, d1), times_dot(d, d2)) + bend)
-
-
-@dataclass(frozen=True, eq=False)
-class TorsionEnd(SpringSide):
-    """What a torsion spring and damper turns one link with: k·φ + c·φ̇ against the twist φ from free; +1 the first link."""
-
-    spring: TorsionSpring = field(kw_only=True)
-    sign: float = 1.0
-
-    def reads(self) -> set[str]:
-        return {f"angle:{body}" for body in self.spring.links}
-
-    def _between(self, of: Any) -> Number:
-        """Of the second link less the first."""
-        a, b = self.spring.links
-        return minus(of(b), of(a))
-
-    def stretch(self, block: Block) -> Number:
-        return block.setting.twist(block.st, self.spring)
-
-    def pull(self, block: Block) -> Number:
-        stiffness = self.spring.stiffness
-        return times(stiffness * self.stretch(block), self.sign) if stiffness else None
-
-    def damped(self, block: Block) -> Number:
-        rate = self._between(block.omega) if self.spring.damping else None
-        return times(times(rate, self.spring.damping), self.sign)
-
-    def displacement(self, block: Block, j: int) -> Number:
-        if not self.carries:
-            return None
-        return times(self._between(lambda body: block.turning(body, j)), -self.sign)
-
-    def second(self, block: Block, rates: Rates) -> Number:
-        """−k(φ′² + φ·φ″)."""
-        s, first = self.spring, self._between(lambda body: angle_rate(rates, body, 1))
-        if not self.carries or not s.stiffness or first is None:
-            return None
-        bend = self._between(lambda body: angle_rate(rates, body, 2))
-        return -s.stiffness * plus(first * first, times(self.stretch(block), bend))
 
 
 @dataclass(frozen=True, eq=False)
@@ -404,7 +269,7 @@ class InertiaForce(Load):
         assert self.path is not None
         return block.acceleration(self.path, -self.mass)
 
-    def combination(self, quantities: Quantities) -> Combination:
+    def combination(self, force_terms: ForceTerms) -> Combination:
         return self.acceleration.times(-self.mass)
 
 
@@ -418,8 +283,8 @@ class InertiaTorque(Load):
     def form(self, block: Block) -> Number:
         return block.alpha(self.body, -self.inertia)
 
-    def combination(self, quantities: Quantities) -> Combination:
-        return Combination({quantities.second("angle", self.body): -self.inertia})
+    def combination(self, force_terms: ForceTerms) -> Combination:
+        return Combination({force_terms.second("angle", self.body): -self.inertia})
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dalembert.arithmetic.recorded import RECORDED, bare
 from dalembert.arithmetic.systems import regularity
-from virtualwork.formulas.newton import unknowns
+from virtualwork.formulas.group_loops import unknowns
 from virtualwork.formulas.numbers import PARTS, WRITTEN, Number, cross
 from virtualwork.formulas.positions import columns
 from virtualwork.formulas.quantity import Quantity, Recording

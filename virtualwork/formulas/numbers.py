@@ -77,14 +77,16 @@ def leave_out(values: NDArray[Any], which: NDArray[np.bool_]) -> None:
 
 
 def real_array(name: str, value: ArrayLike) -> Reals:
-    """Read real numbers as an array; ValueError names what holds something else.
+    """Read real numbers as an array of its own; ValueError names what holds something else.
+
+    A motion is solved when it is first asked for: what the caller does to his array in between does not change it.
 
     >>> real_array("angle", "abc")
     Traceback (most recent call last):
     ValueError: angle: expected real numbers, found 'abc'
     """
     try:
-        return np.asarray(value, dtype=float)
+        return np.array(value, dtype=float)
     except (TypeError, ValueError):
         text = repr(value)
         text = text if len(text) <= 60 else f"{text[:60]} …"
@@ -188,18 +190,17 @@ def equilibrated(jacobian: Reals) -> tuple[Reals, Reals]:
     return jacobian / lengths[:, None, :], lengths
 
 
-def singular_values(cols: list[list[Number]], n: int) -> Reals:
-    """The singular values of the Jacobian (`equilibrated`) at each pose; NaN where it is not assembled."""
-    jacobian = stack(cols, n)
+def singular_values(jacobian: Reals) -> Reals:
+    """The singular values of each pose's Jacobian (`equilibrated`); NaN where it is not assembled."""
     good = np.isfinite(jacobian).all(axis=(1, 2))
-    out = np.full((n, min(jacobian.shape[1:])), np.nan)
+    out = np.full((len(jacobian), min(jacobian.shape[1:])), np.nan)
     out[good] = np.linalg.svd(equilibrated(jacobian[good])[0], compute_uv=False)
     return out
 
 
 def singular_poses(cols: list[list[Number]], n: int) -> NDArray[np.bool_]:
     """Which poses have a Jacobian whose smallest singular value is below 1e-6 of its largest."""
-    s = singular_values(cols, n)
+    s = singular_values(stack(cols, n))
     return np.asarray(s[:, -1] < SINGULAR * s[:, 0])
 
 
@@ -358,18 +359,6 @@ class Many:
         if all(value == values[0] for value in values):
             return values[0]
         return np.array(values)[np.clip(np.searchsorted(knots, x, "right") - 1, 0, len(values) - 1)]
-
-
-class Folded:
-    """A kind for two assemblies that meet in every pose: the root is zero, and its noise is left out."""
-
-    def __init__(self, kind: Kind) -> None:
-        self.exp, self.join, self.angle = kind.exp, kind.join, kind.angle
-        self.select, self.among, self.solve = kind.select, kind.among, kind.solve
-
-    def sqrt(self, x: Number) -> Number:
-        """Zero."""
-        return 0.0 * x
 
 
 def real_part(z: Number) -> Number:

@@ -14,6 +14,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.engines import as_part
 from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.describe.description import Description
 from virtualwork.formulas.kinematics import Angle, Kinematic, Partial, Point
@@ -60,6 +61,10 @@ class Branch(Protocol):
         """What has been written down of it."""
 
     @property
+    def together(self) -> dict[Any, Any]:
+        """What one pose that is requested again and again brings with a first request (`one_pose`)."""
+
+    @property
     def known_steps(self) -> dict[tuple[str, ...], tuple[Step, ...]]:
         """The steps that targets depend on, as far as requested."""
 
@@ -73,6 +78,31 @@ class Branch(Protocol):
 
     def cover(self, low: float, high: float) -> None:
         """Look for change points and limits over the inputs from low to high."""
+
+    @property
+    def may_open(self) -> bool:
+        """Whether it cannot be assembled somewhere in what was covered, as far as is known."""
+
+
+def as_inputs(angle: ArrayLike, k: int) -> Reals:
+    """Inputs as an array (n, k), from a number or an array (n,) where k is 1, from (k,) or (n, k).
+
+    >>> as_inputs([0.0, 0.5], 1).shape, as_inputs([0.0, 0.5], 2).shape
+    ((2, 1), (1, 2))
+
+    Raises
+    ------
+    ValueError
+    """
+    q = real_array("angle", angle)
+    if k == 1 and q.ndim < 2:
+        return q.reshape(-1, 1)
+    if k > 1 and q.shape == (k,):
+        return q.reshape(1, k)
+    if q.ndim != 2 or q.shape[1] != k:
+        expected = "a number or shape (n,) for one input" if k == 1 else f"shape (n, {k}) for {k} inputs"
+        raise ValueError(f"angle: expected {expected}, found {q.shape}")
+    return q
 
 
 def check_rate(name: str, rate: Reals, n: int, k: int) -> None:
@@ -122,14 +152,7 @@ class Poses:
             given = [e.value for e in m.inputs]
             angle = [a if v is None else v for v, a in zip(given, m.at, strict=True)]
             angle = angle if k == 1 else [angle]
-        q = real_array("angle", angle)
-        if k == 1:
-            q = q.reshape(-1, 1)
-        elif q.ndim == 1 and q.shape == (k,):
-            q = q.reshape(1, k)
-        elif q.ndim != 2 or q.shape[1] != k:
-            raise ValueError(f"angle: expected shape (n, {k}) for {k} inputs, found {q.shape}")
-        self.inputs = q
+        self.inputs = q = as_inputs(angle, k)
         self.n = len(q)
         self.rates = [
             self._given(name, value, [getattr(e, name) for e in m.inputs])
@@ -139,10 +162,16 @@ class Poses:
         self.input_rest: ArrayLike | Callable[[], Reals] | None = None
         # (n,) s, where the poses are those of a motion in time
         self.time: Reals | None = None
+        # whether nothing moves: the rates are those of virtual displacements
+        self.at_rest = False
         self._solved: list[tuple[Step, int]] = []
         self._done: set[tuple[int, int, int]] = set()
         self._blocks: list[State] | None = None
         self._along: dict[int, Rates] = {}
+        self._begin()
+
+    def _begin(self) -> None:
+        """Set the state that a class below adds; each calls the one above it."""
 
     def _given(self, name: str, value: ArrayLike | None, own: list[float | None]) -> list[Number]:
         """One rate of the inputs, a scalar or (n,) array for each input."""
@@ -174,20 +203,25 @@ class Poses:
 
         some = self.again(self.inputs[which], [[of(rate) for rate in rates] for rates in self.rates])
         some.time = None if self.time is None else np.asarray(self.time)[which]
+        some.at_rest = self.at_rest
         return some
 
     @cached_property
     def assembled(self) -> NDArray[np.bool_]:
         """(n,) bool: which poses can be assembled."""
+        finite: NDArray[np.bool_] = np.asarray(np.isfinite(self.inputs).all(axis=1))
+        # what opens is known once the inputs are looked over
+        self.cover()
+        if not self.branch.may_open:
+            return finite
         self.solve([key for g in self.plan.groups for key in self.plan.writes(g)])
-        whole = np.ones(self.n, dtype=bool)
         for rows, st in self.rows():
             for g in self.plan.groups:
                 for value in (*(st.turn[body] for body in g.angles), *(st.slide[s] for s in g.slides)):
                     # the sum of squares is finite where all of them are; else each is looked at
                     if not np.isfinite(np.vdot(value, value)):
-                        whole[rows] &= np.isfinite(value)
-        return np.asarray(whole & np.isfinite(self.inputs).all(axis=1))
+                        finite[rows] &= np.isfinite(value)
+        return finite
 
     @property
     def condition(self) -> Reals:
@@ -213,19 +247,23 @@ class Poses:
         """What has been worked out so far, (step, order); order 0 is position."""
         return self._solved
 
+    def cover(self) -> None:
+        """Look for change points and limits over the one input of all poses, of those that have one."""
+        if self.inputs.shape[1] == 1 and self.n:
+            self.branch.cover(
+                float(np.fmin.reduce(self.inputs[:, 0])), float(np.fmax.reduce(self.inputs[:, 0]))
+            )
+
     def states(self) -> list[State]:
         """The blocks of poses."""
         if self._blocks is None:
             k = self.inputs.shape[1]
-            if k == 1 and self.n:
-                q = self.inputs[:, 0]
-                self.branch.cover(float(q.min()), float(q.max()))
+            self.cover()
             if not self.many:
                 self._blocks = [State([float(v) for v in self.inputs[0]])]
             else:
                 self._blocks = [
-                    State([self.inputs[i : i + BLOCK, j] for j in range(k)], many=True)
-                    for i in range(0, self.n, BLOCK)
+                    State([self.inputs[i : i + BLOCK, j] for j in range(k)]) for i in range(0, self.n, BLOCK)
                 ]
         return self._blocks
 
@@ -261,6 +299,15 @@ class Poses:
         new = self._new(self._steps(targets), 0, -2)
         if not new:
             return
+        # a part of a sweep has the digits of the whole
+        if self.block_of:
+            as_part(self.block_of, self._place, new)
+        else:
+            self._place(new)
+        self._note(new, 0, -2)
+
+    def _place(self, new: list[Step]) -> None:
+        """Do the steps that are new."""
         states = self.states()
         with np.errstate(all="ignore"):
             for i, st in enumerate(states):
@@ -268,14 +315,9 @@ class Poses:
                     run(new, st, self._close, self._plain)
                 except (ZeroDivisionError, OverflowError):
                     # one pose on Python numbers at a singular place: the same again on arrays
-                    states[i] = State([np.array([q]) for q in st.inputs], many=True)
-                    run(
-                        [*(step for step, k in self._solved if not k), *new],
-                        states[i],
-                        self._close,
-                        self._plain,
-                    )
-        self._note(new, 0, -2)
+                    states[i] = State([np.array([q]) for q in st.inputs])
+                    done = (step for step, k in self._solved if not k)
+                    run([*done, *new], states[i], self._close, self._plain)
 
     def advance(self, targets: Iterable[str], order: int, which: int = -1) -> None:
         """Work out the derivatives of one pose: along the motion (−1), or over input `which` alone.
@@ -315,6 +357,8 @@ class Poses:
         if len(parts) == 1:
             value: Any = np.asarray(parts[0], dtype=kind)
             return value.copy() if value.shape == (self.n,) else np.full(self.n, value)
+        if not parts:
+            return np.empty(0, dtype=kind)
         sizes = (np.shape(st.inputs[0]) for st in self.states())
         return np.concatenate(
             [np.broadcast_to(np.asarray(p, dtype=kind), size) for p, size in zip(parts, sizes, strict=True)]

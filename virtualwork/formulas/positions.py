@@ -40,6 +40,8 @@ class State:
     Attributes
     ----------
     inputs : list of float or array (n,)
+    many : bool
+        Whether they are arrays.
     turn : dict of body to e^{iθ}
     angle : dict of body to θ (unwrapped), where a step needed the angle itself
     point : dict of node to x + iy
@@ -49,9 +51,10 @@ class State:
         The operations of its numbers.
     """
 
-    def __init__(self, inputs: list[Number], many: bool = False, kind: Kind | None = None) -> None:
-        self.inputs, self.many = inputs, many
-        self.kind: Kind = kind or (MANY if many else ONE)
+    def __init__(self, inputs: list[Number], kind: Kind | None = None) -> None:
+        self.inputs = inputs
+        self.many = any(isinstance(q, np.ndarray) for q in inputs)
+        self.kind: Kind = kind or (MANY if self.many else ONE)
         self.turn: dict[str, Number] = {GROUND: 1.0}
         self.angle: dict[str, Number] = {GROUND: 0.0}
         self.point: dict[str | None, Number] = {None: 0j}
@@ -64,16 +67,12 @@ class State:
         # e^{i·input}
         self.spins: dict[int, Number] = {}
 
-    def copy(self, many: bool | None = None) -> State:
+    def copy(self) -> State:
         """Another state of the same poses, to go on from here."""
-        many = self.many if many is None else many
-        inputs = [np.atleast_1d(np.asarray(q, dtype=float)) for q in self.inputs] if many else self.inputs
-        other = State(list(inputs), many, None if many != self.many else self.kind)
-        for name in ("turn", "angle", "point", "slide", "margin"):
+        other = State(list(self.inputs), self.kind)
+        for name in ("turn", "angle", "point", "slide", "margin", "lifts"):
             setattr(other, name, dict(getattr(self, name)))
         other.folded = set(self.folded)
-        if many == self.many:
-            other.lifts = dict(self.lifts)
         return other
 
     def spin(self, j: int) -> Number:

@@ -41,9 +41,16 @@ class RecordedBlock(Block):
 
     def table(self, load: Table) -> Number:
         """The force of a table, as it enters."""
+        return self._entering("table", load)
+
+    def slope(self, load: Table) -> Number:
+        """How steep it is, as it enters."""
+        return self._entering("slope", load)
+
+    def _entering(self, what: str, load: Table) -> Number:
         number = next(i for i, of in enumerate(self.recording.tables) if load.alike(of))
         enter = self.recording.recorder.input
-        return WRITTEN.join(enter(f"table {number} x"), enter(f"table {number} y"))
+        return WRITTEN.join(enter(f"{what} {number} x"), enter(f"{what} {number} y"))
 
 
 def forces_of(recording: Recording) -> PoseForces:

@@ -12,6 +12,7 @@ Inputs of a tape
 `near BODY`              the angle, with its whole turns, of a body of which the angle itself is needed
 `near spring 0`          the same of a torsion spring's twist
 `table 0 x`, `table 0 y` the force of the first load that is given by a table
+`slope 0 x`, `slope 0 y` its derivative to what the table is over
 `time`                   where a table is over it
 """
 
@@ -26,7 +27,7 @@ from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare, squa
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.description import Description
 from virtualwork.formulas.closed_forms import Case
-from virtualwork.formulas.newton import gaps, put_unknowns
+from virtualwork.formulas.group_loops import gaps, put_unknowns
 from virtualwork.formulas.numbers import WRITTEN, Written
 from virtualwork.formulas.positions import State, columns, run
 from virtualwork.formulas.quantity import Quantity

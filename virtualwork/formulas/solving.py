@@ -11,19 +11,20 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from dalembert.arithmetic.engines import Outputs, run
 from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.recorded import bare
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.entering import GroupColumn, RightSide
-from virtualwork.formulas.forces import Bearing, Effort, Entry, SlippingRate
+from virtualwork.formulas.forces import Bearing, Effort, Entry
+from virtualwork.formulas.group_loops import unknowns
 from virtualwork.formulas.kinematics import AnglePartial
 from virtualwork.formulas.loops import Closed, Margin, Regularity
-from virtualwork.formulas.newton import unknowns
 from virtualwork.formulas.numbers import (
     SINGULAR,
+    Complexes,
     Number,
     Reals,
     cross,
@@ -50,16 +51,8 @@ class Solving(Poses):
 
     branch: Turning
 
-    def __init__(
-        self,
-        branch: Turning,
-        angle: ArrayLike | None = None,
-        speed: ArrayLike | None = None,
-        acceleration: ArrayLike | None = None,
-        jerk: ArrayLike | None = None,
-        block_of: int | None = None,
-    ) -> None:
-        super().__init__(branch, angle, speed, acceleration, jerk, block_of)
+    def _begin(self) -> None:
+        super()._begin()
         # where doubts are right
         self._bad: dict[Quantity, NDArray[np.bool_] | None] = {}
         # whether the derivatives of groups enter; and those, with the unknowns
@@ -77,9 +70,8 @@ class Solving(Poses):
     @cached_property
     def enters(self) -> bool:
         """Whether the derivatives of groups enter: of poses close to a change point, and where a group is singular in every pose."""
-        inputs = self.inputs
-        if inputs.shape[1] == 1 and len(inputs) and not self.branch.settled:
-            self.branch.cover(float(np.nanmin(inputs)), float(np.nanmax(inputs)))
+        if not self.branch.settled:
+            self.cover()
         return self._enter or bool(self.branch.folded)
 
     def formed(
@@ -96,13 +88,15 @@ class Solving(Poses):
         derivatives up to an order. `name`: under which the tape of forms that are the same for all poses is kept.
         """
         recording, wanted = self.recording, tuple(targets)
+        doubts = self._singular([Effort(0)])
         with recording.lock:
             tape = recording.forms.get(name)
             if tape is None:
-                tape = self._written(forms, wanted, order)
+                tape = self._written(forms, wanted, order, doubts)
                 if name:
                     recording.forms[name] = tape
         rows = run(tape, self.entering(tape.inputs))
+        self._doubted(doubts, rows)
         result: list[Any] = [np.empty(self.n, kind) for _ in forms]
         for i, to in enumerate(result):
             to.real = rows.get(f"{i} x", 0.0)
@@ -118,10 +112,15 @@ class Solving(Poses):
         return result
 
     def _written(
-        self, forms: Sequence[Callable[[Block], Number]], targets: tuple[str, ...], order: int
+        self,
+        forms: Sequence[Callable[[Block], Number]],
+        targets: tuple[str, ...],
+        order: int,
+        doubts: Sequence[Quantity],
     ) -> Tape:
-        """The tape of what forms make of the pose."""
-        recording, outputs = self.recording, dict[str, Any]()
+        """The tape of what forms make of the pose, and of what tells where a group is singular."""
+        recording = self.recording
+        outputs = recording.outputs(doubts)
         recording.forces.solve_places()
         recording.solve(targets, order)
         for i, form in enumerate(forms):
@@ -134,8 +133,7 @@ class Solving(Poses):
         """The poses whose derivatives enter: which, and these alone; None where there are none."""
         if self.enters:
             return None
-        rows = self._careful
-        doubts = [key for key in dict.fromkeys(self._doubts(keys)) if not isinstance(key, Closed)]
+        rows, doubts = self._careful, self._singular(keys)
         new = [key for key in doubts if key not in self._bad]
         self._bad |= {
             key: self._where_bad(key, value) for key, value in zip(new, self._raw(new), strict=True)
@@ -149,6 +147,10 @@ class Solving(Poses):
             self._apart[name] = self.some(rows)
             self._apart[name]._enter = True
         return rows, self._apart[name]
+
+    def _singular(self, keys: Iterable[Quantity]) -> list[Quantity]:
+        """What tells where a group is singular that quantities depend on."""
+        return [key for key in dict.fromkeys(self._doubts(keys)) if not isinstance(key, Closed)]
 
     def _raw(self, keys: Sequence[Quantity], friction: Reals | None = None) -> list[Any]:
         """Quantities as the tape has them, with another friction; not kept."""
@@ -177,18 +179,27 @@ class Solving(Poses):
     @cached_property
     def _settled(self) -> tuple[Reals, int]:
         """The friction of each contact (c, n), NaN where the joints lock; and how often it was exchanged for the forces."""
-        from virtualwork.formulas.friction import settled
+        from virtualwork.formulas.friction import read, settled, written
 
-        contacts = self.recording.forces.case.contacts
-        rates = self._raw([SlippingRate(n) for n in range(len(contacts))])
-        arms = np.zeros((len(contacts), self.n))
-        for arm, rate, (joint, _, _, coefficient, radius) in zip(arms, rates, contacts, strict=True):
-            arm[:] = coefficient * (radius if joint.guide is None else 1.0) * np.sign(rate)
-        apart = self._apart_of([Effort(0)]) if contacts else None
+        recording = self.recording
+        c, doubts = len(recording.forces.case.contacts), self._singular([Effort(0)])
+        if not c:
+            return np.zeros((0, self.n)), 0
+        with recording.lock:
+            if "friction" not in recording.forms:
+                recording.forms["friction"] = written(recording, doubts)
+        tape, keys = recording.forms["friction"], [Bearing(k) for k in range(c)]
+
+        def bears(friction: Reals) -> Complexes:
+            return np.reshape(self._raw(keys, friction), (c, self.n))
+
+        rows = run(tape, self.entering(tape.inputs))
+        self._doubted(doubts, rows)
+        arms, free, per = read(rows, c, self.n, bears)
+        apart = self._apart_of([Effort(0)])
         if apart is not None:
             arms[:, apart[0]] = np.nan
-        keys = [Bearing(n) for n in range(len(contacts))]
-        friction, count = settled(lambda phi: np.reshape(self._raw(keys, phi), (len(keys), self.n)), arms)
+        friction, count = settled(arms, free, per, bears)
         if apart is not None:
             friction[:, apart[0]], more = apart[1]._settled
             count = max(count, more)
@@ -207,7 +218,8 @@ class Solving(Poses):
     @cached_property
     def locked(self) -> NDArray[np.bool_]:
         """(n,): poses in which friction locks the mechanism: no reaction balances its own friction."""
-        return np.isnan(self.friction).any(axis=0) & self.assembled
+        nowhere = np.isnan(self.friction).any(axis=0)
+        return np.asarray(nowhere & self.assembled if nowhere.any() else nowhere)
 
     @cached_property
     def statics(self) -> Statics:
@@ -243,6 +255,12 @@ class Solving(Poses):
     def _closed(self, key: Quantity) -> list[Quantity]:
         """What tells where the groups that a quantity depends on are not assembled."""
         return [Closed((group,)) for group in key.groups(self.recording)] if self.branch.may_open else []
+
+    def _doubted(self, doubts: Iterable[Quantity], rows: Outputs) -> None:
+        """Note where doubts are right, by a run that has them."""
+        for key in doubts:
+            if key not in self._bad:
+                self._bad[key] = self._where_bad(key, key.of_rows(rows, self.n))
 
     def _where_bad(self, key: Quantity, found: Any) -> NDArray[np.bool_] | None:
         """The poses that a doubt is right about; None where it is right about none."""
@@ -288,9 +306,9 @@ class Solving(Poses):
                 result[name] = statics.solved[0][:, int(of)]
             elif kind == "time":
                 result[name] = self.time
-            elif kind == "table":
+            elif kind in ("table", "slope"):
                 number, part = of.split()
-                force = self._table(int(number))
+                force = self._table(int(number), kind)
                 result[name] = force.real if part == "x" else force.imag
             elif of.startswith("spring "):
                 result[name] = self.twist(int(of.removeprefix("spring ")))
@@ -349,10 +367,11 @@ class Solving(Poses):
         self.solve(tuple(f"angle:{body}" for body in spring.links if body != "ground"))
         return self.over(lambda st: setting.twist(st, spring))  # type: ignore[no-any-return]
 
-    def _table(self, number: int) -> Any:
-        """What a table gives."""
+    def _table(self, number: int, kind: str) -> Any:
+        """What a table gives, or how steep it is."""
         table = self.recording.tables[number]
-        return table.over(self.place(table))
+        place = self.place(table)
+        return table.over(place) if kind == "table" else table.slope(place)
 
     def place(self, table: Tabled) -> Reals:
         """What a table is over."""
@@ -360,6 +379,8 @@ class Solving(Poses):
             return self.inputs[:, 0]
         if table.axis == "time":
             return np.asarray(table.timed(self.time))
+        if table.axis == "speed" and self.at_rest:
+            return np.zeros(self.n)
         if table.axis == "speed":
             return self.angle(table.body, 1)
         known = self.branch.plan.angles[table.body]

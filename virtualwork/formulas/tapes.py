@@ -44,10 +44,6 @@ class Turning(Branch, Protocol):
         """The closed forms that change their sign somewhere in what was covered."""
 
     @property
-    def may_open(self) -> bool:
-        """Whether it cannot be assembled somewhere in what was covered, as far as is known."""
-
-    @property
     def settled(self) -> bool:
         """Whether no change point lies anywhere, however far the input turns."""
 

@@ -26,11 +26,11 @@ from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
 from virtualwork.formulas.forces import Effort
+from virtualwork.formulas.group_loops import unknowns
 from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled
-from virtualwork.formulas.newton import unknowns
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.recording import Recording
 from virtualwork.intime.crossing import OTHER, Crossing, crossings, narrowed, nearest

@@ -102,7 +102,7 @@ def size(third: Numbers, fifth: Numbers, scale: Numbers) -> Number:
     return high / RECORDED.sqrt(RECORDED.select(whole - TINY, whole, TINY))
 
 
-class Written:
+class RecordedStep:
     """A step from a state of k inputs, being written down: with calls of the accelerations, which are given what is `passed`."""
 
     def __init__(self, k: int, passed: Sequence[str]) -> None:
@@ -190,7 +190,7 @@ class DormandPrince:
 @lru_cache(maxsize=64)
 def _function(k: int, passed: tuple[str, ...]) -> tuple[Callable[..., Any], Callable[[Any], Any]]:
     """A step on floats, and what of (t, h, q, q̇, rates) it is given."""
-    written = Written(k, passed)
+    written = RecordedStep(k, passed)
     done = written.step(written.enter("h"))
     parts = zip(("dq", "dv", "rate", "third", "fifth"), (*done[:2], *done[3:6]), strict=True)
     entering = {f"{name}{j}": x for name, values in parts for j, x in enumerate(values)}

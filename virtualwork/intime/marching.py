@@ -33,7 +33,7 @@ from virtualwork.intime.control import (
     stiffer,
     tried,
 )
-from virtualwork.intime.explicit import DormandPrince, Written, size
+from virtualwork.intime.explicit import DormandPrince, RecordedStep, size
 from virtualwork.intime.powers import names, state_names
 
 # an error that is surely enough, and is no zero
@@ -52,7 +52,7 @@ def body(k: int, passed: tuple[str, ...]) -> Tape:
     `tolerance`, and `scale0` and so on.
     """
     places, speeds, rates = names(k)
-    written = Written(k, passed)
+    written = RecordedStep(k, passed)
     t, q, v, a = written.t, written.q, written.v, written.rates
     h, grow, stiff, left, work = written.several(("h", "grow", "stiff", "left", "work"))
     end, span, tolerance = written.several(("end", "span", "tolerance"))
@@ -110,7 +110,7 @@ def loop(k: int, rates: Tape) -> Loop:
 def again(k: int, rates: Tape) -> Loop:
     """The loop of steps whose ends are given (`next`): no step is judged."""
     places, speeds, slopes = names(k)
-    written = Written(k, _passed(k, rates))
+    written = RecordedStep(k, _passed(k, rates))
     end = written.enter("next")
     done = written.step(end - written.t)
     work, left = written.several(("work", "left"))

@@ -189,7 +189,7 @@ class Run:
         True
         """
         from virtualwork.animation import JointForce, force_columns, moving_page, plain
-        from virtualwork.table import moving_columns
+        from virtualwork.motion_table import moving_columns
 
         m = self.assembly.mechanism
         inputs = {
@@ -377,7 +377,7 @@ def rising(times: ArrayLike) -> Reals:
     ------
     ValueError
     """
-    t = np.asarray(times, dtype=float).reshape(-1)
+    t = np.array(times, dtype=float).reshape(-1)
     if not len(t) or not np.isfinite(t).all() or (np.diff(t) <= 0).any():
         raise ValueError("times: expected rising finite times, s")
     return t

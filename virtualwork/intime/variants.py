@@ -22,7 +22,7 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
 from virtualwork.family.family import Family, FamilyMotion
 from virtualwork.family.part import Part, Solver
-from virtualwork.family.written import Written
+from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.control import first_steps
 from virtualwork.intime.coordinates import FOLDING
@@ -204,7 +204,7 @@ class _Lanes:
 
     family: Variants
     solver: Solver
-    written: Written
+    written: VariedFormulas
     rates: Tape
     energy: Tape
     given: dict[str, Reals]

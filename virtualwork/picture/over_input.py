@@ -14,7 +14,7 @@ from dalembert.drawing.sheet import plain, sheet
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.poses import Poses
-from virtualwork.picture.quantities import Quantity, quantities
+from virtualwork.picture.plot_quantities import PlotQuantity, plot_quantities
 from virtualwork.plan.steps import Joint
 
 if TYPE_CHECKING:
@@ -28,10 +28,10 @@ Row = tuple[Joint, str, str]
 
 def curves(poses: Poses, names: Sequence[str], figure: FigureBase | None = None) -> Panels:
     """Draw quantities of these names against the input, a panel for each unit; return their axes."""
-    return curves_of(poses, quantities(poses, names), figure)
+    return curves_of(poses, plot_quantities(poses, names), figure)
 
 
-def curves_of(poses: Poses, quantities: Sequence[Quantity], figure: FigureBase | None = None) -> Panels:
+def curves_of(poses: Poses, quantities: Sequence[PlotQuantity], figure: FigureBase | None = None) -> Panels:
     """Draw quantities against the input, a panel for each unit; return their axes."""
     units = list(dict.fromkeys(q.unit for q in quantities))
     figure = sheet(7.6, 1.0 + 2.3 * len(units), figure)

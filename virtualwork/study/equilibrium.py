@@ -11,26 +11,19 @@ V″ a μ = M a (Meriam & Kraige, Dynamics, §8/5; Lagrange).
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import combinations, product
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.branch.assembly import Assembly
-from virtualwork.describe.parts import GROUND
 from virtualwork.digits.forces import ForceErrors
-from virtualwork.formulas.block import Block
 from virtualwork.formulas.dynamics import Dynamics
-from virtualwork.formulas.lanes import Lanes
-from virtualwork.formulas.loads import Load, Tabled
-from virtualwork.formulas.numbers import EPS, Number, Reals, plus
-from virtualwork.formulas.scene import Scene
-from virtualwork.plan.steps import path_reads
+from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.study.loads_at_rest import Rest
 
 SAMPLES = 1440
 # halvings of the way from the last sample to a limit
@@ -135,104 +128,6 @@ class Equilibria:
         return f"Equilibria({', '.join(f'{e.inputs[0]:g} {words[e.stable]}' for e in self.found) or 'none'})"
 
 
-class Rest:
-    """Generalized forces, their derivative and the potential of a mechanism at rest at given inputs (n, k)."""
-
-    def __init__(self, assembly: Assembly, inputs: Reals) -> None:
-        self.assembly, self.inputs, self.k = assembly, inputs, inputs.shape[1]
-        self.poses = Lanes(assembly, inputs if self.k > 1 else inputs[:, 0], 0.0, 0.0)
-        self.scene = Scene(self.poses, at_rest=True)
-
-    def force(self) -> tuple[Reals, Reals]:
-        """Q and the sum of the sizes of its terms, each (n, k)."""
-
-        def forms(j: int) -> Iterator[Callable[[Block], Number]]:
-            for sized in (False, True):
-
-                def form(block: Block, sized: bool = sized) -> Number:
-                    total: Number = None
-                    for load in self.scene.loads:
-                        value = load.power(block, j)
-                        total = plus(total, value if value is None or not sized else abs(value))
-                    return total
-
-                yield form
-
-        each = self.scene.over([form for j in range(self.k) for form in forms(j)], float, name="rest, first")
-        return np.stack(each[0::2], axis=1), np.stack(each[1::2], axis=1)
-
-    def along(self, direction: Reals) -> Reals:
-        """∂Q/∂q along a direction in the inputs, times the direction: d²(work), (n,)."""
-        still: list[Number] = [0.0] * self.k
-        way = [direction.tolist(), still, still] if self.k > 1 else None
-        scene = Scene(self.poses.again(self.inputs, way), at_rest=True)
-        reads = sorted(set().union(*(load.reads() for load in scene.loads)) - {f"angle:{GROUND}"})
-
-        def bent(block: Block) -> Number:
-            rates, total = block.along or block.by[0], None
-            for load in scene.loads:
-                total = plus(total, load.second(block, rates))
-            return total
-
-        if scene.on_tape and not any(isinstance(load, Tabled) for load in scene.loads):
-            (total,) = scene.over([bent], float, reads, 2, name="rest, second")
-        else:
-            # the slope of a table is that of each pose's own row
-            total = np.array(
-                [self._along(scene.loads, self.inputs[i : i + 1], way) for i in range(len(self.inputs))]
-            )
-        return np.asarray(total * (direction[0] ** 2 if self.k == 1 else 1.0))
-
-    def _along(self, loads: Sequence[Load], inputs: Reals, way: list[list[Number]] | None) -> float:
-        """The derivative of one pose along a way in the inputs; NaN at a singular pose."""
-        scene = Scene(self.poses.again(inputs, way), at_rest=True)
-        rates = scene.along(sorted(set().union(*(load.reads() for load in loads)) - {f"angle:{GROUND}"}))
-        if rates is None:
-            return math.nan
-        return float(sum(load.second(scene.block, rates) or 0.0 for load in loads))
-
-    def hessian(self) -> Reals:
-        """V″, (n, k, k), by polarization of exact second derivatives along the inputs and their pairs."""
-        k = self.k
-        unit = np.eye(k)
-        out = np.zeros((len(self.inputs), k, k))
-        for i in range(k):
-            out[:, i, i] = -self.along(unit[i])
-        for i, j in combinations(range(k), 2):
-            both = -self.along(unit[i] + unit[j])
-            out[:, i, j] = out[:, j, i] = (both - out[:, i, i] - out[:, j, j]) / 2
-        return out
-
-    def mass(self) -> Reals:
-        """The generalized mass Σ m K_j·K_k + Σ I κ_j κ_k, (n, k, k)."""
-        k, rigid = self.k, self.assembly.mechanism.rigid
-        still: list[Number] = [0.0] * k
-        ways = [self.poses.again(self.inputs, [unit, still, still]) for unit in np.eye(k).tolist()]
-        out = np.zeros((len(self.inputs), k, k))
-        for body, of in rigid.items():
-            moved = [way.point(body, of.center, 1) for way in ways] if of.mass else None
-            turned = [way.angle(body, 1) for way in ways] if of.inertia else None
-            for i, j in product(range(k), repeat=2):
-                if moved is not None:
-                    out[:, i, j] += of.mass * (np.conj(moved[i]) * moved[j]).real
-                if turned is not None:
-                    out[:, i, j] += of.inertia * turned[i] * turned[j]
-        return out
-
-    def potential(self) -> Reals:
-        """V, (n,) J; NaN where a load has no potential."""
-        keys = {key for load in self.scene.loads if load.path is not None for key in path_reads(load.path)}
-
-        def stored(block: Block) -> Number:
-            total: Number = None
-            for load in self.scene.loads:
-                total = plus(total, load.potential(block))
-            return total
-
-        (result,) = self.scene.over([stored], float, sorted(keys), name="rest, potential")
-        return np.asarray(result)
-
-
 def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int = SAMPLES) -> Equilibria:
     """Return every position in which a mechanism rests under its loads without effort, each stable or not.
 
@@ -284,10 +179,11 @@ def _one(assembly: Assembly, span: Reals, samples: int) -> Equilibria:
     good = np.isfinite(force)
     if not good.any():
         return Equilibria(())
-    scale = float(size[good].max())
+    # beside a limit the loads' work grows without bound: that is no measure of it elsewhere
+    largest, scale = float(size[good].max()), _usual(size[good])
     # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart; but for dwells
     cams = bool(assembly.mechanism.cams)
-    if not (np.max if cams else np.median)(np.abs(force[good])) > 1e-12 * scale:
+    if not (np.max if cams else np.median)(np.abs(force[good])) > 1e-12 * (largest if cams else scale):
         return Equilibria((), everywhere=True, loaded=scale > 0)
     ends = _towards_limits(assembly, q, good)
     if len(ends):
@@ -307,12 +203,12 @@ def _one(assembly: Assembly, span: Reals, samples: int) -> Equilibria:
     roots = list(q[rests])
     here = np.flatnonzero(good[:-1] & good[1:] & (sign[:-1] * sign[1:] < 0))
     if len(here):
-        roots += list(_refine(assembly, q[here], q[here + 1], force[here]))
+        roots += list(_refine(assembly, q[here], q[here + 1], force[here], force[here + 1]))
     # a root that the force only touches: its derivative changes sign where it is small
     touch = np.flatnonzero(good[:-1] & good[1:] & (sign[:-1] * sign[1:] > 0) & (slope[:-1] * slope[1:] < 0))
-    touch = touch[np.minimum(np.abs(force[touch]), np.abs(force[touch + 1])) < 1e-4 * scale]
+    touch = touch[np.minimum(np.abs(force[touch]), np.abs(force[touch + 1])) < 1e-4 * largest]
     if len(touch):
-        flat = _refine(assembly, q[touch], q[touch + 1], slope[touch], order=1)
+        flat = _refine(assembly, q[touch], q[touch + 1], slope[touch], slope[touch + 1], order=1)
         value, around = (v[:, 0] for v in Rest(assembly, flat[:, None]).force())
         double = np.abs(value) <= 1e-13 * np.maximum(around, scale)
         roots += list(flat[double])
@@ -320,14 +216,24 @@ def _one(assembly: Assembly, span: Reals, samples: int) -> Equilibria:
         twice = ~double & (np.sign(value) == -sign[touch])
         if twice.any():
             low, middle, high = q[touch][twice], flat[twice], q[touch + 1][twice]
-            roots += list(_refine(assembly, low, middle, force[touch][twice]))
-            roots += list(_refine(assembly, middle, high, value[twice]))
+            roots += list(_refine(assembly, low, middle, force[touch][twice], value[twice]))
+            roots += list(_refine(assembly, middle, high, value[twice], force[touch + 1][twice]))
     roots = sorted(roots)
     if whole and len(roots) > 1 and roots[-1] - roots[0] > 2 * np.pi - 1e-9:
         roots.pop()
     unit = 1.0 if not assembly.mechanism.inputs[0].is_slide else assembly.track.length
     distinct = [root for i, root in enumerate(roots) if i == 0 or root - roots[i - 1] > 1e-8 * unit]
     return _judged(assembly, np.array(distinct)[:, None], scale)
+
+
+def _usual(size: Reals) -> float:
+    """The middle one of the sizes that are not zero; 0 where none is.
+
+    >>> _usual(np.array([0.0, 1.0, 2.0, 1e14]))
+    2.0
+    """
+    some = size[size > 0]
+    return float(np.median(some)) if len(some) else 0.0
 
 
 def _towards_limits(assembly: Assembly, q: Reals, good: NDArray[np.bool_]) -> Reals:
@@ -344,10 +250,12 @@ def _towards_limits(assembly: Assembly, q: Reals, good: NDArray[np.bool_]) -> Re
     return np.concatenate(result) if result else np.empty(0)
 
 
-def _refine(assembly: Assembly, low: Reals, high: Reals, at_low: Reals, order: int = 0) -> Reals:
-    """Roots of Q (order 0) or of ∂Q/∂q (order 1) in brackets, all at once: Newton's step where it stays inside."""
+def _refine(
+    assembly: Assembly, low: Reals, high: Reals, at_low: Reals, at_high: Reals, order: int = 0
+) -> Reals:
+    """Roots of Q (order 0) or of ∂Q/∂q (order 1) in brackets, all at once: from the chord Newton's step where it stays inside."""
     a, b, below = low.copy(), high.copy(), np.sign(at_low)
-    x = (a + b) / 2
+    x = low + (high - low) * (at_low / (at_low - at_high))
     for _ in range(80):
         rest = Rest(assembly, x[:, None])
         value = rest.force()[0][:, 0] if order == 0 else rest.along(np.ones(1))
@@ -405,10 +313,10 @@ def _many(assembly: Assembly, ranges: Reals) -> Equilibria:
     if not good.any():
         return Equilibria(())
     x = x[good]
-    scale = float(size[good].max())
+    largest, scale = float(size[good].max()), _usual(size[good])
     # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart; but for dwells
     cams = bool(assembly.mechanism.cams)
-    if not (np.max if cams else np.median)(np.abs(force[good])) > 1e-12 * scale:
+    if not (np.max if cams else np.median)(np.abs(force[good])) > 1e-12 * (largest if cams else scale):
         return Equilibria((), everywhere=True, loaded=scale > 0)
     # the most promising starts: where no neighbour is nearer to balance would do; a few hundred suffice
     x = x[np.argsort(np.abs(force[good]).max(axis=1))[:400]]

@@ -12,10 +12,21 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.solutions import guessed_unknowns
 from virtualwork.describe import AssemblyError
 from virtualwork.describe.description import known_by_guess
-from virtualwork.formulas.newton import Iterate, gaps, newton, write_unknowns
-from virtualwork.formulas.numbers import Reals, solve, stack, stack_rows
-from virtualwork.formulas.positions import State, columns
+from virtualwork.formulas.group_loops import LAST, ROUNDED, Loops
+from virtualwork.formulas.newton import CLOSED
+from virtualwork.formulas.numbers import Reals, solve
+from virtualwork.formulas.positions import State
 from virtualwork.plan.steps import Group
+
+
+@record
+@dataclass(frozen=True, eq=False, repr=False)
+class Iterate:
+    """One row of the Newton-Raphson table: the unknowns and the gap they leave."""
+
+    k: int
+    unknowns: Reals
+    residual: float
 
 
 @record
@@ -73,12 +84,10 @@ def worked(assembly: Assembly, inputs: tuple[float, ...], done: AllAtOnce) -> li
     ((2, 2), True)
     """
     group, st = _prepared(assembly, inputs)
-    result = []
+    at, result = assembly.loops(group).over(st), []
     for iterate in done.iterates:
-        x = iterate.unknowns[None]
         with np.errstate(all="ignore"):
-            write_unknowns(group, st, x)
-            f, jacobian = stack_rows(gaps(group, st), 1), stack(columns(group, st), 1)
+            f, jacobian = at(iterate.unknowns[None])
             step = solve(jacobian, -f)
         result.append(Worked(iterate.k, iterate.unknowns, f[0], jacobian[0], step[0]))
     return result
@@ -89,7 +98,7 @@ def _prepared(assembly: Assembly, inputs: tuple[float, ...]) -> tuple[Group, Sta
     merged, group = assembly.merged
     if group is None:
         raise AssemblyError("newton: the mechanism has no loop to close")
-    st = State([np.array([q]) for q in inputs], many=True)
+    st = State(list(inputs))
     for step in merged.steps:
         if step is group:
             break
@@ -112,20 +121,38 @@ def all_at_once(
     m = assembly.mechanism
     group, st = _prepared(assembly, inputs)
     first = _guessed(assembly, group, st) if start is None else start[None]
-    write_unknowns(group, st, first)
-    jacobian = stack(columns(group, st), 1)[0]
-    table: list[Iterate] = []
+    loops = assembly.loops(group)
+    _, (jacobian,) = loops.over(st)(first)
     with np.errstate(all="ignore"):
-        x, closed = newton(group, st, first, m.size, limit, table, damped=False)
+        table, closed = iterates(loops, st, first[0], m.size, limit)
+        x = table[-1].unknowns
         exact = assembly.state(inputs)
         # numpy's maximum keeps a NaN: where one link is not assembled there is nothing to compare with
         away = [
-            np.abs(np.angle(np.exp(1j * x[0, j]) / np.ravel(exact.turn[body])[0]))
+            np.abs(np.angle(np.exp(1j * x[j]) / np.ravel(exact.turn[body])[0]))
             for j, body in enumerate(group.angles)
         ]
         difference = float(np.max(away, initial=0.0))
     names = (*group.angles, *(m.guides[g].point for g in group.slides))
-    return AllAtOnce(names, len(group.angles), tuple(table), jacobian, bool(closed[0]), difference)
+    return AllAtOnce(names, len(group.angles), tuple(table), jacobian, closed, difference)
+
+
+def iterates(loops: Loops, st: State, start: Reals, size: float, limit: int) -> tuple[list[Iterate], bool]:
+    """The table of an undamped search in one pose, from its start (unknowns,) on; and whether it closes the loops."""
+    at, x, result = loops.over(st), start, list[Iterate]()
+    slides = np.arange(len(x)) >= len(loops.group.angles)
+    longest = np.inf
+    while True:
+        f, jacobian = at(x[None])
+        gap = float(np.linalg.norm(f))
+        far = float(np.abs(x[slides]).max(initial=size))
+        result.append(Iterate(len(result) + 1, x, gap))
+        if not np.isfinite(gap) or (gap <= ROUNDED * far and longest <= LAST) or len(result) > limit:
+            return result, gap <= CLOSED * far
+        (step,) = solve(jacobian, -f)
+        step = np.where(np.isfinite(step).all(), step, 0.0)
+        longest = float(np.abs(step / np.where(slides, far, 1.0)).max(initial=0.0))
+        x = x + step
 
 
 def _guessed(assembly: Assembly, group: Group, st: State) -> Reals:

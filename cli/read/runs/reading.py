@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cli.read import options
-from cli.read.runs.channels import OfInitialRun, near_speeds
 from cli.read.runs.layouts import Layout, alpha_of, is_log, log_table, runs_table
 from cli.read.runs.masses import MassColumns, Masses, on_top, turned, turned_exactly
 from cli.read.runs.rows import NoInitialRun, Sorted
-from cli.read.runs.runs import Complex, LogRows, Real, Rows, Runs
+from cli.read.runs.runs import Complex, LogRows, OfInitialRun, Real, Rows, Runs, near_speeds
 from cli.read.runs.stored import Sisters, Stored, read_stored, stored_alpha
 from dalembert.angles import phasor
 from dalembert.errors import DataError, quote

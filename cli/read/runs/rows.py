@@ -199,8 +199,14 @@ class Sorted:
             for k, word in enumerate(words):
                 if word.lower() not in (*YES, *NO):
                     raise self.rows.of.table.error(int(np.argmax(code == k)), "trial_kept", word, "yes or no")
-            kept = np.array([word.lower() in YES for word in words])
-            stays[self.run[kept[code[self.order]]]] = True
+            kept = np.array([word.lower() in YES for word in words])[code[self.order]]
+            stays[self.run[kept]] = True
+            stated = np.array([bool(word) for word in words])[code[self.order]]
+            for row in np.flatnonzero(stated & ~kept & stays[self.run])[:1].tolist():
+                i, name = int(self.order[row]), self.rows.runs[self.runs.code[self.run[row]]]
+                raise self.rows.of.table.error(
+                    i, "trial_kept", words[code[i]], f"the same as elsewhere in run {name}"
+                )
         return stays
 
     def _planes(self) -> tuple[_Listed, Rows]:
@@ -260,7 +266,7 @@ class Sorted:
         many, many_rows = (np.bincount(of, minlength=len(begin)) for of in (label, label[rotor]))
         rank = np.empty(rotors, dtype=np.intp)
         rank[members] = np.arange(rotors) - np.repeat(np.cumsum(many) - many, many)
-        years = self._years(mine, run, lines)
+        years, weights = self._years(mine, run, lines), self._weights(mine, channels)
         for group, at in zip(
             np.split(members, np.cumsum(many)[:-1]), np.split(rows_of, np.cumsum(many_rows)[:-1]), strict=True
         ):
@@ -283,7 +289,7 @@ class Sorted:
                 self.on[loads],
                 self.on[stand],
                 [rows.runs[k] for k in self.runs.code[self.last[group]].tolist()],
-                self._weights(group, self.order[mine[channels.first[heads]]]),
+                None if weights is None else self._positive(group, weights[heads]),
                 [] if rows.of.fitted else self._trials(run[first[0]]),
                 partial(self._exact, readings.shape, cells, source, loads, stand),
             )
@@ -323,12 +329,27 @@ class Sorted:
                 "run with a mass on the rotor"
             )
 
-    def _weights(self, group: Rows, at: Rows) -> Real | None:
-        """Return the weights of the channels (g, s), written in these rows."""
+    def _weights(self, mine: Rows, channels: _Listed) -> Real | None:
+        """Return the weight of each channel, from the rows that state one; 1 where none does."""
         weight = self.rows.of.table.numbers.get("weight")
         if weight is None:
             return None
-        weights = np.where(np.isnan(weight.values[at]), 1.0, weight.values[at])
+        value = weight.values[self.order[mine]]
+        stated, first = np.flatnonzero(~np.isnan(value)), np.full(len(channels.first), -1)
+        first[channels.number[stated[::-1]]] = stated[::-1]
+        other = stated[value[stated] != value[first[channels.number[stated]]]]
+        for row in other[:1].tolist():
+            wanted = value[first[channels.number[row]]]
+            raise self.rows.of.table.error(
+                int(self.order[mine[row]]),
+                weight.header,
+                f"{value[row]:g}",
+                f"{wanted:g} as elsewhere for this sensor",
+            )
+        return np.where(first < 0, 1.0, value[first])
+
+    def _positive(self, group: Rows, weights: Real) -> Real:
+        """Return the weights of rotors (g, s), of which none may be negative and one has to be positive."""
         wrong = ~(weights > 0).any(axis=1) | (weights < 0).any(axis=1)
         if wrong.any():
             of = self.rows.of.of(int(group[np.argmax(wrong)]))

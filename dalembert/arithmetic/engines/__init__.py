@@ -105,7 +105,7 @@ def run(
     if one and engine in (None, "python") and floats.takes(tape):
         # one pose: nothing of numpy on the way, but at a singular place, where its numbers go on with infinity and NaN
         try:
-            return Outputs(tape, floats.compiled(tape)(*values))
+            return Outputs(tape, floats.function(tape)(*values))
         except (ZeroDivisionError, ValueError, OverflowError):
             engine = "numpy"
     columns = [np.asarray(value, dtype=float) for value in values]
@@ -227,9 +227,14 @@ class Repeated:
         return (table[:-1], bool((table[-1] > 0).all())) if self.tested else (table, True)
 
 
+def lanes_in_all(n: int) -> int:
+    """The lanes of the whole work of which n lanes are a part (`as_part`); n where they are no part."""
+    return _whole.get() or n
+
+
 def chosen(tape: Tape, n: int) -> str:
     """The engine for n lanes: compiled code only once the tape has been asked for so often that it pays."""
-    if (_whole.get() or n) <= FEW:
+    if lanes_in_all(n) <= FEW:
         return "python"
     return "llvm" if work_on(tape, n) > PAYS else "numpy"
 
@@ -279,7 +284,7 @@ def _lanes(tape: Tape, columns: list[Reals], table: Rows, n: int, engine: str) -
 
 
 def _on_floats(tape: Tape, columns: list[Reals], table: Rows, n: int) -> None:
-    function = floats.compiled(tape)
+    function = floats.function(tape, n)
     # a tape without inputs has its lanes too
     lanes = zip(*(np.broadcast_to(c, n).tolist() for c in columns), strict=True) if columns else [()] * n
     for lane, values in enumerate(lanes):

@@ -28,6 +28,8 @@ ROOM = 1 << 20  # bytes
 # of a tape in doubled numbers, whose operations are so many that numpy's calls cost more than the third cache
 LONG, LONG_ROOM = 16384, 1 << 24
 LONGEST = 1000  # operations of one generated function
+# to prepare a tape takes as long as so many runs over so many lanes do that do its operations one by one
+SOON, NARROW = 8, 2048
 
 UFUNCS = {
     "add": "add",
@@ -181,7 +183,7 @@ class Blocks:
         values = [float(inputs[name]) for name in self.same.inputs]
         if floats.takes(self.same):
             try:
-                return dict(zip(self.same.names, floats.compiled(self.same)(*values), strict=True))
+                return dict(zip(self.same.names, floats.function(self.same)(*values), strict=True))
             except (ZeroDivisionError, ValueError, OverflowError):
                 pass
         return self.same.on(dict(zip(self.same.inputs, map(np.float64, values), strict=True)), NUMPY)
@@ -236,14 +238,14 @@ def compiled(tape: Tape, uniform: frozenset[str]) -> Blocks:
 def run(tape: Tape, columns: Sequence[Reals], out: Sequence[Reals] | Reals) -> None:
     """Run a tape: inputs in its order, (n,), or () for one number; `out` a row an output, (n,).
 
-    The first time on few lanes it is done operation by operation: to prepare it takes longer than that.
+    The first times on few lanes it is done operation by operation: to prepare it takes longer than that.
     """
     runs = _runs(tape)
     runs[0] += 1
     if (
-        runs[0] == 1
+        runs[0] <= SOON
         and len(out)
-        and len(out[0]) <= LEAST
+        and len(out[0]) <= NARROW
         and SIMPLE.issuperset(op[0] for op in tape.operations)
     ):
         _once(tape, columns, out)

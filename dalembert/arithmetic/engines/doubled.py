@@ -70,7 +70,7 @@ def run(tape: Tape, inputs: Mapping[str, Any], direct: bool = False) -> dict[str
     lanes = {len(x.high) for x in numbers.values() if np.ndim(x.high)}
     if len(lanes) > 1:
         raise ValueError(f"inputs of different lengths: {', '.join(map(str, sorted(lanes)))}")
-    n = lanes.pop() if lanes else 0
+    alone, n = not lanes, lanes.pop() if lanes else 0
     if n > FEW and not direct:
         engine = _engine(tape, n)
         if engine is not None:
@@ -79,7 +79,7 @@ def run(tape: Tape, inputs: Mapping[str, Any], direct: bool = False) -> dict[str
     uniform, varying, last = _split(tape, frozenset(name for name, x in numbers.items() if np.ndim(x.high)))
     with np.errstate(all="ignore"):
         common = _run(tape, numbers, uniform, {}, {})
-        if not n:
+        if alone:
             return {name: common[number] for name, number in tape.outputs}
         found: dict[int, Any] = {
             number: common[number] if number in common else Doubled(np.empty(n), np.empty(n))

@@ -1,10 +1,15 @@
-"""The tape as straight-line Python on floats: for one pose or a few, without numpy's cost of a call."""
+"""The tape as straight-line Python on floats: for one pose or a few, without numpy's cost of a call.
+
+Python's compiler takes as long for an operation as a hundred lanes that do it one by one: a function is made of a tape
+that is run again and again.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import lru_cache
+import operator
+from collections.abc import Callable, Sequence
+from functools import lru_cache, partial
 from typing import Any
 
 from dalembert.arithmetic.loop import called
@@ -13,6 +18,23 @@ from dalembert.arithmetic.tape import DOUBLED, SIGNS, Tape
 
 LONGEST = 2000  # operations of one function: Python's own compiler slows down on longer ones
 DEEPEST = 12  # operations of one expression
+PAYS = 100  # lanes of a tape from which on to compile it pays
+
+ONE: dict[str, Callable[[float], float]] = {
+    "neg": operator.neg,
+    "abs": abs,
+    "sqrt": math.sqrt,
+    "sin": math.sin,
+    "cos": math.cos,
+    "binade": binade,
+}
+TWO: dict[str, Callable[[float, float], float]] = {
+    "add": operator.add,
+    "sub": operator.sub,
+    "mul": operator.mul,
+    "div": operator.truediv,
+    "atan2": math.atan2,
+}
 
 
 @lru_cache(maxsize=256)
@@ -101,3 +123,55 @@ def compiled(
 def takes(tape: Tape) -> bool:
     """Is the tape short enough for one Python function?"""
     return len(tape.operations) <= LONGEST
+
+
+def function(tape: Tape, lanes: int = 1) -> Callable[..., Sequence[float]]:
+    """What runs a tape on so many lanes of floats: `compiled` once that pays; the bits, and what it raises, are the same.
+
+    Examples
+    --------
+    >>> from dalembert.arithmetic.recorded import Recorder
+    >>> recorder = Recorder()
+    >>> x = recorder.input("x")
+    >>> tape = recorder.tape({"square": x * x, "inverse": 1 / x})
+    >>> list(function(tape)(4.0)), list(function(tape, PAYS)(4.0))
+    ([16.0, 0.25], [16.0, 0.25])
+    """
+    run = _runs(tape)
+    run.lanes += lanes
+    return compiled(tape) if run.lanes > PAYS or not run.plain else run.once
+
+
+class _Runs:
+    """How many lanes of a tape have been run."""
+
+    def __init__(self, tape: Tape) -> None:
+        self.lanes = 0
+        # without loops, and with operations of plain numbers alone
+        self.plain = SIGNS.keys() >= {op[0] for op in tape.operations} - {"const", "input"} and not any(
+            map(called, tape.inputs)
+        )
+        self.once = partial(_once, tape)
+
+
+_runs = lru_cache(maxsize=256)(_Runs)
+
+
+def _once(tape: Tape, *inputs: float) -> list[float]:
+    """Do a tape's operations one by one."""
+    enter = iter(inputs)
+    values: list[float] = []
+    for operation in tape.operations:
+        kind = operation[0]
+        if kind in TWO:
+            values.append(TWO[kind](values[operation[1]], values[operation[2]]))
+        elif kind in ONE:
+            values.append(ONE[kind](values[operation[1]]))
+        elif kind == "const":
+            values.append(operation[1])
+        elif kind == "input":
+            values.append(next(enter))
+        else:
+            _, test, positive, otherwise = operation
+            values.append(values[positive] if values[test] > 0 else values[otherwise])
+    return [values[number] for _, number in tape.outputs]

@@ -1,9 +1,9 @@
-"""Forces and torques as combinations of quantities with constant coefficients, added before any pose is looked at.
+"""Forces and torques as combinations of terms with constant coefficients, added before any pose is looked at.
 
 But for springs and friction, a force on a link is a fixed combination of a few vectors: of 1 (a weight), of e^{iθ} (a
 force that turns with its link), of second derivatives (−m·a_G = −m Σ z (e^{iθ})″) and of other joint forces. Such
-vectors are the quantities; a `Combination` holds their coefficients, which depend on the mechanism alone. Combinations
-are added and weighed as numbers, once for each mechanism. An array over the poses is formed of a quantity or a
+vectors are the terms; a `Combination` holds their coefficients, which depend on the mechanism alone. Combinations
+are added and weighed as numbers, once for each mechanism. An array over the poses is formed of a term or a
 combination when its value is asked for, and never twice.
 """
 
@@ -20,8 +20,8 @@ from virtualwork.formulas.rates import Rates
 from virtualwork.plan.steps import Term
 
 
-class Quantity:
-    """A vector (complex) or a number (real) at each pose; two quantities are the same only if they are one object."""
+class ForceTerm:
+    """A vector (complex) or a number (real) at each pose; two terms are the same only if they are one object."""
 
     lasts = False
     """Whether its array is kept over a long sweep, for others that ask later."""
@@ -30,13 +30,13 @@ class Quantity:
         """A factor and an array over a block of poses; None for an array of zeros."""
         raise NotImplementedError
 
-    def reads(self) -> Iterable[Quantity | None]:
-        """The quantities it is made of."""
+    def reads(self) -> Iterable[ForceTerm | None]:
+        """The terms it is made of."""
         return ()
 
 
-class Combination(dict[Quantity | None, Any]):
-    """Σ coefficient·quantity; the quantity None is the constant 1.
+class Combination(dict[ForceTerm | None, Any]):
+    """Σ coefficient·term; the term None is the constant 1.
 
     >>> force = Combination({None: 3 - 2j})
     >>> force.add(Combination({None: 1j}), 2)
@@ -46,25 +46,25 @@ class Combination(dict[Quantity | None, Any]):
 
     def add(self, other: Combination, factor: complex = 1.0) -> None:
         """Add another, times a factor; what cancels is gone."""
-        for quantity, c in other.items():
-            total = self.get(quantity, 0.0) + factor * c
+        for term, c in other.items():
+            total = self.get(term, 0.0) + factor * c
             if total:
-                self[quantity] = total
+                self[term] = total
             else:
-                self.pop(quantity, None)
+                self.pop(term, None)
 
     def times(self, factor: complex) -> Combination:
         """The combination times a factor."""
-        return Combination({quantity: factor * c for quantity, c in self.items()})
+        return Combination({term: factor * c for term, c in self.items()})
 
     def value(self, block: Block) -> Number:
         """Its array over a block, or one number where it is the same at every pose; None where it is zero."""
         total: Number = None
-        for quantity, c in self.items():
-            if quantity is None:
+        for term, c in self.items():
+            if term is None:
                 part = c
             else:
-                factor, v = block.formed(quantity)
+                factor, v = block.formed(term)
                 if v is None:
                     continue
                 c = c * factor
@@ -77,7 +77,7 @@ class Combination(dict[Quantity | None, Any]):
 
 
 @dataclass(frozen=True, eq=False)
-class Turned(Quantity):
+class Turned(ForceTerm):
     """s·e^{iθ} of a body, with the slide s of a guide or without."""
 
     body: str
@@ -89,7 +89,7 @@ class Turned(Quantity):
 
 
 @dataclass(frozen=True, eq=False)
-class SecondRate(Quantity):
+class SecondRate(ForceTerm):
     """The second derivative in time: of s·e^{iθ}, of a point (`node`), or of a body's angle."""
 
     kind: str
@@ -113,8 +113,8 @@ class SecondRate(Quantity):
 
 
 @dataclass(frozen=True, eq=False)
-class Given(Quantity):
-    """A load that is no combination of other quantities: of a spring, of friction, of a table."""
+class LoadTerm(ForceTerm):
+    """A load that is no combination of other terms: of a spring, of friction, of a table."""
 
     load: Formed
 
@@ -123,7 +123,7 @@ class Given(Quantity):
 
 
 @dataclass(frozen=True, eq=False)
-class Total(Quantity):
+class Total(ForceTerm):
     """A combination whose array more than one other reads."""
 
     of: Combination
@@ -131,7 +131,7 @@ class Total(Quantity):
     def form(self, block: Block) -> tuple[float, Number]:
         return 1.0, self.of.value(block)
 
-    def reads(self) -> Iterable[Quantity | None]:
+    def reads(self) -> Iterable[ForceTerm | None]:
         return self.of
 
 
@@ -143,7 +143,7 @@ class Transmitted(Total):
 
 
 @dataclass(frozen=True, eq=False)
-class Lever(Quantity):
+class Lever(ForceTerm):
     """What a force does for a unit turn of a body, (s e^{iθ}) × F, or (`along`) for a unit of its slide, e^{iθ}·F.
 
     The lever's constant z in the body's axes is taken into the force: (z e) × F = e × (z̄ F).
@@ -164,12 +164,12 @@ class Lever(Quantity):
         work = e.conjugate() * force
         return 1.0, work.real if self.along else work.imag
 
-    def reads(self) -> Iterable[Quantity | None]:
+    def reads(self) -> Iterable[ForceTerm | None]:
         return self.force
 
 
 @dataclass(frozen=True, eq=False)
-class Carried(Quantity):
+class Carried(ForceTerm):
     """The torque of input j's motor, where it sits on another body than `on`."""
 
     input: int
@@ -178,21 +178,21 @@ class Carried(Quantity):
         return 1.0, block.drive(self.input)
 
 
-class Quantities:
-    """Makes each quantity once: what is made of the same is the same quantity."""
+class ForceTerms:
+    """Makes each term once: what is made of the same is the same term."""
 
     def __init__(self) -> None:
-        self._made: dict[Hashable, Quantity] = {}
+        self._made: dict[Hashable, ForceTerm] = {}
 
-    def __call__(self, kind: type[Quantity], *of: Any) -> Quantity:
-        """The quantity of a kind."""
+    def __call__(self, kind: type[ForceTerm], *of: Any) -> ForceTerm:
+        """The term of a kind."""
         key = (kind, *(frozenset(x.items()) if isinstance(x, Combination) else x for x in of))
         if key not in self._made:
             self._made[key] = kind(*of)
         return self._made[key]
 
-    def second(self, kind: str, name: str, slide: int | None = None) -> Quantity:
-        """The quantity of a second derivative in time."""
+    def second(self, kind: str, name: str, slide: int | None = None) -> ForceTerm:
+        """The term of a second derivative in time."""
         return self(SecondRate, kind, name, slide)
 
     def total(self, terms: Combination) -> Combination:
@@ -202,7 +202,7 @@ class Quantities:
         return terms if list(terms.values()) == [1.0] else Combination({self(Total, terms): 1.0})
 
     def lever(self, body: str, slide: int | None, force: Combination, along: bool = False) -> Combination:
-        """The work of a force for a unit turn, or a unit of the slide, as a combination of real quantities.
+        """The work of a force for a unit turn, or a unit of the slide, as a combination of real terms.
 
         Of the force's part in the body's own (e^{iθ})″ = (iα − ω²)e^{iθ} only α is left, e × (e)″ = α: this turns
         I_G·α into (I_G + m|z|²)·α, the inertia about the point the body hangs on (Steiner).
@@ -222,14 +222,14 @@ class Quantities:
         return lever
 
 
-def in_order(quantity: Quantity) -> list[Quantity]:
-    """The quantities that one is made of, each after those it is made of itself, and that one last.
+def in_order(term: ForceTerm) -> list[ForceTerm]:
+    """The terms that one is made of, each after those it is made of itself, and that one last.
 
     Forming them so keeps the chain of calls short, however long the chain of links.
     """
-    done: set[Quantity] = set()
-    result: list[Quantity] = []
-    stack: list[tuple[Quantity, bool]] = [(quantity, False)]
+    done: set[ForceTerm] = set()
+    result: list[ForceTerm] = []
+    stack: list[tuple[ForceTerm, bool]] = [(term, False)]
     while stack:
         here, open_ = stack.pop()
         if open_:

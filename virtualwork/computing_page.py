@@ -26,9 +26,8 @@ from virtualwork.branch.sampling import FINE
 from virtualwork.branch.track import SAMPLES
 from virtualwork.describe.description import Description, known_by_guess
 from virtualwork.describe.dimensions import Dimension, dimensions, value
-from virtualwork.dragged import cams, drawn_numbers, handles, profiles
 from virtualwork.drawing import Drawing, draw
-from virtualwork.family.written import Written
+from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.forces import Forces
 from virtualwork.formulas.forces import Effort, Over
 from virtualwork.formulas.kinematics import Angle
@@ -38,12 +37,13 @@ from virtualwork.formulas.pose_forces import PoseForces
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.rubbing import Rub, Slip
+from virtualwork.page_shapes import cams, drawn_numbers, handles, profiles
 from virtualwork.picture.paper import travel_of
-from virtualwork.pieces import toml_pieces
 from virtualwork.plan.steps import Group
 from virtualwork.quantities import Component, places
 from virtualwork.quantities import forces as quantities_of_forces
 from virtualwork.study.free_bodies import parts
+from virtualwork.toml_template import toml_template
 
 ORDERS = 2
 """How often places are differentiated in time."""
@@ -125,11 +125,11 @@ class Formulas:
         self._rows = 0
 
     @cached_property
-    def written(self) -> Written:
+    def written(self) -> VariedFormulas:
         """The formulas with the dimensions as inputs."""
         fixed = [d for d in self.dimensions.values() if d.where[0] != "inputs"]
         moves = (True, True, self.order > ORDERS)
-        return Written(self.assembly, fixed, moves, True, settled=False)
+        return VariedFormulas(self.assembly, fixed, moves, True, settled=False)
 
     def refused(self, keys: Sequence[Quantity]) -> str:
         """Say why a page cannot compute these quantities; empty where it can."""
@@ -241,7 +241,7 @@ class Formulas:
             "n": self.poses.n,
             "comesBack": bool(iterated and len(m.inputs) == 1 and self.assembly.track.whole),
             "rates": [bool(np.any(rate)) for rate in self.poses.rates[0]],
-            "toml": toml_pieces(m, list(self.dimensions)),
+            "toml": toml_template(m, list(self.dimensions)),
         }
 
     @property

@@ -10,7 +10,7 @@ from math import atan2, cos, degrees, hypot, radians, sin
 
 import numpy as np
 
-from cli.read import seeking
+from cli.read import root_search
 from cli.read.options import bad
 from cli.spin.rotation import Rotation, TurningBody
 from cli.spin.tables import constants, states
@@ -21,7 +21,7 @@ from rigidbody3d import check
 Change = Callable[[float], TurningBody]
 
 
-def find(rotation: Rotation, name: str, wanted: str) -> tuple[Rotation, seeking.Found]:
+def find(rotation: Rotation, name: str, wanted: str) -> tuple[Rotation, root_search.Found]:
     """Return the rotation with the number nearest to its own with which the quantity has the value.
 
     Raises
@@ -34,15 +34,15 @@ def find(rotation: Rotation, name: str, wanted: str) -> tuple[Rotation, seeking.
     if len(rotation.time) > 1:
         raise bad("--find", "expected one instant, such as --at 2")
     choices = _choices(rotation.body)
-    sought = seeking.named({key: number for key, (number, _) in choices.items()}, name)
+    sought = root_search.named({key: number for key, (number, _) in choices.items()}, name)
     change = choices[name][1]
-    word, text = seeking.quantity_and_value(wanted, "slow=0.5rad_s")
+    word, text = root_search.quantity_and_value(wanted, "slow=0.5rad_s")
     quantities = _quantities(rotation)
     if word not in quantities:
         expected = f"expected one of {', '.join(quantities)}{nearest(word, quantities)}"
         raise bad("--so-that", f"'{word}': {expected}")
     unit = quantities[word][1]
-    goal = seeking.Goal(word, unit, seeking.value_in(unit, text))
+    goal = root_search.Goal(word, unit, root_search.value_in(unit, text))
 
     def value(x: float) -> float | None:
         try:
@@ -53,8 +53,8 @@ def find(rotation: Rotation, name: str, wanted: str) -> tuple[Rotation, seeking.
         except (DataError, ValueError, KeyError):
             return None
 
-    root = seeking.search(name, sought, goal, value)
-    return replace(rotation, body=change(root)), seeking.sentence(name, sought, root, goal)
+    root = root_search.search(name, sought, goal, value)
+    return replace(rotation, body=change(root)), root_search.sentence(name, sought, root, goal)
 
 
 def _quantities(r: Rotation) -> dict[str, tuple[float, str]]:
@@ -64,9 +64,9 @@ def _quantities(r: Rotation) -> dict[str, tuple[float, str]]:
     return {re.sub(r"_([wxyz])$", r".\1", c.name): (float(c.values[0]), c.unit) for c in columns}  # type: ignore[arg-type]
 
 
-def _choices(body: TurningBody) -> dict[str, tuple[seeking.Sought, Change]]:
+def _choices(body: TurningBody) -> dict[str, tuple[root_search.Sought, Change]]:
     """The numbers of the file."""
-    choices: dict[str, tuple[seeking.Sought, Change]] = {}
+    choices: dict[str, tuple[root_search.Sought, Change]] = {}
 
     def entry(x: float, key: str, i: int) -> TurningBody:
         vector = np.array(getattr(body, key))
@@ -80,10 +80,13 @@ def _choices(body: TurningBody) -> dict[str, tuple[seeking.Sought, Change]]:
         vectors.append(("torque", "N_m", "xyz"))
     for key, unit, names in vectors:
         for i, letter in enumerate(names):
-            number = seeking.Sought(f"{key}.{letter}_{unit}", unit, float(getattr(body, key)[i]))
+            number = root_search.Sought(f"{key}.{letter}_{unit}", unit, float(getattr(body, key)[i]))
             choices[f"{key}.{letter}"] = number, partial(entry, key=key, i=i)
     if body.mgl is not None:
-        choices["top.mgl"] = seeking.Sought("top.mgl_N_m", "N_m", body.mgl), lambda x: replace(body, mgl=x)
+        choices["top.mgl"] = (
+            root_search.Sought("top.mgl_N_m", "N_m", body.mgl),
+            lambda x: replace(body, mgl=x),
+        )
         w, x, y, z = body.attitude.tolist()
         if z == 0:
             # the axis leans by a turn about a horizontal line
@@ -94,5 +97,5 @@ def _choices(body: TurningBody) -> dict[str, tuple[seeking.Sought, Change]]:
                 half = radians(tilt) / 2
                 return replace(body, attitude=np.array([cos(half), *(sin(half) * a for a in across), 0.0]))
 
-            choices["tilt"] = seeking.Sought("tilt_deg", "deg", lean), leaning
+            choices["tilt"] = root_search.Sought("tilt_deg", "deg", lean), leaning
     return choices

@@ -7,11 +7,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from cli.cases.analysis import Analysis, Request
-from cli.cases.inputs import of_one
-from cli.cases.poses import column
-from cli.cases.quantities import cells_of, keys_of, solved
-from cli.cases.values import Varied, dimension_named, place_or_angle, with_numbers
-from cli.read import seeking
+from cli.cases.axes import dimension_named, place_or_angle
+from cli.cases.inputs import Varied, of_one, with_numbers
+from cli.cases.poses import cells_of, column, keys_of, solved
+from cli.read import root_search
 from cli.read.options import bad
 from dalembert.errors import DataError
 from dalembert.units import UNITS, from_si, written
@@ -19,7 +18,7 @@ from virtualwork import MechanismError
 from virtualwork.quantities import Component
 
 if TYPE_CHECKING:
-    from cli.cases.axes import Grid
+    from cli.cases.inputs import Grid
     from virtualwork import Mechanism
 
 
@@ -27,11 +26,16 @@ class Changed(NamedTuple):
     """The mechanism with the number that was sought."""
 
     mechanism: Mechanism
-    found: seeking.Found
+    found: root_search.Found
 
 
 def find(
-    m: Mechanism, bare: Mapping[str, str], request: Request, moved: Grid | None, name: str, wanted: str
+    m: Mechanism,
+    bare: Mapping[str, str],
+    request: Request,
+    moved: Grid | None,
+    name: str | None,
+    wanted: str | None,
 ) -> Changed:
     """Return the mechanism with the number nearest to its own with which the quantity has the value.
 
@@ -42,8 +46,11 @@ def find(
     DataError
         No number in reach gives the value.
     """
+    both = root_search.pair(name, wanted)
+    assert both is not None
+    name, wanted = both
     of = dimension_named(m, name, name, "--find")
-    word, text = seeking.quantity_and_value(wanted, "B.vx=3m_s")
+    word, text = root_search.quantity_and_value(wanted, "B.vx=3m_s")
     its_own = request._replace(only=[word], order=None)
 
     def analysis(mechanism: Mechanism) -> Analysis:
@@ -66,11 +73,11 @@ def find(
             return None
 
     own = m.value(of.label)
-    sought = seeking.Sought(of.of.header, of.unit, _shown(of, float(own.real)) if own == own else 0.0)
-    goal = seeking.Goal(word, unit, target, bool(each.link))
-    root = seeking.search(name, sought, goal, value)
-    text = f"{name} = {_text(of, root, bare)} gives {word} = {seeking.amount(target, unit)}"
-    return Changed(with_numbers(m, [of.of], [root]), seeking.Found(sought.header, root, text))
+    sought = root_search.Sought(of.of.header, of.unit, _shown(of, float(own.real)) if own == own else 0.0)
+    goal = root_search.Goal(word, unit, target, bool(each.link))
+    root = root_search.search(name, sought, goal, value)
+    text = f"{name} = {_text(of, root, bare)} gives {word} = {root_search.amount(target, unit)}"
+    return Changed(with_numbers(m, [of.of], [root]), root_search.Found(sought.header, root, text))
 
 
 def _shown(of: Varied, si: float) -> float:
@@ -92,4 +99,4 @@ def _value(each: Component, text: str, bare: Mapping[str, str]) -> tuple[float, 
         return place_or_angle(text, "angle", "--so-that", bare), unit
     if unit == "m":
         return place_or_angle(text, "length", "--so-that", bare), unit
-    return seeking.value_in(unit, text), unit
+    return root_search.value_in(unit, text), unit

@@ -21,8 +21,8 @@ from virtualwork.describe.dimensions import Dimension, changed, value
 from virtualwork.describe.keys import keys_of
 from virtualwork.describe.parts import Link
 from virtualwork.formulas.closed_forms import Case, missing
+from virtualwork.formulas.group_loops import gaps, put_unknowns, unknowns
 from virtualwork.formulas.loops import Closed, Margin
-from virtualwork.formulas.newton import gaps, put_unknowns, unknowns
 from virtualwork.formulas.numbers import PARTS, WRITTEN, Number
 from virtualwork.formulas.positions import State, columns, principal_of, run
 from virtualwork.formulas.quantity import Quantity
@@ -43,7 +43,7 @@ DIP = 0.05
 
 
 @guarded
-class Written:
+class VariedFormulas:
     """Formulas of an assembly, in which dimensions are inputs of the tape, called by their paths.
 
     Parameters

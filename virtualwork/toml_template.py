@@ -12,7 +12,7 @@ from virtualwork.describe.dimensions import changed
 from virtualwork.describe.text import toml_text
 
 
-def toml_pieces(m: Description, paths: Sequence[str]) -> list[Any] | None:
+def toml_template(m: Description, paths: Sequence[str]) -> list[Any] | None:
     """The file as lines of text and paths of dimensions; None where it cannot be written.
 
     A number that is left out as it is the default stands only where it was changed.

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from virtualwork.forces import Forces
 
 
-class Pictured:
+class MotionViews:
     """What a motion looks like: its drawing, pictures on paper, pages that move and that compute."""
 
     @property
@@ -104,6 +104,6 @@ class Pictured:
         >>> "links.crank.P.x" in crank.motion(np.linspace(0, 6, 37), speed=3.0).page().html
         True
         """
-        from virtualwork.computing import page_of
+        from virtualwork.computing_page import page_of
 
         return page_of(self.poses, self.drawing, self.dynamics if forces else None)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from virtualwork import Mechanism
 
 
-def written(
+def file_bytes(
     m: Mechanism, inputs: tuple[float, ...], suffix: str, file: str, bare: Mapping[str, str]
 ) -> tuple[bytes, list[str]]:
     """Return the file of a mechanism that starts at the inputs, rad or m, and what is omitted.

@@ -10,7 +10,7 @@ import numpy as np
 
 from cli.body.moving import AXES, ORIGIN, MovingBody, Request
 from cli.body.tables import numbers_of
-from cli.read import seeking
+from cli.read import root_search
 from cli.read.options import bad
 from cli.read.parts import bodies_of
 from dalembert.errors import DataError
@@ -22,7 +22,7 @@ Change = Callable[[float], tuple[Table, Request]]
 
 def find(
     table: Table, path: str, request: Request, name: str, wanted: str
-) -> tuple[MovingBody, seeking.Found]:
+) -> tuple[MovingBody, root_search.Found]:
     """Return the body with the number nearest to its own with which the quantity has the value.
 
     Raises
@@ -40,16 +40,16 @@ def find(
         return MovingBody(bodies[0], moved)
 
     choices = {**_motions(table, request), **_cells(table, request)}
-    sought = seeking.named({key: number for key, (number, _) in choices.items()}, name)
+    sought = root_search.named({key: number for key, (number, _) in choices.items()}, name)
     change = choices[name][1]
-    word, text = seeking.quantity_and_value(wanted, "bearing1_dynamic.x=20N")
+    word, text = root_search.quantity_and_value(wanted, "bearing1_dynamic.x=20N")
     quantities = numbers_of(body(*change(sought.start)))
     if word not in quantities:
         each = dict.fromkeys(quantity.partition(".")[0] for quantity in quantities)
         expected = f"expected one of {', '.join(each)}, with .x, .y, .z or .size behind a vector"
         raise bad("--so-that", f"'{word}': {expected}{nearest(word, quantities)}")
     unit = quantities[word][1]
-    goal = seeking.Goal(word, unit, seeking.value_in(unit, text), unit == "deg")
+    goal = root_search.Goal(word, unit, root_search.value_in(unit, text), unit == "deg")
 
     def value(x: float) -> float | None:
         try:
@@ -57,13 +57,13 @@ def find(
         except (DataError, ValueError):
             return None
 
-    root = seeking.search(name, sought, goal, value)
-    return body(*change(root)), seeking.sentence(name, sought, root, goal)
+    root = root_search.search(name, sought, goal, value)
+    return body(*change(root)), root_search.sentence(name, sought, root, goal)
 
 
-def _motions(table: Table, request: Request) -> dict[str, tuple[seeking.Sought, Change]]:
+def _motions(table: Table, request: Request) -> dict[str, tuple[root_search.Sought, Change]]:
     """The numbers of the motion: of a shaft its speed and rate, else components of ω, of its rate, of Ω."""
-    choices: dict[str, tuple[seeking.Sought, Change]] = {}
+    choices: dict[str, tuple[root_search.Sought, Change]] = {}
     shaft = request.shaft
     if shaft is not None:
         for name, unit in (("speed", "rad_s"), ("speed_rate", "rad_s2")):
@@ -72,7 +72,7 @@ def _motions(table: Table, request: Request) -> dict[str, tuple[seeking.Sought, 
                 assert shaft is not None
                 return table, replace(request, shaft=replace(shaft, **{name: x}))  # type: ignore[arg-type]
 
-            number = seeking.Sought(f"{name}_{unit}", unit, getattr(shaft, name))
+            number = root_search.Sought(f"{name}_{unit}", unit, getattr(shaft, name))
             choices[name] = number, partial(turned, name=name)
         return choices
     for name, unit in (("omega", "rad_s"), ("alpha", "rad_s2"), ("frame_omega", "rad_s")):
@@ -87,14 +87,14 @@ def _motions(table: Table, request: Request) -> dict[str, tuple[seeking.Sought, 
                 components[i] = x
                 return table, replace(request, **{name: tuple(components)})  # type: ignore[arg-type]
 
-            number = seeking.Sought(f"{name}.{axis}_{unit}", unit, (vector or ORIGIN)[i])
+            number = root_search.Sought(f"{name}.{axis}_{unit}", unit, (vector or ORIGIN)[i])
             choices[f"{name}.{axis}"] = number, partial(moved, name=name, i=i)
     return choices
 
 
-def _cells(table: Table, request: Request) -> dict[str, tuple[seeking.Sought, Change]]:
+def _cells(table: Table, request: Request) -> dict[str, tuple[root_search.Sought, Change]]:
     """The numbers of the parts, in the file's units."""
-    choices: dict[str, tuple[seeking.Sought, Change]] = {}
+    choices: dict[str, tuple[root_search.Sought, Change]] = {}
     for row, part in enumerate(table.texts.get("part", [str(k + 1) for k in range(table.rows)])):
         for key, column in table.numbers.items():
             if np.isnan(column.values[row]):
@@ -107,6 +107,6 @@ def _cells(table: Table, request: Request) -> dict[str, tuple[seeking.Sought, Ch
                 return replace(table, numbers={**table.numbers, key: replace(own, values=values)}), request
 
             header = f"{part}.{key}_{column.unit}".rstrip("_")
-            number = seeking.Sought(header, column.unit, float(column.values[row]))
+            number = root_search.Sought(header, column.unit, float(column.values[row]))
             choices[f"{part}.{key}"] = number, partial(changed, key=key, row=row)
     return choices

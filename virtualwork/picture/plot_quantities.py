@@ -20,7 +20,7 @@ LENGTHS = ("m", "m/s", "m/s²", "m/s³")
 ANGLES = ("deg", "rad/s", "rad/s²", "rad/s³")
 
 
-class Quantity(NamedTuple):
+class PlotQuantity(NamedTuple):
     """A quantity over the poses: its name, its unit, its values (n,), and how large one of its kind is."""
 
     name: str
@@ -29,7 +29,7 @@ class Quantity(NamedTuple):
     scale: float
 
 
-def quantities(poses: Poses, names: Iterable[str]) -> list[Quantity]:
+def plot_quantities(poses: Poses, names: Iterable[str]) -> list[PlotQuantity]:
     """Return the quantities of these names.
 
     Raises
@@ -40,29 +40,33 @@ def quantities(poses: Poses, names: Iterable[str]) -> list[Quantity]:
     return [_quantity(poses, name) for name in names]
 
 
-def _quantity(poses: Poses, word: str) -> Quantity:
+def _quantity(poses: Poses, word: str) -> PlotQuantity:
     m = poses.mechanism
     name, _, what = word.rpartition(".")
     guides = {g.point: i for i, g in enumerate(m.guides)}
     names = {*m.points, *m.links}
+    if not name:
+        raise DescriptionError(
+            f"'{word}': expected a quantity, such as {word}.{'x' if word in m.points else 'omega'}"
+        )
     if name not in names:
         raise DescriptionError(f"'{word}': no link or point is named '{name}'{nearest(name, names)}")
     if name in m.points and what in POINTS:
         order, part = POINTS[what]
         body, place = m.points[name]
         z = poses.point(body, place, order, name)
-        return Quantity(
+        return PlotQuantity(
             word, LENGTHS[order], z.real if part == "x" else z.imag, m.size * pace(poses) ** order
         )
     if name in m.links and what in LINKS:
         order = LINKS[what]
         if order:
-            return Quantity(word, ANGLES[order], poses.angle(name, order), pace(poses) ** order)
-        return Quantity(word, "deg", unwrapped(poses.angle(name)), 180.0)
+            return PlotQuantity(word, ANGLES[order], poses.angle(name, order), pace(poses) ** order)
+        return PlotQuantity(word, "deg", unwrapped(poses.angle(name)), 180.0)
     if name in guides and what in SLIDES:
         order = SLIDES[what]
         values = poses.values([Slide(guides[name], order)])[0]
-        return Quantity(word, LENGTHS[order], values, m.size * pace(poses) ** order)
+        return PlotQuantity(word, LENGTHS[order], values, m.size * pace(poses) ** order)
     kinds = ((POINTS, m.points), (LINKS, m.links), (SLIDES, guides))
     choices = [choice for of, holders in kinds if name in holders for choice in of]
     raise DescriptionError(f"'{word}': expected {name}. with one of {', '.join(choices)}")

@@ -1,0 +1,137 @@
+"""Loads of a mechanism at rest: generalized forces, their derivative, the generalized mass, the potential.
+
+At rest the effort is τ_j = −Q_j with the generalized force Q_j = Σ F·K_j + Σ T κ_j (Riul, unit II, eq. 3); of many poses it comes
+from the tape, with everything else that the search for equilibria asks of the same poses.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cached_property
+from itertools import combinations, product
+
+import numpy as np
+
+from virtualwork.branch.assembly import Assembly
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.block import Block
+from virtualwork.formulas.lanes import Lanes
+from virtualwork.formulas.numbers import Number, Reals, plus
+from virtualwork.formulas.scene import Scene
+from virtualwork.plan.steps import path_reads
+
+
+class Rest:
+    """Generalized forces, their derivative and the potential of a mechanism at rest at given inputs (n, k)."""
+
+    def __init__(self, assembly: Assembly, inputs: Reals) -> None:
+        self.assembly, self.inputs, self.k = assembly, inputs, inputs.shape[1]
+        self.poses = Lanes(assembly, inputs if self.k > 1 else inputs[:, 0], 0.0, 0.0)
+        self.scene = Scene(self.poses, at_rest=True)
+
+    def force(self) -> tuple[Reals, Reals]:
+        """Q and the sum of the sizes of its terms, each (n, k)."""
+        force, size, *_ = self._values
+        return force, size
+
+    @cached_property
+    def _values(self) -> list[Reals]:
+        """Q and the sum of the sizes of its terms, (n, k); of many poses over one input also ∂Q/∂q and V, (n,), from one tape."""
+
+        def of(j: int, sized: bool) -> Callable[[Block], Number]:
+            def form(block: Block) -> Number:
+                total: Number = None
+                for load in self.scene.loads:
+                    value = load.power(block, j)
+                    total = plus(total, value if value is None or not sized else abs(value))
+                return total
+
+            return form
+
+        forms = [of(j, sized) for sized in (False, True) for j in range(self.k)]
+        if self._together:
+            more = self._bent, self._stored
+            each = self.scene.over([*forms, *more], float, self._reads(), 2, name="rest")
+        else:
+            each = self.scene.over(forms, float, name="rest")
+        return [*(np.stack(each[i : i + self.k], axis=1) for i in (0, self.k)), *each[2 * self.k :]]
+
+    @property
+    def _together(self) -> bool:
+        return self.k == 1 and self.scene.on_tape
+
+    def _reads(self) -> list[str]:
+        """What the loads depend on."""
+        return sorted(set().union(*(load.reads() for load in self.scene.loads)) - {f"angle:{GROUND}"})
+
+    def _bent(self, block: Block) -> Number:
+        """The second variation of the work, along the direction of the rates."""
+        rates, total = block.along or block.by[0], None
+        for load in self.scene.loads:
+            total = plus(total, load.second(block, rates))
+        return total
+
+    def along(self, direction: Reals) -> Reals:
+        """∂Q/∂q along a direction in the inputs, times the direction: d²(work), (n,)."""
+        if self._together:
+            return np.asarray(self._values[2] * direction[0] ** 2)
+        still: list[Number] = [0.0] * self.k
+        way = [direction.tolist(), still, still] if self.k > 1 else None
+        poses = self.poses.again(self.inputs, way)
+        poses.at_rest = True
+        scene = Scene(poses, at_rest=True)
+        if scene.on_tape:
+            (total,) = scene.over([self._bent], float, self._reads(), 2, name="rest, second")
+        else:
+            total = np.array([self._along(scene, self._reads())])
+        return np.asarray(total * (direction[0] ** 2 if self.k == 1 else 1.0))
+
+    def _along(self, scene: Scene, reads: list[str]) -> float:
+        """The derivative of one pose along its rates; NaN at a singular pose."""
+        rates = scene.along(reads)
+        if rates is None:
+            return math.nan
+        return float(sum(load.second(scene.block, rates) or 0.0 for load in scene.loads))
+
+    def hessian(self) -> Reals:
+        """V″, (n, k, k), by polarization of exact second derivatives along the inputs and their pairs."""
+        k = self.k
+        unit = np.eye(k)
+        out = np.zeros((len(self.inputs), k, k))
+        for i in range(k):
+            out[:, i, i] = -self.along(unit[i])
+        for i, j in combinations(range(k), 2):
+            both = -self.along(unit[i] + unit[j])
+            out[:, i, j] = out[:, j, i] = (both - out[:, i, i] - out[:, j, j]) / 2
+        return out
+
+    def mass(self) -> Reals:
+        """The generalized mass Σ m K_j·K_k + Σ I κ_j κ_k, (n, k, k)."""
+        k, rigid = self.k, self.assembly.mechanism.rigid
+        still: list[Number] = [0.0] * k
+        ways = [self.poses.again(self.inputs, [unit, still, still]) for unit in np.eye(k).tolist()]
+        out = np.zeros((len(self.inputs), k, k))
+        for body, of in rigid.items():
+            moved = [way.point(body, of.center, 1) for way in ways] if of.mass else None
+            turned = [way.angle(body, 1) for way in ways] if of.inertia else None
+            for i, j in product(range(k), repeat=2):
+                if moved is not None:
+                    out[:, i, j] += of.mass * (np.conj(moved[i]) * moved[j]).real
+                if turned is not None:
+                    out[:, i, j] += of.inertia * turned[i] * turned[j]
+        return out
+
+    def potential(self) -> Reals:
+        """V, (n,) J; NaN where a load has no potential."""
+        if self._together:
+            return self._values[3]
+        keys = {key for load in self.scene.loads if load.path is not None for key in path_reads(load.path)}
+        (result,) = self.scene.over([self._stored], float, sorted(keys), name="rest, potential")
+        return np.asarray(result)
+
+    def _stored(self, block: Block) -> Number:
+        total: Number = None
+        for load in self.scene.loads:
+            total = plus(total, load.potential(block))
+        return total
