@@ -55,7 +55,7 @@ def run(
     plane: list[str] | None = None,
     planes: str | None = None,
     mass: list[str] | None = None,
-    gravity: float = 9.80665,
+    gravity: str = "9.80665",
     remove: bool = False,
     round_mass: str | None = None,
     round_angle: str | None = None,
@@ -88,8 +88,9 @@ def run(
 
     if (plane is None) == (planes is None):
         raise options.bad("--plane", "expected --plane (once or more) or --planes FILE.csv")
-    if not 1e-9 < gravity < 1e9:
-        raise options.bad("--gravity", f"'{gravity:g}': expected a positive number of m/s²")
+    g = options.number_or_quantity("--gravity", gravity, "acceleration")
+    if not 1e-9 < g < 1e9:
+        raise options.bad("--gravity", f"'{gravity}': expected a positive number of m/s²")
     if modes is None:
         options.refuse("needs --modes", mode_count=mode_count, rigid=rigid)
     else:
@@ -109,7 +110,7 @@ def run(
         )
     only_forces = carried is not None and grade is None and permissible is None
     request = Request(
-        gravity=gravity,
+        gravity=g,
         remove=remove,
         mass_step=options.with_unit("--round-mass", round_mass, "mass", positive=True),
         angle_step=options.with_unit("--round-angle", round_angle, "angle", positive=True),
@@ -120,7 +121,7 @@ def run(
         modes=shapes,
     )
     needs_z = chosen.several or carried is not None or shapes is not None
-    rotors = read_rotors(table, gravity, needs_z=needs_z)
+    rotors = read_rotors(table, g, needs_z=needs_z)
     if carried is not None and chosen.z is None:
         raise options.bad("--bearings", "the forces need the place of the plane: --plane NAME:Z:RADIUS")
     with options.processes(workers) as executor:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -80,17 +79,6 @@ def branch(text: str | None) -> str | None:
     if text is not None and text != "all" and options.whole(text) < 1:
         raise options.bad("--branch", f"'{text}': expected all, or the number of an assembly")
     return text
-
-
-@contextmanager
-def naming(file: str) -> Iterator[None]:
-    """Name the file in what is wrong with a mechanism."""
-    from virtualwork import MechanismError
-
-    try:
-        yield
-    except MechanismError as error:
-        raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
 
 
 @dataclass

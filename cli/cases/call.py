@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cli.cases.analysis import Request, naming
+from cli.cases.analysis import Request
 from cli.cases.axes import assigned, grids
 from cli.cases.case import Study
 from cli.cases.inputs import Driven, Grid, Varied, with_numbers
@@ -61,6 +63,17 @@ def load(path: str) -> Described:
     document = tomllib.loads(text)
     units = {kind: str(unit) for kind, unit in document.get("units", {}).items()}
     return Described(mechanism, units, warnings, about(file, document))
+
+
+@contextmanager
+def naming(file: str) -> Iterator[None]:
+    """Name the file in what is wrong with a mechanism."""
+    from virtualwork import MechanismError
+
+    try:
+        yield
+    except MechanismError as error:
+        raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
 
 
 _KNOWN = {

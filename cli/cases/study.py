@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.cases import poses, remarks
-from cli.cases.analysis import Analysis, naming
+from cli.cases.analysis import Analysis
 from cli.cases.case import Case, Study, like
 from cli.show.result import Result, Section, Sheet
 from cli.show.terminal import progress
@@ -250,7 +250,6 @@ class PoseStudy(Study):
             sheets=lambda: [Sheet("", self.sections(a, tables), lambda: self.figure(a))],
             warnings=case.warnings(),
             failed=lambda: not any(a.assembled(motion).any() for motion in a.motions),
-            within=partial(naming, a.file),
         )
 
     def sections(self, analysis: Analysis, tables: Mapping[str, Callable[[], Table]]) -> list[Section]:

@@ -13,7 +13,7 @@ from typing import Any
 
 from dalembert.errors import DataError, quote
 from dalembert.hints import nearest
-from dalembert.tables.files import read_bytes
+from dalembert.tables.files import read_toml
 from dalembert.units import composed
 
 COMMANDS = (
@@ -114,15 +114,7 @@ def read_exercise(path: str) -> Exercise:
     DataError
         With the place in the file, what stands there and what was expected.
     """
-    import tomllib
-
-    file, data = read_bytes(path)
-    try:
-        table = tomllib.loads(data.decode("utf-8-sig"))
-    except UnicodeDecodeError:
-        raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
-    except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{file}: this is no TOML: {error}") from None
+    file, table = read_toml(path)
     place = _Place(file)
     place.known(table, KEYS, "")
     words = _command(place, place.text(table, "command", 'such as "balance rotor.csv --plane A:20mm"'))

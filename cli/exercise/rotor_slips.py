@@ -13,9 +13,9 @@ from balancing import correct
 from cli.exercise.answers import Answer
 from cli.exercise.slips import Candidates, Change, Pairs, Slip, together
 from cli.exercise.variants import Variant
-from cli.exercise.work_slips import GRAVITIES
+from cli.exercise.work_slips import GRAVITIES, gravity
 from dalembert.angles import degrees
-from dalembert.units import parted, unit_name
+from dalembert.units import G0, parted, unit_name
 
 Complexes = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -72,7 +72,7 @@ def rotor(variant: Variant, answer: Answer) -> Rotor | None:
         return None
     options = [words[k + 1] for k, word in enumerate(words[:-1]) if word == "--plane"]
     files = [words[k + 1] for k, word in enumerate(words[:-1]) if word == "--planes"]
-    g = next((float(words[k + 1]) for k, word in enumerate(words[:-1]) if word == "--gravity"), 9.80665)
+    g = gravity(variant) or G0
     planes = from_table(files[0]) if files else from_options(options)
     read = read_rotors(words[1], g, needs_z=planes.several)
     if len(planes.name) > 2 or not len(planes.name) >= 1:

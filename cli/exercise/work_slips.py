@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -10,6 +11,7 @@ import numpy as np
 from cli.exercise.answers import Answer
 from cli.exercise.slips import Candidates, Change, Slip, of_sum
 from cli.exercise.variants import Variant
+from cli.read.options import components
 from dalembert.units import unit_name
 
 GRAVITIES = (9.81, 10.0, 9.80665, 9.8)
@@ -136,8 +138,7 @@ def gravity(variant: Variant) -> float:
     words = variant.problem.command
     if "--gravity" in words[:-1]:
         text = words[words.index("--gravity") + 1]
-        parts = [float(part) for part in text.split(",")]
-        return abs(complex(*parts)) if len(parts) == 2 else abs(parts[0])
+        return math.hypot(*components("--gravity", text, "acceleration", min(text.count(","), 2) + 1))
     if variant.problem.workshop.mechanism is not None:
         return abs(complex(variant.problem.workshop.described.mechanism.gravity))
     return 0.0

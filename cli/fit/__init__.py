@@ -36,8 +36,7 @@ def run(own: Options, show: ShowOptions) -> Result:
     file with the fitted numbers. --keep holds from the first to the last input of the target, over a whole turn where
     the input is free.
     """
-    from cli.cases.analysis import naming
-    from cli.cases.call import Call
+    from cli.cases.call import Call, naming
     from cli.fit.fitting import STARTS, Fits, aims, bounds
     from cli.fit.targets import kept
     from cli.read.options import bad

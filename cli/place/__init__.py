@@ -89,6 +89,12 @@ def run(
     each plane of each rotor is placed on its own.
     """
     every = read_corrections(corrections, rotor, plane)
+    stated = (
+        []
+        if remove or not every[0].removed
+        else [f"{corrections[0]}: its corrections are material to remove"]
+    )
+    remove = remove or every[0].removed
     radii = read_radii(at_radius, to_radius)
     drilled = read_drill(drill, density, drill_point, max_depth)
     in_stock, fixed = read_weights("--stock", stock), read_weights("--weights", weights)
@@ -136,7 +142,8 @@ def run(
         method=METHOD,
         sheets=None if alone else lambda: map(sheet, placings),
         about={"title": "Placement of a correction"},
-        warnings=[
+        warnings=stated
+        + [
             text if alone else f"{placing.of.name}: {text}"
             for placing in placings
             for text in placing.warnings

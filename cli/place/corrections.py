@@ -72,6 +72,8 @@ class Correction(NamedTuple):
     rotor: str
     plane: str
     vectors: list[Vector]
+    removed: bool = False
+    """Whether the file states that it is material to remove."""
 
     @property
     def unit(self) -> str:
@@ -145,12 +147,13 @@ def _of_json(path: str) -> list[Correction]:
     except (ValueError, RecursionError) as error:
         raise DataError(f"{file}: no valid JSON: {error}") from None
     try:
+        removed = document.get("correction") == "remove"
         corrections = [
-            Correction(str(rotor["rotor"]), str(one["plane"]), [_vector(one)])
+            Correction(str(rotor["rotor"]), str(one["plane"]), [_vector(one)], removed)
             for rotor in document["rotors"]
             for one in rotor["corrections"]
         ]
-    except (KeyError, TypeError, ValueError):
+    except (AttributeError, KeyError, TypeError, ValueError):
         corrections = []
     if not corrections:
         raise DataError(

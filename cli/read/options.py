@@ -193,32 +193,30 @@ def exact_places(
     return [start + way * Fraction(360 * k, blades) for k in range(blades)]
 
 
-def plane_vector(flag: str, text: str) -> complex:
-    """Read `X,Y` in SI as x + iy."""
-    from dalembert.quantities import parse_number
-
-    parts = text.split(",")
-    try:
-        if len(parts) != 2:
-            raise ValueError
-        return complex(parse_number(parts[0]), parse_number(parts[1]))
-    except ValueError:
-        raise bad(flag, f"'{text}': expected two numbers X,Y, such as 0,-9.81") from None
+def plane_vector(flag: str, text: str, dimension: str) -> complex:
+    """Read `X,Y` as x + iy, in units as `vector` does."""
+    return complex(*components(flag, text, dimension, 2))
 
 
 def vector(flag: str, text: str | None, dimension: str) -> tuple[float, float, float] | None:
     """Read `x,y,z` in SI, or in the units that stand with the numbers; a unit behind the last serves all without one."""
     if text is None:
         return None
+    x, y, z = components(flag, text, dimension, 3)
+    return x, y, z
+
+
+def components(flag: str, text: str, dimension: str, count: int) -> list[float]:
+    """Read one, two or three numbers between commas, in units as `vector` does."""
     parts = [part.strip() for part in text.split(",")]
-    if len(parts) != 3:
-        raise bad(flag, f"'{text}': expected three numbers x,y,z")
+    expected = ("a number", "two numbers X,Y", "three numbers x,y,z")[count - 1]
+    if len(parts) != count:
+        raise bad(flag, f"'{text}': expected {expected}")
     try:
         numbers = [_number_and_unit(part, dimension) for part in parts]
     except ValueError as error:
-        raise bad(flag, f"'{text}': expected three numbers x,y,z: {error}") from None
-    x, y, z = (_in_si(value, dimension, unit or numbers[2][1]) for value, unit in numbers)
-    return x, y, z
+        raise bad(flag, f"'{text}': expected {expected}: {error}") from None
+    return [_in_si(value, dimension, unit or numbers[-1][1]) for value, unit in numbers]
 
 
 def _number_and_unit(text: str, dimension: str) -> tuple[float, str]:

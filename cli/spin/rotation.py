@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -16,7 +15,7 @@ from cli.read.about import about
 from dalembert.errors import DataError
 from dalembert.hints import nearest
 from dalembert.results.columns import finite
-from dalembert.tables.files import read_bytes, remember
+from dalembert.tables.files import read_toml, remember
 from dalembert.units import LARGEST
 from rigidbody3d import Body, FreeBody, FreeState, Top, TopState, Trajectory, check, integrate, principal
 from rigidbody3d import cones as cones_of
@@ -69,13 +68,7 @@ class TurningBody:
 def read_body(path: str) -> TurningBody:
     """Read BODY.toml."""
     remember(path)
-    file, data = read_bytes(path)
-    try:
-        document = tomllib.loads(data.decode("utf-8-sig"))
-    except ValueError as error:
-        raise DataError(f"{file}: {error}") from None
-    except RecursionError:
-        raise DataError(f"{file}: no valid TOML: nested too deeply") from None
+    file, document = read_toml(path)
     for key in document:
         if key not in KEYS:
             raise DataError(f"{file}: unknown key '{key}': expected {', '.join(KEYS)}{nearest(key, KEYS)}")

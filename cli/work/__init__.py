@@ -33,7 +33,7 @@ def run(states: str, gravity: str | None = None, ledger: bool = False) -> Result
     torque cell holds ?; several unknowns are marked ?NAME and need as many velocity fields, distinguished by a
     column field.
     """
-    g = 0j if gravity is None else options.plane_vector("--gravity", gravity)
+    g = 0j if gravity is None else options.plane_vector("--gravity", gravity, "acceleration")
     from cli.show.result import Result
     from cli.work.power import WorkBalance
     from cli.work.states import read_states

@@ -6,6 +6,7 @@ import os
 import sys
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from dalembert.errors import DataError
 
@@ -67,6 +68,28 @@ def read_bytes(path: str) -> tuple[str, bytes]:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise DataError(f"{file}: {reason}") from None
+
+
+def read_toml(path: str) -> tuple[str, dict[str, Any]]:
+    """Read a TOML file: what messages call it, and what it holds.
+
+    Raises
+    ------
+    DataError
+        The file cannot be read, is no text, or is no valid TOML.
+    """
+    import tomllib
+
+    file, data = read_bytes(path)
+    try:
+        return file, tomllib.loads(data.decode("utf-8-sig"))
+    except UnicodeDecodeError:
+        raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
+    except RecursionError:
+        raise DataError(f"{file}: no valid TOML: nested too deeply") from None
+    except ValueError as error:
+        # a TOMLDecodeError, or a number of thousands of digits
+        raise DataError(f"{file}: no valid TOML: {error}") from None
 
 
 def is_input(path: str | Path) -> bool:

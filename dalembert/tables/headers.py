@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
-from dalembert.tables.files import read_bytes
+from dalembert.tables.files import read_toml
 from dalembert.units import AMPLITUDES, TAGS, UNITS, dimensions, find_unit, nearest_unit, parted, unit_name
 
 # compiled where a header is so written
@@ -98,13 +98,7 @@ def rename(names: Mapping[str, str]) -> None:
 
 def rename_from(path: str) -> None:
     """Take the headers of `--columns FILE.toml` for this call; where `--column` has the same name, that one holds."""
-    import tomllib
-
-    try:
-        stored = tomllib.loads(read_bytes(path)[1].decode("utf-8-sig"))
-    except ValueError as error:
-        raise DataError(f"{path}: {error}") from None
-    for name, header in stored.items():
+    for name, header in read_toml(path)[1].items():
         if not isinstance(header, str):
             raise DataError(f'{path}: {name}: expected a header in quotes, such as mass_g = "Masse"')
         _renamed.setdefault(name, header.strip())

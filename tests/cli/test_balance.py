@@ -422,3 +422,16 @@ def test_residual_couple_of_a_correction_whose_place_is_not_stated(dalembert: Da
         for rotor in json.loads(dalembert(*asked, "--plane", plane, stdin=table).stdout)["rotors"]
     ]
     assert couples == [(pytest.approx(0.0027), None), (pytest.approx(0.0027), pytest.approx(0.0054))]
+
+
+@pytest.mark.parametrize("gravity", ["9.81", "9.81m_s2", "9810 mm/s2"])
+def test_gravity_takes_a_unit(gravity: str, dalembert: Dalembert) -> None:
+    """As other options do: 9.81 N at 10 mm is 1 kg, in `work` too."""
+    table = "weight_N,radius_mm,angle_deg\n9.81,10,0\n"
+    done = dalembert("balance", "-", "--plane", "A:10mm", "--gravity", gravity, "--json", stdin=table)
+    (row,) = json.loads(done.stdout)["rotors"][0]["corrections"]
+    assert row["mass_kg"] == pytest.approx(1, rel=1e-15)
+    states = "link,mass_kg,vy_m_s,torque_N_m,omega_rad_s\n2,1,1,?,1\n"
+    done = dalembert("work", "-", "--gravity", f"0,-{gravity}", "--json", stdin=states)
+    (unknown,) = json.loads(done.stdout)["steps"][0]["unknowns"]
+    assert unknown["value"] == pytest.approx(9.81, rel=1e-15)

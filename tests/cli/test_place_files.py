@@ -119,3 +119,21 @@ def test_what_goes_beside_is_not_put_over_an_input(dalembert: Dalembert, solved:
     assert done.returncode == 2
     assert not (solved / "x.csv").exists()
     assert (solved / "pump.csv").read_bytes() == before
+
+
+def test_material_to_remove_is_drilled_where_it_stands(dalembert: Dalembert, tmp_path: Path) -> None:
+    """The JSON of `balance --remove` was read as masses to add: the hole came out half a turn off."""
+    table = "unbalance_g_mm,angle_deg\n100,60\n"
+    for remove in ((), ("--remove",)):
+        done = dalembert("balance", "-", "--plane", "A:10mm", *remove, "-o", "fix.json", stdin=table)
+        assert done.returncode == 0, done.stderr
+        drilled = json.loads(
+            dalembert("place", "fix.json", "--drill", "10mm", "--density", "7850kg_m3", "--json").stdout
+        )
+        (hole,) = drilled["masses"]
+        assert (hole["angle_deg"], hole["mass_kg"]) == (pytest.approx(60), pytest.approx(0.01))
+    on_blades = json.loads(dalembert("place", "fix.json", "--blades", "6", "--json").stdout)
+    assert (on_blades["action"], on_blades["warnings"]) == (
+        "remove",
+        ["fix.json: its corrections are material to remove"],
+    )

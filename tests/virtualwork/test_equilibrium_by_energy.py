@@ -245,3 +245,19 @@ def test_equilibria_in_any_unit(scale: float) -> None:
         assert math.cos(e.inputs[0]) == pytest.approx(-(e.inputs[0] - 0.7) / 3, abs=1e-13)
         assert e.stiffness == pytest.approx(G * scale * bend, rel=1e-12)
         assert e.stable is (bend > 0)
+
+
+def test_rest_of_a_block_that_runs_away_where_its_guides_are_parallel() -> None:
+    """A block of 1 kg on a turning bar and a vertical line at 1 m: V = m g tan θ − T θ, endless at 90°."""
+    m = Mechanism(
+        {"O": 0j},
+        {"bar": Link({"O": 0j}), "block": Link({"B": 0j, "C": 0j}, 1.0)},
+        [Guide("B", "block", on="bar", turned=0.0), Guide("C", "block", through=1.0, angle=math.pi / 2)],
+        inputs=Input(link="bar"),
+        gravity=-G * 1j,
+        torques=[Torque("bar", 4 * G)],
+        guess=Guess(0.0, {}, {"B": 1.0}),
+    )
+    rest = m.equilibria().found
+    assert [e.stable for e in rest] == [True, False, True, False]
+    assert np.allclose(np.degrees([e.inputs[0] for e in rest]), [60, 120, 240, 300], rtol=0, atol=1e-10)

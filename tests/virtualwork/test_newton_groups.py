@@ -12,6 +12,7 @@ from dalembert.arithmetic.tape import Tape
 from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
 from virtualwork.formulas import group_loops
 from virtualwork.formulas.group_loops import Loops
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.newton import newton
 from virtualwork.formulas.numbers import inverse_norm, solve, solve_columns, stack
 from virtualwork.formulas.positions import State
@@ -175,6 +176,16 @@ def test_many_poses_close_as_each_of_them_alone() -> None:
         if closed[i]:
             assert np.abs(alone[0] - x[i]).max() < 1e-15
             assert m.motion(q[i]).link("coupler").angle == pytest.approx(x[i, :1], abs=1e-15)
+
+
+def test_a_part_of_a_sweep_has_the_digits_of_the_whole() -> None:
+    """Few poses are searched for one by one on floats; not those that are a part of many."""
+    m = triad()
+    q = np.linspace(1.2, 1.8, 300)
+    whole = Lanes(m.assembly, q)
+    part = Lanes(m.assembly, q[40:45], block_of=len(q))
+    assert part.assembled.all()
+    assert part.angle("coupler").tolist() == whole.angle("coupler")[40:45].tolist()
 
 
 @pytest.mark.parametrize("many", [False, True])

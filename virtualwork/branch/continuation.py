@@ -50,12 +50,21 @@ class Continuation:
         q = track.start
         rate, det = self._rate(self._state(q), x)
         self.q, self.x, self.rate, self.det = [q], [x], [rate], [det]
+        # as arrays, until more are laid down
+        self._nodes: tuple[Reals, Reals, Reals] = (np.empty(0),) * 3
         self.stopped = {1: False, -1: False}
         # the last one that was taken
         self.step = {1: np.inf, -1: np.inf}
         # the input of the guess and its neighbours', where the branch stands upright over it
         self.upright: tuple[float, float, float] | None = None
         self._begin_upright()
+
+    @property
+    def nodes(self) -> tuple[Reals, Reals, Reals]:
+        """The nodes in the order of their inputs: these, (n,), unknowns and rates, (n, unknowns)."""
+        if len(self._nodes[0]) != len(self.q):
+            self._nodes = np.array(self.q), np.array(self.x), np.array(self.rate)
+        return self._nodes
 
     def _state(self, q: float) -> State:
         """What the group depends on at one input."""
@@ -238,10 +247,11 @@ class Continuation:
     def singular(self) -> bool:
         """Whether the Jacobian is singular at all nodes."""
         some = np.unique(np.linspace(0, len(self.q) - 1, 24).astype(int))
-        st = State([np.array(self.q)[some]])
+        q, x, _ = self.nodes
+        st = State([q[some]])
         with np.errstate(all="ignore"):
             self.track.run(self.before, st)
-        return singular(self.loops.over(st)(np.array(self.x)[some])[1])
+        return singular(self.loops.over(st)(x[some])[1])
 
     @property
     def crossings(self) -> list[float]:
@@ -360,7 +370,7 @@ class Continuation:
     def close(self, st: State) -> None:
         """Close the group at a state's poses."""
         q = self.in_period(np.atleast_1d(np.asarray(st.inputs[0], dtype=float)))
-        nodes, x, rate = np.array(self.q), np.array(self.x), np.array(self.rate)
+        nodes, x, rate = self.nodes
         if len(nodes) == 1:
             start = x[0] + np.outer(q - nodes[0], np.nan_to_num(rate[0]))
             inside = np.ones(len(q), dtype=bool)

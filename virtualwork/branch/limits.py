@@ -209,7 +209,7 @@ class Reach:
         for x in track.brackets:
             here = x.group, x.low, x.high
             if here not in self._crossings:
-                self._crossings[here] = crossing(partial(track.margin, by_name[x.group]), x.low, x.high)
+                self._crossings[here] = crossing(partial(track.margin_at, by_name[x.group]), x.low, x.high)
             q, side = self._crossings[here]
             limits.append(Limit(x.group, q + x.on, side))
         for name, way in track.continuations.items():
@@ -272,24 +272,24 @@ class Reach:
 
     def _left(self, group: Group, inputs: tuple[float, ...]) -> Gap | None:
         """The least gap that Newton-Raphson leaves in a group without a closed form, from the guess's own pose on."""
-        many, assembly = State([np.array([q]) for q in inputs]), self.track.assembly
-        self.track.run(assembly.needed(assembly.plan.writes(group)), many)
-        unknowns = [*(many.turn[b] for b in group.members), *(many.slide[s] for s in group.slides)]
-        if all(np.isfinite(value).all() for value in unknowns):
+        assembly = self.track.assembly
+        st = self.track.pose(assembly.needed(assembly.plan.writes(group)), inputs)
+        unknowns = [*(st.turn[b] for b in group.members), *(st.slide[s] for s in group.slides)]
+        if np.isfinite(unknowns).all():
             return None
         start = np.asarray(assembly.starts[group.name], dtype=float)[None]
         loops = assembly.loops(group)
-        x, _ = newton(loops, many, start, assembly.mechanism.size)
-        gap = float(np.linalg.norm(loops.over(many)(x)[0]))
+        x, _ = newton(loops, st, start, assembly.mechanism.size)
+        gap = float(np.linalg.norm(loops.over(st)(x)[0]))
         return Gap(gap, 0.0, "its loops stay {by} apart where they come nearest")
 
 
-def crossing(margin: Callable[[Reals], Reals], a: float, b: float) -> tuple[float, int]:
+def crossing(margin: Callable[[float], float], a: float, b: float) -> tuple[float, int]:
     """The radicand's crossing between a and b: regula falsi (Illinois), then the last bits by bisection.
 
     Returns it, and on which side of it the group is assembled, ±1.
     """
-    fa, fb = (float(margin(np.array([q]))[0]) for q in (a, b))
+    fa, fb = margin(a), margin(b)
     side = -1 if fa >= 0 else 1
     for _ in range(200):
         if fa == 0 or fb == 0 or abs(b - a) <= 2 * EPS * max(abs(a), abs(b)):
@@ -299,7 +299,7 @@ def crossing(margin: Callable[[Reals], Reals], a: float, b: float) -> tuple[floa
             q = (a + b) / 2
             if q in (a, b):
                 break
-        f = float(margin(np.array([q]))[0])
+        f = margin(q)
         if (f >= 0) != (fb >= 0):
             a, fa = b, fb
         else:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import Case
-from virtualwork.formulas.numbers import EPS, Complexes, Reals
+from virtualwork.formulas.numbers import EPS, Complexes, Number, Reals
 from virtualwork.formulas.positions import State
 
 # rad: what a body that a gear drives may turn between two samples
@@ -176,6 +176,13 @@ def depths(case: Case, st: State, size: float) -> tuple[float, float]:
     if not (shortest > 0 and np.isfinite(far)):
         return 1.0, 256 * EPS
     return level, 256 * EPS * (1 + far / shortest) * level
+
+
+def vanishes(margin: Number, noise: float) -> bool:
+    """Whether a radicand is zero to rounding wherever there is one."""
+    m = np.abs(np.atleast_1d(margin))
+    m = m[np.isfinite(m)]
+    return len(m) > 4 and bool((m <= noise).all())
 
 
 # --- the lowest point of a radicand ---------------------------------------------------------------------------------

@@ -30,6 +30,7 @@ from virtualwork.branch.sampling import (
     refined,
     touched,
     turns_far,
+    vanishes,
 )
 from virtualwork.describe import MechanismError
 from virtualwork.formulas.numbers import Complexes, Number, Reals
@@ -292,6 +293,11 @@ class Track:
             self.run(self.assembly.needed(self.plan.writes(group)), st)
         return np.broadcast_to(st.margin[group.name], q.shape).astype(float)
 
+    def margin_at(self, group: Group, q: float) -> float:
+        """The group's radicand at one input."""
+        st = self.pose(self.assembly.needed(self.plan.writes(group)), (q,))
+        return float(np.ravel(st.margin[group.name])[0])
+
     def _scan(self, a: float, b: float) -> None:
         """Look through the inputs from a to b, group by group in their order."""
         step = (b - a) / SAMPLES
@@ -452,10 +458,3 @@ class Track:
             from virtualwork.branch.lines import along_lines
 
             along_lines(self, group, st)
-
-
-def vanishes(margin: Number, noise: float) -> bool:
-    """Whether a radicand is zero to rounding wherever there is one."""
-    m = np.abs(np.atleast_1d(margin))
-    m = m[np.isfinite(m)]
-    return len(m) > 4 and bool((m <= noise).all())

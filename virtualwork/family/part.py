@@ -448,4 +448,4 @@ def seeds_of(own: Assembly, low: float, high: float) -> Seeds:
         except MechanismError:
             return {}
         ways = own.track.continuations
-        return {name: (np.array(way.q), np.array(way.x)) for name, way in ways.items()}
+        return {name: way.nodes[:2] for name, way in ways.items()}

@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache, partial
+from itertools import repeat
 from typing import Any
 
 import numpy as np
 
-from dalembert.arithmetic.engines import floats, run
+from dalembert.arithmetic.engines import floats, lanes_in_all, run
 from dalembert.arithmetic.guard import Lock, guarded, own_lock
 from dalembert.arithmetic.recorded import RECORDED, Recorder, squared
 from dalembert.arithmetic.tape import Tape
@@ -34,6 +35,8 @@ HALVED = 12
 LARGEST = 1e300
 # unknowns up to which the linear system of a step is on the tape
 WHOLE = 8
+# poses up to which a search is faster on floats, one by one
+FEW = 64
 
 
 def write_unknowns(group: Group, st: State, x: Reals) -> None:
@@ -256,7 +259,7 @@ def _pattern(group: Group) -> tuple[Group, list[float]]:
     constants: list[float] = []
 
     def one(value: float) -> float:
-        constants.extend([value] if value else [])
+        constants.extend([float(value)] if value else [])
         return 1.0 if value else 0.0
 
     closures = tuple(
@@ -314,32 +317,51 @@ class Loops:
         """Where a damped Newton search of so many steps ends, (n, unknowns), and the gap that it leaves, (n,) m."""
         of, fixed, (n, count) = self._of, [*self._fixed(st), size], start.shape
         order = (*of.constants, *of.enters, "size", *of.unknowns, *of.directions, *SEARCH)
+        order = order if of.whole else (*order, *of.solved)
         state = np.zeros((2 * count + len(SEARCH), n))
         state[:count] = start.T
         state[2 * count :].T[:] = np.inf, np.inf, 1.0, 1.0, limit + 1.0
-        if n == 1 and of.whole and _one_pose(fixed) and floats.takes(of.search):
-            function, values = floats.compiled(of.search, among=order), tuple(state[:, 0].tolist())
-            try:
-                while values[-1] > 0:
-                    values = function(*fixed, *values)
-                return np.array([values[:count]]), np.array([values[2 * count]])
-            except (ZeroDivisionError, ValueError, OverflowError):
-                # a singular pose: numpy goes on with infinity and NaN
-                pass
-        going = np.arange(n)
+        # the digits of a pose depend on how many there are in all, and of one pose on nothing
+        one, few = _one_pose(fixed), lanes_in_all(n) <= FEW
+        on_floats, going = floats.takes(of.search), np.arange(n)
         while going.size:
             here = [value[going] if isinstance(value, np.ndarray) else value for value in fixed]
             rows = state[:, going]
-            named = dict(zip(order, (*here, *rows), strict=True))
-            if not of.whole:
-                x, d, factor = rows[:count], rows[count : 2 * count], rows[2 * count + 2]
-                f, jacobian = self._linear(here[:-1], (x + factor * d).T)
-                after = np.sqrt((f * f).sum(axis=1))
-                named |= zip(of.solved, (after, *solve(jacobian, -f).T), strict=True)
-            result = np.asarray(run(of.search, named, "numpy").table)
+            if on_floats and (few or (one and going.size <= FEW)):
+                step = floats.compiled(of.search, among=order)
+                lanes = (v.tolist() if isinstance(v, np.ndarray) else repeat(v, going.size) for v in here)
+                pairs = zip(zip(*lanes, strict=True), rows.T.tolist(), strict=True)
+                result = np.array([self._alone(step, own, values) for own, values in pairs]).T
+                # at a singular pose numpy goes on with infinity and NaN
+                on_floats = False
+            else:
+                named = dict(zip(order, (*here, *rows, *self._solved(here, rows)), strict=True))
+                result = np.asarray(run(of.search, named, "numpy").table)
             state[:, going] = result
             going = going[result[-1] > 0]
         return state[:count].T, state[2 * count]
+
+    def _alone(
+        self, step: Callable[..., Sequence[float]], fixed: Sequence[float], state: Sequence[float]
+    ) -> Sequence[float]:
+        """The state of a search in one pose after all its steps, or as far as Python's floats go."""
+        try:
+            while state[-1] > 0:
+                state = step(*fixed, *state, *self._solved(fixed, state))
+        except (ZeroDivisionError, ValueError, OverflowError):
+            pass
+        return state
+
+    def _solved(self, fixed: Sequence[Number], state: Any) -> Sequence[Number]:
+        """The gap after the step that a search is about to try, and the next step, where its tape has none."""
+        if self._of.whole:
+            return ()
+        rows = np.asarray(state).reshape(len(state), -1)
+        count = len(self._of.unknowns)
+        x, d, factor = rows[:count], rows[count : 2 * count], rows[2 * count + SEARCH.index("factor")]
+        f, jacobian = self._linear(list(fixed[:-1]), (x + factor * d).T)
+        result = np.sqrt((f * f).sum(axis=1)), *solve(jacobian, -f).T
+        return result if np.ndim(state) > 1 else [float(value[0]) for value in result]
 
     def stands(self, st: State) -> Any:
         """Whether all that the group depends on is assembled: bool, or array (n,) of bool.

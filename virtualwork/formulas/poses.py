@@ -14,6 +14,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.engines import as_part
 from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.describe.description import Description
 from virtualwork.formulas.kinematics import Angle, Kinematic, Partial, Point
@@ -298,6 +299,15 @@ class Poses:
         new = self._new(self._steps(targets), 0, -2)
         if not new:
             return
+        # a part of a sweep has the digits of the whole
+        if self.block_of:
+            as_part(self.block_of, self._place, new)
+        else:
+            self._place(new)
+        self._note(new, 0, -2)
+
+    def _place(self, new: list[Step]) -> None:
+        """Do the steps that are new."""
         states = self.states()
         with np.errstate(all="ignore"):
             for i, st in enumerate(states):
@@ -306,13 +316,8 @@ class Poses:
                 except (ZeroDivisionError, OverflowError):
                     # one pose on Python numbers at a singular place: the same again on arrays
                     states[i] = State([np.array([q]) for q in st.inputs])
-                    run(
-                        [*(step for step, k in self._solved if not k), *new],
-                        states[i],
-                        self._close,
-                        self._plain,
-                    )
-        self._note(new, 0, -2)
+                    done = (step for step, k in self._solved if not k)
+                    run([*done, *new], states[i], self._close, self._plain)
 
     def advance(self, targets: Iterable[str], order: int, which: int = -1) -> None:
         """Work out the derivatives of one pose: along the motion (−1), or over input `which` alone.

@@ -179,10 +179,11 @@ def _one(assembly: Assembly, span: Reals, samples: int) -> Equilibria:
     good = np.isfinite(force)
     if not good.any():
         return Equilibria(())
-    scale = float(size[good].max())
+    # beside a limit the loads' work grows without bound: that is no measure of it elsewhere
+    largest, scale = float(size[good].max()), _usual(size[good])
     # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart; but for dwells
     cams = bool(assembly.mechanism.cams)
-    if not (np.max if cams else np.median)(np.abs(force[good])) > 1e-12 * scale:
+    if not (np.max if cams else np.median)(np.abs(force[good])) > 1e-12 * (largest if cams else scale):
         return Equilibria((), everywhere=True, loaded=scale > 0)
     ends = _towards_limits(assembly, q, good)
     if len(ends):
@@ -205,7 +206,7 @@ def _one(assembly: Assembly, span: Reals, samples: int) -> Equilibria:
         roots += list(_refine(assembly, q[here], q[here + 1], force[here], force[here + 1]))
     # a root that the force only touches: its derivative changes sign where it is small
     touch = np.flatnonzero(good[:-1] & good[1:] & (sign[:-1] * sign[1:] > 0) & (slope[:-1] * slope[1:] < 0))
-    touch = touch[np.minimum(np.abs(force[touch]), np.abs(force[touch + 1])) < 1e-4 * scale]
+    touch = touch[np.minimum(np.abs(force[touch]), np.abs(force[touch + 1])) < 1e-4 * largest]
     if len(touch):
         flat = _refine(assembly, q[touch], q[touch + 1], slope[touch], slope[touch + 1], order=1)
         value, around = (v[:, 0] for v in Rest(assembly, flat[:, None]).force())
@@ -223,6 +224,16 @@ def _one(assembly: Assembly, span: Reals, samples: int) -> Equilibria:
     unit = 1.0 if not assembly.mechanism.inputs[0].is_slide else assembly.track.length
     distinct = [root for i, root in enumerate(roots) if i == 0 or root - roots[i - 1] > 1e-8 * unit]
     return _judged(assembly, np.array(distinct)[:, None], scale)
+
+
+def _usual(size: Reals) -> float:
+    """The middle one of the sizes that are not zero; 0 where none is.
+
+    >>> _usual(np.array([0.0, 1.0, 2.0, 1e14]))
+    2.0
+    """
+    some = size[size > 0]
+    return float(np.median(some)) if len(some) else 0.0
 
 
 def _towards_limits(assembly: Assembly, q: Reals, good: NDArray[np.bool_]) -> Reals:
@@ -302,10 +313,10 @@ def _many(assembly: Assembly, ranges: Reals) -> Equilibria:
     if not good.any():
         return Equilibria(())
     x = x[good]
-    scale = float(size[good].max())
+    largest, scale = float(size[good].max()), _usual(size[good])
     # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart; but for dwells
     cams = bool(assembly.mechanism.cams)
-    if not (np.max if cams else np.median)(np.abs(force[good])) > 1e-12 * scale:
+    if not (np.max if cams else np.median)(np.abs(force[good])) > 1e-12 * (largest if cams else scale):
         return Equilibria((), everywhere=True, loaded=scale > 0)
     # the most promising starts: where no neighbour is nearer to balance would do; a few hundred suffice
     x = x[np.argsort(np.abs(force[good]).max(axis=1))[:400]]

@@ -47,7 +47,7 @@ def read(file: str, root: Element) -> Robot:
         held = _inertial(at, child(e, "inertial"))
         robot.add(RobotLink(name, np.eye(4), held, shapes=_shapes(at, e)))
     if not robot.links:
-        raise DataError(f"{file}: <robot>: no link")
+        raise DataError(f"{file}: <robot>: no link: expected one or more")
     _tree(robot, joints)
     for e in children(root, "loop_joint"):
         _loop(robot, e)

@@ -227,9 +227,14 @@ class Repeated:
         return (table[:-1], bool((table[-1] > 0).all())) if self.tested else (table, True)
 
 
+def lanes_in_all(n: int) -> int:
+    """The lanes of the whole work of which n lanes are a part (`as_part`); n where they are no part."""
+    return _whole.get() or n
+
+
 def chosen(tape: Tape, n: int) -> str:
     """The engine for n lanes: compiled code only once the tape has been asked for so often that it pays."""
-    if (_whole.get() or n) <= FEW:
+    if lanes_in_all(n) <= FEW:
         return "python"
     return "llvm" if work_on(tape, n) > PAYS else "numpy"
 
