@@ -9,20 +9,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from fractions import Fraction
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.doubled import PI, Doubled
+from dalembert.arithmetic.doubled import Doubled
 from dalembert.arithmetic.doubled_functions import (
     DOUBLED,
+    constant,
     direction,
     exponential,
+    hypot,
     logarithm,
+    rint,
     root,
 )
 from dalembert.arithmetic.doubled_vectors import OWN, Vectors, total
@@ -303,20 +304,11 @@ _COMPLEX: dict[Any, Callable[..., Any]] = {
 }
 
 
-@lru_cache(maxsize=256)
-def _constant(x: float) -> Doubled:
-    """A constant of a formula as it is written: a short decimal, or a simple fraction of π."""
-    share = Fraction(x / math.pi).limit_denominator(360) if math.isfinite(x) else Fraction(0)
-    if 0 < abs(share.numerator) <= 360 and abs(float(share) * math.pi - x) <= 2.0**-52 * abs(x):
-        return PI * Doubled.of(share)
-    return Doubled.of(Fraction(repr(x))) if len(repr(x)) < 9 and math.isfinite(x) else Doubled(x)
-
-
 def _entering(x: Any) -> Any:
     if isinstance(x, DoubledArray):
         return x
     if type(x) is float:
-        return DoubledArray.of(_constant(x))
+        return DoubledArray.of(constant(x))
     if isinstance(x, Doubled):
         return DoubledArray.of(x)
     return DoubledArray(x)
@@ -365,13 +357,6 @@ def _chosen(a: DoubledArray, b: DoubledArray, first: Any) -> DoubledArray:
     return DoubledArray(np.where(first, a.high, b.high), np.where(first, a.low, b.low))
 
 
-def _hypot(a: DoubledArray, b: DoubledArray) -> DoubledArray:
-    # by a power of two near the larger: no square underflows
-    size = np.exp2(np.floor(np.log2(np.maximum(np.maximum(np.abs(a.high), np.abs(b.high)), 1e-290))))
-    x, y = a / size, b / size
-    return np.sqrt(x * x + y * y) * size  # type: ignore[no-any-return]
-
-
 def _power(x: DoubledArray, y: DoubledArray) -> DoubledArray:
     """Whole powers, by squares."""
     left = np.abs(y.high).astype(np.int64)
@@ -415,12 +400,6 @@ def _zeros(like: DoubledArray, dtype: Any = float, shape: Any = None) -> Any:
     return DoubledComplex(real, imag) if dtype is complex else real
 
 
-def _rint(x: DoubledArray) -> DoubledArray:
-    near = np.rint(x.high)
-    rest = x - near
-    return DoubledArray(near + np.where(rest > 0.5, 1.0, np.where(rest < -0.5, -1.0, 0.0)))
-
-
 _UFUNCS: dict[Any, Callable[..., Any]] = {
     np.add: _of(lambda a, b: a + b),
     np.subtract: _of(lambda a, b: a - b),
@@ -431,7 +410,7 @@ _UFUNCS: dict[Any, Callable[..., Any]] = {
     np.square: _of(lambda x: x * x),
     np.power: _power,
     np.sqrt: _of(root),
-    np.hypot: _hypot,
+    np.hypot: _of(hypot),
     np.sin: _of(DOUBLED.sin),
     np.cos: _of(DOUBLED.cos),
     np.arctan2: _of(direction),
@@ -445,7 +424,7 @@ _UFUNCS: dict[Any, Callable[..., Any]] = {
     np.cosh: lambda x: (np.exp(x) + np.exp(-x)) / 2.0,
     np.tanh: lambda x: np.copysign(1.0 - 2.0 / (np.exp(np.abs(x) * 2.0) + 1.0), x),
     np.degrees: lambda x: x * 180.0 / math.pi,
-    np.rint: _rint,
+    np.rint: _of(rint),
     np.fmod: lambda x, y: x - y * np.trunc((x / y).value),
     # of whole numbers
     np.remainder: lambda x, y: DoubledArray(np.remainder(x.high, y.high)),

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -188,3 +189,27 @@ def logarithm(x: Doubled) -> Doubled:
     left = x * exponential(Doubled(-near)) - 1.0
     result: Doubled = left - left * left / 2.0 + near
     return result
+
+
+@lru_cache(maxsize=256)
+def constant(x: float) -> Doubled:
+    """A constant of a formula as it is written: a short decimal, or a simple fraction of π."""
+    share = Fraction(x / math.pi).limit_denominator(360) if math.isfinite(x) else Fraction(0)
+    if 0 < abs(share.numerator) <= 360 and abs(float(share) * math.pi - x) <= 2.0**-52 * abs(x):
+        return PI * Doubled.of(share)
+    return Doubled.of(Fraction(repr(x))) if len(repr(x)) < 9 and math.isfinite(x) else Doubled(x)
+
+
+def hypot(a: Doubled, b: Doubled) -> Doubled:
+    """√(a² + b²) of arrays, by a power of two near the larger: no square underflows."""
+    size = np.exp2(np.floor(np.log2(np.maximum(np.maximum(np.abs(a.high), np.abs(b.high)), 1e-290))))
+    x, y = a / size, b / size
+    result: Doubled = root(x * x + y * y) * size
+    return result
+
+
+def rint(x: Doubled) -> Doubled:
+    """The nearest whole numbers of arrays."""
+    near = np.rint(x.high)
+    rest = x - near
+    return Doubled(near + np.where((rest - 0.5).high > 0, 1.0, np.where((rest + 0.5).high < 0, -1.0, 0.0)))

@@ -6,6 +6,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from dalembert.angles import phasor
 from dalembert.arithmetic.doubled_arrays import DoubledArray
 
 
@@ -19,6 +20,9 @@ EACH = {
     "product": (lambda a, b: a * b, lambda x, y: x * y),
     "quotient": (lambda a, b: a / b, lambda x, y: x / y),
     "constant": (lambda a, _: 0.3 * a * np.pi, lambda x, _: x * 3 / 10 * mp.pi),
+    "degrees": (lambda a, _: a * (np.pi / 180), lambda x, _: x * mp.pi / 180),
+    "powers": (lambda a, _: a ** np.array([3.0] * 8), lambda x, _: x**3),
+    "rest": (lambda a, _: np.fmod(a, 0.25), lambda x, _: mp.sign(x) * (abs(x) % mp.mpf("0.25"))),
     "power": (lambda a, _: a**4, lambda x, _: x**4),
     "root": (lambda a, _: np.sqrt(np.abs(a)), lambda x, _: mp.sqrt(abs(x))),
     "hypot": (lambda a, b: np.hypot(a, b), mp.hypot),
@@ -80,3 +84,28 @@ def test_entries_are_set_without_touching_another_array() -> None:
     x[2] += 2.0
     assert x.off([0, 1 / 3, 2]).max() < 2e-17
     assert x.low[1] == 1.850371707708594e-17
+
+
+def test_running_sums_and_products() -> None:
+    x = DoubledArray(A.high, A.high * 1e-17)
+    with mp.workdps(50):
+        total, product = mp.mpf(0), mp.mpf(1)
+        for i, one in enumerate(exact(x)):
+            total, product = total + one, product * one
+            assert abs(exact(np.cumsum(x))[i] - total) < 1e-30
+            assert abs(exact(np.cumprod(x))[i] - product) < 1e-30 * max(1, abs(product))
+
+
+def test_complex_numbers() -> None:
+    z = phasor(A, 100.0 * B, "deg")
+    w = (1j * z + np.conj(z) * 2.0) / (z - 3.0)
+    with mp.workdps(50):
+        for i, (size, angle) in enumerate(zip(exact(A), exact(B), strict=True)):
+            true = size * mp.expj(mp.radians(100 * angle))
+            true = (1j * true + mp.conj(true) * 2) / (true - 3)
+            got = mp.mpc(exact(w.real[[i]])[0], exact(w.imag[[i]])[0])
+            assert abs(got - true) < 1e-29 * max(1, abs(true))
+            assert abs(exact(np.abs(w))[i] - abs(true)) < 1e-29 * max(1, abs(true))
+    quarter = phasor(DoubledArray([2.0]), DoubledArray([450.0]), "deg")
+    assert quarter.real.value == 0
+    assert quarter.imag.value == 2
