@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from decimal import ROUND_CEILING, Context
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -222,7 +223,9 @@ class _Limited:
             step, force = solve(problem)
             w = self._within(start + step)
             force = force[: len(self.cones[1])] / self._share
-            reached = self._judged(w, force, unit, problem.to_w, residual)
+            # of the step as it was solved: w is rounded, which shows where it leaves little
+            stepped = residual(self.a, self.b, start) + self.a @ step
+            reached = self._judged(w, stepped, force, unit, problem.to_w, residual)
             if best is None or reached.gap < best.gap:
                 best = reached
             if best.gap <= CLOSED:
@@ -292,8 +295,13 @@ class _Limited:
         length = 2 * np.hypot(most / unit, np.sqrt(len(self.limited)))
         return np.asarray(1.01 * length * np.linalg.norm(to_w, axis=1))
 
-    def _judged(self, w: Complex, y: Complex, unit: float, to_w: Complex, residual: Residual) -> Optimum:
-        """Hold what w leaves against the dual bound of the forces y of the cones."""
+    def _judged(
+        self, w: Complex, stepped: Complex, y: Complex, unit: float, to_w: Complex, residual: Residual
+    ) -> Optimum:
+        """Hold what w leaves against the dual bound of the forces y of the cones, and of those of the squares.
+
+        These are what w leaves, or what its numbers before rounding do (`stepped`): each proves a bound.
+        """
         left = residual(self.a, self.b, w)
         reach = self._reach(to_w, unit, left)
         # the rounding of a residual that is small against the readings is no gap
@@ -308,26 +316,35 @@ class _Limited:
         # orthogonal to them. Of large masses that leave little a limit may be missed by less than 1e-9 and yet be free
         none, size = np.zeros(len(w), dtype=bool), np.abs(w)
         near, nearest = (size < (1 - share) * self.limit for share in (1e-9, 64 * EPS))
-        for loose in (none, near, nearest, ~np.isfinite(self.limit)):
-            bound = max(bound, self._bound(w, y, unit, reach, loose, residual))
+        squares = [left] if self.squares is None else [left, stepped]
+        for loose, pull in product((none, near, nearest, ~np.isfinite(self.limit)), squares):
+            bound = max(bound, self._bound(w, (pull, y), unit, reach, loose, residual))
             if value - bound <= 32 * EPS * value:
                 break
         gap = max(value - bound - excused, 0.0) / value if value > 0 else 0.0
         return Optimum(w, bound, gap)
 
     def _bound(
-        self, w: Complex, y: Complex, unit: float, reach: Real, loose: NDArray[np.bool_], residual: Residual
+        self,
+        w: Complex,
+        pulls: tuple[Complex, Complex],
+        unit: float,
+        reach: Real,
+        loose: NDArray[np.bool_],
+        residual: Residual,
     ) -> float:
-        """Return the lower bound that the forces y prove, made orthogonal to the `loose` planes; the optimum is in `reach`.
+        """Return the lower bound that the forces of squares and cones prove, made orthogonal to the `loose` planes.
+
+        The optimum is in `reach`.
 
         The products with readings are taken as those with what w leaves, which is small: no digits cancel.
         """
         e, offset = self.cones
-        rows, at, forces = e, offset, y
+        rows, at, forces = e, offset, pulls[1]
         if self.squares is not None:
             # the squares in units in which they stand beside those of the limits
             rows, at = np.concatenate([self.a / unit, e]), np.concatenate([self.b / unit, offset])
-            forces = np.concatenate([(self.b + self.a @ w) / unit, y])
+            forces = np.concatenate([pulls[0] / unit, pulls[1]])
         if loose.any():
             u, sigma, _ = np.linalg.svd(columns_scaled(rows[:, loose])[0], full_matrices=False)
             u = u[:, sigma > 1e-13 * sigma[0]]

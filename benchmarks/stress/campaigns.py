@@ -27,6 +27,7 @@ MODULES = tuple(
         "solids",
         "gyroscopes",
         "topology_rates",
+        "loaded",
         "equilibria",
         "assemblies",
         "in_time",

@@ -18,7 +18,7 @@ from virtualwork import GROUND
 from virtualwork.branch.assembly import Assembly
 
 if TYPE_CHECKING:
-    from virtualwork import Guide
+    from virtualwork import Guide, TorsionSpring
     from virtualwork.describe.description import Description
     from virtualwork.motion import Motion
 
@@ -32,7 +32,7 @@ def along(angle: float) -> Any:
     return mp.mpc(d) if d in (1, -1, 1j, -1j) else mp.expj(mp.mpf(angle))
 
 
-def _ratio(part: Any) -> Any:
+def ratio(part: Any) -> Any:
     """The ratio of a gear, or of a belt by its radii."""
     if not hasattr(part, "radii"):
         return mp.mpf(part.ratio)
@@ -52,11 +52,21 @@ class Exact:
         Of the highest time derivative.
     inputs : sequence of mpf, optional
         The inputs, where a double is not exactly what is meant.
+    constants : sequence of mpf, optional
+        Those of gears and belts, then of racks, where their guess fixes them by way of loops.
     """
 
-    def __init__(self, motion: Motion, i: int = 0, order: int = 2, inputs: Series | None = None) -> None:
+    def __init__(
+        self,
+        motion: Motion,
+        i: int = 0,
+        order: int = 2,
+        inputs: Series | None = None,
+        constants: Series | None = None,
+    ) -> None:
         self.m: Description = motion.mechanism
         self.order = order
+        self.constants = constants
         self.links = list(self.m.links)
         with mp.workdps(DIGITS):
             self._start(motion, i, inputs)
@@ -81,13 +91,21 @@ class Exact:
             self.theta[link] = [mp.mpf(float(motion.link(link).angle[i])), *zero]
             self.origin[link] = [mp.mpc(complex(motion.at(link, 0j).complex(0)[i])), *zero]
         for j, entry in enumerate(self.m.inputs):
-            if entry.link is not None:
+            if entry.link is not None and self.constants is None:
                 self.theta[entry.link][0] = self.theta[entry.on][0] + self.drive[j][0]
+            elif entry.link is not None:
+                # in the turn of the answers
+                here = self.theta[entry.link][0] - self.theta[entry.on][0]
+                self.drive[j][0] += 2 * mp.pi * mp.nint((here - self.drive[j][0]) / (2 * mp.pi))
         self.turned = [self._whole(g) for g in self.m.guides]
         # where a relation does not hang on inputs alone: the double that the motion takes from the guess
-        self.seat = Assembly.from_guess(self.m).phases
+        self.seat: Any = Assembly.from_guess(self.m).phases if self.constants is None else self.constants
         self.toothed: list[Any] = [*self.m.gears, *self.m.belts]
-        self.phase = [self._phase(i, part) for i, part in enumerate(self.toothed)]
+        self.phase = (
+            [self._phase(i, part) for i, part in enumerate(self.toothed)]
+            if self.constants is None
+            else self.constants[: len(self.toothed)]
+        )
 
     def _whole(self, g: Guide) -> Any:
         """The angle of a slider's link to its guide's, in the turn of the start."""
@@ -106,7 +124,7 @@ class Exact:
                 at[e.link] = mp.mpf(float(q))
         if not {a, gear.arm} <= at.keys():
             return mp.mpf(self.seat[i])
-        r = _ratio(gear)
+        r = ratio(gear)
         guess = self.m.guess.angles
         phase = mp.mpf(guess.get(b, 0.0)) - r * at[a] + (r - 1) * at[gear.arm]
         self.theta[b][0] = phase + r * self.theta[a][0] - (r - 1) * self.theta[gear.arm][0]
@@ -191,7 +209,7 @@ class Exact:
                 angles((f"moment:{i}", g.link), [(g.link, 1), (g.on, -1)], [self.turned[i]])
         for i, gear in enumerate(self.toothed):
             a, b = gear.links
-            r = _ratio(gear)
+            r = ratio(gear)
             angles((f"gear:{i}", b), [(b, 1), (a, -r), (gear.arm, r - 1)], [self.phase[i]])
         for i, rack in enumerate(m.racks):
             g, r = m.guides[m.guide_at(rack.slider)], mp.mpf(rack.radius)
@@ -239,11 +257,12 @@ class Exact:
             return mp.re(rel[order]) * math.factorial(order)
 
     def _close(self) -> bool:
-        """Newton on all equations, until the step is below the last digits."""
-        scale = mp.mpf(self.m.size)
+        """Newton on all equations, until the step is below the last digits; with the same Jacobian while that converges fast."""
+        scale, before, fresh = mp.mpf(self.m.size), mp.inf, True
         for _ in range(60):
             rows = self._equations(0)
-            self._factor([row for _, row in rows])
+            if fresh:
+                self._factor([row for _, row in rows])
             if self._lu is None:
                 return False
             dx = self._solve([-value[0] for value, _ in rows])
@@ -257,6 +276,7 @@ class Exact:
                 return self._lu is not None
             if not step < 10:
                 return False
+            fresh, before = step > before * mp.mpf(10) ** -8, step
         return False
 
     # --- Gauss ----------------------------------------------------------------------------------------------------
@@ -264,16 +284,17 @@ class Exact:
         n = 3 * len(self.links)
         a = [[mp.mpf(row.get(c, 0)) for c in range(n)] for row in rows]
         order = list(range(len(a)))
+        size = [max((abs(v) for v in row), default=mp.mpf(0)) for row in a]
         self._lu: Any = None
         if len(a) != n:
             raise ValueError("redundant constraints: not for this engine")
         for k in range(n):
-            size = [max((abs(v) for v in a[i]), default=0) for i in range(n)]
-            p = max(range(k, n), key=lambda i: abs(a[i][k]) / size[i] if size[i] else 0)
+            p = max(range(k, n), key=lambda i: abs(a[i][k]) / size[i] if a[i][k] else 0)
             if a[p][k] == 0:
                 return
             a[k], a[p] = a[p], a[k]
             order[k], order[p] = order[p], order[k]
+            size[k], size[p] = size[p], size[k]
             for i in range(k + 1, n):
                 if a[i][k] != 0:
                     f = a[i][k] / a[k][k]
@@ -344,9 +365,19 @@ class Exact:
             found += [(a, za, pull, mp.mpf(0)), (b, zb, -pull, mp.mpf(0))]
         for ts in m.torsion_springs:
             angle, rate = (self.angle(ts.links[1], k) - self.angle(ts.links[0], k) for k in (0, 1))
-            torque = mp.mpf(ts.stiffness) * (angle - mp.mpf(ts.free_angle)) + mp.mpf(ts.damping) * rate
+            twist = angle - mp.mpf(ts.free_angle) - 2 * mp.pi * self._turns(ts, angle)
+            torque = mp.mpf(ts.stiffness) * twist + mp.mpf(ts.damping) * rate
             found += [(ts.links[0], 0j, mp.mpc(0), torque), (ts.links[1], 0j, mp.mpc(0), -torque)]
         return [load for load in found if load[0] != GROUND]
+
+    def _turns(self, spring: TorsionSpring, angle: Any) -> Any:
+        """The whole turns that a spring's angle counts too many, less than half a turn from the guess."""
+        guess = [0.0 if link == GROUND else self.m.guess.angles.get(link) for link in spring.links]
+        if None in guess:
+            return 0
+        drawn = mp.mpf(guess[1]) - mp.mpf(guess[0])
+        off = mp.nint((drawn - mp.mpf(spring.free_angle)) / (2 * mp.pi)) - spring.turns
+        return off + mp.nint((angle - drawn) / (2 * mp.pi))
 
     def _rack_guide(self, i: int) -> Guide:
         return self.m.guides[self.m.guide_at(self.m.racks[i].slider)]
@@ -354,16 +385,16 @@ class Exact:
     def _at_pitch_point(self, i: int, row: dict[int, Any]) -> None:
         """Let the tooth force act where the teeth meet: at the pitch point, on the rack's body and on the wheel."""
         rack, g = self.m.racks[i], self._rack_guide(i)
-        along = mp.expj(mp.mpf(g.angle)) * self.turn(g.on, 0)[0]
+        rail = along(g.angle) * self.turn(g.on, 0)[0]
         if rack.gear == g.link:
             wheel = self.series(rack.gear, self.m.bodies[rack.gear][g.point], 0)[0]
-            touch, bodies = wheel + 1j * mp.mpf(rack.radius) * along, ((g.link, 1), (g.on, -1))
+            touch, bodies = wheel + 1j * mp.mpf(rack.radius) * rail, ((g.link, 1), (g.on, -1))
         else:
             pin = next((p for p in self.m.bodies[rack.gear] if p in self.m.bodies[g.on]), None)
             if pin is None:
                 return
             wheel = self.series(rack.gear, self.m.bodies[rack.gear][pin], 0)[0]
-            touch, bodies = wheel - 1j * mp.mpf(rack.radius) * along, ((g.link, 1), (rack.gear, -1))
+            touch, bodies = wheel - 1j * mp.mpf(rack.radius) * rail, ((g.link, 1), (rack.gear, -1))
         # in a slot the link may turn: a block of no mass takes the teeth, pinned to the link, and its guide the moment
         seat = (
             touch
@@ -372,19 +403,19 @@ class Exact:
         )
         row.clear()
         if g.on != GROUND:
-            row[3 * self.links.index(g.on)] = mp.im(mp.conj(touch - seat) * along)
+            row[3 * self.links.index(g.on)] = mp.im(mp.conj(touch - seat) * rail)
         for body, sign in bodies:
             if body != GROUND:
                 c = 3 * self.links.index(body)
                 arm = (seat if body == g.link else touch) - self.origin[body][0]
-                row[c] = row.get(c, mp.mpf(0)) + sign * mp.im(mp.conj(arm) * along)
-                row[c + 1] = row.get(c + 1, mp.mpf(0)) + sign * mp.re(along)
-                row[c + 2] = row.get(c + 2, mp.mpf(0)) + sign * mp.im(along)
+                row[c] = row.get(c, mp.mpf(0)) + sign * mp.im(mp.conj(arm) * rail)
+                row[c + 1] = row.get(c + 1, mp.mpf(0)) + sign * mp.re(rail)
+                row[c + 2] = row.get(c + 2, mp.mpf(0)) + sign * mp.im(rail)
 
-    def generalized_loads(self) -> list[Any]:
-        """The work of the loads for each coordinate: θ, x, y of every link."""
+    def generalized_loads(self, loads: list[tuple[str, complex, Any, Any]] | None = None) -> list[Any]:
+        """The work of the loads, or of some, for each coordinate: θ, x, y of every link."""
         q = [mp.mpf(0)] * (3 * len(self.links))
-        for body, z, force, torque in self.loads():
+        for body, z, force, torque in self.loads() if loads is None else loads:
             c = 3 * self.links.index(body)
             arm = mp.mpc(z) * mp.expj(self.theta[body][0])
             q[c] += torque + mp.im(mp.conj(arm) * force)
@@ -393,7 +424,10 @@ class Exact:
         return q
 
     def forces(self) -> dict[tuple[str, str, int], Any]:
-        """The multipliers by label: ("pin:B", body, 0 or 1) the components on that body, ("input", "0", 0) the effort."""
+        """The multipliers by label: ("pin:B", body, 0 or 1) the components on that body, ("input", "0", 0) the effort.
+
+        NaN where friction does not settle.
+        """
         with mp.workdps(DIGITS):
             rows = [row for _, row in self._equations(0)]
             for (kind, which, _), row in zip(self.labels, rows, strict=True):
@@ -405,6 +439,53 @@ class Exact:
             for i in range(len(self.m.racks)):
                 self._at_pitch_point(i, rows[self.labels.index((f"rack:{i}", self._rack_guide(i).link, 0))])
             self._factor(rows)
-            return dict(
-                zip(self.labels, self._solve_transposed([-v for v in self.generalized_loads()]), strict=True)
-            )
+            free = self._solve_transposed([-v for v in self.generalized_loads()])
+            contacts = self._contacts()
+            per = [self._solve_transposed([-v for v in self.generalized_loads(of)]) for of, _, _ in contacts]
+            friction = self._settled(contacts, free, per)
+            borne = [
+                f + sum(x * own[i] for x, own in zip(friction, per, strict=True)) for i, f in enumerate(free)
+            ]
+            return dict(zip(self.labels, borne, strict=True))
+
+    def _contacts(self) -> list[tuple[list[tuple[str, complex, Any, Any]], list[int], Any]]:
+        """Of each contact that rubs: a unit of its friction as loads, the labels of what it bears, −μ or −μ r by its sense."""
+        m = self.m
+        result = []
+        for rub in m.friction:
+            bodies = m.pins.get(rub.joint)
+            if bodies is not None:
+                first, other = bodies
+                loads = [(other, 0j, mp.mpc(0), mp.mpf(1)), (first, 0j, mp.mpc(0), mp.mpf(-1))]
+                rate = self.angle(other, 1) - self.angle(first, 1)
+                bears = [self.labels.index((f"pin:{rub.joint}", other, part)) for part in (0, 1)]
+                arm = mp.mpf(rub.coefficient) * mp.mpf(rub.radius)
+            else:
+                i = m.guide_at(rub.joint)
+                g = m.guides[i]
+                z = m.links[g.link].points[g.point]
+                rail = along(g.angle) * self.turn(g.on, 0)[0]
+                there = (self.point(g.link, z, 0) - self.origin[g.on][0]) / self.turn(g.on, 0)[0]
+                loads = [(g.link, z, rail, mp.mpf(0)), (g.on, there, -rail, mp.mpf(0))]
+                rate, arm = self.slide(i, 1), mp.mpf(rub.coefficient)
+                bears = [self.labels.index((f"guide:{i}", g.link, 1))]
+            # parts that do not move against each other do not rub
+            sense = mp.sign(rate) if abs(rate) > mp.mpf(10) ** (10 - DIGITS) else 0
+            result.append(([load for load in loads if load[0] != GROUND], bears, -arm * sense))
+        return result
+
+    def _settled(self, contacts: list[Any], free: list[Any], per: list[list[Any]]) -> list[Any]:
+        """The friction of each contact, exchanged for what the contacts bear from none on until the two fit."""
+        friction = [mp.mpf(0)] * len(contacts)
+        for _ in range(1000 if contacts else 0):
+            new = []
+            for _, bears, arm in contacts:
+                parts = [
+                    free[i] + sum(x * own[i] for x, own in zip(friction, per, strict=True)) for i in bears
+                ]
+                new.append(arm * mp.hypot(*parts, *[0] * (2 - len(parts))))
+            change = max(abs(x - y) for x, y in zip(new, friction, strict=True))
+            friction = new
+            if change <= mp.mpf(10) ** (5 - DIGITS) * max(map(abs, friction)):
+                return friction
+        return [mp.nan] * len(contacts) if contacts else []

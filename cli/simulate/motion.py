@@ -130,14 +130,14 @@ class Motion(TableCase):
         values = inputs_of(m, q, v, acceleration, error)
         turned = {each.path[1]: angles for each, angles in values.items() if each.path[2] == "angle_deg"}
         driven = {e.link: turned[e.name] for e in m.inputs if not e.is_slide and e.on == GROUND}
-        values[ENERGY] = way.energy(t)
+        values[ENERGY] = way.energy(t, moved)
         keys = keys_of(wanted)
         solved = dict(zip(keys, way.motion(t, moved).values(keys), strict=True)) if keys else {}
         for each in wanted:
             if each.link:
                 # whole turns and all
                 name = each.link
-                values[each] = driven[name] if name in driven else np.degrees(way.link_angle(name, t))
+                values[each] = driven[name] if name in driven else np.degrees(way.link_angle(name, t, moved))
             else:
                 values[each] = each.of(solved[each.key]) if each.key else np.zeros(len(t))
         return values

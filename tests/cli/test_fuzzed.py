@@ -147,9 +147,9 @@ USAGE = {
     ("spin", "b.toml", "--time", "0:1:1e-30"): "expected at most 250000",
     ("spin", "b.toml", "--time", "0:1/100000000"): "expected at most 250000",
     ("spin", "b.toml", "--time", "0:1/" + "9" * 5000): "number of equal steps",
-    ("place", "5g@0deg", "--blades", "20000000"): "not in the range",
-    ("field", "r.csv", "--blades", "20000000"): "not in the range",
-    ("field", "r.csv", "--monte-carlo", "1000000000", "--reading-error", "2%"): "not in the range",
+    ("place", "5g@0deg", "--blades", "20000000"): "expected a number from",
+    ("field", "r.csv", "--blades", "20000000"): "expected a number from",
+    ("field", "r.csv", "--monte-carlo", "1000000000", "--reading-error", "2%"): "expected a number from",
 }
 
 

@@ -25,6 +25,7 @@ SHARES = {
     "geared five-bars": 0.02,
     "forces near dead points": 0.01,
     "any topology": 0.01,
+    "loaded mechanisms of any topology": 0.02,
     "near-singular triads": 0.01,
 }
 

@@ -20,9 +20,10 @@ Values = dict[str, Any]
 def values(run: Run, way: Any, times: Any, moved: Any = None) -> Values:
     """Everything that moves and every joint force, (n,) each."""
     m, motion = run.assembly.mechanism, way.motion(times, moved)
-    result: Values = {"energy": way.energy(times)}
+    result: Values = {"energy": way.energy(times, moved)}
     for name in m.links:
         result |= {f"{name} {rate}": getattr(motion.link(name), rate) for rate in ("omega", "alpha")}
+        result[f"{name} angle"] = way.link_angle(name, times, moved)
     for name in set(m.points) - set(m.ground):
         for rate in ("position", "velocity", "acceleration"):
             x, y = getattr(motion.point(name), rate).T
@@ -143,9 +144,12 @@ def held(seed: int) -> float:
     return worst
 
 
-@pytest.mark.parametrize("seed", [8, 14, 46])
+@pytest.mark.parametrize("seed", [8, 14, 46, 20261124002])
 def test_estimates_that_were_too_small(seed: int) -> None:
-    """Two solutions that met by chance, a slide's rate across its guide, joint forces beside change points: up to 60 times."""
+    """Two solutions that met by chance, a slide's rate across its guide, joint forces beside change points: up to 60 times.
+
+    Of the last the energy, which was not formed of the states that may be as wrong as the answer's.
+    """
     assert held(seed) <= 1.0
 
 

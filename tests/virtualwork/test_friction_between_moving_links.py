@@ -114,3 +114,32 @@ def test_friction_where_there_is_no_joint() -> None:
     motion = m.motion(0.3, 1.0)
     with pytest.raises(DescriptionError, match="no joint"):
         motion.effort  # noqa: B018
+
+
+@pytest.mark.parametrize("tilt", [0.3, 1.7, -2.1])
+def test_what_does_not_slide_does_not_rub(tilt: float) -> None:
+    """A block held on a lever by a prism and a slot: its slides' rates are rounding, whose sign once gave them friction."""
+    links = {
+        "lever": Link({"O": 0j}, 2.0, 0.4 + 0.1j, 0.3),
+        "block": Link({"A": 0.1 + 0.2j, "B": -0.3 + 0.1j}, 1.5, 0.2 - 0.1j, 0.1),
+    }
+    guides = [
+        Guide("A", "block", "lever", 0.7 + 0.3j, tilt, turned=0.2),
+        Guide("B", "block", "lever", 0.5 - 0.2j, tilt + 1.1),
+    ]
+    guess = Guess(1.0, {"block": 1.2 + tilt})
+    q = np.linspace(0.4, 1.9, 25)
+    forces = []
+    for friction in ([], [Friction("A", 0.3), Friction("B", 0.2)]):
+        m = Mechanism(
+            {"O": 0j},
+            links,
+            guides,
+            inputs=Input(link="lever"),
+            guess=guess,
+            gravity=-G * 1j,
+            friction=friction,
+        )
+        dynamics = m.motion(q, 1.3, -0.7).dynamics
+        forces.append([dynamics.joint_force(joint, "block") for joint in dynamics.reactions.joints[1:]])
+    np.testing.assert_allclose(forces[1], forces[0], rtol=0, atol=1e-12)

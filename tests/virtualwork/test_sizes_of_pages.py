@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dalembert.arithmetic.exact import EPS
 from tests.computed_pages import machines
 from tests.node import needs_node
 from tests.stress.test_pages_agree import faults, tried
@@ -77,15 +78,24 @@ def test_the_lines_of_a_row() -> None:
     )
 
 
-def touching(m: Mechanism, points: list[int]) -> list[complex]:
-    """The profile of the first cam by the formulas of a pose: so many points on each piece of its law."""
+# roundings of y′, the slope of a lift
+SLOPE = 32 * EPS
+
+
+def touching(m: Mechanism, points: list[int]) -> list[tuple[complex, float]]:
+    """The profile of the first cam by the formulas of a pose: so many points on each piece of its law, and what rounding may move each by.
+
+    The flat face of an arm touches at c/(1 − y′) along it, without end where y′ = 1: an error of y′ grows by c/(1 − y′)² there.
+    """
     drive = m.cam_drives[0]
     of, center, found = drive.lift, m.bodies[drive.cam.cam][drive.pin], []
     for low, high, count in zip(of.knots, of.knots[1:], points, strict=False):
         for j in range(count):
             angle = of.first + low + (high - low) * (j / count)
-            touch = carried(m, drive, ONE, located(ONE, of, ONE.exp(angle))).touch()
-            found.append(center + touch * ONE.exp(-angle))
+            pose = carried(m, drive, ONE, located(ONE, of, ONE.exp(angle)))
+            touch = pose.touch()
+            rounding = SLOPE * abs(touch / (1 - pose.rates[0])) if pose.flat and pose.arm else 0.0
+            found.append((center + touch * ONE.exp(-angle), rounding))
     return found
 
 
@@ -95,7 +105,7 @@ def narrow(m: Mechanism) -> bool:
 
 
 def apart(every: list[Mechanism], rng: np.random.Generator, times: int, folder: Path) -> float:
-    """How far profiles on pages lie from the program's after changes of dimensions; of the size of the mechanism."""
+    """How far profiles on pages lie from the program's after changes of dimensions, beyond rounding; of the size of the mechanism."""
     pages, changes, true = [], [], []
     for m in every:
         at = [m.at] if len(m.inputs) > 1 else m.at + np.linspace(0, 1, 5)
@@ -122,8 +132,9 @@ def apart(every: list[Mechanism], rng: np.random.Generator, times: int, folder: 
     for m, rows, profiles in zip(every, answers, true, strict=True):
         for shapes, profile in zip(rows, profiles, strict=True):
             (drawn,) = (shape["p"] for shape in shapes if shape["r"] == "cam")
-            off = np.array(drawn[::2]) + 1j * np.array(drawn[1::2]) - np.array(profile)
-            worst = max(worst, float(np.abs(off).max() / np.real(m.size)))
+            places, rounding = np.array(profile).T
+            off = np.abs(np.array(drawn[::2]) + 1j * np.array(drawn[1::2]) - places) - rounding.real
+            worst = max(worst, float(off.max() / np.real(m.size)))
     return worst
 
 
@@ -170,8 +181,10 @@ def test_profiles_of_every_kind(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @needs_node
-def test_random_profiles(tmp_path: Path, first_seed: int) -> None:
-    rng = np.random.default_rng(first_seed)
+@pytest.mark.parametrize("known", [0, 5, None])
+def test_random_profiles(tmp_path: Path, first_seed: int, known: int | None) -> None:
+    """Flat faces of arms that lift at nearly the speed of their cam touch it metres away: 7e-11 and 8e-12 off."""
+    rng = np.random.default_rng(first_seed if known is None else known)
     every = [sliding(rng, face, on_arm) for face in FACES for on_arm in (False, True) for _ in range(15)]
     every += [swinging(rng, face, sense) for face in FACES for sense in ("ccw", "cw") for _ in range(15)]
     assert apart([m for m in every if not narrow(m)], rng, 2, tmp_path) < 1e-12

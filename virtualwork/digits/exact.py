@@ -34,7 +34,7 @@ from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import Recording
 from virtualwork.formulas.tapes import Turning
 from virtualwork.plan.order import plan
-from virtualwork.plan.steps import Group, turns
+from virtualwork.plan.steps import Group, Plan, turns
 
 # of 1e-15 of a quarter turn a guide stands at it, as in `plan.topology.direction`
 QUARTER = PI * 0.5
@@ -158,6 +158,7 @@ class Exact(Recording):
                 for g in open_gears
             }
             order = plan(numbers.mechanism, phases=phases)
+        order = _named_as(order, branch.plan)
         super().__init__(
             numbers.mechanism,
             order,
@@ -197,6 +198,16 @@ class Exact(Recording):
                 part = part * self.recorder.input(f"f {column}")
             left[row] = left.get(row, 0.0) + part
         return left
+
+
+def _named_as(order: Plan, own: Plan) -> Plan:
+    """An order of solution with the names of the groups of another.
+
+    Where shares of gears cancel, a link is no part of a group in floats but is one as a number that enters.
+    """
+    names = iter([group.name for group in own.groups])
+    steps = (replace(step, name=next(names)) if isinstance(step, Group) else step for step in order.steps)
+    return replace(order, steps=tuple(steps))
 
 
 class Unknown(Quantity, kind="unknown"):

@@ -258,6 +258,16 @@ class RubbingRate(Force, kind="rubbing"):
         return forces.rubbing_rate(self.contact)
 
 
+class SlippingRate(Force, kind="slipping"):
+    """The rate at which a contact slides; 0 where its parts do not move against each other, but for rounding."""
+
+    is_rubbed = False
+    contact: int
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.slipping_rate(self.contact)
+
+
 class Entry(Force, kind="entry"):
     """An entry of the equations of all links, A f + b = 0 (`statics`): of A, or of b (column None)."""
 

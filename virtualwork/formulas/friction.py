@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from dalembert.arithmetic.recorded import bare
 from dalembert.arithmetic.tape import Tape
-from virtualwork.formulas.forces import Bearing, RubbingRate
+from virtualwork.formulas.forces import Bearing, SlippingRate
 from virtualwork.formulas.locking import balanced
 from virtualwork.formulas.numbers import Complexes, Number, Reals, solve
 from virtualwork.formulas.positions import BLOCK
@@ -41,7 +41,7 @@ def written(recording: Recording, more: Sequence[Quantity] = ()) -> Tape:
     each = range(len(contacts))
     outputs = recording.outputs(more)
     for n, (joint, _, _, coefficient, radius) in enumerate(contacts):
-        outputs[f"rate {n}"] = recording.value(RubbingRate(n))
+        outputs[f"rate {n}"] = recording.value(SlippingRate(n))
         outputs[f"arm {n}"] = bare(coefficient) * (bare(radius) if joint.guide is None else 1.0)
     if not recording.forces.redundant:
         forces: dict[str, Number] = {}

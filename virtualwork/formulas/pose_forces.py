@@ -23,6 +23,9 @@ from virtualwork.formulas.reactions import JointForces
 from virtualwork.formulas.resultants import applied_loads, reduced, resultant, shaking_loads
 from virtualwork.formulas.statics import Column, equations, mesh_column, unknowns
 
+# a rate of a contact beside those of all links that is rounding alone, also where the pose is ill-conditioned
+AT_REST = 2.0**-40
+
 
 class PoseForces:
     """The forces of a pose, as the kinds of `forces.Force` read them.
@@ -204,3 +207,19 @@ class PoseForces:
         if joint.guide is not None:
             return self.block.slide_rate(joint.guide)
         return minus(self.block.omega(body), self.block.omega(other))
+
+    def slipping_rate(self, n: int) -> Number:
+        """The rate of a contact, or 0 where it is nothing beside the rates of all links: the parts do not move against each other."""
+        rate = self.rubbing_rate(n)
+        if rate is None:
+            return None
+        m, block = self.mechanism, self.block
+        self.solve([*(f"angle:{body}" for body in m.links), *(f"slide:{i}" for i in range(len(m.guides)))], 1)
+        size = float(complex(m.size).real)
+        all_: Number = 0.0
+        for turning in map(block.omega, m.links):
+            all_ = all_ if turning is None else all_ + abs(turning) * size
+        for sliding in map(block.slide_rate, range(len(m.guides))):
+            all_ = all_ if sliding is None else all_ + abs(sliding)
+        least = all_ * (AT_REST if self.case.contacts[n][0].guide is not None else AT_REST / size)
+        return block.kind.select(abs(rate) - least, rate, 0.0)

@@ -7,7 +7,7 @@ input of the tape: `slip 0`, which way the first contact slips, ±1.
 from __future__ import annotations
 
 from dalembert.arithmetic.recorded import RECORDED, Number, bare
-from virtualwork.formulas.forces import Bearing, RubbingRate
+from virtualwork.formulas.forces import Bearing, SlippingRate
 from virtualwork.formulas.quantity import Quantity, Recording
 
 
@@ -29,5 +29,5 @@ class Slip(Quantity, kind="slip"):
     contact: int
 
     def write(self, recording: Recording) -> Number:
-        rate = recording.value(RubbingRate(self.contact))
+        rate = recording.value(SlippingRate(self.contact))
         return RECORDED.select(rate, 1.0, RECORDED.select(-rate, -1.0, 0.0))

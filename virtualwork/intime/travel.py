@@ -159,11 +159,13 @@ class Travel:
                 whole[rows] = part
         return out[0], out[1], out[2], work
 
-    def energy(self, times: Reals) -> Reals:
-        """Kinetic energy and that of gravity and springs, (n,) J."""
+    def energy(self, times: Reals, moved: Moved | None = None) -> Reals:
+        """Kinetic energy and that of gravity and springs, (n,) J; `moved`: with other inputs and speeds, by so much."""
         out = np.empty(len(times))
         for leg, rows in self._parts(times):
             q, v, _, _ = leg.at(times[rows])
+            if moved is not None:
+                q, v = q + moved[0][rows], v + moved[1][rows]
             out[rows] = leg.equations.energies(times[rows], q, v)
         return out
 
@@ -179,8 +181,8 @@ class Travel:
             parts.append((rows, leg.coordinates.motion(q, v, a, times[rows])))
         return parts[0][1] if len(parts) == 1 else Joined(parts, len(times))
 
-    def link_angle(self, name: str, times: Reals) -> Reals:
-        """A link's angle (n,) rad, followed from the first time on through all whole turns."""
+    def link_angle(self, name: str, times: Reals, moved: Moved | None = None) -> Reals:
+        """A link's angle (n,) rad, followed from the first time on through all whole turns; `moved` as of `motion`."""
         every = np.union1d(self.nodes[self.nodes <= times[-1]], times)
         link = self.motion(every).link(name)
         angle, omega = link.angle[:, None], link.omega[:, None]
@@ -189,7 +191,11 @@ class Travel:
             if entry.link == name and entry.on == "ground":
                 # as the input itself is counted
                 whole += TURN * np.round((self.legs[0].first[j] - whole[0]) / TURN)
-        return np.asarray(whole[np.searchsorted(every, times)])
+        result = np.asarray(whole[np.searchsorted(every, times)])
+        if moved is not None:
+            off = self.motion(times, moved).link(name).angle - self.motion(times).link(name).angle
+            result += off - TURN * np.round(off / TURN)
+        return result
 
 
 def travel(
