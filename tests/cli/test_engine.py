@@ -242,7 +242,7 @@ def test_bad_cylinders(case: str, dalembert: Dalembert) -> None:
         (("--speed", "1rpm", "--shaft", "0:0mm:with"), "expected ORDER:Z:with or ORDER:Z:against"),
         (("--speed", "1rpm", "--shaft", "9:0mm:with"), "above the highest"),
         (("--speed", "1rpm", "--shaft", "2:0mm:with", "--shaft", "2:0m:with"), "at one place"),
-        (("--speed", "1rpm", "--counterweight-share", "1.5"), "range"),
+        (("--speed", "1rpm", "--counterweight-share", "1.5"), "expected a number from 0 to 1"),
         (("--speed", "1rpm", "--plane", "A:60"), "--plane"),
     ],
 )

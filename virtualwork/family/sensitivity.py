@@ -19,7 +19,7 @@ from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.tape import Operation, Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
-from virtualwork.describe.dimensions import Dimension, named, value
+from virtualwork.describe.dimensions import Dimension, dimensions, named, value
 from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import leave_out
@@ -102,7 +102,8 @@ class Sensitivities:
 
         What is constant, as a coordinate across its slide is, has derivatives of nothing but rounding. So a quantity
         varies if along one direction of all dimensions its derivative is anywhere larger than its own rounding error, by
-        a second run in 32 digits, and than what the rounding of the numbers that enter makes of it.
+        a second run in 32 digits, and than what the rounding of the numbers that enter makes of it. Every dimension enters:
+        what rounds where two constants meet would be exact in both runs.
         """
         there = np.flatnonzero(self.poses.assembled)
         if not len(there):
@@ -111,11 +112,15 @@ class Sensitivities:
         every = tuple(limits)
         # of no simple ratio to each other: derivatives do not cancel
         steps = [limit * (1 + GOLDEN * i % 1) for i, limit in enumerate(limits.values(), 1)]
-        tape = self._formulas(every).along(tuple(keys), tuple(zip(self._entering(every), steps, strict=True)))
+        own_lengths = tuple(d for d in dimensions(self.assembly.mechanism).values() if d.where[0] != "inputs")
+        enters = tuple(dict.fromkeys((*every, *own_lengths)))
+        tape = self._formulas(enters).along(
+            tuple(keys), tuple(zip(self._entering(every), steps, strict=True))
+        )
         rows = there[np.unique(np.linspace(0, len(there) - 1, LOOKED_AT).astype(int))]
         entering = {
             name: np.asarray(value, dtype=float)[rows] if np.ndim(value) else np.full(len(rows), value)
-            for name, value in self._given(tape, every).items()
+            for name, value in self._given(tape, enters).items()
         }
         with np.errstate(all="ignore"):
             slopes = {name: np.broadcast_to(x, len(rows)) for name, x in dict(run(tape, entering)).items()}

@@ -135,7 +135,7 @@ class MassColumns:
         stated = _first_of_run(of_run, named & loaded)
         bare = named & (stated < 0)
         if bare.any():
-            raise self._wrong(int(np.argmax(bare)), size.header, "", "a positive trial mass")
+            raise self._wrong(int(np.argmax(bare)), size.header, "", "a trial mass above 0")
         for cells in (size, table.cells.get("trial_angle")):
             if cells is None:
                 continue
