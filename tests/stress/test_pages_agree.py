@@ -90,7 +90,12 @@ def tried(
         changes.append(change | dict(zip([e.name for e in m.inputs], at, strict=True)))
         row, condition = [math.nan] * len(named), 1.0
         try:
-            motion = Motion(Assembly.from_guess(changed(m, change)), [at] if len(at) > 1 else at, 3.0, 1.5)
+            assembly = Assembly.from_guess(changed(m, change))
+            motion = Motion(assembly, [at] if len(at) > 1 else at, 3.0, 1.5)
+            if multiplied(assembly) > MULTIPLIED:
+                # its angle has lost as many digits: see test_a_gear_on_an_arm_that_multiplies_turns
+                changes.pop()
+                continue
             if motion.assembled[0]:
                 row = [number(motion, each) for each in named.values()]
                 condition = float(motion.condition[0])
@@ -104,6 +109,16 @@ def tried(
     kinds = [(alike.get(each.key.kind, each.key.kind), each.order) for each in named.values()]
     rate = max(3.0 / (m.size if e.is_slide else 1.0) for e in m.inputs)
     return Tried(name, page, changes, list(named), kinds, true, conditions, rate)
+
+
+# times that a link turns as far as those it is geared to
+MULTIPLIED = 1000.0
+
+
+def multiplied(assembly: Assembly) -> float:
+    """How many times as far as the unknowns of its group a link turns at most, by gears whose ratio on an arm is close to 1."""
+    shares = (abs(f) for g in assembly.plan.groups for of in g.shares.values() for f in of.values())
+    return max(shares, default=1.0)
 
 
 def regular(m: Mechanism) -> bool:

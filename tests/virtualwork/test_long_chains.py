@@ -32,7 +32,7 @@ def shallow(calls: int) -> Iterator[None]:
         sys.setrecursionlimit(before)
 
 
-@pytest.mark.parametrize(("n", "calls"), [(150, 200), pytest.param(500, 250, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("n", "calls"), [(150, 200), pytest.param(300, 200, marks=pytest.mark.slow)])
 def test_positions_and_forces_of_a_chain(n: int, calls: int) -> None:
     angles = 0.01 * np.arange(n)
     with shallow(calls):

@@ -8,8 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.stress.topologies import generate
 from dalembert.arithmetic.tape import Tape
 from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
+from virtualwork.describe.dimensions import changed
 from virtualwork.formulas import group_loops
 from virtualwork.formulas.group_loops import Loops
 from virtualwork.formulas.lanes import Lanes
@@ -229,3 +231,16 @@ def test_all_at_once_says_how_far_another_assembly_is() -> None:
     rocker = math.pi - math.acos((80**2 + d**2 - 120**2) / (2 * 80 * d))
     apart = [abs(math.remainder(2 * angle, 2 * math.pi)) for angle in (coupler, rocker)]
     assert all_at_once(other, m.at).difference == pytest.approx(max(apart), rel=1e-13)
+
+
+@pytest.mark.xfail(
+    strict=True,
+    reason="a gap that rounding leaves of an angle of 1.6e5 rad counts as one that does not close",
+)
+def test_a_gear_on_an_arm_that_multiplies_turns() -> None:
+    """A ratio of 0.99996 on an arm turns a link 26 300 times as far: its angle rounds by 3e-11 rad, its loop by 3e-12."""
+    m = generate(20261238).mechanism
+    ratio = {"gears.2.ratio": 0.9999619792998344, "links.l2.P2.y": 0.28660601790560924}
+    motion = changed(m, ratio).motion(np.linspace(0.5367, 0.5377, 41))
+    # one pose in four, by chance
+    assert motion.assembled.all()

@@ -7,6 +7,7 @@ the inputs' rates. Derivatives of many poses come from the tape (`lanes`).
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property, partial
 from typing import Any, Protocol, Self
@@ -165,7 +166,8 @@ class Poses:
         # whether nothing moves: the rates are those of virtual displacements
         self.at_rest = False
         self._solved: list[tuple[Step, int]] = []
-        self._done: set[tuple[int, int, int]] = set()
+        # by order and input: which steps are carried on to it, by their identity
+        self._done: defaultdict[tuple[int, int], set[int]] = defaultdict(set)
         self._blocks: list[State] | None = None
         self._along: dict[int, Rates] = {}
         self._begin()
@@ -285,14 +287,14 @@ class Poses:
             steps = self._known_steps[wanted] = self.plan.needed(wanted)
         return steps
 
-    def _new(self, steps: Iterable[Step], k: int, which: int) -> list[Step]:
+    def _new(self, steps: Sequence[Step], k: int, which: int) -> list[Step]:
         """The steps that are not yet carried on to an order."""
-        return [step for step in steps if (id(step), k, which) not in self._done]
+        done = self._done[k, which]
+        return [] if done.issuperset(map(id, steps)) else [step for step in steps if id(step) not in done]
 
-    def _note(self, steps: Iterable[Step], k: int, which: int) -> None:
-        for step in steps:
-            self._done.add((id(step), k, which))
-            self._solved.append((step, k))
+    def _note(self, steps: Sequence[Step], k: int, which: int) -> None:
+        self._done[k, which].update(map(id, steps))
+        self._solved.extend((step, k) for step in steps)
 
     def solve(self, targets: Iterable[str]) -> None:
         """Work out the targets' positions."""

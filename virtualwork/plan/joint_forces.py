@@ -156,7 +156,7 @@ def left_inverse(pattern: list[list[Any]]) -> list[list[Any]] | None:
     chosen: dict[int, int] = {}
     while len(chosen) < k:
         free = [c for c in range(k) if c not in chosen.values()]
-        left = [(i, c) for i in range(n) if i not in chosen for c in free]
+        left = [(i, c) for i in range(n) if i not in chosen for c in free if columns[c][i]]
         row, pivot = max(left, key=lambda at: _size(columns[at[1]][at[0]]), default=(-1, 0))
         if row < 0 or not _size(columns[pivot][row]) > 1e-12:
             return None
