@@ -154,7 +154,12 @@ class Motion(TableCase):
         def of(way: Travel, t: Reals, moved: Moved | None) -> list[Reals]:
             return list(self.values(way, self._wanted, t, moved).values())
 
-        return dict(zip(self.fine, self.run.errors(of), strict=True))
+        run, errors = self.run, dict(zip(self.fine, self.run.errors(of), strict=True))
+        if run.unknown.any() and not np.any(run.work):
+            # the energy stays what it was, wherever the mechanism is by then: what it has changed by is wrong
+            kept = errors[ENERGY][0] + np.maximum.accumulate(np.abs(run.energy_drift))
+            errors[ENERGY] = np.where(run.unknown, np.minimum(errors[ENERGY], kept), errors[ENERGY])
+        return errors
 
     def table(self) -> Table:
         """A row for each time."""

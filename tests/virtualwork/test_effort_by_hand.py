@@ -116,3 +116,23 @@ def test_nothing_is_not_minus_nothing(gravity: float) -> None:
     effort = m.motion(np.array([0.0, 0.0])).effort
     assert np.array_equal(effort, [0.0, 0.0])
     assert not np.signbit(effort).any()
+
+
+@pytest.mark.parametrize("mirrored", [1.0, -1.0])
+def test_a_motor_whose_carrier_turns_with_what_it_drives_does_no_work(mirrored: float) -> None:
+    """Crank and rocker of a parallelogram turn alike: rounding must not make an effort of the difference."""
+    away, arm = complex(0.1, 0.03 * mirrored), complex(0.037, 0.011 * mirrored)
+    m = Mechanism(
+        {"A": 0j, "D": away},
+        {
+            "crank": Link({"A": 0j, "B": arm}, 1.0, 0.02),
+            "coupler": Link({"B": 0j, "C": away}, 1.0, 0.05),
+            "rocker": Link({"D": 0j, "C": arm}, 1.0, 0.02),
+        },
+        inputs=Input("crank", speed=10.0),
+        guess=Guess(0.5, {"coupler": 0.0, "rocker": 0.5}),
+        gravity=-9.81j,
+        motors=[Motor("rocker", "crank", 0.5, 0.005)],
+    )
+    for poses in (0.3, np.linspace(-1.2, 1.3, 41)):
+        assert not np.isfinite(m.motion(poses).effort).any()

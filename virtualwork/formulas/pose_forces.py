@@ -90,10 +90,18 @@ class PoseForces:
             link, carrier = str(m.inputs[j].link), m.carrier(j)
             self.solve([f"angle:{link}", f"angle:{carrier}"], 1)
             for i in range(k):
-                turned = [self.block.turning(body, i) for body in (link, carrier)]
-                driven, carried = (0.0 if t is None else t for t in turned)
-                matrix[i][j] = driven - carried
+                matrix[i][j] = self._apart(*(self.block.turning(body, i) for body in (link, carrier)))
         return self.system_of(matrix, force) if k > 1 else [force[0] / matrix[0][0]]
+
+    def _apart(self, driven: Number, carried: Number) -> Number:
+        """The rate of a driven link against its carrier, or 0 where both turn alike but for rounding: the motor does no work."""
+        if carried is None:
+            return 0.0 if driven is None else driven
+        if driven is None:
+            return -carried
+        rate = driven - carried
+        least = AT_REST * (abs(driven) + abs(carried))
+        return self.block.kind.select(abs(rate) - least, rate, 0.0)
 
     def effort(self, j: int) -> Number:
         return self.efforts[j]
