@@ -93,7 +93,7 @@ def tried(
             assembly = Assembly.from_guess(changed(m, change))
             motion = Motion(assembly, [at] if len(at) > 1 else at, 3.0, 1.5)
             if multiplied(assembly) > MULTIPLIED:
-                # its angle has lost as many digits: see test_a_gear_on_an_arm_that_multiplies_turns
+                # its angle has lost as many digits, which the condition does not count
                 changes.pop()
                 continue
             if motion.assembled[0]:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.arithmetic.exact import EPS
 from virtualwork.formulas.group_loops import Loops
 from virtualwork.formulas.numbers import SINGULAR, Reals, singular_values
 from virtualwork.formulas.positions import State
@@ -23,6 +24,8 @@ from virtualwork.formulas.positions import State
 ROUNDS = 4
 # of the mechanism's size, or of a slide that runs beyond it: a loop with a smaller gap is closed
 CLOSED = 1e-12
+# rad: eight roundings of an angle this large are as much
+MANY = CLOSED / (8 * EPS)
 
 
 def newton(
@@ -49,6 +52,10 @@ def newton(
     """
     x, gap = loops.search(st, start, size, limit)
     far = np.abs(x[:, len(loops.group.angles) :]).max(axis=1, initial=size)
+    for tie in loops.group.ties:
+        # a body that gears turn by many turns: its angle rounds by more than its loops
+        turned = sum(abs(f) * np.abs(x[:, j]) for j, f in loops.group.shares.get(tie.body, {}).items())
+        far = np.maximum(far, turned * (size / MANY))
     return x, np.asarray((gap <= CLOSED * far) & loops.stands(st))
 
 
