@@ -7,14 +7,17 @@ reader waiting for its rest, and the other workers for their turn.
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable
+import signal
+import threading
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
 from functools import partial
 from itertools import count
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import TracebackType
+from types import FrameType, TracebackType
 from typing import Any, TypeVar
 
 R = TypeVar("R")
@@ -40,11 +43,13 @@ class Processes(Executor):
     def submit(self, fn: Callable[..., R], /, *args: Any, **kwargs: Any) -> Future[R]:
         """Send a call to a worker."""
         file = Path(self._folder.name, str(next(self._numbers)))
-        try:
-            sent = self._pool.submit(_write_result, file, fn, args, kwargs)
-        except BrokenExecutor:
-            self._pool = self._new()
-            sent = self._pool.submit(_write_result, file, fn, args, kwargs)
+        # a worker starts here: one whose sender is stopped half-way, or that is stopped itself, shows a traceback
+        with _interrupts_later():
+            try:
+                sent = self._pool.submit(_write_result, file, fn, args, kwargs)
+            except BrokenExecutor:
+                self._pool = self._new()
+                sent = self._pool.submit(_write_result, file, fn, args, kwargs)
         result: _FromFile[R] = _FromFile(sent)
         sent.add_done_callback(partial(result.read, file))
         return result
@@ -102,6 +107,28 @@ def _write_result(file: Path, fn: Callable[..., Any], args: tuple[Any, ...], kwa
 
 def _ignore_interrupts() -> None:
     """Ctrl-C is for the process that asked."""
-    import signal
-
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def _interrupts_later() -> Iterator[None]:
+    """Hold Ctrl-C back, from this process until the end, and from processes that start meanwhile for good."""
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+    held: list[tuple[int, FrameType | None]] = []
+    signal.signal(signal.SIGINT, lambda number, frame: held.append((number, frame)))
+    mask = (
+        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+        if hasattr(signal, "pthread_sigmask")
+        else None
+    )
+    try:
+        yield
+    finally:
+        if mask is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        signal.signal(signal.SIGINT, before)
+    if held:
+        before(*held[0])

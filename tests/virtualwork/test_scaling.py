@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import signal
 import subprocess
 import time
+from concurrent.futures import Future, ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -89,6 +91,28 @@ def test_what_is_sent_of_a_part_is_the_numbers_of_its_variants():
     assert sizes[0] < 8000
     assert sizes[1] - sizes[0] == pytest.approx(8 * 4 * 1000, abs=64)
     assert sizes[2] - sizes[0] == pytest.approx(8 * 4 * 9999, abs=64)
+
+
+def test_ctrl_c_waits_until_a_worker_has_started(monkeypatch):
+    """A worker whose start is cut short shows a traceback: what it reads from its parent ends too soon."""
+    started = []
+
+    def submit(self, *arguments):
+        os.kill(os.getpid(), signal.SIGINT)
+        started.append(arguments)
+        return Future()
+
+    monkeypatch.setattr(ProcessPoolExecutor, "submit", submit)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    pool = Processes(1)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            pool.submit(len, [])
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+        pool.shutdown()
+    assert started
 
 
 @pytest.mark.slow
