@@ -84,8 +84,8 @@ class MotionViews:
     def page(self, forces: bool = False) -> Page:
         """Return a page that computes: dimensions can be dragged and typed, and poses, paths, curves and limits follow.
 
-        The mechanism's formulas stand in the page, which needs no network. What it cannot compute (friction, loads given by
-        tables, a law of motion in time) it replays, and says so.
+        The mechanism's formulas stand in the page, which needs no network. What it cannot compute it replays, and says so:
+        loops that are singular in every pose, redundant statics with friction, motions in time.
 
         Parameters
         ----------

@@ -156,7 +156,7 @@ class Motion(TableCase):
 
         run, errors = self.run, dict(zip(self.fine, self.run.errors(of), strict=True))
         if run.unknown.any() and not np.any(run.work):
-            # the energy stays what it was, wherever the mechanism is by then: what it has changed by is wrong
+            # no load takes energy: what the energy has changed by is its error, also where the states are lost
             kept = errors[ENERGY][0] + np.maximum.accumulate(np.abs(run.energy_drift))
             errors[ENERGY] = np.where(run.unknown, np.minimum(errors[ENERGY], kept), errors[ENERGY])
         return errors

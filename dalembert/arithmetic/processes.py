@@ -43,7 +43,7 @@ class Processes(Executor):
     def submit(self, fn: Callable[..., R], /, *args: Any, **kwargs: Any) -> Future[R]:
         """Send a call to a worker."""
         file = Path(self._folder.name, str(next(self._numbers)))
-        # a worker starts here: one whose sender is stopped half-way, or that is stopped itself, shows a traceback
+        # a worker may start here; a Ctrl-C during its start would make it show a traceback
         with _interrupts_later():
             try:
                 sent = self._pool.submit(_write_result, file, fn, args, kwargs)
@@ -112,7 +112,7 @@ def _ignore_interrupts() -> None:
 
 @contextmanager
 def _interrupts_later() -> Iterator[None]:
-    """Hold Ctrl-C back, from this process until the end, and from processes that start meanwhile for good."""
+    """Delay Ctrl-C in this process until the end; processes that start meanwhile never receive it."""
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(before):
         yield

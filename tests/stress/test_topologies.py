@@ -14,7 +14,7 @@ from benchmarks.stress.topologies import generate
 from benchmarks.stress.topology_followed import verdict
 from benchmarks.stress.topology_rates import rates
 
-# some two minutes
+# some half a minute
 MORE = 700
 
 # of 0.1.0: what was wrong with each of these
