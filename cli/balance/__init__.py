@@ -128,7 +128,7 @@ def run(
         balancing = Balancing(rotors, chosen, request, executor)
 
     def figure() -> Figure:
-        from cli.balance.picture import draw
+        from cli.balance.page import draw
 
         return draw(balancing, polygons=show.steps)
 

@@ -294,6 +294,12 @@ class Balancing:
         """The unit in which lengths are said."""
         return self.rotors.radius_unit or self.planes.z_unit or "mm"
 
+    @property
+    def couple_unit(self) -> str:
+        """The unit of a couple unbalance: that of the unbalances times that of lengths."""
+        unbalance, length = self.rotors.unbalance_unit, self.length_unit
+        return f"{unbalance}_{length}".replace(f"{length}_{length}", f"{length}2")
+
     def rows_of(self, rotor: int) -> slice:
         """Return the rows of a rotor's planes."""
         return slice(self.start[rotor], self.start[rotor] + self.count[rotor])
