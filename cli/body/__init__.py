@@ -107,7 +107,7 @@ def run(
     if sought is None:
         bodies = [MovingBody(each, request) for each in read_bodies(parts)]
     else:
-        from cli.body.find import find as search
+        from cli.body.way import find as search
 
         moving, solution = search(read_table(parts), parts, request, *sought)
         bodies = [moving]

@@ -46,8 +46,7 @@ def run(table: str, speed: str | None = None, fluctuation: str | None = None) ->
     step. The rows span whole turns of the shaft, the last row included: 0 to 360 deg, or 0 to 720 deg of a four-stroke
     engine. The load is constant, the mean of the torque.
     """
-    from cli.flywheel.tables import METHOD, draw, tables, warnings, way
-    from cli.flywheel.turns import read_torque
+    from cli.flywheel.turns import METHOD, draw, read_torque, tables, warnings, way
     from cli.show.result import Result
 
     if speed is None or fluctuation is None:

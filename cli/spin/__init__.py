@@ -92,7 +92,7 @@ def run(
     rotation = Rotation(turning, np.array(times), method.value if method else None, integrator.value)
     sought, solution = pair(find, so_that), None
     if sought is not None:
-        from cli.spin.find import find as search
+        from cli.spin.tables import find as search
 
         rotation, solution = search(rotation, *sought)
         turning = rotation.body

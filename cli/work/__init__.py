@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from cli.read import options
@@ -9,7 +10,6 @@ from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.result import Result
-    from dalembert.results.way import Topic
 
 
 EXAMPLE = "riul-slider-crank"
@@ -37,21 +37,16 @@ def run(states: str, gravity: str | None = None, ledger: bool = False) -> Result
     from cli.show.result import Result
     from cli.work.power import WorkBalance
     from cli.work.states import read_states
-    from cli.work.tables import METHOD, draw, tables
+    from cli.work.tables import METHOD, draw, tables, way
 
     table = read_states(states)
     balance = WorkBalance(table, g)
 
-    def way() -> list[Topic]:
-        from cli.work.way import way
-
-        return way(balance)
-
     return Result(
         tables=tables(balance, ledger_first=ledger),
-        figure=lambda: draw(balance),
+        figure=partial(draw, balance),
         method=METHOD,
-        way=way,
+        way=partial(way, balance),
         about={"title": "Balance of virtual power"},
         warnings=[*table.table.warnings, *table.warnings, *balance.warnings],
     )
