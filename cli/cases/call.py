@@ -13,8 +13,7 @@ from cli.cases.axes import assigned, grids
 from cli.cases.case import Study
 from cli.cases.inputs import Driven, Grid, Varied, with_numbers
 from cli.cases.loop import Loop
-from cli.read.about import about
-from cli.read.options import bad
+from cli.read.options import about, bad
 from cli.show.result import Result, with_found
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError

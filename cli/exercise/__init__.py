@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -48,16 +47,14 @@ def _run(
     CSV), where (its key columns), figures, points, unit. Every drawn variant can be assembled, lies away from limits
     and is well conditioned.
     """
+    from cli.exercise import questions
     from cli.exercise.description import read_exercise
     from cli.exercise.drawings import figure, moving
-    from cli.exercise.files import put
-    from cli.exercise.mistakes import candidates
-    from cli.exercise.moodle import moodle
-    from cli.exercise.sheets import answers_csv, filled, key_csv, sheet_page, tables
-    from cli.exercise.solutions import solutions
+    from cli.exercise.recomputed import candidates
+    from cli.exercise.sheets import answers_csv, filled, key_csv, put, sheet_page, solutions, tables
     from cli.exercise.solving import workshop
     from cli.exercise.variants import variants
-    from cli.show.capture import options_of
+    from cli.show.output import options_of
     from cli.show.result import Result
 
     if folder is None:
@@ -87,11 +84,9 @@ def _run(
         files["key.csv"] = key_csv(exercise, people, drawn)
         files["solutions.html"] = solutions(exercise, people, drawn, drawings)
         slips = {id(variant): candidates(variant) for variant in dict.fromkeys(drawn)}
-        files["moodle.xml"] = moodle(exercise, people, drawn, drawings, slips)
+        files["moodle.xml"] = questions.moodle(exercise, people, drawn, drawings, slips)
         for name in system or ():
-            # cli.exercise.prairielearn, cli.exercise.numbas
-            questions = getattr(import_module(f"cli.exercise.{name}"), name)
-            files |= questions(exercise, drawn, drawings, slips)
+            files |= questions.SYSTEMS[name](exercise, drawn, drawings, slips)
         put(Path(folder), files)
         made = len({id(variant) for variant in drawn})
         result = Result(

@@ -30,9 +30,7 @@ def _run(file: str, answers: str, key: str | None = None) -> Result:
     """
     from cli.exercise.description import read_exercise
     from cli.exercise.solving import workshop
-    from cli.grade.answers import read_students
-    from cli.grade.marks import mark_all
-    from cli.grade.tables import METHOD, tables
+    from cli.grade.marks import METHOD, mark_all, read_students, tables
     from cli.show.result import Result
 
     exercise = read_exercise(file)

@@ -1,9 +1,9 @@
-"""Option values with a unit; a bad one is wrong usage, status 2."""
+"""Option values with a unit, a bad one is wrong usage, status 2; the head of a report."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,6 +11,7 @@ import typer
 
 from dalembert.angles import in_turn
 from dalembert.errors import DataError
+from dalembert.hints import nearest
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     import numpy as np
     from numpy.typing import NDArray
+
 
 STATES = 250_000  # what a gigabyte holds, integrated and shown
 PLACES = 10_000  # holes or blades on one rotor
@@ -316,3 +318,27 @@ def processes(workers: int) -> Iterator[Executor | None]:
             yield pool
     except LostPart as lost:
         raise DataError(str(lost)) from None
+
+
+HEAD = ("title", "machine", "customer", "date", "author")
+
+
+def about(file: str, document: Mapping[str, object]) -> dict[str, str]:
+    """Read the table `[report]`: texts, a date may be TOML's own.
+
+    Raises
+    ------
+    DataError
+        No table, an unknown key, or a value that is no text.
+    """
+    result = document.get("report", {})
+    if not isinstance(result, dict):
+        raise DataError(f"{file}: [report]: expected a table with some of {', '.join(HEAD)}")
+    for key, value in result.items():
+        if key not in HEAD:
+            raise DataError(
+                f"{file}: [report]: unknown key '{key}': expected {', '.join(HEAD)}{nearest(key, HEAD)}"
+            )
+        if isinstance(value, (dict, list)):
+            raise DataError(f"{file}: [report] {key}: expected text")
+    return {key: str(value) for key, value in result.items()}

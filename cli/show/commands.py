@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
 import typer
 from typer.core import TyperCommand
 
-from cli.read.about import HEAD
-from cli.show.capture import take
+from cli.read.options import HEAD, column_names
 from dalembert.dataclass import dataclass
 
 if TYPE_CHECKING:
@@ -172,7 +171,7 @@ def with_options(
     find: Callable[..., Result],
     options: str,
     chosen: Sequence[str] | None,
-    hand_on: Callable[[Result, ShowOptions, Mapping[str, str]], None],
+    present: Callable[[Result, ShowOptions, Mapping[str, str]], None],
     asked: Callable[..., object] | None = None,
     declared: Mapping[str, Parameter] | None = None,
 ) -> Callable[..., None]:
@@ -193,7 +192,6 @@ def with_options(
 
     @wraps(find)
     def run(**values_of: object) -> None:
-        from cli.read.options import column_names
         from dalembert.tables.headers import rename
 
         options = ShowOptions(**{name: values_of.pop(name) for name in shared})  # type: ignore[arg-type]
@@ -213,8 +211,7 @@ def with_options(
             values_of["show"] = options
         result = find(**values_of) if asked is None else find(asked(**values_of), options)
         with result.within():
-            if not take(result):
-                hand_on(result, options, messages)
+            present(result, options, messages)
 
     mine = [p for name, p in own.items() if name != "show" and not (two and name == "about")]
     parameters = [*mine, *shared.values()]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.read import options
-from cli.show.in_units import chosen_units, in_units
+from cli.show.result import chosen_units, in_units
 from dalembert.errors import needs
 from dalembert.units import UNITS, to_si
 

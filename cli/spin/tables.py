@@ -238,8 +238,8 @@ def _choices(body: TurningBody) -> dict[str, tuple[root_search.Sought, Change]]:
         vectors.append(("inertia", "kg_m2", "123"))
     if body.torque is not None:
         vectors.append(("torque", "N_m", "xyz"))
-    for key, unit, names in vectors:
-        for i, letter in enumerate(names):
+    for key, unit, letters in vectors:
+        for i, letter in enumerate(letters):
             number = root_search.Sought(f"{key}.{letter}_{unit}", unit, float(getattr(body, key)[i]))
             choices[f"{key}.{letter}"] = number, partial(entry, key=key, i=i)
     if body.mgl is not None:
