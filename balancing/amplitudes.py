@@ -29,7 +29,7 @@ STARTS = 24
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class AmplitudeFit:
-    """Influence coefficients of one plane from amplitudes; see `influence_from_amplitudes`."""
+    """The influence coefficients of one plane, fitted to amplitudes by `influence_from_amplitudes`."""
 
     influence: Complex
     """α (s,), amplitude per kg; its phase is counted from each sensor's own initial vibration."""
@@ -121,7 +121,7 @@ class AmplitudeFit:
 
 
 def influence_from_amplitudes(initial: ArrayLike, trials: ArrayLike, trial_masses: ArrayLike) -> AmplitudeFit:
-    """Find the influence coefficients of one plane from amplitudes, without any phase.
+    """Find the influence coefficients of one plane from amplitudes without phase.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ Complex = NDArray[np.complex128]
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class Balance:
-    """Corrections from influence coefficients; see `least_squares` and `minimax`."""
+    """Corrections from influence coefficients, computed by `least_squares` or `minimax`."""
 
     influence: Complex
     """α, (..., s, p), amplitude per kg."""
@@ -258,7 +258,7 @@ def least_squares(
     max_mass: ArrayLike | None = None,
     max_residual: ArrayLike | None = None,
 ) -> Balance:
-    """Find the corrections that leave the least (weighted) sum of squares of residual vibration.
+    """Find the corrections with the least (weighted) sum of squares of residual vibration.
 
     Parameters
     ----------
@@ -332,7 +332,7 @@ def minimax(
     *,
     weights: ArrayLike | None = None,
 ) -> Balance:
-    """Find the corrections whose largest residual vibration is the smallest there is.
+    """Find the corrections with the smallest possible maximum of the residual vibration.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ LARGEST = 1e290  # products beyond it overflow where they are split into parts
 
 
 class CoincidentPlanes(ValueError):
-    """All correction planes of a rotor lie at one place: they cannot correct a couple."""
+    """All correction planes of a rotor lie at one place, so they cannot correct a couple."""
 
     def __init__(self, rotors: NDArray[np.bool_]) -> None:
         self.rotors = rotors
@@ -70,7 +70,7 @@ class Unbalances(NamedTuple):
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class Correction:
-    """Corrections of rotors with known unbalances; see `correct`."""
+    """The corrections of rotors with known unbalances, computed by `correct`."""
 
     moment: Complex
     """The unbalances m·r·e^{iθ}, (..., k), kg·m."""
@@ -334,7 +334,7 @@ def correct(
     planes: ArrayLike = (0.0,),
     executor: Executor | None = None,
 ) -> Correction:
-    """Find the corrections that balance rotors whose unbalances are known.
+    """Find the corrections of rotors with known unbalances.
 
     Parameters
     ----------

@@ -26,19 +26,28 @@ class Unseen(ValueError):
 
 
 class DependentPlanes(Unseen):
-    """The readings cannot tell the planes apart; `combination` is one that no sensor sees, `case` which rotor."""
+    """The readings cannot distinguish the planes of rotor `case`: no sensor sees the `combination`."""
 
 
 class DependentTrials(Unseen):
-    """The trial runs do not tell the planes' effects apart; `combination` is one no run has tried."""
+    """The trial runs cannot distinguish the effects of the planes: no run has tried the `combination`."""
 
 
 def condition_number(influence: ArrayLike, weights: ArrayLike | None = None) -> Real:
-    """Return σ_max/σ_min of the coefficients: by what factor relative errors of readings can grow.
+    """Return σ_max/σ_min of the coefficients, (...): by what factor relative errors of readings can grow.
 
-    The columns are first brought within a factor of two of the largest by powers of two (without rounding),
-    so that a plane of small effect does not count as a dependent one. Shape (...); inf for dependent planes.
+    The columns are first scaled to within a factor of two of the largest, by powers of two (without rounding),
+    so that a plane of small effect does not count as a dependent one. It is inf for dependent planes.
 
+    Parameters
+    ----------
+    influence
+        α, complex (..., s, p), amplitude per kg.
+    weights
+        w_s >= 0, (..., s); default 1 each.
+
+    Examples
+    --------
     >>> float(condition_number([[1, 0], [0, 1000]]).round(3))
     1.953
     """
@@ -53,7 +62,14 @@ def condition_number(influence: ArrayLike, weights: ArrayLike | None = None) -> 
 
 
 def plane_significance(influence: ArrayLike, weights: ArrayLike | None = None) -> Real:
-    """Tell for each plane how much of its effect no other planes can bring about.
+    """Return the share of each plane's effect that the other planes cannot produce, (..., p).
+
+    Parameters
+    ----------
+    influence
+        α, complex (..., s, p), amplitude per kg.
+    weights
+        w_s >= 0, (..., s); default 1 each.
 
     Returns
     -------
@@ -93,11 +109,23 @@ def plane_significance(influence: ArrayLike, weights: ArrayLike | None = None) -
 
 
 def unseen(influence: ArrayLike, weights: ArrayLike | None = None) -> tuple[Complex, float]:
-    """Return the combination of planes that the readings see least, and how well they see it.
+    """Return the combination of planes with the least effect on the readings, and its relative effect.
 
-    The combination is complex (p,), with its largest component 1; the second value is σ_min/σ_max of the
-    scaled coefficients (0 for a combination that cannot be seen).
+    Parameters
+    ----------
+    influence
+        α, complex (s, p), amplitude per kg.
+    weights
+        w_s >= 0, (s,); default 1 each.
 
+    Returns
+    -------
+    combination, effect
+        Complex (p,) with the largest component 1; σ_min/σ_max of the scaled coefficients, 0 for a combination without any
+        effect.
+
+    Examples
+    --------
     >>> np.abs(unseen([[1, 2], [2, 4]])[0]).round(3)
     array([1. , 0.5])
     """

@@ -28,7 +28,12 @@ MEDIAN = float(np.sqrt(2 * np.log(2)))  # of |·| of a circular vector with comp
 
 
 def outlier_probability(fit: JointFit) -> Real:
-    """Probability that the largest residual of a fit is by chance as large as each one, (..., r, s); NaN where untested.
+    """Return the probability by chance of a largest residual like each one, (..., r, s); NaN if untested.
+
+    Parameters
+    ----------
+    fit
+        The fit of the runs.
 
     Notes
     -----
@@ -69,12 +74,28 @@ class Repeat(NamedTuple):
 
 
 def repeats(fit: JointFit, errors: Errors | None = None) -> Iterator[Repeat]:
-    """Yield the repeated readings of one machine, (r, s).
+    """Yield the repeated readings of one machine, (r, s), with the test of their difference.
 
+    Parameters
+    ----------
+    fit
+        The fit of one machine.
+    errors
+        Errors of the readings; None: the residuals give them.
+
+    Yields
+    ------
+    Repeat
+        `.runs`, the two runs, and `.probability` of such a difference by chance.
+
+    Notes
+    -----
     The difference of two readings with equal masses is a direction of the residuals, and has the test of
-    `outlier_probability`. With errors that are known it is held against these: so large a |difference|² of two circular errors
-    has the probability exp(-|difference|²/(E|ε₁|² + E|ε₂|²)), times the number of pairs.
+    `outlier_probability`. With given errors the probability of such a |difference|² of two circular errors is
+    exp(-|difference|²/(E|ε₁|² + E|ε₂|²)), times the number of pairs.
 
+    Examples
+    --------
     >>> found = repeats(joint_fit([[1], [1.1], [3], [3.1], [2]], [[0], [0], [1], [1], [0.5]]))
     >>> [(one.runs, round(one.probability, 2)) for one in found]
     [((0, 1), 0.68), ((2, 3), 0.68)]
@@ -100,7 +121,7 @@ def repeats(fit: JointFit, errors: Errors | None = None) -> Iterator[Repeat]:
 
 @record
 class Drift(NamedTuple):
-    """How the vibration without masses changes with time, and how probable so large a change is by chance."""
+    """The rate at which the vibration changes with time, and the probability of such a rate by chance."""
 
     rate: Complex
     """Of each channel, in readings per unit of time, (..., s); NaN where the times do not tell it."""
@@ -111,14 +132,19 @@ class Drift(NamedTuple):
 
 
 def drift(fit: JointFit, times: ArrayLike) -> Drift:
-    """Test whether the vibration drifts with time: y = x₀ + αw + βt, with a β of each channel.
+    """Test whether the vibration drifts with time, y = x₀ + αw + βt, with one β for each channel.
 
     Parameters
     ----------
     fit
-        Of the runs without drift.
+        The fit of the runs without drift.
     times
-        When each run was read, (..., r), any origin and unit.
+        The time of each run, (..., r), in any unit from any origin.
+
+    Returns
+    -------
+    Drift
+        `.rate` β (..., s), amplitude in the unit of time, with its error; `.probability` (...) of so large a rate by chance.
 
     Notes
     -----
@@ -165,11 +191,23 @@ def drift(fit: JointFit, times: ArrayLike) -> Drift:
 
 
 def phase_sense(fit: JointFit) -> tuple[Real, Real, Real]:
-    """Tell whether the phase leads (1), lags (-1) or cannot be told (0), and the sums of squares of either, (...) each.
+    """Return whether the phase leads (1), lags (-1) or is undecided (0), and both sums of squares, (...).
 
-    The runs are fitted as they are, and with every reading conjugate. If masses lie on a line both fit alike, and the
-    runs cannot tell. A sense is told where its sum of squares is the smaller one by the F(2ν, 2ν) quantile of 95 %.
+    The runs are fitted as they are, and with every reading conjugate. If the masses lie on a line, both fits are equal
+    and the runs cannot decide. A sense is chosen if its sum of squares is smaller by the F(2ν, 2ν) quantile of 95 %.
 
+    Parameters
+    ----------
+    fit
+        The fit of the runs as they are.
+
+    Returns
+    -------
+    sense, lead, lag
+        The sense, and the sums of squares with a leading and with a lagging phase.
+
+    Examples
+    --------
     >>> on = np.array([[0], [1], [1j], [-1 - 1j]])
     >>> [float(phase_sense(joint_fit(read, on))[0]) for read in (3 + 2j * on, (3 + 2j * on).conj())]
     [1.0, -1.0]
@@ -191,17 +229,22 @@ def phase_sense(fit: JointFit) -> tuple[Real, Real, Real]:
 
 
 def robust_fit(fit: JointFit, prior: Prior | None = None, deviation: ArrayLike | None = None) -> JointFit:
-    """Fit again with Huber's weights, so that a few wrong readings hardly count.
+    """Fit again with Huber's weights, which reduce the effect of a few wrong readings.
 
     Parameters
     ----------
     fit
-        Of all runs, with `prior` if that is given.
+        The fit of all runs, with `prior` if there is one.
     prior
-        What was known before the runs: it is not weighted.
+        Coefficients from before the runs; they are not weighted.
     deviation
-        With a prior √E|ε|² of the readings, (..., r, s) or what broadcasts; None or NaN: as the runs alone scatter, found
-        with Huber's weights too.
+        With a prior √E|ε|² of the readings, (..., r, s) or a shape that broadcasts; None or NaN: the scatter of the runs,
+        also with Huber's weights.
+
+    Returns
+    -------
+    JointFit
+        With the weights of its readings.
 
     Notes
     -----
@@ -210,6 +253,8 @@ def robust_fit(fit: JointFit, prior: Prior | None = None, deviation: ArrayLike |
     median of |r| over √(2 ln 2), made up for the unknowns fitted. With a prior it is held fixed, and what is least is
     Σ h(|r|)/σ² + (α - α̂)ᴴ Γ⁻¹ (α - α̂) with h = |r|² up to c = kσ/√2 and 2c|r| - c² beyond.
 
+    Examples
+    --------
     >>> on = np.arange(8.0)[:, None] * 1j
     >>> read = 5 + 2 * on + 0.01 * np.exp(1j * np.arange(8.0) ** 2)[:, None]
     >>> read[3] += 10

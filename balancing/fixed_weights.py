@@ -17,7 +17,7 @@ Real = NDArray[np.float64]
 
 
 def place_weights(target: complex, weights: ArrayLike) -> Placement:
-    """Turn weights of fixed mass, which may stand at any angle, so that together they are a correction.
+    """Find the angles of weights of fixed mass that together are a correction.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ Real = NDArray[np.float64]
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class TorqueCycle:
-    """The work of a torque over a cycle, and what a flywheel has to store of it."""
+    """The work of a torque over a cycle, and the energy that a flywheel has to store."""
 
     mean: float
     """N·m."""
@@ -98,6 +98,11 @@ def torque_cycle(angle: ArrayLike, torque: ArrayLike) -> TorqueCycle:
         are the ends of the cycle.
     torque
         The torque at them, (n,), N·m.
+
+    Returns
+    -------
+    TorqueCycle
+        `.mean`, N·m; `.work` and `.fluctuation`, J; `.inertia(speed, coefficient)`, kg·m².
 
     Raises
     ------

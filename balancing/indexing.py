@@ -16,7 +16,7 @@ Complex = NDArray[np.complex128]
 
 @record
 class Indexed(NamedTuple):
-    """The unbalance of the rotor itself and that of its mounting, in the unit of the readings."""
+    """The unbalance of the rotor and that of its mounting, in the unit of the readings."""
 
     rotor: Complex
     mounting: Complex
@@ -31,7 +31,7 @@ class Indexed(NamedTuple):
 
 
 def index_balancing(readings: ArrayLike, turned: ArrayLike = (0.0, np.pi)) -> Indexed:
-    """Separate a rotor's unbalance from its mandrel's by readings with the rotor turned on the mandrel.
+    """Separate a rotor's unbalance from its mandrel's by readings in several positions on the mandrel.
 
     Parameters
     ----------
@@ -60,6 +60,8 @@ def index_balancing(readings: ArrayLike, turned: ArrayLike = (0.0, np.pi)) -> In
     For 0 and 180° that is half the difference and half the sum. Both have the variance σ²/D, where σ² is that of a
     complex reading; each component has half of it.
 
+    Examples
+    --------
     >>> both = index_balancing([5 + 1j, 1 - 1j])
     >>> complex(both.rotor), complex(both.mounting)
     ((2+1j), (3+0j))

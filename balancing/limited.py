@@ -72,7 +72,7 @@ class Doubtful(UserWarning):
 
 
 class NotConverged(ArithmeticError):
-    """The best corrections reached are not proven optimal; `gap` is by what share they may leave too much."""
+    """The best corrections are not proven optimal; `gap` is the largest relative excess of their residual."""
 
     def __init__(self, gap: float, condition: float) -> None:
         self.gap, self.condition = gap, condition

@@ -25,11 +25,28 @@ Complex = NDArray[np.complex128]
 
 
 def region_factor(probability: float, degrees_of_freedom: ArrayLike, dimensions: int = 2) -> Real:
-    """Return k of the region δᵀV⁻¹δ ≤ k² that holds the true value with this probability.
+    """Return the k of the region δᵀV⁻¹δ ≤ k² that contains the true value with a given probability.
 
-    V is the covariance as estimated with ν complex, 2ν real degrees of freedom, and k² = n F(n, 2ν) with n the real
-    dimensions (Seber and Lee, section 5.1); χ² where ν is inf, NaN where it is 0.
+    Parameters
+    ----------
+    probability
+        Between 0 and 1.
+    degrees_of_freedom
+        ν complex degrees of freedom of the covariance V, (...); inf for an exact V.
+    dimensions
+        The real dimensions n of δ.
 
+    Returns
+    -------
+    ndarray
+        k, (...); NaN if ν is 0.
+
+    Notes
+    -----
+    k² = n F(n, 2ν) (G. A. F. Seber, A. J. Lee, Linear Regression Analysis, 2003, section 5.1); χ² if ν is inf.
+
+    Examples
+    --------
     >>> region_factor(0.95, [1, 4, np.inf]).round(3)
     array([6.164, 2.986, 2.448])
     """
@@ -69,7 +86,7 @@ class CoefficientSpread(NamedTuple):
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class LogBalance:
-    """Corrections of a rotor whose log was fitted, and their doubt.
+    """Corrections of a rotor whose log was fitted, with their uncertainty.
 
     Examples
     --------
@@ -356,7 +373,26 @@ def _unit_errors(sources: Complex) -> tuple[Complex, Real, Real]:
 
 
 def spread(samples: Complex, about: Complex) -> Real:
-    """Return the covariance (p, 2, 2) of drawn corrections (n, p) along and across the given ones."""
+    """Return the covariance (p, 2, 2) of drawn corrections (n, p), along and across the nominal ones.
+
+    Parameters
+    ----------
+    samples
+        Drawn corrections, complex (n, p), kg.
+    about
+        The nominal corrections, complex (p,), kg.
+
+    Returns
+    -------
+    ndarray
+        (p, 2, 2), kg²: the first axis along the nominal correction, the second across it.
+
+    Examples
+    --------
+    >>> spread(np.array([[2.1 + 0j], [1.9 + 0j]]), np.array([2.0 + 0j])).round(3) + 0.0
+    array([[[0.01, 0.  ],
+            [0.  , 0.  ]]])
+    """
     turned = (samples - about) * directions(about.conj())
     parts = np.stack([turned.real, turned.imag])
     return np.asarray(np.einsum("anp,bnp->pab", parts, parts) / len(samples))

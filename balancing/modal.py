@@ -35,7 +35,7 @@ Complex = NDArray[np.complex128]
 
 
 class UnreachedMode(ValueError):
-    """The planes cannot act on a combination of the conditions: `combination` (q,), the largest component 1."""
+    """The planes have no effect on the `combination` (q,) of conditions; its largest component is 1."""
 
     def __init__(self, message: str, combination: Real, case: tuple[int, ...]) -> None:
         self.combination, self.case = combination, case
@@ -45,7 +45,7 @@ class UnreachedMode(ValueError):
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class ModalCorrection:
-    """Corrections that leave some modes without excitation; see `modal_corrections`."""
+    """Corrections that leave the given modes without excitation, computed by `modal_corrections`."""
 
     unbalance: Complex
     """To ADD in each plane, (..., p), kg·m."""
@@ -62,7 +62,7 @@ class ModalCorrection:
 
 
 def modal_corrections(moment: ArrayLike, shapes: ArrayLike, at_planes: ArrayLike) -> ModalCorrection:
-    """Find the corrections of least Σ|w|² whose modal sums are opposite to those of the unbalances.
+    """Find the corrections with the least Σ|w|² whose modal sums are opposite to those of the unbalances.
 
     Parameters
     ----------
@@ -72,6 +72,11 @@ def modal_corrections(moment: ArrayLike, shapes: ArrayLike, at_planes: ArrayLike
         φ_k at the unbalances, real (..., q, m); any scale of each mode. Rows of 1 and of z are force and couple.
     at_planes
         φ_k at the correction planes, (..., q, p), p >= q.
+
+    Returns
+    -------
+    ModalCorrection
+        `.unbalance` (..., p) complex, to ADD, kg·m; `.residual_of(unbalance)` (..., q) the modal sums that they leave.
 
     Raises
     ------
@@ -121,8 +126,24 @@ def modal_corrections(moment: ArrayLike, shapes: ArrayLike, at_planes: ArrayLike
 
 
 def shapes_at(stations: ArrayLike, shapes: ArrayLike, z: ArrayLike) -> Real:
-    """Interpolate mode shapes that are known at stations: cubic splines, (n,), (k, n), (...) -> (k, ...).
+    """Interpolate mode shapes between their stations by cubic splines, (k, ...).
 
+    Parameters
+    ----------
+    stations
+        Axial positions with values of the shapes, rising, (n,), m.
+    shapes
+        The values, (k, n), of any scale.
+    z
+        Axial positions, (...), m.
+
+    Raises
+    ------
+    ValueError
+        A position beyond the stations, stations that do not rise, or shapes that do not fit.
+
+    Examples
+    --------
     >>> shapes_at([0, 1, 2, 3], [[0, 1, 8, 27]], [1.5, 2.0])
     array([[3.375, 8.   ]])
     """

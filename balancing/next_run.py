@@ -19,7 +19,7 @@ Complex = NDArray[np.complex128]
 
 @record
 class NextRun(NamedTuple):
-    """Masses to have on the rotor in the next run, and the uncertainty of the corrections before and after it."""
+    """Masses for the next run, and the uncertainty of the corrections before and after it."""
 
     masses: Complex
     """(p,), kg."""
@@ -29,14 +29,24 @@ class NextRun(NamedTuple):
 
 
 def suggest_run(balance: LogBalance, max_mass: ArrayLike) -> NextRun:
-    """Find the masses within limits whose run most reduces the uncertainty of the corrections; one machine.
+    """Find the masses within limits whose run reduces the uncertainty of one machine's corrections most.
 
     Parameters
     ----------
     balance
-        What is known so far.
+        The balance after the runs so far.
     max_mass
         The largest mass in each plane, scalar or (p,), kg.
+
+    Returns
+    -------
+    NextRun
+        `.masses` (p,) complex, kg, and the root mean square uncertainty of the corrections before and after, kg.
+
+    Raises
+    ------
+    ValueError
+        A limit that is not positive and finite.
 
     Notes
     -----

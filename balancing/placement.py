@@ -27,7 +27,7 @@ Complex = NDArray[np.complex128]
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class Placement:
-    """Masses at given positions; see `place`, `place_from_stock` and `place_weights`."""
+    """Masses at given positions, computed by `place`, `place_from_stock` or `place_weights`."""
 
     target: complex
     """What the masses together should be, complex kg."""
@@ -121,7 +121,7 @@ class Placement:
 
 
 def place(target: complex, angles: ArrayLike, max_mass: ArrayLike | None = None) -> Placement:
-    """Split a correction onto given positions: exactly and with the least mass, or as near as the limits let.
+    """Split a correction onto given positions: exactly with the least mass, or as near as the limits let.
 
     Parameters
     ----------
@@ -137,6 +137,11 @@ def place(target: complex, angles: ArrayLike, max_mass: ArrayLike | None = None)
     Placement
         `.masses` (n,), `.error`. Without limits the two positions on either side of the target share it by the
         sine rule; with limits the positions next to the target are filled up first.
+
+    Raises
+    ------
+    ValueError
+        Several corrections, a correction that is not finite, positions that coincide, a negative limit.
 
     Notes
     -----
@@ -252,7 +257,7 @@ def place_from_stock(
     pieces: int = 1,
     max_pieces: int | None = None,
 ) -> Placement:
-    """Choose weights from stock for given positions so that they come nearest to a correction.
+    """Choose weights from stock for given positions, with the least error of their sum.
 
     Parameters
     ----------
@@ -271,6 +276,11 @@ def place_from_stock(
         `.masses` (n,) sums of stock weights, of the least |error| there is, and among equals of the least total
         mass. Where there are too many choices to search (some 18 positions with three weights, some 60 with
         `max_pieces` 3) only the positions nearest to the target's direction are used, and `.bound` is 0.
+
+    Raises
+    ------
+    ValueError
+        No weights in stock, one that is not positive, or less than one piece for a position.
 
     Notes
     -----
@@ -408,7 +418,7 @@ def _loads(weights: Real, pieces: int) -> tuple[Real, NDArray[np.intp]]:
 def drill_depth(
     mass: ArrayLike, diameter: ArrayLike, density: ArrayLike, point_angle: float = np.pi
 ) -> NDArray[np.float64]:
-    """Tell how deep to drill to remove a mass, m, measured at the tip of the drill.
+    """Return the depth of a hole that removes a mass, (...), m, measured at the tip of the drill.
 
     Parameters
     ----------
@@ -417,11 +427,18 @@ def drill_depth(
     point_angle
         The drill's point angle, rad; π for a flat bottom.
 
+    Raises
+    ------
+    ValueError
+        A negative mass, a diameter or density that is not positive, an angle outside (0, π].
+
     Notes
     -----
     m = ρ(π d²/4·h + π d³/(24 tan(φ/2))), h the depth of the full diameter; a hole shallower than the point
     is a cone.
 
+    Examples
+    --------
     >>> round(float(drill_depth(0.010, 0.010, 7850.0)) * 1000, 2)
     16.22
     """
@@ -441,11 +458,33 @@ def drill_depth(
 
 
 def transfer(unbalance: ArrayLike, z: ArrayLike, planes: ArrayLike) -> Complex:
-    """Carry corrections over to other planes, with the same force and moment (least norm for three or more).
+    """Transfer corrections to other planes with the same force and moment (least norm for three or more).
 
-    Corrections (..., k) at z (..., k) become corrections (..., p) in the planes (p,); two planes share one
-    correction by its distances (the lever).
+    Parameters
+    ----------
+    unbalance
+        Corrections, complex (..., k), kg·m.
+    z
+        Their axial positions, (..., k), m.
+    planes
+        Axial positions of the new planes, (p,), m; two planes share a correction by its distances (the lever).
 
+    Returns
+    -------
+    ndarray
+        Corrections in the new planes, complex (..., p), kg·m.
+
+    Raises
+    ------
+    CoincidentPlanes
+        All new planes at one place.
+
+    Notes
+    -----
+    The corrections of `correct` with the opposite sign (J. A. Riul, Dinâmica das Máquinas II, eqs. 12-21).
+
+    Examples
+    --------
     >>> transfer([12.0], [0.03], [0.0, 0.09]).real.round(12)
     array([8., 4.])
     """

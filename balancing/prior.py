@@ -28,7 +28,7 @@ Complex = NDArray[np.complex128]
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class Prior:
-    """Influence coefficients as known before, and how far a machine's own may lie from them."""
+    """Influence coefficients from earlier measurements, and the scatter of one machine about them."""
 
     mean: Complex
     """α̂, (..., s, p)."""
@@ -44,10 +44,26 @@ class Prior:
 
 
 def stored_prior(mean: ArrayLike, covariance: ArrayLike, degrees_of_freedom: ArrayLike = np.inf) -> Prior:
-    """Take the coefficients of one machine (..., s, p) with their covariance E δδᴴ of each channel (..., s, p, p).
+    """Return the prior of one machine from its coefficients (..., s, p) and their covariance (..., s, p, p).
 
-    How machines differ one machine does not tell: this is for coefficients of the same machine, or of one just like it.
+    One machine does not show how machines differ: the prior is for the same machine, or for one exactly like it.
 
+    Parameters
+    ----------
+    mean
+        α, complex (..., s, p), amplitude per kg.
+    covariance
+        E δδᴴ of the errors of each channel, (..., s, p, p).
+    degrees_of_freedom
+        Complex degrees of freedom of the covariance, (...).
+
+    Raises
+    ------
+    ValueError
+        A covariance with a negative eigenvalue, or shapes that do not fit.
+
+    Examples
+    --------
     >>> stored_prior([[2.0]], [[[0.04]]]).factor
     array([[[0.2+0.j]]])
     """
@@ -69,14 +85,24 @@ def stored_prior(mean: ArrayLike, covariance: ArrayLike, degrees_of_freedom: Arr
 
 
 def pooled_prior(coefficients: ArrayLike, covariances: ArrayLike | None = None) -> Prior:
-    """Pool the coefficients of sister machines, (m, s, p) with m ≥ 2, and estimate how machines differ.
+    """Pool the coefficients of sister machines, (m, s, p) with m ≥ 2, and estimate their scatter.
 
     Parameters
     ----------
     coefficients
-        α of each machine.
+        α of each machine, complex (m, s, p), amplitude per kg.
     covariances
-        E δδᴴ of the error with which each is known, (m, s, p, p); None: exact.
+        E δδᴴ of the error of each, (m, s, p, p); None: no errors.
+
+    Returns
+    -------
+    Prior
+        `.mean` (s, p), `.scatter` (relative), `.degrees_of_freedom` m - 1.
+
+    Raises
+    ------
+    ValueError
+        Fewer than two machines, or another shape.
 
     Notes
     -----
@@ -120,7 +146,7 @@ def pooled_prior(coefficients: ArrayLike, covariances: ArrayLike | None = None) 
 def fit_with_prior(
     readings: ArrayLike, masses: ArrayLike, prior: Prior, deviation: ArrayLike | None = None
 ) -> JointFit:
-    """Fit initial vibration and coefficients to runs and to what was known of the coefficients.
+    """Fit initial vibration and coefficients to runs and to earlier coefficients.
 
     Parameters
     ----------

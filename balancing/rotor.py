@@ -12,7 +12,7 @@ BLOCK = 16384
 
 
 def by_size(rotor: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Yield groups of rotors of nearly equal numbers of masses, for one vectorised pass over each group.
+    """Yield groups of rotors with nearly equal numbers of masses, each for one vectorised pass.
 
     Parameters
     ----------

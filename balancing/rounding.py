@@ -30,6 +30,11 @@ def influence_error(initial: ArrayLike, trials: ArrayLike, trial_masses: ArrayLi
     initial, trials, trial_masses
         As given to `influence_coefficients`: (..., s), (..., r, s), (..., r, p).
 
+    Returns
+    -------
+    ndarray
+        |α - α₃₂| of the answers with 16 and with 32 digits, (..., s, p).
+
     Notes
     -----
     The coefficients of each sensor solve T α = V_j - V_0 by least squares. The readings are taken as exact; how their own

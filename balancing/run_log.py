@@ -39,7 +39,7 @@ Complex = NDArray[np.complex128]
 
 
 class Undetermined(Unseen):
-    """The runs do not determine x₀ and α: `combination` (1 + p,) of them leaves no trace, x₀ first; `case` says where."""
+    """The runs do not determine x₀ and α: their `combination` (1 + p,), x₀ first, has no effect at `case`."""
 
 
 @record
@@ -58,7 +58,7 @@ class Foreknown:
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class JointFit:
-    """Initial vibration and influence coefficients of every channel; see `joint_fit`."""
+    """Initial vibration and influence coefficients of every channel, fitted by `joint_fit`."""
 
     readings: Complex
     """(..., r, s); NaN where a run lacks a channel."""
@@ -322,7 +322,7 @@ def joint_fit(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None 
 
 
 def initial_alone(readings: ArrayLike, influence: ArrayLike) -> JointFit:
-    """Fit the initial vibration alone, to runs without masses; the influence coefficients are known.
+    """Fit only the initial vibration, to runs without masses; the influence coefficients are given.
 
     Parameters
     ----------
@@ -330,6 +330,16 @@ def initial_alone(readings: ArrayLike, influence: ArrayLike) -> JointFit:
         As for `joint_fit`, (..., r, s), each channel read once at least.
     influence
         α, complex (..., s, p), without errors.
+
+    Returns
+    -------
+    JointFit
+        Its `.influence` are the given coefficients; the degrees of freedom are those of repeated readings.
+
+    Raises
+    ------
+    ValueError
+        A channel without a reading.
 
     Examples
     --------
@@ -353,8 +363,17 @@ def initial_alone(readings: ArrayLike, influence: ArrayLike) -> JointFit:
 
 
 def determined(masses: ArrayLike, present: ArrayLike) -> NDArray[np.bool_]:
-    """Tell which channels (..., s) are determined by the runs (..., r, s) in which they were read.
+    """Return which channels (..., s) the runs determine in which they were read.
 
+    Parameters
+    ----------
+    masses
+        On the rotor in each run, complex (..., r, p), kg.
+    present
+        Whether a run has a reading of a channel, (..., r, s).
+
+    Examples
+    --------
     >>> determined([[0], [1], [2]], [[True, True], [True, False], [True, False]])
     array([ True, False])
     """

@@ -24,6 +24,11 @@ def severity_zone(velocity: ArrayLike, machine: str) -> NDArray[np.str_]:
     machine
         A key of `ZONE_BOUNDARIES`: group 1 (above 300 kW) or 2 (15 kW to 300 kW), on a rigid or a flexible support.
 
+    Returns
+    -------
+    ndarray of str
+        The zones, (...).
+
     Raises
     ------
     ValueError

@@ -25,7 +25,7 @@ BLOCK = 8192
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class OncePerTurn:
-    """V of V e^{iωt}, t = 0 at the mark, and the turns it is the mean of."""
+    """The once-per-turn vector V of V e^{iωt} (t = 0 at the mark), a mean over turns."""
 
     vector: Complex
     """Mean over the turns, complex (s,)."""
@@ -188,7 +188,7 @@ def _roomiest(k: Any, low: Any, high: Any, least: float, most: float) -> Any:
 def once_per_turn(
     t: ArrayLike, signal: ArrayLike, mark: ArrayLike, pulses: int = 1, tacho: ArrayLike | None = None
 ) -> OncePerTurn:
-    """Find the once-per-turn vectors of signals, turn by turn between marks, and their mean.
+    """Find the once-per-turn vectors of signals in each turn between marks, and their mean.
 
     Parameters
     ----------
@@ -204,6 +204,11 @@ def once_per_turn(
     tacho
         A second signal with several pulses in a turn, (n,), beside a mark that comes once: it tells the angle, and the mark
         where it is zero.
+
+    Returns
+    -------
+    OncePerTurn
+        `.vector` (s,) complex, in the unit of the signal; `.speed`, rad/s; `.turns`; `.phase_resolution`, rad.
 
     Raises
     ------

@@ -10,10 +10,20 @@ GRADES = (4000.0, 1600.0, 630.0, 250.0, 100.0, 40.0, 16.0, 6.3, 2.5, 1.0, 0.4)
 
 
 def grade_value(name: str) -> float:
-    """Return e_per·Ω in m/s of a grade such as `G2.5` (or `G 2,5`); any positive value is taken.
+    """Return e_per·Ω in m/s of a balance quality grade such as `G2.5` (or `G 2,5`).
 
-    Raises ValueError for what is no grade.
+    Parameters
+    ----------
+    name
+        A grade of ISO 21940-11:2016, or any other positive number after the G, mm/s.
 
+    Raises
+    ------
+    ValueError
+        A text that is no grade.
+
+    Examples
+    --------
     >>> grade_value("G6.3")
     0.0063
     """
@@ -31,11 +41,28 @@ def grade_value(name: str) -> float:
 
 
 def permissible_unbalance(grade: ArrayLike, speed: ArrayLike, mass: ArrayLike) -> NDArray[np.float64]:
-    """Return the permissible residual unbalance U_per = (e_per·Ω)·m/Ω, kg·m.
+    """Return the permissible residual unbalance U_per = (e_per·Ω)·m/Ω, (...), kg·m.
 
-    Parameters are e_per·Ω in m/s (`grade_value`), the highest service speed Ω in rad/s and the rotor's mass
-    in kg; they broadcast. ISO 21940-11:2016, permissible residual unbalance from the quality grade.
+    Parameters
+    ----------
+    grade
+        e_per·Ω, (...), m/s: see `grade_value`.
+    speed
+        Highest service speed Ω, (...), rad/s.
+    mass
+        Mass of the rotor, (...), kg.
 
+    Raises
+    ------
+    ValueError
+        A number that is not positive.
+
+    Notes
+    -----
+    ISO 21940-11:2016, permissible residual unbalance from the balance quality grade.
+
+    Examples
+    --------
     >>> round(float(permissible_unbalance(0.0025, 3000 * np.pi / 30, 10.0)) * 1e6, 2)  # g·mm
     79.58
     """
@@ -46,12 +73,28 @@ def permissible_unbalance(grade: ArrayLike, speed: ArrayLike, mass: ArrayLike) -
 
 
 def allocate(permissible: ArrayLike, center: float, plane_a: float, plane_b: float) -> NDArray[np.float64]:
-    """Return the shares (..., 2) of a permissible residual unbalance in two tolerance planes.
+    """Return the shares (..., 2) of a permissible residual unbalance for two tolerance planes.
 
-    Each plane's share goes with the distance of the centre of mass from the other plane, within limits: 0.3 to
-    0.7 of the whole where the centre lies between the planes, 0.3 to 1.3 where it lies outside them
+    Parameters
+    ----------
+    permissible
+        U_per of the whole rotor, (...), kg·m.
+    center, plane_a, plane_b
+        Axial positions of the centre of mass and of the planes, m.
+
+    Raises
+    ------
+    ValueError
+        Both planes at one place.
+
+    Notes
+    -----
+    The share of a plane is proportional to the distance of the centre of mass from the other plane, within limits:
+    0.3 to 0.7 of the whole if the centre lies between the planes, 0.3 to 1.3 if it lies outside
     (ISO 21940-11:2016, allocation to the tolerance planes, with its limitations for inboard and outboard rotors).
 
+    Examples
+    --------
     >>> (allocate(28648.0, center=1.5, plane_a=0.0, plane_b=2.4)).round(0)
     array([10743., 17905.])
     """
@@ -69,11 +112,26 @@ _OZ_IN_RPM_PER_LB = 0.0254 / 16 * np.pi / 30
 
 
 def api_unbalance(journal_mass: ArrayLike, speed: ArrayLike) -> NDArray[np.float64]:
-    """Return the permissible residual unbalance of a plane after API (610, 617 …), kg·m: U = 4W/N.
+    """Return the permissible residual unbalance of a plane after API (610, 617 …), (...), kg·m.
 
-    U is in oz·in, W the static load of the plane's journal in lb, N the highest speed in rpm; with W in kg it is
-    6350 W/N g·mm. Parameters are W as a mass in kg and the speed in rad/s; they broadcast.
+    Parameters
+    ----------
+    journal_mass
+        Static load of the plane's journal as a mass, (...), kg.
+    speed
+        Highest speed, (...), rad/s.
 
+    Raises
+    ------
+    ValueError
+        A negative load, or a speed that is not positive.
+
+    Notes
+    -----
+    U = 4W/N in oz·in, W the load in lb, N the speed in rpm; with W in kg it is 6350 W/N g·mm.
+
+    Examples
+    --------
     >>> round(float(api_unbalance(500.0, 3000 * np.pi / 30)) * 1e6, 6)  # g·mm
     1058.333333
     """
@@ -84,11 +142,27 @@ def api_unbalance(journal_mass: ArrayLike, speed: ArrayLike) -> NDArray[np.float
 
 
 def mil_unbalance(rotor_mass: ArrayLike, speed: ArrayLike) -> NDArray[np.float64]:
-    """Return the permissible residual unbalance of each correction plane after MIL-STD-167-1, kg·m.
+    """Return the permissible residual unbalance of each correction plane after MIL-STD-167-1, (...), kg·m.
 
-    In oz·in, with W the weight of the whole rotor in lb and N the highest speed in rpm: 0.177 W below 150 rpm, 4000 W/N² from
-    150 to 1000 rpm, 4W/N above. Parameters are the rotor's mass in kg and the speed in rad/s; they broadcast.
+    Parameters
+    ----------
+    rotor_mass
+        Mass of the whole rotor, (...), kg.
+    speed
+        Highest speed, (...), rad/s.
 
+    Raises
+    ------
+    ValueError
+        A mass or a speed that is not positive.
+
+    Notes
+    -----
+    In oz·in, with W the weight of the rotor in lb and N the speed in rpm: 0.177 W below 150 rpm, 4000 W/N² from
+    150 to 1000 rpm, 4W/N above.
+
+    Examples
+    --------
     >>> rpm = np.array([100.0, 500.0, 1800.0])
     >>> (mil_unbalance(0.45359237 * 40, rpm * np.pi / 30) / (0.0254 * 0.45359237 / 16)).round(6)  # oz·in for 40 lb
     array([7.08    , 0.64    , 0.088889])
@@ -102,8 +176,23 @@ def mil_unbalance(rotor_mass: ArrayLike, speed: ArrayLike) -> NDArray[np.float64
 
 
 def journal_loads(mass: float, center: float, bearing_1: float, bearing_2: float) -> NDArray[np.float64]:
-    """Return the static loads of two bearings as masses, (2,), kg; that of a bearing which is lifted counts by its size.
+    """Return the static loads of two bearings as masses, (2,), kg; a lifted bearing counts by the size of its
+    load.
 
+    Parameters
+    ----------
+    mass
+        Of the rotor, kg.
+    center, bearing_1, bearing_2
+        Axial positions of the centre of mass and of the bearings, m.
+
+    Raises
+    ------
+    ValueError
+        Both bearings at one place.
+
+    Examples
+    --------
     >>> journal_loads(100.0, center=0.3, bearing_1=0.0, bearing_2=1.0)
     array([70., 30.])
     """

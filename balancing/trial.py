@@ -19,11 +19,30 @@ STANDARD_GRAVITY = 9.80665
 def trial_unbalance(
     rotor_mass: ArrayLike, speed: ArrayLike, planes: int = 1, share: float = 0.1
 ) -> NDArray[np.float64]:
-    """Suggest a trial unbalance m·r for the first run, kg·m.
+    """Return a trial unbalance m·r for the first run, (...), kg·m.
 
-    The rule: its centrifugal force is a tenth (`share`) of the static load that the plane carries,
-    m·r·ω² = share·(M/planes)·g. It is felt, and does no harm. Rotor mass in kg, speed in rad/s.
+    Parameters
+    ----------
+    rotor_mass
+        Mass of the rotor, (...), kg.
+    speed
+        Speed of the trial run, (...), rad/s.
+    planes
+        The number of planes that share the mass of the rotor.
+    share
+        The centrifugal force over the static load of a plane.
 
+    Raises
+    ------
+    ValueError
+        A number that is not positive.
+
+    Notes
+    -----
+    Rule of practice: m·r·ω² = share·(M/planes)·g. A tenth of the static load is measurable and does no harm.
+
+    Examples
+    --------
     >>> m_r = trial_unbalance(100.0, 1500 * np.pi / 30, planes=2)
     >>> round(float(m_r / 0.2) * 1000, 2)  # grams at 200 mm
     9.94
@@ -42,7 +61,7 @@ def load_rule(mass: Any, omega: Any, planes: float, share: Any, gravity: Any) ->
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class TrialEffect:
-    """What a trial mass changed: the amplitude by this share, the phase by this angle (rad), (...,) each."""
+    """The effect of a trial mass: the relative change of amplitude and the change of phase (rad), (...) each."""
 
     amplitude: Real
     phase: Real
@@ -69,11 +88,23 @@ class TrialEffect:
 
 
 def trial_effect(before: ArrayLike, after: ArrayLike) -> TrialEffect:
-    """Tell how much a trial mass changed the readings, for the 30/30 rule.
+    """Return the effect of a trial mass on the readings, for the 30/30 rule.
 
-    The rule of the practitioner: a trial run tells something where the amplitude changed by 30 % or the phase
+    The rule of the practitioner: a trial run is informative if the amplitude changed by 30 % or the phase
     by 30° at one sensor at least. A vibration that rises from zero has changed by inf.
 
+    Parameters
+    ----------
+    before, after
+        Vibration without and with the trial mass, complex (...).
+
+    Returns
+    -------
+    TrialEffect
+        `.amplitude`, the relative change, and `.phase`, the change in rad, (...).
+
+    Examples
+    --------
     >>> effect = trial_effect(3.4 * np.exp(1j * np.radians(116)), 1.8 * np.exp(1j * np.radians(42)))
     >>> effect.amplitude.round(2), np.degrees(effect.phase).round()
     (np.float64(0.47), np.float64(74.0))
@@ -97,7 +128,7 @@ def _effect(v0: Any, v1: Any) -> tuple[Any, Any]:
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class ErrorBudget:
-    """The error of a residual unbalance, and the readings from which on a rotor is in or out of tolerance."""
+    """The error of a residual unbalance, and the limits of its reading to accept or reject a rotor."""
 
     error: Real
     accept: Real
@@ -123,7 +154,7 @@ class ErrorBudget:
 
 
 def error_budget(permissible: ArrayLike, random: ArrayLike = (), systematic: ArrayLike = ()) -> ErrorBudget:
-    """Combine the errors of balancing and say which residual readings pass.
+    """Combine the errors of balancing and return the limits of the residual readings.
 
     Parameters
     ----------
@@ -134,11 +165,23 @@ def error_budget(permissible: ArrayLike, random: ArrayLike = (), systematic: Arr
     systematic
         Systematic errors that were NOT corrected, sizes, (..., n): they add in full, as the worst case.
 
+    Returns
+    -------
+    ErrorBudget
+        `.error` ΔU, `.accept` U_per - ΔU and `.reject` U_per + ΔU, (...), in the unit of the parameters.
+
+    Raises
+    ------
+    ValueError
+        A permissible unbalance that is not positive, or errors that are not finite.
+
     Notes
     -----
-    ISO 21940-14:2012 (before: ISO 1940-2): ΔU = Σ systematic + √Σ random²; the maker accepts a reading up to
-    U_per - ΔU, the user rejects one above U_per + ΔU; between the two it is not decided.
+    ISO 21940-14:2012 (before: ISO 1940-2): ΔU = Σ systematic + √Σ random². The maker accepts a reading up to
+    U_per - ΔU, the user rejects one above U_per + ΔU; between the two there is no decision.
 
+    Examples
+    --------
     >>> error_budget(100.0, random=[3.0, 4.0], systematic=[2.0])
     ErrorBudget(error=7, accept=93, reject=107)
     """

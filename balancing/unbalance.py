@@ -14,7 +14,7 @@ Complex = NDArray[np.complex128]
 def initial_unbalance(
     influence: ArrayLike, initial: ArrayLike, weights: ArrayLike | None = None, *, singular: float = 1e12
 ) -> Complex:
-    """Find the unbalance in the correction planes that explains the initial vibration best.
+    """Find the unbalance in the correction planes that best explains the initial vibration.
 
     It is the rotor's: no limit, ridge or rounding of the corrections changes it.
 

@@ -11,10 +11,16 @@ import dalembert
 
 _HEAD = """# The library
 
-Every public name with the first sentence of its docstring; `help(NAME)` shows parameters, units, errors, sources and an example.
-`import dalembert` has all of them in one namespace. Where a name there is longer than in its package, it stands in brackets.
-This page is written by `python -m benchmarks.library_page`.
+This page lists every public name with the first sentence of its docstring. `help(NAME)` shows parameters, units, errors, sources
+and an example. `import dalembert` has all names in one namespace; a longer name there stands in brackets.
+`python -m benchmarks.library_page` writes this page.
 """
+
+_CONSTANTS = {
+    "GRADES": "The balance quality grades of ISO 21940-11, mm/s",
+    "ZONE_BOUNDARIES": "The classes of machines whose vibration zones ISO 10816-3 bounds",
+    "SHAPES": "The shapes of parts",
+}
 
 _PACKAGES = {"balancing": "Rotors", "virtualwork": "Mechanisms", "rigidbody3d": "Bodies in space"}
 
@@ -39,6 +45,7 @@ def page() -> Iterator[str]:
             value = getattr(module, name)
             other = long.get(id(value), name)
             shown = f"`{name}`" if other == name else f"`{name}` (`dalembert.{other}`)"
+            shown += " (module)" if inspect.ismodule(value) else ""
             yield f"| {shown} | {first_sentence(name, value)} |"
 
 
@@ -49,9 +56,9 @@ def first_sentence(name: str, value: object) -> str:
     "Return the first sentence of a name's docstring; of a constant, what it holds."
     """
     if isinstance(value, str):
-        text = f'The constant "{value}".'
+        text = f'The name of the fixed body, "{value}".'
     elif isinstance(value, dict | tuple):
-        text = f"A constant with the entries {', '.join(map(str, value))}."
+        text = f"{_CONSTANTS[name]}: {', '.join(map(str, value))}."
     else:
         text = (inspect.getdoc(value) or "").partition("\n\n")[0]
     sentence = re.split(r"(?<=[a-z)\]`²³]\.)\s+(?=[A-Z])", " ".join(text.split()))[0]

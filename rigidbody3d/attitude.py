@@ -166,7 +166,12 @@ def from_vector(turn: ArrayLike) -> Array:
 
 
 def to_scipy(q: ArrayLike) -> Rotation:
-    """Return scipy's `Rotation` of an attitude, (4,) or (n, 4).
+    """Return the scipy `Rotation` of an attitude, (4,) or (n, 4).
+
+    Parameters
+    ----------
+    q
+        Quaternions [w, x, y, z], body to space, (4,) or (n, 4).
 
     Examples
     --------
@@ -179,7 +184,12 @@ def to_scipy(q: ArrayLike) -> Rotation:
 
 
 def from_scipy(rotation: Rotation) -> Array:
-    """Return the attitude [w, x, y, z] of scipy's `Rotation`.
+    """Return the attitude [w, x, y, z] of a scipy `Rotation`, (4,) or (n, 4).
+
+    Parameters
+    ----------
+    rotation
+        scipy's `Rotation`, whose quaternions have the scalar last.
 
     Examples
     --------

@@ -39,10 +39,10 @@ class BodyError(NamedTuple):
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class Body:
-    """Mass (...), centre of mass (..., 3) and inertia tensor at it (..., 3, 3), kg, m, kg·m²; leading axes are bodies.
+    """A body: mass (...), centre of mass (..., 3) and inertia tensor about it (..., 3, 3), kg, m, kg·m².
 
-    The numbers may be doubled ones (`DoubledArray`) as well. `exact` gives a body that was worked out (moved, turned, put
-    together) to 32 digits; see `error_estimate`. `form` has the shapes it was made of, for its picture.
+    Leading axes are bodies. The numbers may also be doubled ones (`DoubledArray`). `exact` computes the same body (moved,
+    turned, composed) to 32 digits; see `error_estimate`. `form` has the shapes of its parts, for its picture.
 
     Examples
     --------
@@ -218,7 +218,19 @@ class Body:
 
 
 def compose(parts: Body, axis: int = -1) -> Body:
-    """Put parts together: the body of all parts along one axis of the bodies; a hole is a part of negative mass.
+    """Compose a body from parts along one axis of the bodies; a hole is a part of negative mass.
+
+    Parameters
+    ----------
+    parts
+        The parts; their leading axes are parts and bodies.
+    axis
+        The axis of the parts.
+
+    Returns
+    -------
+    Body
+        One body for all parts along the axis.
 
     Raises
     ------
@@ -227,8 +239,9 @@ def compose(parts: Body, axis: int = -1) -> Body:
 
     Notes
     -----
-    Each part is shifted to the common centre directly, never to the origin and back; the rounding of that
-    centre is taken out again, since Σ m (c - G) is zero only in exact arithmetic.
+    I = Σ [I_i + m_i (|d_i|² E − d_i d_iᵀ)], d_i = c_i − G (Beer and Johnston, ch. 9: parallel axis theorem). Each part is
+    shifted to the common centre directly, never to the origin and back; the result is corrected for the rounding of that
+    centre, since Σ m (c - G) is zero only in exact arithmetic.
 
     Examples
     --------

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class FreeBody:
-    """A rigid body that no torque acts on, from its inertia and its state at time zero.
+    """A rigid body without torque, from its inertia and its state at time zero.
 
     Parameters
     ----------

@@ -14,7 +14,18 @@ Array = NDArray[np.float64]
 
 
 def gyroscopic_couple(momentum: ArrayLike, frame_omega: ArrayLike) -> Array:
-    """Return the moment that must act on a rotor whose base turns, Ω × H, (..., 3), N·m; the rotor answers -Ω × H.
+    """Return the moment Ω × H on a rotor whose base turns, (..., 3), N·m; the rotor exerts -Ω × H.
+
+    Parameters
+    ----------
+    momentum
+        H of the rotor, (..., 3), kg·m²/s.
+    frame_omega
+        Angular velocity Ω of the base, (..., 3), rad/s.
+
+    Notes
+    -----
+    Beer and Johnston, ch. 18; Riul II, eq. 44, with a constant H in the axes of the base.
 
     Examples
     --------
@@ -54,7 +65,7 @@ class Steady(_Rates):
 def steady_precession(
     transverse: ArrayLike, axial: ArrayLike, mgl: ArrayLike, tilt: ArrayLike, spin: ArrayLike
 ) -> Steady:
-    """Return the slow and the fast rate at which a top precesses at constant tilt.
+    """Return the slow and the fast rate of precession of a top at constant tilt.
 
     Parameters
     ----------
@@ -66,6 +77,11 @@ def steady_precession(
         Angle of the axis with the vertical, (...), rad.
     spin
         ω3, the component of the angular velocity along the axis, (...), rad/s.
+
+    Returns
+    -------
+    Steady
+        `.slow` and `.fast`, (...), rad/s.
 
     Notes
     -----
@@ -94,9 +110,20 @@ def steady_precession(
 
 
 def sleeping_threshold(transverse: ArrayLike, axial: ArrayLike, mgl: ArrayLike) -> Array:
-    """Return the spin above which a top stands upright stably, 2 √(m g l I1)/I3, (...), rad/s (Goldstein, §5.7).
+    """Return the spin above which a top is stable upright, 2 √(m g l I1)/I3, (...), rad/s.
 
-    Zero where the centre of mass lies below the fixed point.
+    It is zero if the centre of mass lies below the fixed point.
+
+    Parameters
+    ----------
+    transverse, axial
+        Moments I1 and I3 about the fixed point, (...), kg·m².
+    mgl
+        Weight times the distance of the centre of mass from the fixed point, (...), N·m.
+
+    Notes
+    -----
+    H. Goldstein, Classical Mechanics, §5.7.
 
     Examples
     --------
@@ -133,7 +160,7 @@ class Cones(_Cones):
 
 
 def cones(transverse: ArrayLike, axial: ArrayLike, omega: ArrayLike) -> Cones:
-    """Return the cones that roll on each other when a symmetric body turns freely.
+    """Return the cones that roll on each other in the free rotation of a symmetric body.
 
     Parameters
     ----------
@@ -141,6 +168,11 @@ def cones(transverse: ArrayLike, axial: ArrayLike, omega: ArrayLike) -> Cones:
         I1 (twice) and I3, (...), kg·m².
     omega
         Angular velocity in body axes, the axis last, (..., 3), rad/s.
+
+    Returns
+    -------
+    Cones
+        Half angles (rad) of both cones, precession and spin (rad/s), (...) each.
 
     Notes
     -----

@@ -95,9 +95,14 @@ def tensor(
     ixz: ArrayLike = 0.0,
     iyz: ArrayLike = 0.0,
 ) -> Array:
-    """Return the inertia tensor (..., 3, 3) of given moments and products, kg·m².
+    """Return the inertia tensor (..., 3, 3) of moments and products, kg·m².
 
-    The products are I_xy = +∫ x y dm; the matrix carries their negatives (Riul II, eq. 31).
+    Parameters
+    ----------
+    ixx, iyy, izz
+        Moments of inertia, (...), kg·m².
+    ixy, ixz, iyz
+        Products of inertia +∫ x y dm …, (...), kg·m²; the tensor has their negatives (Riul II, eq. 31).
 
     Examples
     --------
@@ -116,6 +121,11 @@ def _arranged(*entries: Array) -> Array:
 def products(inertia: ArrayLike) -> Array:
     """Return the products of inertia I_xy, I_xz, I_yz = +∫ x y dm … of a tensor, (..., 3), kg·m².
 
+    Parameters
+    ----------
+    inertia
+        The tensor, (..., 3, 3), kg·m²; it has -I_xy (Riul II, eq. 31).
+
     Examples
     --------
     >>> products(tensor(2, 3, 4, ixy=0.5, iyz=-0.25))
@@ -126,7 +136,7 @@ def products(inertia: ArrayLike) -> Array:
 
 
 def shift(mass: ArrayLike, offset: ArrayLike) -> Array:
-    """Return the tensor of a point mass at an offset: what the parallel axis theorem adds, (..., 3, 3), kg·m².
+    """Return the tensor of a point mass at an offset, the term of the parallel axis theorem, (..., 3, 3), kg·m².
 
     Parameters
     ----------
@@ -285,7 +295,7 @@ def _right_handed(axes: Array) -> Array:
 
 
 def check(inertia: ArrayLike, rtol: float = RTOL) -> Validity:
-    """Say whether any body can have a tensor: no negative moment, and none larger than the other two together.
+    """Return whether a body can have a tensor: no negative moment, none larger than the sum of the other two.
 
     Parameters
     ----------
@@ -295,10 +305,15 @@ def check(inertia: ArrayLike, rtol: float = RTOL) -> Validity:
         How far, as a part of the largest moment, an inequality may be missed. Flat bodies (I1 + I2 = I3) and
         thin rods (I1 = 0) meet it with equality, and rounding must not reject them.
 
+    Returns
+    -------
+    Validity
+        `.valid` (...) and `.reason`, which names the broken inequality.
+
     Notes
     -----
     The principal moments are tested, not the diagonal: I1 + I2 - I3 = 2∫ z² dm ≥ 0 holds in principal axes and
-    is stronger there. No such test can see a product of inertia of the wrong sign.
+    is stronger there. No such test detects a product of inertia with the wrong sign.
 
     Examples
     --------

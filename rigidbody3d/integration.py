@@ -44,7 +44,7 @@ STAGES = _STAGES + _STAGES[-2::-1]
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(AtTimes):
-    """States at the times asked for: `.omega` (n, 3) in body axes, `.attitude` (n, 4), `.momentum` (n, 3) in space axes."""
+    """States at the requested times: `.omega` (n, 3) in body axes, `.attitude` (n, 4), `.momentum` (n, 3) in space axes."""
 
     time: Array
     momentum: Array
@@ -158,7 +158,7 @@ def integrate(
     longest: float = math.inf,
     most: float = MOST,
 ) -> Trajectory:
-    """Integrate the rotation of a body under a torque from time zero to each of the times.
+    """Integrate the rotation of a body under a torque from time zero to each time.
 
     Parameters
     ----------
@@ -189,6 +189,11 @@ def integrate(
         No step of a scipy method is longer, s.
     most
         Steps that are not to be exceeded.
+
+    Returns
+    -------
+    Trajectory
+        The states in the order of `t`, with the drift of momentum and energy.
 
     Raises
     ------

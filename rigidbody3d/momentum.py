@@ -41,7 +41,7 @@ class Wrench(NamedTuple):
 @record
 @dataclass(frozen=True, init=False, eq=False, repr=False)
 class Motion:
-    """A rigid body in motion, one state or many: what its momentum is and what forces the motion asks for.
+    """A rigid body in motion, one state or many: its momentum and the forces that the motion needs.
 
     Each quantity is computed on the first request. All components are along one set of axes, in which the
     tensor is given: the fixed axes at the instant looked at, or axes turning with the body.

@@ -34,7 +34,7 @@ def strike(
     pin: ArrayLike | None = None,
     axis: ArrayLike | None = None,
 ) -> Blow:
-    """Return the change of a body's motion under an impulse, free, held at a point, or hinged on an axis.
+    """Return the change of a body's motion by an impulse: a free body, held at a point, or hinged on an axis.
 
     Parameters
     ----------
@@ -53,6 +53,11 @@ def strike(
     -------
     Blow
         Changes Δv (m/s) and Δω (rad/s), and the impulse with which the pin answers (N·s), (..., 3) each.
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not fit.
 
     Notes
     -----

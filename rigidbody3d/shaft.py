@@ -67,7 +67,7 @@ def shaft_axes(axis: ArrayLike) -> Array:
 @record
 @dataclass(frozen=True, init=False, eq=False, repr=False)
 class Shaft:
-    """A body turning about the z-axis on two bearings, in the position drawn.
+    """A body that turns about the z-axis on two bearings, in the drawn position.
 
     Parameters
     ----------

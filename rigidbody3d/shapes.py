@@ -178,10 +178,20 @@ def inertia_of(shape: str, mass: ArrayLike, **dimensions: ArrayLike) -> Array:
     **dimensions
         The dimensions of the shape, m.
 
+    Returns
+    -------
+    ndarray
+        (..., 3, 3), kg·m².
+
     Raises
     ------
     ValueError
         An unknown shape, a missing dimension, one too many, one that is not positive.
+
+    Notes
+    -----
+    The tables of Beer and Johnston and of Meriam and Kraige; hollow shapes in divided form, which holds down to walls
+    without thickness.
 
     Examples
     --------
@@ -196,7 +206,24 @@ def inertia_of(shape: str, mass: ArrayLike, **dimensions: ArrayLike) -> Array:
 
 
 def measure_of(shape: str, **dimensions: ArrayLike) -> tuple[Array, int]:
-    """Return the volume, area or length of a shape, and 3, 2 or 1 for which of them it is.
+    """Return the volume, area or length of a shape, and its dimension 3, 2 or 1.
+
+    Parameters
+    ----------
+    shape
+        A name of `SHAPES`.
+    **dimensions
+        The dimensions of the shape, (...), m.
+
+    Returns
+    -------
+    measure, dimension
+        (...), m³, m² or m; 3, 2 or 1.
+
+    Raises
+    ------
+    ValueError
+        An unknown shape, one without a measure, a missing dimension, one too many, one that is not positive.
 
     Examples
     --------
@@ -221,6 +248,11 @@ def mesh(vertices: ArrayLike, faces: ArrayLike, density: float = 1.0) -> tuple[A
         Indices of the vertices of each triangle, counter-clockwise seen from outside, (f, 3).
     density
         kg/m³.
+
+    Returns
+    -------
+    mass, center, inertia
+        kg; (3,), m; (3, 3), kg·m².
 
     Raises
     ------
@@ -266,7 +298,12 @@ def mesh(vertices: ArrayLike, faces: ArrayLike, density: float = 1.0) -> tuple[A
 
 
 def load_mesh(path: str) -> tuple[Array, NDArray[np.int64]]:
-    """Return vertices (v, 3) and triangles (f, 3) of an STL, OBJ … file, in the file's own unit of length.
+    """Return vertices (v, 3) and triangles (f, 3) of a mesh file (STL, OBJ …), in the unit of the file.
+
+    Parameters
+    ----------
+    path
+        The file.
 
     Raises
     ------
@@ -274,6 +311,20 @@ def load_mesh(path: str) -> tuple[Array, NDArray[np.int64]]:
         trimesh is not installed (the extra `mesh`).
     ValueError
         No mesh can be read from the file.
+
+    Examples
+    --------
+    A corner of a unit cube:
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> text = "v 0 0 0;v 1 0 0;v 0 1 0;v 0 0 1;f 1 3 2;f 1 2 4;f 1 4 3;f 2 3 4"
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder, "corner.obj")
+    ...     _ = file.write_text(text.replace(";", chr(10)))
+    ...     vertices, triangles = load_mesh(str(file))
+    >>> round(float(mesh(vertices, triangles, density=6.0)[0]), 12)
+    1.0
     """
     import trimesh
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 class Mechanism(Description):
-    """A planar mechanism, described: who is pinned, guided, geared, driven and loaded by what.
+    """A planar mechanism: its links and joints, its inputs and its loads.
 
     Parameters
     ----------
@@ -449,5 +449,30 @@ class Mechanism(Description):
 
 
 def equilibria(mechanism: Mechanism, spans: ArrayLike | None = None, samples: int = 1440) -> Equilibria:
-    """Every position in which a mechanism rests under its loads without effort; see `Mechanism.equilibria`."""
+    """Return every position in which a mechanism rests under its loads without effort.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    spans : array (k, 2), optional
+        The range of each input, rad or m. Default: a whole turn; for a slide, two sizes of the mechanism either way.
+    samples : int
+        The number of samples of one input's range.
+
+    Returns
+    -------
+    Equilibria
+        As by `Mechanism.equilibria`.
+
+    Notes
+    -----
+    Q = Σ F·K + Σ T κ = 0 (J. A. Riul, Dinâmica das Máquinas, unit II, eq. 3); stable where V″ > 0 (Lagrange, Dirichlet).
+
+    Examples
+    --------
+    >>> from virtualwork import Input, Link
+    >>> bob = Link({"O": 0j}, mass=2, center=0.5)
+    >>> equilibria(Mechanism({"O": 0j}, {"bob": bob}, inputs=Input(link="bob"), gravity=-9.81j))
+    Equilibria(1.5708 unstable, 4.71239 stable)
+    """
     return mechanism.equilibria(spans, samples)

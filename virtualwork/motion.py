@@ -49,7 +49,7 @@ ENDS = 10
 
 @guarded
 class Motion(MotionViews):
-    """Position, velocity, acceleration, jerk and forces over given inputs, on demand.
+    """Position, velocity, acceleration, jerk and forces at given inputs, each computed on request.
 
     `Mechanism.motion` makes one. See there for the parameters.
 

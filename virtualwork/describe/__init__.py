@@ -11,19 +11,19 @@ from dalembert.hints import choices
 
 
 class MechanismError(ValueError):
-    """A description that cannot be solved: names the table and key, the value and what is expected."""
+    """A mechanism that cannot be solved; the message names table, key, value and the expected value."""
 
 
 class DescriptionError(MechanismError):
-    """The description itself is wrong: an unknown name, a contradiction, a zero length."""
+    """The description is wrong: an unknown name, a contradiction, a zero length."""
 
 
 class MobilityError(MechanismError):
-    """The parts do not make a mechanism: a free degree of freedom, a structure, an idle input."""
+    """The parts are no mechanism: a free degree of freedom, a structure, or an input without effect."""
 
 
 class AssemblyError(MechanismError):
-    """No assembly, or none that the guess would choose: names the choices."""
+    """The mechanism has no assembly, or the guess chooses none; the message names the possible choices."""
 
 
 class ParallelGuidesError(AssemblyError):

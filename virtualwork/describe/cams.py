@@ -82,10 +82,12 @@ class Cam(Part):
 
     @property
     def slides(self) -> bool:
+        """Whether the follower is a slide."""
         return self.slider is not None
 
     @property
     def label(self) -> str:
+        """The cam's name, as messages have it after the table."""
         return f" ({self.cam})"
 
     def check(self, where: str) -> None:

@@ -110,7 +110,7 @@ MOTIONS = (DWELL, *RISES)
 
 @dataclass(frozen=True)
 class Segment:
-    """One segment of a law: a dwell, or a rise (negative: a return) from one angle of the cam to another.
+    """One segment of a law: a dwell, or a rise (negative: a return) between two angles of the cam.
 
     Where it has no beginning it begins where the one before ends, the first at 0; where the last has no end it closes
     the turn. One segment that moves may have no rise: it takes what brings the follower back to where it began.

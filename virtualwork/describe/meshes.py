@@ -86,7 +86,7 @@ class Gear(Part):
 
 @dataclass(frozen=True)
 class Belt(Part):
-    """A belt or a chain around two links: r_a (ω_a − ω_arm) = ± r_b (ω_b − ω_arm), − where it is crossed."""
+    """A belt or a chain around two links: r_a (ω_a − ω_arm) = ± r_b (ω_b − ω_arm), minus if it is crossed."""
 
     tables: ClassVar = ("belts",)
     collection: ClassVar = "belts"

@@ -151,10 +151,12 @@ class Guide(Part):
 
     @property
     def table(self) -> str:
+        """The table of the file, slots or sliders."""
         return self.tables[self.is_slider]
 
     @property
     def label(self) -> str:
+        """The point's name, as messages have it after the table."""
         return f" ({self.point})"
 
     def check(self, where: str) -> None:
@@ -164,7 +166,7 @@ class Guide(Part):
 
 @dataclass(frozen=True)
 class Input(Part):
-    """What drives: the angle of `link` (against `on`), or the position of a `slider` along its guide.
+    """An input: the angle of `link` (against `on`), or the position of a `slider` along its guide.
 
     `value` is the angle (rad) or position (m) of the single pose that is meant; `speed` and its rates are its
     derivatives in time. `history` is a table (time, value) where the law of motion is data.
@@ -214,6 +216,7 @@ class Input(Part):
 
     @property
     def slides(self) -> bool:
+        """Whether the input is a slide."""
         return self.is_slide
 
     def check(self, where: str) -> None:
@@ -239,7 +242,7 @@ class Input(Part):
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class Guess(Record):
-    """Roughly how the mechanism stands when its inputs are `at`: this chooses the assembly."""
+    """A rough pose of the mechanism at the inputs `at`; it chooses the assembly."""
 
     at: tuple[float, ...] | None = declared(
         Free("inputs"), "the input, or every input, for which the guess holds", default=None
@@ -331,7 +334,7 @@ class Torque(Part):
 
 @dataclass(frozen=True)
 class Spring(Part):
-    """A spring and damper between two points, each given as (link, point): its name, or its place in the link's axes."""
+    """A spring and damper between two points, each (link, point): a name, or coordinates in the link's axes."""
 
     tables: ClassVar = ("springs",)
     collection: ClassVar = "springs"

@@ -33,7 +33,7 @@ AWAY = 1.0
 
 @dataclass(frozen=True)
 class Bound:
-    """One bound of one quantity over the whole sweep, SI.
+    """A bound of one quantity over the whole sweep, in SI units.
 
     Attributes
     ----------

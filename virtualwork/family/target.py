@@ -20,7 +20,7 @@ from virtualwork.formulas.quantity import Quantity
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Where points, links and slides should be, together at the same inputs.
+    """Target values of points, links and slides at common inputs.
 
     Attributes
     ----------

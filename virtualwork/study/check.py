@@ -45,7 +45,7 @@ class FourBar:
 @guarded
 @dataclass(frozen=True)
 class Check:
-    """A mechanism's character; every part is worked out when first read.
+    """The character of a mechanism: mobility, limits, dead and change points, strokes, each computed on request.
 
     Examples
     --------
@@ -280,7 +280,18 @@ class Check:
 
 
 def grashof_class(ground: float, crank: float, coupler: float, rocker: float) -> str:
-    """The class of a four-bar by its lengths (F. Grashof, 1883; names as in Norton, Design of Machinery, §2.13).
+    """Return the class of a four-bar from its lengths (F. Grashof, 1883).
+
+    Parameters
+    ----------
+    ground, crank, coupler, rocker : float
+        Lengths in any common unit.
+
+    Returns
+    -------
+    str
+        `crank-rocker`, `double-crank`, `double-rocker`, `triple-rocker` or `change-point`, as in Norton, Design of
+        Machinery, §2.13.
 
     Examples
     --------

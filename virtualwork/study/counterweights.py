@@ -1,6 +1,6 @@
 """Counterweights that balance the shaking force of a mechanism: completely, or best in the mean square.
 
-The bridge between a rotor and a mechanism: on a link that turns about a fixed pivot a counterweight of mass times
+On a link that turns about a fixed pivot a counterweight of mass times
 radius u (complex, in the link's axes) adds the shaking force −u·d²(e^{iθ})/dt². The shaking force is linear in u.
 """
 

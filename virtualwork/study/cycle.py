@@ -30,7 +30,7 @@ COMPARED = 16
 @guarded
 @dataclass(frozen=True)
 class Cycle:
-    """A sweep as a cycle of work.
+    """A sweep as a cycle of work: mean, peak, energy balance, flywheel.
 
     Attributes
     ----------

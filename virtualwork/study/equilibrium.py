@@ -32,7 +32,7 @@ NEARER = 30
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """A position of rest.
+    """A position of rest: inputs, stability, stiffness and potential.
 
     `inputs` are the inputs, rad or m; `stable` is None where the second variation does not decide; `stiffness` is
     V″ (the smallest eigenvalue for several inputs); `potential` is V, J, None under loads that have none.
@@ -110,7 +110,7 @@ class Equilibrium:
 
 @dataclass(frozen=True)
 class Equilibria:
-    """All equilibria found.
+    """All positions of rest of a mechanism in a range of its inputs.
 
     `everywhere`: the loads balance in every position of the range. `region`: with several inputs, positions of rest
     fill a part of the range and are not listed. `loaded`: something acts at rest.

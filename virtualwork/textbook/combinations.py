@@ -23,7 +23,16 @@ Vector = Any
 
 
 def sense(vector: Vector) -> Any:
-    """Direction in which a vector points, rad in [0, 2π) from the horizontal (Ibrahim §1.2); NaN for a zero vector.
+    """Return the direction of a vector, (...), rad in [0, 2π) from the horizontal; NaN for a zero vector.
+
+    Parameters
+    ----------
+    vector : complex, (...)
+        x + iy, in any unit.
+
+    Notes
+    -----
+    Ibrahim §1.2.
 
     Examples
     --------
@@ -51,7 +60,7 @@ def on_incline(
     acceleration: ArrayLike = 0.0,
     start: complex = 0j,
 ) -> Translation:
-    """Motion of a body that slides on a fixed incline (Ibrahim eqs 1.6.1–1.6.8), in components.
+    """Return the motion of a body that slides on a fixed incline (Ibrahim eqs 1.6.1–1.6.8), in components.
 
     Parameters
     ----------
@@ -59,6 +68,11 @@ def on_incline(
         Of the incline, rad; 90° is as good as any other.
     distance, speed, acceleration : float or array
         Along the incline from `start`, m, m/s, m/s².
+
+    Returns
+    -------
+    Translation
+        Position, velocity and acceleration in components, complex, m, m/s, m/s².
 
     Examples
     --------
@@ -89,7 +103,7 @@ def on_moving_ramp(
     ramp_acceleration: Vector = 0j,
     acceleration: ArrayLike = 0.0,
 ) -> Relative:
-    """Motion of a body that slides on a ramp which itself translates (Ibrahim eqs 1.7.4–1.7.6).
+    """Return the motion of a body that slides on a ramp which itself translates (Ibrahim eqs 1.7.4–1.7.6).
 
     Parameters
     ----------
@@ -99,6 +113,11 @@ def on_moving_ramp(
         Of the ramp, x + iy.
     speed, acceleration : float or array
         Of the body along the ramp, relative to it.
+
+    Returns
+    -------
+    Relative
+        Velocity and acceleration of the body with their parts, complex, m/s, m/s².
 
     Examples
     --------
@@ -121,7 +140,7 @@ class Rotation:
 
 
 def rotation(arm: Vector, omega: ArrayLike, alpha: ArrayLike = 0.0) -> Rotation:
-    """Motion of a point of a body that turns about a fixed point (Ibrahim eqs 1.8.1–1.8.5): V = ω×R, Aᵗ = α×R, Aⁿ = −ω²R.
+    """Return the motion of a point of a body that turns about a fixed point (Ibrahim eqs 1.8.1–1.8.5).
 
     Parameters
     ----------
@@ -129,6 +148,11 @@ def rotation(arm: Vector, omega: ArrayLike, alpha: ArrayLike = 0.0) -> Rotation:
         R, from the fixed point to the point, m.
     omega, alpha : float or array
         rad/s, rad/s².
+
+    Returns
+    -------
+    Rotation
+        Velocity V = ω×R, tangential Aᵗ = α×R and normal acceleration Aⁿ = −ω²R, complex, m/s, m/s².
 
     Examples
     --------
@@ -155,7 +179,7 @@ class TwoPoints:
 def second_point(
     arm: Vector, omega: ArrayLike, alpha: ArrayLike, velocity: Vector, acceleration: Vector = 0j
 ) -> TwoPoints:
-    """Motion of a second point B of a body from that of its point A (Ibrahim eqs 1.9.1–1.9.4).
+    """Return the motion of a second point B of a body from that of its point A (Ibrahim eqs 1.9.1–1.9.4).
 
     Parameters
     ----------
@@ -165,6 +189,11 @@ def second_point(
         Of the body.
     velocity, acceleration : complex
         Of A.
+
+    Returns
+    -------
+    TwoPoints
+        Velocity and acceleration of B with their parts, complex, m/s, m/s².
 
     Examples
     --------
@@ -211,7 +240,7 @@ def block_on_bar(
     carrier_acceleration: Vector = 0j,
     along: Vector | None = None,
 ) -> SlidingBlock:
-    """Motion of a block that slides along a bar which turns and translates (Ibrahim eqs 1.10.1–1.10.7).
+    """Return the motion of a block on a bar which turns and translates (Ibrahim eqs 1.10.1–1.10.7).
 
     Parameters
     ----------
@@ -225,6 +254,11 @@ def block_on_bar(
         Of the bar's point A.
     along : complex, optional
         Unit vector of the guide; by default that of the arm.
+
+    Returns
+    -------
+    SlidingBlock
+        Velocity and acceleration of the block with their parts, complex, m/s, m/s².
 
     Examples
     --------
@@ -274,7 +308,7 @@ def crank_rod_piston(
     incline: float = 0.0,
     through: complex = 0j,
 ) -> tuple[Piston, Piston]:
-    """Both solution sets of a crank, rod and piston on an inclined line (Ibrahim §1.11).
+    """Return both solutions of a crank, rod and piston on an inclined line (Ibrahim §1.11).
 
     The rates come from the linear systems (1.11.8, 10, 11) and (1.11.12–14), with the line's condition written as
     V_By·cos α = V_Bx·sin α: printed with |·| it loses the sign, and with tan α it fails at 90°.

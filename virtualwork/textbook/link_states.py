@@ -65,7 +65,7 @@ class PowerTerm(NamedTuple):
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class LinkStates:
-    """The states of n links at an instant, or at many.
+    """The states of n links, at one instant or at many.
 
     Every entry is an array (..., n) or a number, links on the last axis. Vectors are complex, x + iy.
 
@@ -222,10 +222,12 @@ def _power(load: Any, rate: Any) -> Any:
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class UnitLoad:
-    """The pattern of an unknown load: what acts on each link per newton or newton-metre of the unknown.
+    """An unknown load: its force and torque on each link for one newton or newton-metre of it.
 
     `force` is complex, (..., n), acting where `LinkStates.force` acts; `torque` is (..., n).
 
+    Examples
+    --------
     >>> UnitLoad(torque=[1, 0, 0])  # an unknown torque on the first of three links
     UnitLoad(force=0, torque=[1 0 0])
     """
@@ -365,6 +367,11 @@ def balance(states: LinkStates, unknowns: Sequence[UnitLoad]) -> Balance:
     Returns
     -------
     Balance
+
+    Raises
+    ------
+    ValueError
+        k > 1 unknowns without k velocity fields.
 
     Notes
     -----

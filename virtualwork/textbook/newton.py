@@ -75,7 +75,7 @@ def newton(
     limit: int = 50,
     accuracy: float = 4 * EPS,
 ) -> NewtonTable:
-    """Solve f(x) = 0 from a first guess: x_{k+1} = x_k − f(x_k)/f′(x_k), with the table of iterates.
+    """Solve f(x) = 0 from a first guess by x_{k+1} = x_k − f(x_k)/f′(x_k), with the table of iterates.
 
     Parameters
     ----------
