@@ -452,6 +452,8 @@ class Exact:
         """Of each contact that rubs: a unit of its friction as loads, the labels of what it bears, −μ or −μ r by its sense."""
         m = self.m
         result = []
+        turning = max(abs(self.angle(link, 1)) for link in self.links)
+        moving = max([turning * mp.mpf(m.size), *(abs(self.slide(i, 1)) for i in range(len(m.guides)))])
         for rub in m.friction:
             bodies = m.pins.get(rub.joint)
             if bodies is not None:
@@ -459,7 +461,7 @@ class Exact:
                 loads = [(other, 0j, mp.mpc(0), mp.mpf(1)), (first, 0j, mp.mpc(0), mp.mpf(-1))]
                 rate = self.angle(other, 1) - self.angle(first, 1)
                 bears = [self.labels.index((f"pin:{rub.joint}", other, part)) for part in (0, 1)]
-                arm = mp.mpf(rub.coefficient) * mp.mpf(rub.radius)
+                arm, fastest = mp.mpf(rub.coefficient) * mp.mpf(rub.radius), turning
             else:
                 i = m.guide_at(rub.joint)
                 g = m.guides[i]
@@ -467,10 +469,10 @@ class Exact:
                 rail = along(g.angle) * self.turn(g.on, 0)[0]
                 there = (self.point(g.link, z, 0) - self.origin[g.on][0]) / self.turn(g.on, 0)[0]
                 loads = [(g.link, z, rail, mp.mpf(0)), (g.on, there, -rail, mp.mpf(0))]
-                rate, arm = self.slide(i, 1), mp.mpf(rub.coefficient)
+                rate, arm, fastest = self.slide(i, 1), mp.mpf(rub.coefficient), moving
                 bears = [self.labels.index((f"guide:{i}", g.link, 1))]
-            # parts that do not move against each other do not rub
-            sense = mp.sign(rate) if abs(rate) > mp.mpf(10) ** (10 - DIGITS) else 0
+            # parts that do not move against each other do not rub: beside a limit their rate is rounding of large ones
+            sense = mp.sign(rate) if abs(rate) > mp.mpf(10) ** (20 - DIGITS) * fastest else 0
             result.append(([load for load in loads if load[0] != GROUND], bears, -arm * sense))
         return result
 
