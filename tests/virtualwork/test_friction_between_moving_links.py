@@ -9,7 +9,8 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from benchmarks.truth.mechanism import DIGITS, Exact
+from benchmarks.truth.constraints import DIGITS
+from benchmarks.truth.mechanism import Exact
 from virtualwork import DescriptionError, Friction, Guess, Guide, Input, Link, Mechanism, Torque
 from virtualwork.study.ledger import ledger
 
