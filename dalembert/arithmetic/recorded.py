@@ -43,20 +43,17 @@ class Recorder:
         """An input; the same name is the same number."""
         return Real(self, self.node("input", name))
 
-    def node(self, kind: str, *arguments: Any) -> int:
-        """The number of an operation, which is written down if it is new."""
-        return self._numbered((kind, *arguments))
-
-    def pair(self, kind: str, a: int, b: int) -> int:
-        """The same of a sum or product, whose arguments may change places."""
-        return self._numbered((kind, a, b) if a <= b else (kind, b, a))
-
-    def _numbered(self, operation: Operation) -> int:
+    def node(self, *operation: Any) -> int:
+        """The number of an operation (kind, arguments …), which is written down if it is new."""
         number = self._known.get(operation)
         if number is None:
             number = self._known[operation] = len(self.operations)
             self.operations.append(operation)
         return number
+
+    def pair(self, kind: str, a: int, b: int) -> int:
+        """The same of a sum or product, whose arguments may change places."""
+        return self.node(kind, a, b) if a <= b else self.node(kind, b, a)
 
     def difference(self, a: int, b: int) -> Real:
         """a − b; b − a, where that is known, with the other sign."""
@@ -249,21 +246,17 @@ class Real:
         return -self + other
 
     def __mul__(self, other: Number) -> Number:
-        if type(other) is Real:
-            return self.times(other)
-        if isinstance(other, (Complex, complex)):
-            if isinstance(other, Constant):
-                return self * other.recorded
-            return Complex(product(self, other.real), product(self, other.imag))
-        if _plain(other):
-            if other == 0:
-                return 0.0
-            if abs(other) == 1:
-                return self if other > 0 else -self
-        return self.times(lifted(self.recorder, other))
-
-    def times(self, other: Real) -> Real:
-        """The product with a recorded number."""
+        if type(other) is not Real:
+            if isinstance(other, (Complex, complex)):
+                if isinstance(other, Constant):
+                    return self * other.recorded
+                return Complex(self * other.real, self * other.imag)
+            if _plain(other):
+                if other == 0:
+                    return 0.0
+                if abs(other) == 1:
+                    return self if other > 0 else -self
+            other = lifted(self.recorder, other)
         number = self.recorder.pair("mul", self.number, other.number)
         return Real(self.recorder, number, self.negative != other.negative)
 
@@ -304,8 +297,10 @@ class Real:
 
 def product(a: Number, b: Number) -> Number:
     """a·b, nothing where one is exactly nothing."""
-    if type(a) is Real and type(b) is Real:
-        return a.times(b)
+    if type(a) is Real:
+        return a * b
+    if type(a) is float and type(b) is Real:
+        return b * a
     return 0.0 if (_plain(a) and a == 0) or (_plain(b) and b == 0) else a * b
 
 

@@ -9,7 +9,7 @@ combination when its value is asked for, and never twice.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Container, Hashable, Iterable
 from typing import Any
 
 from dalembert.dataclass import dataclass
@@ -222,10 +222,10 @@ class ForceTerms:
         return lever
 
 
-def in_order(term: ForceTerm) -> list[ForceTerm]:
-    """The terms that one is made of, each after those it is made of itself, and that one last.
+def in_order(term: ForceTerm, formed: Container[Any]) -> list[ForceTerm]:
+    """The terms that one is made of, each after those it is made of itself, and that one last; not below what is formed.
 
-    Forming them so keeps the chain of calls short, however long the chain of links.
+    This order keeps the chain of calls short, however long the chain of links.
     """
     done: set[ForceTerm] = set()
     result: list[ForceTerm] = []
@@ -234,7 +234,7 @@ def in_order(term: ForceTerm) -> list[ForceTerm]:
         here, open_ = stack.pop()
         if open_:
             result.append(here)
-        elif here not in done:
+        elif here not in done and here not in formed:
             done.add(here)
             stack.append((here, True))
             stack += [(part, False) for part in here.reads() if part is not None and part not in done]

@@ -54,12 +54,10 @@ def later(recording: Recording, keys: Sequence[Quantity], formed: Container[int]
         below = reached(operations, (number for _, number in outputs), formed)
     takes = {number: f"kept {k}" for k, number in enumerate(number for number in below if number in formed)}
     worth = _worth_keeping(recording, operations) if len(operations) <= LONGEST else set()
-    others = (number for number in worth.difference(below) if number not in formed)
-    near = {number for number in others if _is_near(operations, number, set(below))}
-    leaves = {
-        f"left {k}": number
-        for k, number in enumerate(sorted((near | worth.intersection(below)) - takes.keys()))
-    }
+    known = set(below)
+    others = (number for number in worth - known if number not in formed)
+    near = {number for number in others if _is_near(operations, number, known)}
+    leaves = {f"left {k}": number for k, number in enumerate(sorted((near | worth & known) - takes.keys()))}
     tape = shortened(operations, [*outputs, *leaves.items()], takes)
     return Later(tape, {name: number for number, name in takes.items()}, leaves)
 
@@ -69,10 +67,12 @@ def _worth_keeping(recording: Recording, operations: Sequence[Operation]) -> set
     state = {number for value in recording.state() for number in _numbers(value)}
     result: set[int] = set()
     costs: list[int] = []
-    for number, (kind, *arguments) in enumerate(operations):
+    for number, operation in enumerate(operations):
         cost = 0
-        if kind not in ("const", "input"):
-            cost = COSTS.get(kind, 1) + sum(costs[a] for a in arguments)
+        if operation[0] not in ("const", "input"):
+            cost = COSTS.get(operation[0], 1)
+            for argument in operation[1:]:
+                cost += costs[argument]
         if number in state and cost >= WORTH:
             result.add(number)
             cost = 0
@@ -82,8 +82,14 @@ def _worth_keeping(recording: Recording, operations: Sequence[Operation]) -> set
 
 def _is_near(operations: Sequence[Operation], number: int, known: set[int]) -> bool:
     """Whether a value costs few operations where others are known: the other link of a group that has been solved."""
-    needed = reached(operations, [number], known)
-    return sum(k not in known and operations[k][0] not in ("const", "input") for k in needed) <= FEW
+    needed, ahead = set[int](), [number]
+    while ahead and len(needed) <= FEW:
+        here = ahead.pop()
+        kind, *arguments = operations[here]
+        if kind not in ("const", "input") and here not in known:
+            needed.add(here)
+            ahead += arguments
+    return len(needed) <= FEW
 
 
 def _numbers(value: Number) -> Iterator[int]:

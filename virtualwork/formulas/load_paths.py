@@ -56,7 +56,6 @@ class LoadPaths:
         self._deep = max(len(self.plan.groups), len(self.mechanism.links)) > DEEP
         self._known: dict[Any, Combination] = {}
         self._on_group: dict[str, list[Combination]] = {}
-        self._first: dict[ForceTerm, list[ForceTerm]] = {}
         self._sides: dict[Side, Combination] = {}
         self._hung: dict[str, list[Hung]] = {}
         self._tied: dict[str, list[tuple[Coordinate, float]]] = {}
@@ -72,10 +71,9 @@ class LoadPaths:
         """The array of a sum over a block; what a long chain of links passes on is formed from its far end."""
         if self._deep:
             for row in terms:
-                if row is not None and row not in self._first:
-                    self._first[row] = [part for part in in_order(row) if part.lasts]
-                for part in self._first[row] if row is not None else ():
-                    block.formed(part)
+                for part in in_order(row, block.kept) if row is not None else ():
+                    if part.lasts:
+                        block.formed(part)
         return terms.value(block)
 
     # --- the tree ---------------------------------------------------------------------------------------------

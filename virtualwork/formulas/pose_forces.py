@@ -60,6 +60,7 @@ class PoseForces:
         self.block, self.solve, self.system_of, self.enter = block, solve, system, enter
         self.joints = JointForces(paths)
         self.formed: dict[Quantity, Number] = {}
+        self._placed = False
         block.drive = self.effort
         solve(*self.case.targets())
         if self.case.contacts:
@@ -74,8 +75,10 @@ class PoseForces:
         return bool(self.joints.redundant)
 
     def solve_places(self) -> None:
-        """Write down what the places of all joints depend on."""
-        self.solve(*self.case.targets(self.case.places))
+        """Solve what the places of all joints depend on, once."""
+        if not self._placed:
+            self.solve(*self.case.targets(self.case.places))
+            self._placed = True
 
     # --- the inputs and the ground ----------------------------------------------------------------------------------
     @cached_property

@@ -98,6 +98,8 @@ class Recording:
         # in time, with several inputs
         self.together = self.rates_of(k, given) if k > 1 else None
         self._done: set[tuple[int, int, int]] = set()
+        # what is solved, to which order
+        self._solved: dict[str, int] = {}
         self._values: dict[Quantity, Number] = {}
         # tapes of what studies make of the pose
         self.forms: dict[str, Tape] = {}
@@ -152,8 +154,9 @@ class Recording:
 
     def solve(self, targets: Iterable[str], order: int) -> None:
         """Write down what targets depend on, up to an order of derivatives."""
-        steps = self.plan.needed(targets)
-        for k in range(order + 1):
+        new = [target for target in targets if self._solved.get(target, -1) < order]
+        steps = self.plan.needed(new) if new else ()
+        for k in range(order + 1) if new else ():
             ways: list[tuple[int, Rates | None]] = [(-1, None)] if k == 0 else [*enumerate(self.by)]
             if k and self.together is not None:
                 ways.append((len(self.by), self.together))
@@ -167,6 +170,7 @@ class Recording:
                         run([step], self.st, self._close)
                     else:
                         rates.advance([step], k)
+        self._solved.update(dict.fromkeys(new, order))
 
     @property
     def along(self) -> Rates:
