@@ -280,10 +280,10 @@ def poses_of(
     tree |= {"branch": [branch] * n, "assembled": assembled.tolist()}
     if condition is not None:
         tree["condition"] = cells(condition)
-    tree |= {"marks": marks} | nested(cells_of(_moving(analysis), computed, n, driven, assembled), n)
-    if analysis.forces:
-        tree |= nested(cells_of(analysis.forces, computed, n, driven), n)
-    return in_rows(tree, n)
+    # a cam has quantities of both kinds in one object
+    numbers = cells_of(_moving(analysis), computed, n, driven, assembled)
+    numbers |= cells_of(analysis.forces, computed, n, driven)
+    return in_rows(tree | {"marks": marks} | nested(numbers, n), n)
 
 
 def pose_head(analysis: Analysis, i: int) -> Document:
