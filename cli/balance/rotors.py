@@ -81,15 +81,15 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
             f"a radius, or an unbalance {table.told}"
         )
     (amount,) = amounts
-    given = table.numbers[amount]
-    table.reject(given.values < 0, amount, f"a{'n' * (amount == 'unbalance')} {amount} that is not negative")
-    size = given.si
+    column = table.numbers[amount]
+    table.reject(column.values < 0, amount, f"a{'n' * (amount == 'unbalance')} {amount} that is not negative")
+    size = column.si
     radius = None
     if amount != "unbalance":
         radius = table.require("radius", "length")
         table.reject(radius.values < 0, "radius", "a radius that is not negative")
         table.reject(
-            (radius.values == 0) & (given.values > 0), "radius", "a positive radius, for there is a mass"
+            (radius.values == 0) & (column.values > 0), "radius", "a positive radius, for there is a mass"
         )
         size = size * radius.si
         if amount == "weight":
@@ -104,8 +104,8 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
         rotor,
         phasor(size, angle.values, angle.unit),
         None if z is None else z.si,
-        given.unit if amount == "mass" else "kg" if amount == "weight" else given.unit.split("_")[0],
-        given.unit if amount == "unbalance" else {"in": "oz_in", "m": "kg_m"}.get(radius_unit or "", "g_mm"),
+        column.unit if amount == "mass" else "kg" if amount == "weight" else column.unit.split("_")[0],
+        column.unit if amount == "unbalance" else {"in": "oz_in", "m": "kg_m"}.get(radius_unit or "", "g_mm"),
         radius_unit,
         amount == "weight",
     )

@@ -119,7 +119,7 @@ def read_exercise(path: str) -> Exercise:
     Raises
     ------
     DataError
-        With the place in the file, what stands there and what was expected.
+        With the place in the file, the value and what was expected.
     """
     file, table = read_toml(path)
     place = _Place(file)

@@ -93,7 +93,7 @@ class Candidates:
     @cached_property
     def wrong(self) -> list[Slip]:
         """The slips that change the answer at the figures asked."""
-        seen, found = set(), []
+        seen, likely = set(), []
         for slip in self.singles:
             if not isfinite(slip.value) or abs(slip.value) > 1e60:
                 continue
@@ -105,8 +105,8 @@ class Candidates:
             key = f"{slip.value:.9g}"
             if key not in seen:
                 seen.add(key)
-                found.append(slip)
-        return found
+                likely.append(slip)
+        return likely
 
     def _off(self, value: float) -> float:
         return abs(self.distance(value, self.answer.value))

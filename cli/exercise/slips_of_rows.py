@@ -59,17 +59,17 @@ def _ledger(variant: Variant, answer: Answer) -> tuple[list[Term], float] | None
     if is_work:
         if not answer.ask.quantity.startswith(("torque", "fx", "fy")):
             return None
-        found = _instant(document.get("steps"), "step", answer.ask.where)
+        instant = _instant(document.get("steps"), "step", answer.ask.where)
     else:
         if not answer.ask.quantity.startswith(("input_torque", "input_force", "virtual_work")):
             return None
         way = way_of(variant)
         ledger = next((topic for topic in way if topic.get("topic") == "ledger"), {})
-        found = _instant(ledger.get("poses"), "input_deg", answer.ask.where)
-    if found is None:
+        instant = _instant(ledger.get("poses"), "input_deg", answer.ask.where)
+    if instant is None:
         return None
     terms, unknown = [], []
-    for entry in found.get("terms", ()):
+    for entry in instant.get("terms", ()):
         if entry["kind"] == "unknown":
             unknown.append(float(entry["power_W"] or 0.0))
         elif entry["power_W"] and not entry.get("workless"):
@@ -322,7 +322,7 @@ def _final(own: Rotor, kind: str, p: int, answer: Answer, right: complex) -> Ite
                 )
     if kind != "unbalance":
         yield Slip("the diameter in place of the radius of the plane", value / 2)
-        yield Slip("the unbalance in place of what stands at the radius", value * float(own.radius[p]))
+        yield Slip("the unbalance in place of the mass or weight", value * float(own.radius[p]))
     yield Slip("the answer is ten times too large", value * 10)
     yield Slip("the answer is ten times too small", value / 10)
 

@@ -311,16 +311,16 @@ class Judge:
         return min(reading.half, float(Right(answer.value, answer.ask.figures).unit) / 2)
 
 
-def scale_of(unit: str, asked: str) -> Fraction | None:
+def scale_of(unit: str, unit_of_question: str) -> Fraction | None:
     """Return a unit in another one, 1 kJ = 1000 J; None where they do not measure the same.
 
     >>> scale_of("kJ", "J"), scale_of("Nm", "N_m"), scale_of("kg", "N_m"), scale_of("", "")
     (Fraction(1000, 1), Fraction(1, 1), None, Fraction(1, 1))
     """
-    if unit == asked or not asked:
-        return Fraction(1) if unit == asked or not unit else None
+    if unit == unit_of_question or not unit_of_question:
+        return Fraction(1) if unit == unit_of_question or not unit else None
     unit = JOINED.get(unit, unit)
-    own, wanted = _measure(unit), _measure(asked)
+    own, wanted = _measure(unit), _measure(unit_of_question)
     if own is None or wanted is None or own[1] != wanted[1]:
         return None
     return own[0] / wanted[0]
@@ -360,9 +360,9 @@ def judge(answer: Answer, number: Typed, scale: Fraction) -> str:
 
 def _is_degrees(answer: Answer, scale: Fraction) -> bool:
     """Whether a number of an angle is in degrees."""
-    found = composed(answer.unit)
-    assert found is not None
-    (n, d), _ = found
+    size = composed(answer.unit)
+    assert size is not None
+    (n, d), _ = size
     return abs(float(scale) * n / d - pi / 180) < 1e-9
 
 

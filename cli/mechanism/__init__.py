@@ -43,7 +43,7 @@ def run(own: Options, show: ShowOptions) -> Result:
     """Solve the poses of a planar mechanism: positions, velocities, accelerations.
 
     FILE.toml describes ground, links, slots, sliders, gears, input and guess. The table has a row for each pose: its
-    input, every point and link, or those of --only.
+    input, every point and link, or what --only names.
     """
     from cli.cases.call import Call
     from cli.mechanism.newton import Poses

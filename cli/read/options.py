@@ -36,15 +36,15 @@ def bad(flag: str, message: object) -> typer.BadParameter:
     return typer.BadParameter(str(message), param_hint=flag)
 
 
-def given(**values: object) -> list[str]:
-    """Return the flags of the options that are given, each under the name that the function has for it."""
+def flags_of(**values: object) -> list[str]:
+    """Return the flags of the options that have a value, each under the name that the function has for it."""
     there = (name for name, value in values.items() if value not in (None, False, [], ()))
     return [f"--{name.replace('_', '-')}" for name in there]
 
 
 def refuse(message: str, **values: object) -> None:
     """Refuse the first of these options that is given."""
-    for flag in given(**values):
+    for flag in flags_of(**values):
         raise bad(flag, message)
 
 
@@ -60,7 +60,7 @@ def only(text: str | None, names: Sequence[str]) -> Sequence[str]:
 
 
 def column_names(pairs: list[str] | None) -> dict[str, str]:
-    """Read the values of --column, `mass_kg=Masse`: name here -> header in the file."""
+    """Read `mass_kg=Masse`: name here -> header in the file."""
     names = {}
     for pair in pairs or ():
         name, equals, header = pair.partition("=")
@@ -156,7 +156,7 @@ def places(
         return [in_turn(start + way * (360.0 * k / blades)) for k in range(blades)]
     if numbering == "against":
         raise bad(
-            "--numbering", "speaks of --blades: --positions are numbered in the order in which they stand"
+            "--numbering", "goes with --blades: --positions are numbered in the order in which they stand"
         )
     if positions is None:
         return None

@@ -117,7 +117,7 @@ def solve(
 
 
 def value_in(unit: str, text: str) -> float:
-    """Read the value of --so-that in a unit of results."""
+    """Read the wanted value in a unit of results."""
     if is_number(text):
         return parse_number(text)
     for dimension in (each for each in LISTED if unit in UNITS[each]):

@@ -224,7 +224,7 @@ def _hand_on(result: Result, options: ShowOptions, call: Mapping[str, str]) -> N
 def _report(
     result: Result, options: ShowOptions, call: Mapping[str, str], checked: Comparison | None = None
 ) -> dict[Path, Made]:
-    """Return the files of --report."""
+    """Return the files that --report writes."""
     if options.report is None:
         return {}
     from cli.show.report import pages
@@ -234,7 +234,7 @@ def _report(
 
 
 def _in_chosen_units(result: Result, units: str | None) -> Result:
-    """Return the result with its tables in the units of --units."""
+    """Return the result with its tables in the units that --units names."""
     if units is None:
         return result
     from cli.show.result import chosen_units, in_units

@@ -56,7 +56,7 @@ def refuse_long(count: int) -> None:
 
 
 def shown(table: Table, units: str | None) -> dict[str, Shown]:
-    """Return the columns of numbers under their SI headers, in the units of --units."""
+    """Return the columns of numbers under their SI headers, in the units that --units names."""
     # loaded where a page is written
     from dalembert.page import Shown
 

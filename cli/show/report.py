@@ -84,7 +84,7 @@ def report(
     sheets = list(result.sheets() if result.sheets is not None else [_plain_sheet(result)])
     if result.shows_way:
         sheets += way_sheets(result)
-    inputs = list(_given(call_options, () if result.shows_input else named()))
+    inputs = list(_inputs(call_options, () if result.shows_input else named()))
     if sheets:
         sections = list(sheets[0].sections)
         if inputs and sections[0].title != VERDICT:
@@ -134,7 +134,7 @@ def _plain_sheet(result: Result) -> Sheet:
     return Sheet("", sections, result.figure)
 
 
-def _given(call_options: Mapping[str, str], files: Sequence[str]) -> Iterator[str | Table]:
+def _inputs(call_options: Mapping[str, str], files: Sequence[str]) -> Iterator[str | Table]:
     """Yield the options that were given, and what the files hold."""
     if call_options:
         yield "; ".join(
@@ -155,7 +155,7 @@ def _given(call_options: Mapping[str, str], files: Sequence[str]) -> Iterator[st
         yield f"{shown}{source.of_sheet}:"
         width = len(source.header)
         cells = [[*row[:width], *[""] * (width - len(row))] for row in read]
-        yield Table([Column(said(h), "", [row[k] for row in cells]) for k, h in enumerate(source.header)])
+        yield Table([Column(spelled(h), "", [row[k] for row in cells]) for k, h in enumerate(source.header)])
         if left:
             yield f"… and {left} further rows"
 
@@ -219,7 +219,7 @@ def _grids(table: Table) -> Iterator[Part]:
             for v, t in zip(values, printed(column.header, values), strict=True)
         ]
         if column.name in ("quantity", "column"):
-            cells = [said(cell) for cell in cells]
+            cells = [spelled(cell) for cell in cells]
         texts.append(cells)
         headers.append(
             f"{_words(column.name)} [{written(column.unit)}]" if column.unit else _words(column.name)
@@ -269,11 +269,11 @@ def _words(name: str) -> str:
 _RESULTS = ("kg_m2_s", "J", "W", "rad_s3", "m_s3")
 
 
-def said(header: str) -> str:
+def spelled(header: str) -> str:
     """Return a header that stands in a cell as people write it: `inertia_x_kg_m2` is inertia x [kg·m²]."""
     of, colon, rest = header.rpartition(": ")
     if colon:
-        return f"{of}: {said(rest)}"
+        return f"{of}: {spelled(rest)}"
     if " " in header or "_" not in header:
         return header
     name, unit = parted(header, further=_RESULTS)

@@ -182,7 +182,7 @@ class Result:
 
 
 def with_found(result: Result, solution: Found) -> Result:
-    """Return the result with the number of --find: above the table, in JSON, in addition to a table alone."""
+    """Return the result with the number that --find found: above the table, in JSON, in addition to a table alone."""
     notes, document, aside = result.notes, result.documented, result.aside
     return replace(
         result,
@@ -238,7 +238,7 @@ def in_units(table: Table, chosen: Mapping[str, str]) -> Table:
 
 
 def finished(table: Table, units: str | None, digits: bool) -> tuple[Table, int]:
-    """Return the table in the units of --units and with the digits of --digits, and of how many no digit is known."""
+    """Return the table in the chosen units, with --digits cut to its right digits, and of how many no digit is known."""
     if units is not None:
         table = in_units(table, chosen_units(units))
     if not digits:

@@ -18,8 +18,8 @@ What:
   only NAME,...  Show only these quantities: H.x,coupler.angle,crank.torque; H is all of H.
   order position|velocity|acceleration|jerk  Highest derivative (default: the highest that the input's rates give).
   draws N  Number of mechanisms drawn within the tolerances.
-  seed N=0  Random seed of --draws.
-  distribution normal|uniform=normal  Distribution of --draws: normal (a limit is three standard deviations) or uniform (a limit is an end).
+  seed N=0  With --draws: random seed.
+  distribution normal|uniform=normal  With --draws: normal (a limit is three standard deviations) or uniform (a limit is an end).
 """
 
 
