@@ -1,7 +1,8 @@
-"""A robot as links, joints and inertias in space, and the masses that follow from shapes of one density."""
+"""A robot as links, joints and inertias in space, and the plane in which a planar robot moves."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -10,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.errors import DataError
-from rigidbody3d import inertia
 
 Array = NDArray[np.float64]
 Kind = Literal["turn", "slide", "ball", "fixed", "other"]
@@ -218,45 +218,89 @@ def sphere_around(shape: str, size: list[float]) -> float | None:
     return max(size) if shape in ("sphere", "ellipsoid") and size else None
 
 
-# of a shape that says of neither mass nor density, kg/m³
-DENSITY = 1000.0
-# how many of a shape's sizes are used, those along its own axes being halves
-SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
+# rad: what angles such as 1.57 for a right angle are off by
+ROUNDED = 1e-3
+SILENT = 1e-6
 
 
-def unit_mass(shape: str, size: list[float]) -> tuple[float, Array]:
-    """Return a shape's volume, m³, and its moments for unit mass, (3,) m².
+@dataclass(frozen=True)
+class Plane:
+    """Two axes of the world, x and y of the plane, and the normal."""
 
-    >>> unit_mass("box", [0.5, 1.0, 1.5])[0]
-    6.0
+    x: Array
+    y: Array
+    normal: Array
+
+    def place(self, at: Array) -> complex:
+        """Return a place of space in the plane, m."""
+        return complex(float(self.x @ at), float(self.y @ at))
+
+    direction = place
+
+    def turn(self, rotation: Array) -> float:
+        """Return the angle of a link's axes: of its x-axis, or of the first that does not stand on the plane."""
+        for k in range(3):
+            z = self.place(rotation[:, k])
+            if abs(z) > 0.5:
+                return math.atan2(z.imag, z.real)
+        raise AssertionError("three axes cannot all stand on a plane")
+
+    def sense(self, axis: Array) -> float:
+        """Return 1 where an axis of turning is counter-clockwise in the plane, else -1."""
+        return 1.0 if float(self.normal @ axis) > 0 else -1.0
+
+
+def plane_of(file: str, joints: list[RobotJoint], notes: list[str]) -> Plane:
+    """Return the plane of most joints; the joint that is not in it is named, and by how much.
+
+    A robot in a plane of the world's axes keeps these: x-y, x-z or y-z.
     """
-    if shape in ("sphere", "ellipsoid"):
-        a, b, c = size if shape == "ellipsoid" else 3 * size
-        return 4 / 3 * np.pi * a * b * c, np.array([b * b + c * c, a * a + c * c, a * a + b * b]) / 5
-    if shape == "box":
-        a, b, c = size
-        return 8 * a * b * c, np.array([b * b + c * c, a * a + c * c, a * a + b * b]) / 3
-    r, h = size
-    side = np.pi * r * r * 2 * h
-    across, along = r * r / 4 + h * h / 3, r * r / 2
-    if shape == "cylinder":
-        return side, np.array([across, across, along])
-    # a capsule: its two halves of a sphere, each with its centre 3r/8 beyond the cylinder's end
-    ends = 4 / 3 * np.pi * r**3
-    outer = 2 / 5 * r * r - (3 / 8 * r) ** 2 + (h + 3 / 8 * r) ** 2
-    whole = side + ends
-    x = (side * across + ends * outer) / whole
-    return whole, np.array([x, x, (side * along + ends * 2 / 5 * r * r) / whole])
+    for j in joints:
+        if j.kind == "other":
+            raise DataError(
+                f"{file}: no planar mechanism: joint '{j.name}' is of the type '{j.type}': expected pins, slides and fixed joints"
+            )
+    turning = [j for j in joints if j.kind == "turn"]
+    sliding = [j for j in joints if j.kind == "slide"]
+    if turning:
+        normal = max((j.axis for j in turning), key=lambda n: sum(_off(n, j.axis) < ROUNDED for j in turning))
+    else:
+        pairs = [np.cross(a.axis, b.axis) for a in sliding for b in sliding]
+        normal = max(pairs, key=lambda n: float(np.linalg.norm(n)), default=np.array([0.0, 0.0, 1.0]))
+        length = float(np.linalg.norm(normal))
+        normal = normal / length if length > ROUNDED else np.array([0.0, 0.0, 1.0])
+    plane = _axes(normal)
+    worst = 0.0
+    for j in joints:
+        if j.kind == "ball":
+            continue
+        off = _off(plane.normal, j.axis)
+        off = off if j.kind == "turn" else math.pi / 2 - off
+        if off > ROUNDED:
+            what = "its axis stands" if j.kind == "turn" else "its slide leaves the plane by"
+            behind = " off the normal of the plane of the others" if j.kind == "turn" else ""
+            raise DataError(
+                f"{file}: no planar mechanism: joint '{j.name}': {what} {math.degrees(off):.4g} deg{behind}"
+            )
+        worst = max(worst, off)
+    if worst > SILENT:
+        notes.append(f"axes are off by up to {math.degrees(worst):.2g} deg: taken as planar")
+    return plane
 
 
-def together(parts: list[tuple[float, Array, Array]]) -> Inertial | None:
-    """Return the inertia of several masses: each its mass, pose and moments in its own axes."""
-    mass = sum(m for m, _, _ in parts)
-    if mass <= 0:
-        return None
-    center = sum(m * at[:3, 3] for m, at, _ in parts) / mass
-    tensor = sum(
-        inertia.turn(np.diag(moments), at[:3, :3]) + inertia.shift(m, at[:3, 3] - center)
-        for m, at, moments in parts
-    )
-    return Inertial(mass, pose(center), np.asarray(tensor), np.zeros((3, 3)))
+def _off(a: Array, b: Array) -> float:
+    """Return the angle between two axes without sense, rad."""
+    return math.atan2(float(np.linalg.norm(np.cross(a, b))), abs(float(a @ b)))
+
+
+def _axes(normal: Array) -> Plane:
+    """Return the axes of a plane: the world's where it is one of theirs to within rounding."""
+    k = int(np.abs(normal).argmax())
+    x, y = ((1, 2), (0, 2), (0, 1))[k]
+    ex, ey = np.eye(3)[x], np.eye(3)[y]
+    if _off(normal, np.eye(3)[k]) > ROUNDED:
+        ex = ex - normal * (normal @ ex)
+        ex = ex / np.linalg.norm(ex)
+        ey = np.cross(normal, ex)
+        ey = ey if ey[y] > 0 else -ey
+    return Plane(ex, ey, np.cross(ex, ey))

@@ -5,19 +5,41 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
-from cli.imports import freecad, linkage2, linkage_sim, motiongen, pmks, pmksweb, robots
-from cli.imports.drawn import Drawing
-from cli.imports.messages import unknown
-from cli.read.robots import ROOTS, read_robot
-from cli.read.robots.elements import LARGEST_FILE
 from dalembert.errors import DataError
+
+if TYPE_CHECKING:
+    from cli.formats.drawn import Drawing
+    from cli.formats.robot import Robot
+
+# kinds of files, as --from names them
+KINDS = {
+    "pmks-text": "PMKS text or link (`ground, input, R, 0, 0`; `?mech=…`), and its JSON",
+    "pmks-web": "PMKS+ link or string",
+    "motiongen": "MotionGen JSON",
+    "linkage": "Linkage (.linkage2)",
+    "linkage_sim": "linkage_sim JSON",
+    "freecad": "FreeCAD sketch (.FCStd)",
+    "urdf": "URDF robot",
+    "sdf": "SDF model",
+    "mjcf": "MuJoCo's MJCF",
+}
+# outermost element -> the kind of a robot file
+ROOTS = {"robot": "urdf", "sdf": "sdf", "mujoco": "mjcf"}
+
+
+def unknown(file: str) -> DataError:
+    """Refuse a file of no known kind."""
+    programs = "; ".join(f"{name} ({what})" for name, what in KINDS.items())
+    return DataError(f"{file}: of no known kind: expected {programs}; --from names one")
 
 
 def decoded(file: str, data: bytes) -> str:
     """Return a file's text; too large or binary is refused."""
+    from cli.formats.markup import LARGEST_FILE
+
     if len(data) > LARGEST_FILE:
         raise DataError(f"{file}: {len(data)} bytes: expected at most {LARGEST_FILE} (10 MB)")
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -75,6 +97,8 @@ def kind_of(file: str, text: str) -> str:
             if {"mechanism", "mechanisms"} & first.keys() or {"joints", "links"} <= first.keys():
                 return "motiongen"
         raise unknown(file)
+    from cli.formats import pmksweb
+
     line = next((unquote(row).strip() for row in text.splitlines() if row.strip()), "")
     if "mech=" in text or "mech%3" in text.lower():
         return "pmks-text"
@@ -90,14 +114,31 @@ def kind_of(file: str, text: str) -> str:
     raise unknown(file)
 
 
+def read_robot(file: str, data: bytes, folder: Path | None) -> Robot:
+    """Read a robot file; files that it includes must lie in `folder`."""
+    from cli.formats import mjcf, sdf, urdf
+    from cli.formats.markup import parse, plain
+
+    root = parse(file, data)
+    kind = ROOTS.get(plain(root))
+    if kind is None:
+        expected = ", ".join(f"<{tag}> ({name.upper()})" for tag, name in ROOTS.items())
+        raise DataError(f"{file}: found <{plain(root)}>, expected {expected}")
+    if kind == "urdf":
+        return urdf.read(file, root)
+    return sdf.read(file, root) if kind == "sdf" else mjcf.read(file, root, folder)
+
+
 def read(file: str, data: bytes, kind: str | None, folder: Path | None = None) -> tuple[str, list[Drawing]]:
     """Return the kind and the drawings of a file; files that it includes must lie in its folder."""
+    from cli.formats import freecad, linkage2, linkage_sim, motiongen, planar_robot, pmks, pmksweb
+
     if kind == "freecad" or (kind is None and freecad.is_document(data)):
         return "freecad", freecad.read(file, data)
     text = decoded(file, data)
     kind = kind or kind_of(file, text)
     if kind in ROOTS.values():
-        return kind, [robots.drawing(read_robot(file, data, folder))]
+        return kind, [planar_robot.drawing(read_robot(file, data, folder))]
     if kind == "linkage":
         return kind, linkage2.read(file, text)
     if kind == "pmks-text":

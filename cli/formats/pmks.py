@@ -11,22 +11,22 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import unquote
 
-from cli.imports.drawn import (
+from cli.formats.drawn import (
     GROUND,
     Body,
     Drawing,
     Drive,
+    Exact,
     Mesh,
-    Place,
     Slide,
     Toothed,
     apart,
     centers,
+    damaged,
     direction,
     finite,
     place,
 )
-from cli.imports.messages import damaged
 from dalembert.errors import DataError, quote
 
 TYPES = ("R", "P", "RP", "G")
@@ -42,7 +42,7 @@ class Joint:
     where: str
     links: list[str]
     kind: str
-    at: Place
+    at: Exact
     angle: float
     driven: bool = False
 
@@ -181,7 +181,7 @@ def _slot(d: Drawing, j: Joint, name: str, joints: list[Joint]) -> None:
     d.guide(name, link, on, j.at, j.angle, prism=False)
 
 
-def mesh(d: Drawing, a: str, b: str, at: Place, what: str) -> None:
+def mesh(d: Drawing, a: str, b: str, at: Exact, what: str) -> None:
     """Two gears that touch at a pitch point: their centres are pins that one arm holds (R. Willis, 1841).
 
     Where one of them slides on a body on which the other one turns, it is a rack.
@@ -194,10 +194,10 @@ def mesh(d: Drawing, a: str, b: str, at: Place, what: str) -> None:
         between = apart(zp, zq)
         if between == 0:
             continue
-        ux, uy = (float(zq[i] - zp[i]) / between for i in (0, 1))
-        to_a, to_b = ([float(at[i] - z[i]) for i in (0, 1)] for z in (zp, zq))
-        off = abs(to_a[0] * uy - to_a[1] * ux) / between
-        ra, rb = (v[0] * ux + v[1] * uy for v in (to_a, to_b))
+        way, to_a, to_b = zq - zp, at - zp, at - zq
+        ux, uy = way.real / between, way.imag / between
+        off = abs(to_a.real * uy - to_a.imag * ux) / between
+        ra, rb = (to.real * ux + to.imag * uy for to in (to_a, to_b))
         if ra * rb != 0 and (best is None or off < best[0]):
             best = off, Mesh(a, b, ra / rb, arm)
     if best is None:
@@ -210,7 +210,7 @@ def mesh(d: Drawing, a: str, b: str, at: Place, what: str) -> None:
     d.meshes.append(best[1])
 
 
-def _rack(d: Drawing, wheel: str, rack: str, at: Place) -> bool:
+def _rack(d: Drawing, wheel: str, rack: str, at: Exact) -> bool:
     """Add a rack that slides on a body on which a wheel turns; False where it is none."""
     pins = d.pins()
     for s in d.slides:
@@ -220,9 +220,9 @@ def _rack(d: Drawing, wheel: str, rack: str, at: Place) -> bool:
             if pin in pins and s.on in pins[pin]:
                 z = d.bodies[wheel].points[pin]
                 along = math.radians(s.angle)
-                to = [float(at[i] - z[i]) for i in (0, 1)]
+                to = at - z
                 # the pitch point lies on the right of the way that the slide takes as the wheel turns
-                radius = to[0] * math.sin(along) - to[1] * math.cos(along)
+                radius = to.real * math.sin(along) - to.imag * math.cos(along)
                 if radius != 0:
                     d.racks.append(Toothed(wheel, s, radius))
                     return True

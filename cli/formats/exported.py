@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.exports.drawing import DXF_UNITS, draw, dxf, svg
-from cli.exports.skeleton import Skeleton, Travel
+from cli.formats.drawing import DXF_UNITS, draw, dxf, svg
+from cli.formats.skeleton import Skeleton, Travel
 from dalembert.errors import DataError
 from dalembert.results.text import csv_text
 from dalembert.units import UNITS, to_si
@@ -30,7 +30,7 @@ def file_bytes(
     if suffix == ".csv":
         return _curves(travel, length, metres, bare.get("angle", "rad")), []
     s = Skeleton(m, inputs, travel.limits)
-    comment = _said(m, inputs, file)
+    comment = _comment(m, inputs, file)
     if suffix in (".dxf", ".svg"):
         if length not in DXF_UNITS:
             length, metres = "m", 1.0
@@ -43,15 +43,13 @@ def file_bytes(
         if suffix == ".svg":
             return svg(drawing, comment, metres * 1000), notes
         return dxf(drawing, comment), notes
-    from cli.exports.mjcf import mjcf
-    from cli.exports.sdf import sdf
-    from cli.exports.urdf import urdf
+    from cli.formats import mjcf, sdf, urdf
 
-    write: Callable[[Skeleton, Travel, str], bytes] = {".xml": mjcf, ".sdf": sdf, ".urdf": urdf}[suffix]
-    return write(s, travel, comment), _left_out(s, suffix)
+    robot = {".xml": mjcf, ".sdf": sdf, ".urdf": urdf}[suffix]
+    return robot.write(s, travel, comment), _left_out(s, suffix)
 
 
-def _said(m: Mechanism, inputs: tuple[float, ...], file: str) -> str:
+def _comment(m: Mechanism, inputs: tuple[float, ...], file: str) -> str:
     """Return the comment: what it is, from which file, by which version, in which pose."""
     from importlib.metadata import version
 
@@ -100,7 +98,7 @@ def _left_out(s: Skeleton, suffix: str) -> list[str]:
         result.append(f"cams are left out: {len(m.cams)}: the format has no such joint")
     if m.racks and suffix == ".sdf":
         result.append(f"racks are left out: {len(m.racks)}: the format has no such joint")
-    light = [name for name, part in s.parts.items() if part.mass <= 0 and name in m.links]
+    light = [name for name, body in s.bodies.items() if body.mass <= 0 and name in m.links]
     if light and suffix != ".urdf":
         result.append(
             f"without mass: {', '.join(light)}: the format takes none: a millionth of the heaviest is given"

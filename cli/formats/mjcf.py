@@ -1,4 +1,4 @@
-"""MJCF, MuJoCo's own format: nested bodies, joints inside them, equalities that close loops, tendons, actuators."""
+"""MJCF, MuJoCo's own format, read and written: nested bodies, loops closed by equalities, gears and springs as tendons, inputs as actuators, the start as a key frame."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from cli.read.robots.elements import At, child, children, named, parse
-from cli.read.robots.robot import (
-    DENSITY,
+from cli.formats.markup import At, add, child, children, digits, document, include, named, spatial
+from cli.formats.mjcf_shapes import Frames, mass_of_shapes
+from cli.formats.robot import (
     DIAGONAL_FIRST,
-    SIZES,
     WORLD,
     Array,
     Inertial,
@@ -22,50 +21,25 @@ from cli.read.robots.robot import (
     RobotJoint,
     RobotLink,
     Spring,
-    about,
     pose,
     printed,
-    quaternion,
-    together,
-    unit_mass,
 )
+from cli.formats.skeleton import LIGHT, THICK, Branching, Joint, Skeleton, Travel, strokes
 from dalembert.errors import DataError, quote
-from dalembert.tables.files import load
+from virtualwork.describe.parts import GROUND
 
+PLURAL = {"gear": "gears", "belt": "belt", "rack": "rack"}
+# MuJoCo takes nothing lighter
+LIGHTEST = 2e-15
 KINDS: dict[str, Kind] = {"hinge": "turn", "slide": "slide", "ball": "ball"}
-INCLUDES = 20
 
 
 def read(file: str, root: Element, folder: Path | None) -> Robot:
     """Read a `<mujoco>`; files that it includes are followed inside its folder alone."""
-    _include(file, root, folder, [0])
+    include(file, root, folder, [0])
     robot = Robot(file, "MJCF", root.get("model", ""))
     _Reader(robot, root).read()
     return robot
-
-
-def _include(file: str, element: Element, folder: Path | None, seen: list[int]) -> None:
-    """Put the files that are included in the place of their `<include>`."""
-    for i, e in reversed(list(enumerate(element))):
-        if e.tag != "include":
-            _include(file, e, folder, seen)
-            continue
-        name = named(file, e, "file")
-        if folder is None:
-            raise DataError(f"{file}: <include file='{name}'>: standard input has no folder")
-        path, home = (folder / name).resolve(), folder.resolve()
-        if not path.is_relative_to(home):
-            raise DataError(f"{file}: <include file='{name}'>: it lies outside the file's folder: not read")
-        seen[0] += 1
-        if seen[0] > INCLUDES:
-            raise DataError(f"{file}: more than {INCLUDES} files are included")
-        try:
-            inner = parse(name, load(path))
-        except (OSError, ValueError) as error:
-            reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-            raise DataError(f"{file}: <include file='{name}'>: {reason}") from None
-        _include(file, inner, folder, seen)
-        element[i : i + 1] = list(inner)
 
 
 class _Reader:
@@ -77,11 +51,10 @@ class _Reader:
         self.sites: dict[str, tuple[str, Array]] = {}
         # how angles are written, and whether shapes give masses
         compiler = {key: text for e in children(root, "compiler") for key, text in e.attrib.items()}
-        self.degrees = compiler.get("angle", "degree") != "radian"
-        self.sequence = compiler.get("eulerseq", "xyz")
+        self.frames = Frames(
+            self.file, compiler.get("angle", "degree") != "radian", compiler.get("eulerseq", "xyz")
+        )
         self.shapes = compiler.get("inertiafromgeom", "auto")
-        if len(self.sequence) != 3 or not set(self.sequence.lower()) <= set("xyz"):
-            raise At(self.file, "compiler").error("", f"eulerseq '{self.sequence}'", "three of x, y, z")
         robot.gravity = np.array([0.0, 0.0, -9.81])
         for e in children(root, "option"):
             if e.get("gravity") is not None:
@@ -105,10 +78,6 @@ class _Reader:
             raise DataError(f"{self.file}: <{e.tag}>: no default class is called '{name}'")
         return self.classes[name].get(e.tag, {}) | e.attrib
 
-    def angle(self, value: float) -> float:
-        """Return an angle of the file in rad."""
-        return float(np.radians(value)) if self.degrees else value
-
     def read(self) -> None:
         robot = self.robot
         robot.add(RobotLink(WORLD, np.eye(4)))
@@ -119,42 +88,18 @@ class _Reader:
         self._tendons()
         self._actuators()
 
-    def frame(self, where: str, e: Mapping[str, str]) -> Array:
-        """Return the pose that pos and one of quat, euler, axisangle, xyaxes, zaxis give."""
-        at = At(self.file, where)
-        place = at.numbers("pos", e.get("pos"), 3, (0.0, 0.0, 0.0))
-        turned = np.eye(3)
-        if "quat" in e:
-            turned = at.rotation(at.numbers("quat", e["quat"], 4))
-        elif "euler" in e:
-            for axis, angle in zip(self.sequence, at.numbers("euler", e["euler"], 3), strict=True):
-                one = about("xyz".index(axis.lower()), self.angle(angle))
-                turned = turned @ one if axis.islower() else one @ turned
-        elif "axisangle" in e:
-            *v, angle = at.numbers("axisangle", e["axisangle"], 4)
-            half = self.angle(angle) / 2
-            turned = quaternion(np.cos(half), *(np.sin(half) * at.direction("axisangle", v)))
-        elif "xyaxes" in e:
-            v = at.numbers("xyaxes", e["xyaxes"], 6)
-            x = at.direction("xyaxes", v[:3])
-            y = at.direction("xyaxes", np.array(v[3:]) - x * (x @ v[3:]))
-            turned = np.column_stack([x, y, np.cross(x, y)])
-        elif "zaxis" in e:
-            turned = _onto(at.direction("zaxis", at.numbers("zaxis", e["zaxis"], 3)))
-        return pose(place, turned)
-
     def _inside(self, element: Element, link: str, base: Array, of: str) -> None:
         """Read bodies, sites and frames inside a body; `base` is the pose, in the world, in which they are written."""
         for e in element:
             if e.tag == "frame":
-                frame = self.frame(f"frame '{e.get('name', '')}'", e.attrib)
+                frame = self.frames.pose(f"frame '{e.get('name', '')}'", e.attrib)
                 self._inside(e, link, base @ frame, e.get("childclass", of))
             elif e.tag == "site":
                 values = self.whole(e, of)
                 name = e.get("name")
                 if name:
                     at = np.linalg.inv(self.robot.links[link].pose) @ base
-                    at = at @ self.frame(f"site '{name}'", values)
+                    at = at @ self.frames.pose(f"site '{name}'", values)
                     self.sites[name] = link, at[:3, 3]
             elif e.tag == "body":
                 self._body(e, link, base, e.get("childclass", of))
@@ -167,7 +112,7 @@ class _Reader:
         robot = self.robot
         name = e.get("name") or f"body {len(robot.links)}"
         where = f"body '{name}'"
-        here = base @ self.frame(where, e.attrib)
+        here = base @ self.frames.pose(where, e.attrib)
         joints = list(children(e, "joint"))
         if child(e, "freejoint") is not None or any(self.whole(j, of).get("type") == "free" for j in joints):
             robot.notes.append(f"{where}: its free joint is left out: it is taken as fixed")
@@ -175,7 +120,8 @@ class _Reader:
         inertial = child(e, "inertial")
         held = self._inertial(where, inertial)
         if self.shapes == "true" or (self.shapes == "auto" and inertial is None):
-            held = self._of_shapes(where, e, of)
+            geoms = (self.whole(g, of) for g in children(e, "geom"))
+            held = mass_of_shapes(self.frames, where, geoms, robot.notes)
         robot.add(RobotLink(name, here, held))
         above = parent
         if not joints:
@@ -203,7 +149,7 @@ class _Reader:
         more = tuple("limits" if k == "range" else k for k in keys if values.get(k, "0").strip("0. "))
 
         def coordinate(value: float) -> float:
-            return self.angle(value) if kind == "turn" else value
+            return self.frames.angle(value) if kind == "turn" else value
 
         value = coordinate(at.number("ref", values.get("ref", "0")))
         made = RobotJoint(
@@ -218,7 +164,7 @@ class _Reader:
         if e is None:
             return None
         at = At(self.file, where)
-        place = self.frame(f"{where}, inertial", e.attrib)
+        place = self.frames.pose(f"{where}, inertial", e.attrib)
         mass = at.number("mass", e.get("mass"))
         texts = dict.fromkeys(DIAGONAL_FIRST, "0")
         for key, names in (("diaginertia", DIAGONAL_FIRST[:3]), ("fullinertia", DIAGONAL_FIRST)):
@@ -229,31 +175,6 @@ class _Reader:
                     raise at.error(key, f"{len(numbers)} numbers", len(names))
                 texts |= dict(zip(names, numbers, strict=True))
         return Inertial(mass, place, *printed(texts))
-
-    def _of_shapes(self, where: str, body: Element, of: str) -> Inertial | None:
-        """Return the inertia of a body's shapes."""
-        at, parts = At(self.file, where), []
-        for e in children(body, "geom"):
-            values = self.whole(e, of)
-            shape = values.get("type", "sphere")
-            if shape not in SIZES or "mesh" in values:
-                self.robot.notes.append(f"{where}: the mass of a {values.get('mesh', shape)} is not imported")
-                continue
-            here = self.frame(f"{where}, geom", values)
-            size = at.numbers("geom size", values.get("size", "0"))
-            if "fromto" in values:
-                ends = np.array(at.numbers("geom fromto", values["fromto"], 6)).reshape(2, 3)
-                way = ends[1] - ends[0]
-                here = pose(ends.mean(axis=0), _onto(at.direction("geom fromto", way)))
-                # across it has one size, whatever its shape
-                size = size[:1] * (SIZES[shape] - 1) + [float(np.linalg.norm(way)) / 2]
-            if len(size) < SIZES[shape] or min(size[: SIZES[shape]]) <= 0:
-                raise at.error("geom size", len(size), f"{SIZES[shape]} above zero")
-            volume, moments = unit_mass(shape, size[: SIZES[shape]])
-            density = at.number("geom density", values.get("density", str(DENSITY)))
-            mass = at.number("geom mass", values.get("mass", repr(density * volume)))
-            parts.append((mass, here, mass * moments))
-        return together(parts)
 
     # --- what closes loops ----------------------------------------------------------------------------------
     def _equalities(self, element: Element) -> None:
@@ -388,11 +309,133 @@ def _leading(at: At, values: Mapping[str, str], *keys: str) -> list[float]:
     return [(at.numbers(key, values.get(key)) or [0.0])[0] for key in keys]
 
 
-def _onto(z: Array) -> Array:
-    """Return the least rotation that turns the z-axis onto a direction."""
-    axis = np.cross([0.0, 0.0, 1.0], z)
-    s, c = float(np.linalg.norm(axis)), float(z[2])
-    if s < 1e-15:
-        return np.eye(3) if c > 0 else about(0, np.pi)
-    half = np.arctan2(s, c) / 2
-    return quaternion(np.cos(half), *(np.sin(half) * axis / s))
+# --- writing ------------------------------------------------------------------------------------------------------
+def write(s: Skeleton, travel: Travel, comment: str) -> bytes:
+    """Return the file of a mechanism."""
+    m = s.m
+    root = Element("mujoco", model=m.name or "mechanism")
+    masses = [p.mass for p in s.bodies.values() if p.mass > 0]
+    light = max(LIGHT * max(masses, default=1.0), LIGHTEST)
+    inertias = [p.inertia for p in s.bodies.values() if p.inertia > 0]
+    least = max(min([light * m.size**2, *inertias]), LIGHTEST)
+    add(
+        root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false", boundmass=light, boundinertia=least
+    )  # fmt: skip
+    add(root, "option", gravity=spatial(m.gravity), timestep=0.0005, integrator="implicitfast")
+    default = add(root, "default")
+    # as stiff as the solver of constraints takes it
+    add(default, "equality", solref="0.001 1", solimp="0.9999 0.9999 0.001 0.5 2")
+    add(default, "geom", contype="0", conaffinity="0")
+    world = add(root, "worldbody")
+    bodies = {GROUND: world}
+    for b in s.walk():
+        bodies[b.child] = _body(s, b, bodies[b.parent])
+    for name, body in bodies.items():
+        _add_contents(s, name, body)
+    equality = Element("equality")
+    for j in s.closing:
+        _close(j, bodies, equality)
+    for link, block in s.welds:
+        add(equality, "weld", body1=link, body2=block)
+    tendon = Element("tendon")
+    count = dict.fromkeys(PLURAL, 0)
+    for mesh in m.meshes:
+        count[mesh.kind] += 1
+        name = f"{PLURAL[mesh.kind]} {count[mesh.kind]}"
+        _fixed(tendon, name, s.mesh(mesh))
+        add(equality, "tendon", tendon1=name)
+    _springs(s, tendon, bodies)
+    actuator = Element("actuator")
+    for k, e in enumerate(m.inputs):
+        joint = s.joint_of(k)
+        motor = add(actuator, "motor", name=e.name)
+        if joint is None:
+            _fixed(tendon, f"input {e.name}", s.free_input(k))
+            motor.set("tendon", f"input {e.name}")
+        else:
+            motor.set("joint", joint.name)
+        if travel.peak is not None:
+            motor.set("ctrlrange", digits(-travel.peak, travel.peak))
+    root.extend(e for e in (equality, tendon, actuator) if len(e))
+    _key(s, add(root, "keyframe"))
+    return document(root, comment)
+
+
+def _fixed(tendon: Element, name: str, terms: dict[str, float]) -> Element:
+    made = add(tendon, "fixed", name=name)
+    for joint, factor in terms.items():
+        add(made, "joint", joint=joint, coef=factor)
+    return made
+
+
+def _springs(s: Skeleton, tendon: Element, bodies: dict[str, Element]) -> None:
+    """Add springs and dampers, between two places and between two links."""
+    m = s.m
+    for k, spring in enumerate(m.springs, 1):
+        made = add(tendon, "spatial", name=f"spring {k}", stiffness=spring.stiffness, damping=spring.damping)
+        made.set("springlength", digits(spring.free_length))
+        for side, (body, point) in zip("ab", spring.between, strict=True):
+            site = f"spring {k} {side}"
+            add(bodies[body], "site", name=site, pos=spatial(m.place(body, point)))
+            add(made, "site", site=site)
+    for k, turning in enumerate(m.torsion_springs, 1):
+        on, link = turning.links
+        terms = s.terms({link: 1.0, on: -1.0})
+        made = _fixed(tendon, f"torsion spring {k}", terms)
+        made.attrib |= {"stiffness": digits(turning.stiffness), "damping": digits(turning.damping)}
+        here = sum(c * next(j.value for j in s.joints if j.name == name) for name, c in terms.items())
+        made.set("springlength", digits(here - s.twist(turning)))
+
+
+def _body(s: Skeleton, b: Branching, inside: Element) -> Element:
+    """Add a body with its joint."""
+    parent, part, j = s.bodies[b.parent], s.bodies[b.child], b.joint
+    body = add(inside, "body", name=b.child, pos=spatial(parent.inside(part.at)))
+    turned = part.turn - parent.turn
+    if turned:
+        body.set("euler", digits(0.0, 0.0, turned))
+    made = add(body, "joint", name=j.name, type="hinge" if j.kind == "turn" else "slide")
+    # of a slide the place means nothing to MuJoCo, but it is the point's
+    made.set("pos", spatial(j.ends[1] if b.child == j.link else j.ends[0]))
+    made.set("axis", digits(*j.axis(part, b.sense)))
+    if j.value:
+        made.set("ref", digits(j.value))
+    if j.limits is not None:
+        made.set("range", digits(*j.limits))
+    return body
+
+
+def _add_contents(s: Skeleton, name: str, body: Element) -> None:
+    """Add what a body has: mass, named points, a drawing."""
+    part = s.bodies[name]
+    if part.mass > 0:
+        add(
+            body,
+            "inertial",
+            pos=spatial(part.center),
+            mass=part.mass,
+            diaginertia=digits(*3 * (part.inertia,)),
+        )
+    for point, z in part.points.items():
+        # a point of several links stands on the first
+        if next(holder for holder, other in s.bodies.items() if point in other.points) == name:
+            add(body, "site", name=point, pos=spatial(z))
+    for a, b in strokes(part):
+        add(body, "geom", type="capsule", size=THICK * s.m.size, fromto=f"{spatial(a)} {spatial(b)}")
+
+
+def _close(j: Joint, bodies: dict[str, Element], equality: Element) -> None:
+    """Close a loop at a pin."""
+    sites = []
+    for name, z in zip((j.on, j.link), j.ends, strict=True):
+        sites.append(f"{j.name} on {name}")
+        add(bodies[name], "site", name=sites[-1], pos=spatial(z))
+    add(equality, "connect", name=j.name, site1=sites[0], site2=sites[1])
+
+
+def _key(s: Skeleton, keyframe: Element) -> None:
+    """The start: coordinates, speeds, efforts of the inputs."""
+    walked = [b.joint for b in s.walk()]
+    key = add(keyframe, "key", name="start")
+    key.set("qpos", digits(*(j.value for j in walked)))
+    key.set("qvel", digits(*(j.rate for j in walked)))

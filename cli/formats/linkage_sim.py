@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from typing import Any
 
-from cli.imports.drawn import (
+from cli.formats.drawn import (
     GROUND,
     SAME,
     Body,
     Drawing,
     Drive,
+    Exact,
     Load,
-    Place,
     Slide,
     apart,
+    coordinates,
+    damaged,
     exact,
     place,
+    together,
+    unused,
 )
-from cli.imports.messages import damaged
-from cli.read.names import unused
 from dalembert.errors import DataError
 
 # type -> the table here, the keys of its bodies and of its points on them, and of its numbers
@@ -70,7 +73,7 @@ class _Reader:
             raise damaged(self.file, f"{where}{key}", value, "a list of objects")
         return value
 
-    def pair(self, where: str, value: Any) -> Place:
+    def pair(self, where: str, value: Any) -> Exact:
         """Return two coordinates."""
         try:
             x, y = value
@@ -87,7 +90,7 @@ class _Reader:
 
     def drawing(self) -> Drawing:
         d, data = self.d, self.data
-        self.points: dict[str, dict[str, Place]] = {}
+        self.points: dict[str, dict[str, Exact]] = {}
         for name, e in data["bodies"].items():
             self._body(name, e)
         if GROUND not in data["bodies"]:
@@ -176,16 +179,16 @@ class _Reader:
             raise damaged(self.file, where, result[0], "one of the bodies")
         return result
 
-    def held(self, where: str, e: dict[str, Any], key: str, point: str) -> tuple[str, Place]:
+    def held(self, where: str, e: dict[str, Any], key: str, point: str) -> tuple[str, Exact]:
         """Return the body that an entry names, and the place of its point there."""
         name, turn, shift = self.named_body(where, e, key)
         return name, self._carried(self.pair(where, self.get(where, e, point)), turn, shift)
 
     @staticmethod
-    def _carried(z: Place, turn: float, shift: complex) -> Place:
+    def _carried(z: complex, turn: float, shift: complex) -> Exact:
         if turn == 0 and shift == 0:
-            return z
-        w = complex(float(z[0]), float(z[1])) * complex(math.cos(turn), math.sin(turn)) + shift
+            return Exact(*coordinates(z))
+        w = z * complex(math.cos(turn), math.sin(turn)) + shift
         return place(w.real, w.imag)
 
     def _fix(self, name: str, e: dict[str, Any]) -> None:
@@ -197,9 +200,7 @@ class _Reader:
         if j == GROUND:
             i, p, j, q, turn = j, q, i, p, -turn
         z, w = self.points[i][p], self.points[j][q]
-        shift = complex(float(z[0]), float(z[1])) - complex(float(w[0]), float(w[1])) * complex(
-            math.cos(turn), math.sin(turn)
-        )
+        shift = z - w * complex(math.cos(turn), math.sin(turn))
         if turn == 0 and z == w:
             shift = 0j
         self.fixed[j] = (i, turn, shift)
@@ -212,7 +213,7 @@ class _Reader:
 
     def _pin(self, revolutes: dict[str, tuple[str, str, str, str]]) -> None:
         """Points that revolutes join are one pin, and so are those at the same place of one body."""
-        groups: list[tuple[str, set[tuple[str, Place]]]] = []
+        groups: list[tuple[str, set[tuple[str, Exact]]]] = []
         for name, (i, p, j, q) in revolutes.items():
             ends = {(i, self.points[i][p]), (j, self.points[j][q])}
             label = p if p == q else name
@@ -225,17 +226,17 @@ class _Reader:
         for label, ends in groups:
             pin = unused(label, used)
             used.add(pin)
-            for body, z in sorted(ends):
+            for body, z in sorted(ends, key=lambda end: (end[0], end[1].x, end[1].y)):
                 self.d.body(body).points[pin] = z
 
     def _prism(self, name: str, e: dict[str, Any]) -> None:
         d, where = self.d, f"joint {name}"
         i, p, j, q = self._ends(name, e)
         axis = self.pair(where, self.get(where, e, "axis_local_i"))
-        if not any(axis):
+        if axis == 0:
             raise damaged(self.file, where, axis, "a direction")
         turn_i, turn_j = (self.whole(str(e[f"body_{side}"]))[1] for side in "ij")
-        angle = math.atan2(float(axis[1]), float(axis[0])) + turn_i
+        angle = cmath.phase(axis) + turn_i
         delta = self.real(where, e.get("delta_theta_0", 0.0)) + turn_i - turn_j
         point = d.point_at(j, self.points[j][q], name)
         d.slides.append(Slide(point, j, i, self.points[i][p], angle, delta - angle))
@@ -303,14 +304,14 @@ class _Reader:
         constant = self.named(e, "modulation", f"{where}, ").get("modulation_type", "Constant") == "Constant"
         if kind == "Gravity":
             g = self.pair(where, self.get(where, e, "g_vector"))
-            d.gravity = float(g[0]), float(g[1])
+            d.gravity = g.real, g.imag
             return
         if kind not in LOADS or (kind.startswith("External") and not constant):
             d.leave(f"force of type {kind or '?'}", "it has no like here")
             return
         table, ends, keys = LOADS[kind]
         values: dict[str, object] = {k: self.real(f"{where}, {k}", e.get(k, 0.0)) for k in keys}
-        held: list[tuple[str, Place | None]] = [
+        held: list[tuple[str, complex | None]] = [
             (self.named_body(where, e, key)[0], None) if point is None else self.held(where, e, key, point)
             for key, point in ends
         ]
@@ -318,16 +319,6 @@ class _Reader:
             i, j = (self.whole(e[key])[1] for key, _ in ends)
             values["free_angle"] = self.real(where, e.get("free_angle", 0.0)) + i - j
         if kind == "ExternalForce":
-            values["force"] = [*map(float, self.pair(where, self.get(where, e, "force")))]
+            force = self.pair(where, self.get(where, e, "force"))
+            values["force"] = [force.real, force.imag]
         d.loads.append(Load(table, held, values))
-
-
-def together(parts: list[tuple[float, Place, float]]) -> tuple[float, Place, float]:
-    """Return mass, centre and inertia of several masses (Huygens–Steiner)."""
-    mass = math.fsum(m for m, _, _ in parts)
-    heavy = [part for part in parts if part[0] != 0]
-    if mass <= 0 or len(heavy) <= 1:
-        return heavy[0] if heavy else parts[0]
-    x, y = (sum(exact(m) * c[k] for m, c, _ in heavy) / exact(mass) for k in (0, 1))
-    center = exact(float(x)), exact(float(y))
-    return mass, center, math.fsum(i + m * apart(c, center) ** 2 for m, c, i in heavy)

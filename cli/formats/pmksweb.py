@@ -16,8 +16,7 @@ from dataclasses import dataclass
 from itertools import takewhile
 from urllib.parse import unquote
 
-from cli.imports.drawn import GROUND, Drawing, Drive, Load, Place, Slide, direction, exact, finite, place
-from cli.imports.messages import damaged
+from cli.formats.drawn import GROUND, Drawing, Drive, Exact, Load, Slide, damaged, direction, finite, place
 from dalembert.errors import DataError
 
 # a link of before 2022
@@ -42,7 +41,7 @@ class _List:
             raise damaged(self.file, what, word, "t or f")
         return word.lower().startswith("t")
 
-    def _at(self, what: str, x: str, y: str) -> Place:
+    def _at(self, what: str, x: str, y: str) -> Exact:
         return place(finite(self.file, what, x), finite(self.file, what, y))
 
     def drawing(self) -> Drawing:
@@ -53,7 +52,7 @@ class _List:
             d.notes.append("the link names no unit of length: given in m")
         d.gravity = (0.0, -9.81) if gravity and self._yes("s=", gravity) else None
         joints: dict[str, list[str]] = {}
-        at: dict[str, Place] = {}
+        at: dict[str, Exact] = {}
         for row in self.rows["j"]:
             what = f"joint {row[0]}"
             if len(row) < 8 or row[4] not in ("R", "P"):
@@ -80,7 +79,7 @@ class _List:
             self._force(row)
         return d
 
-    def _links(self, joints: dict[str, list[str]], at: dict[str, Place]) -> None:
+    def _links(self, joints: dict[str, list[str]], at: dict[str, Exact]) -> None:
         rows = []
         self.pistons: set[str] = set()
         for row in self.rows["l"]:
@@ -142,7 +141,7 @@ class _List:
         values: dict[str, object] = {"force": [f"{size * v / span!r} N" for v in (x2 - x1, y2 - y1)]}
         if not self._yes(what, row[6]):
             values["frame"] = "link"
-        self.d.loads.append(Load("forces", [(row[1], (exact(x1), exact(y1)))], values))
+        self.d.loads.append(Load("forces", [(row[1], place(x1, y1))], values))
 
 
 DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_-"
@@ -156,7 +155,7 @@ class Joint:
     """One joint as the string has it."""
 
     name: str
-    at: Place
+    at: Exact
     angle: float
     slot: list[str]
     """The link that carries its slot, and the two joints on whose line that lies."""
@@ -364,4 +363,4 @@ class _String:
         size = size if outward else -size
         force = [f"{size * (b - a) / span!r} {unit}" for a, b in ((x1, x2), (y1, y2))]
         values: dict[str, object] = {"force": force} | ({"frame": "link"} if local else {})
-        self.d.loads.append(Load("forces", [(tokens[1], (exact(x1), exact(y1)))], values))
+        self.d.loads.append(Load("forces", [(tokens[1], place(x1, y1))], values))

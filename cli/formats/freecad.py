@@ -14,9 +14,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from cli.imports.drawn import GROUND, Drawing, Drive, Place, direction, finite, place
-from cli.read.names import Groups
-from cli.read.robots.elements import LARGEST_FILE, parse
+from cli.formats.drawn import GROUND, Drawing, Drive, Exact, Groups, direction, finite, place
+from cli.formats.markup import LARGEST_FILE, parse
 from dalembert.errors import DataError
 
 # numbers of Sketcher's constraints (ConstraintType of its source)
@@ -44,12 +43,12 @@ class Sketch:
     """The lines of one sketch, by their numbers, and what holds them."""
 
     name: str
-    lines: dict[int, tuple[Place, Place]] = field(default_factory=dict)
+    lines: dict[int, tuple[Exact, Exact]] = field(default_factory=dict)
     constraints: list[Constraint] = field(default_factory=list)
     others: list[str] = field(default_factory=list)
     """What is no line."""
 
-    def at(self, vertex: Vertex) -> Place:
+    def at(self, vertex: Vertex) -> Exact:
         """Where a point of a line stands."""
         return self.lines[vertex[0]][vertex[1] - 1]
 

@@ -1,15 +1,28 @@
-"""URDF: a tree of links; loops stand in `<gazebo>` blocks, as `<loop_joint>`, or as a second joint to the same child."""
+"""URDF, read and written: a tree of links. Loops stand in `<gazebo>` blocks, as `<loop_joint>`, or as a second joint to one child."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from cli.read.robots import sdf
-from cli.read.robots.elements import At, child, children, named, placed, plain, stated
-from cli.read.robots.robot import (
+from cli.formats import sdf
+from cli.formats.markup import (
+    At,
+    add,
+    child,
+    children,
+    digits,
+    document,
+    named,
+    placed,
+    plain,
+    spatial,
+    stated,
+)
+from cli.formats.robot import (
     ROWS,
     Array,
     Inertial,
@@ -23,9 +36,15 @@ from cli.read.robots.robot import (
     rpy,
     sphere_around,
 )
+from cli.formats.skeleton import Branching, Skeleton, Travel, boxes
 from dalembert.errors import DataError
+from virtualwork.describe.parts import GROUND, Belt, Gear, Rack
 
 KINDS: dict[str, Kind] = {**sdf.KINDS, "spherical": "ball"}
+
+
+# a limit that is none
+LARGE = 1e9
 
 
 class _Joint(NamedTuple):
@@ -53,7 +72,7 @@ def read(file: str, root: Element) -> Robot:
         _loop(robot, e)
     for e in children(root, "gazebo"):
         for inner in children(e, "joint"):
-            sdf.joint(robot, inner)
+            sdf.read_joint(robot, inner)
     for e in joints:
         mimic = child(e, "mimic")
         if mimic is not None:
@@ -213,3 +232,97 @@ def _motors(robot: Robot, root: Element) -> None:
             if child(joint, "command_interface") is not None:
                 speeds.setdefault(named(robot.file, joint), None)
     robot.motors = [Motor(name, [(name, 1.0)], speed) for name, speed in speeds.items()]
+
+
+# --- writing ------------------------------------------------------------------------------------------------------
+def write(s: Skeleton, travel: Travel, comment: str) -> bytes:
+    """Return the file of a mechanism."""
+    root = Element("robot", name=s.m.name or "mechanism")
+    # where each link's axes begin: at the joint on which it hangs, in its own axes of the mechanism's file
+    origin = {GROUND: 0j}
+    for b in s.walk():
+        origin[b.child] = b.joint.ends[1] if b.child == b.joint.link else b.joint.ends[0]
+    for name in s.bodies:
+        _add_link(s, root, name, origin[name])
+    for b in s.walk():
+        _add_joint(s, root, b, origin, travel)
+    for name in s.bodies:
+        _add_frames(s, root, name, origin[name])
+    gazebo = Element("gazebo")
+    for j in s.closing:
+        ends = (j.ends[0] - origin[j.on], j.ends[1] - origin[j.link])
+        sdf.add_joint(gazebo, s, replace(j, ends=ends), travel, GROUND)
+    sdf.add_welds(gazebo, s)
+    _add_gears(s, root, gazebo)
+    sdf.add_plugins(gazebo, s)
+    if len(gazebo):
+        root.append(gazebo)
+    return document(root, comment)
+
+
+def _add_link(s: Skeleton, root: Element, name: str, origin: complex) -> None:
+    part, link = s.bodies[name], add(root, "link", name=name)
+    if part.mass > 0:
+        inertial = add(link, "inertial")
+        add(inertial, "origin", xyz=spatial(part.center - origin), rpy="0 0 0")
+        add(inertial, "mass", value=part.mass)
+        # in the plane only izz acts
+        add(inertial, "inertia", None, **{n: part.inertia if n[1] == n[2] else 0.0 for n in ROWS})
+    for middle, turn, sides in boxes(part, s.m.size):
+        visual = add(link, "visual")
+        add(visual, "origin", xyz=spatial(middle - origin), rpy=digits(0.0, 0.0, turn))
+        add(add(visual, "geometry"), "box", size=digits(*sides))
+
+
+def _add_joint(s: Skeleton, root: Element, b: Branching, origin: dict[str, complex], travel: Travel) -> None:
+    j, parent, part = b.joint, s.bodies[b.parent], s.bodies[b.child]
+    kind = "prismatic" if j.kind == "slide" else "continuous" if j.limits is None else "revolute"
+    made = add(root, "joint", name=j.name, type=kind)
+    at = parent.inside(part.world(origin[b.child])) - origin[b.parent]
+    add(made, "origin", xyz=spatial(at), rpy=digits(0.0, 0.0, part.turn - parent.turn))
+    add(made, "parent", link=b.parent)
+    add(made, "child", link=b.child)
+    add(made, "axis", xyz=digits(*j.axis(part, b.sense)))
+    if kind != "continuous" or j.input is not None:
+        limit = add(made, "limit")
+        low, high = (
+            j.limits
+            or (j.guide is not None and travel.way(j.guide))
+            or (j.value - s.m.size, j.value + s.m.size)
+        )
+        if kind != "continuous":
+            limit.attrib |= {"lower": digits(low - j.value), "upper": digits(high - j.value)}
+        peak = 0.0 if j.input is None else travel.peak
+        # the format wants both numbers; where nothing limits them they are large
+        limit.set("effort", digits(LARGE if peak is None else peak))
+        limit.set("velocity", digits(LARGE))
+
+
+def _add_frames(s: Skeleton, root: Element, name: str, origin: complex) -> None:
+    """Named points that no joint holds: links without mass, fixed there."""
+    for point, z in s.free_points(name).items():
+        frame = point if point not in s.bodies else f"{point} point"
+        add(root, "link", name=frame)
+        made = add(root, "joint", name=f"{frame} fixed", type="fixed")
+        add(made, "origin", xyz=spatial(z - origin), rpy="0 0 0")
+        add(made, "parent", link=name)
+        add(made, "child", link=frame)
+
+
+def _add_gears(s: Skeleton, root: Element, gazebo: Element) -> None:
+    """Gears, belts and racks of two joints of the tree are mimicked; other gears are gearboxes of the simulator."""
+    boxes: list[Gear | Belt] = []
+    parts: tuple[Gear | Belt | Rack, ...] = (*s.m.gears, *s.m.belts, *s.m.racks)
+    for g, mesh in zip(parts, s.m.meshes, strict=True):
+        terms = s.mesh(mesh)
+        driven = {j.name for j in s.joints if j.input is not None}
+        last = [name for name in terms if name not in driven]
+        joint = next((e for e in root.iter("joint") if last and e.get("name") == last[-1]), None)
+        if len(terms) == 2 and joint is not None and joint.find("mimic") is None:
+            (other,) = (name for name in terms if name != last[-1])
+            # of coordinates that may run against the pins' own sense
+            factor = -terms[other] / terms[last[-1]]
+            add(joint, "mimic", joint=other, multiplier=factor)
+        elif not isinstance(g, Rack):
+            boxes.append(g)
+    sdf.add_gearboxes(gazebo, boxes, GROUND)

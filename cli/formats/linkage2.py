@@ -8,21 +8,22 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from html import unescape
 
-from cli.imports.drawn import (
+from cli.formats.drawn import (
     GROUND,
     Drawing,
     Drive,
+    Exact,
+    Groups,
     Mesh,
-    Place,
     Slide,
     apart,
     centers,
+    damaged,
     direction,
+    exact,
     finite,
-    place,
+    unused,
 )
-from cli.imports.messages import damaged
-from cli.read.names import Groups, unused
 from dalembert.errors import DataError
 
 ATTRIBUTE = re.compile(r"""([A-Za-z_][\w.-]*)\s*=\s*("[^"<]*"|'[^'<]*')""")
@@ -128,7 +129,7 @@ class _Reader:
     def drawing(self) -> Drawing:
         d, file = self.d, self.file
         self.connectors: dict[str, Element] = {}
-        self.at: dict[str, Place] = {}
+        self.at: dict[str, Exact] = {}
         layers = 0
         for e in self.root.all("connector"):
             if not e.id:
@@ -139,8 +140,8 @@ class _Reader:
             if e.id in self.connectors:
                 d.leave(f"second connector {e.id} (line {e.line})", "the program takes the first of that id")
                 continue
-            x, y = place(self.number(e, "x"), self.number(e, "y"))
-            self.connectors[e.id], self.at[e.id] = e, (x * self.scale, y * self.scale)
+            x, y = (exact(self.number(e, key)) * self.scale for key in "xy")
+            self.connectors[e.id], self.at[e.id] = e, Exact(x, y)
         self.links: dict[str, Element] = {}
         self.held: dict[str, list[str]] = {}
         for e in self.root.all("link", "element"):
@@ -192,7 +193,7 @@ class _Reader:
             throw, cpm = self.number(e, "throw", 0.0), self.number(e, "cpm", DEFAULT_CPM)
             speed = None
             if throw * cpm != 0 and not yes(e, "alwaysmanual"):
-                speed = f"{float(place(2 * throw * cpm, 0)[0] * self.scale / 60)!r} {d.length}/s"
+                speed = f"{float(exact(2 * throw * cpm) * self.scale / 60)!r} {d.length}/s"
                 d.notes.append(
                     f"actuator L{id_}: its speed is the mean over a stroke (throw {throw:g}, {cpm:g} cycles a minute); "
                     "the ends of its stroke are left out"

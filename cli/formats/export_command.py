@@ -47,9 +47,9 @@ def run(file: str, output: Path, at: str | None = None, profile: str | None = No
     from cli.cases.axes import grids
     from cli.cases.call import load
     from cli.cases.inputs import of_one
-    from cli.exports.file import file_bytes
-    from cli.exports.profile import SUFFIXES, of_follower
-    from cli.exports.profile import file_bytes as profile_bytes
+    from cli.formats.cam_profile import SUFFIXES, of_follower
+    from cli.formats.cam_profile import file_bytes as profile_bytes
+    from cli.formats.exported import file_bytes
     from cli.show.result import Result
     from virtualwork import MechanismError
 

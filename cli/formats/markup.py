@@ -1,24 +1,30 @@
-"""Elements of XML: entities and declarations are refused, numbers are read with their place named."""
+"""XML in and out: entities and declarations are refused, errors name the place of a number, numbers are written with every digit."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import NamedTuple
-from xml.etree.ElementTree import Element, ParseError
+from xml.etree.ElementTree import Element, ParseError, SubElement, indent, tostring
 from xml.parsers.expat import errors
 from xml.parsers.expat.errors import codes
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cli.read.robots.robot import Array, quaternion
+from cli.formats.drawn import LARGEST
+from cli.formats.robot import Array, quaternion
 from dalembert.errors import DataError, quote
+from dalembert.tables.files import load
 
 LARGEST_FILE = 10_000_000  # bytes
-LARGEST = 1e60
 DEEPEST = 100
+# files that a file may include
+INCLUDES = 20
+# characters that no XML can hold
+FORBIDDEN = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 UNBOUND_PREFIX = codes[errors.XML_ERROR_UNBOUND_PREFIX]
 
 
@@ -168,3 +174,65 @@ def placed(file: str, element: Element) -> tuple[str, At]:
     """Return an element's name, which must be there, and its place."""
     name = named(file, element)
     return name, At(file, f"{plain(element)} '{name}'")
+
+
+def include(file: str, element: Element, folder: Path | None, seen: list[int]) -> None:
+    """Put the files that are included in the place of their `<include>` elements; `seen` counts them."""
+    for i, e in reversed(list(enumerate(element))):
+        if e.tag != "include":
+            include(file, e, folder, seen)
+            continue
+        name = named(file, e, "file")
+        if folder is None:
+            raise DataError(f"{file}: <include file='{name}'>: standard input has no folder")
+        path, base = (folder / name).resolve(), folder.resolve()
+        if not path.is_relative_to(base):
+            raise DataError(f"{file}: <include file='{name}'>: it lies outside the file's folder: not read")
+        seen[0] += 1
+        if seen[0] > INCLUDES:
+            raise DataError(f"{file}: more than {INCLUDES} files are included")
+        try:
+            inner = parse(name, load(path))
+        except (OSError, ValueError) as error:
+            reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+            raise DataError(f"{file}: <include file='{name}'>: {reason}") from None
+        include(file, inner, folder, seen)
+        element[i : i + 1] = list(inner)
+
+
+def digits(*values: float) -> str:
+    """Return numbers that are read back as the same.
+
+    >>> digits(0.1, -0.0, 1)
+    '0.1 0.0 1.0'
+    """
+    return " ".join(repr(float(v) + 0.0) for v in values)
+
+
+def spatial(z: complex) -> str:
+    """Return a place of the plane as one of space."""
+    return digits(z.real, z.imag, 0.0)
+
+
+def add(parent: Element, tag: str, text: str | None = None, **attributes: str | float) -> Element:
+    """Add an element inside another; an underscore behind a name is dropped (`class_`)."""
+    made = SubElement(
+        parent, tag, {k.rstrip("_"): v if isinstance(v, str) else digits(v) for k, v in attributes.items()}
+    )
+    made.text = text
+    return made
+
+
+def comment(text: str) -> str:
+    """Return a comment, whatever the text holds."""
+    return f"<!-- {re.sub('-(?=-|$)', '- ', FORBIDDEN.sub('_', text))} -->"
+
+
+def document(root: Element, source: str) -> bytes:
+    """Return the file."""
+    for element in root.iter():
+        element.attrib = {k: FORBIDDEN.sub("_", v) for k, v in element.attrib.items()}
+        element.text = element.text and FORBIDDEN.sub("_", element.text)
+    indent(root)
+    body = tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{comment(source)}\n{body}\n'.encode()

@@ -1,4 +1,4 @@
-"""A mechanism as bodies and joints of two bodies each, standing in its start pose; its tree, what closes its loops, the travel of its input.
+"""A mechanism as bodies and joints of two bodies each in its start pose: the tree, what closes its loops, the travel of its input.
 
 A pin of several bodies becomes joints of two each; a slot becomes a massless block that slides and is pinned.
 """
@@ -8,13 +8,14 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cli.read.names import Groups, unused
+from cli.formats.description import bodies_of
+from cli.formats.drawn import Body, Groups, unused
 from dalembert.errors import DataError
 from virtualwork.describe.meshes import Mesh
 from virtualwork.describe.parts import GROUND, TorsionSpring
@@ -36,40 +37,22 @@ FOLLOWED = 181
 STILL = 1e-9
 # of the heaviest link: what a link without mass is given where a format takes none
 LIGHT = 1e-6
+# how the massless bodies are called that slots become
+BLOCK = "block "
 # how thick a link is drawn, of the mechanism's size
 THICK = 0.008
 
 
-@dataclass
-class Part:
-    """A body: where its axes stand, m and rad; its points, m; its mass, kg, centre and inertia, kg·m²."""
+def strokes(body: Body) -> list[tuple[complex, complex]]:
+    """Return what a body looks like: the sides of the hull of its points, in its axes."""
+    ends = hull(body.points.values())
+    return list(zip(ends, ends[1:] + (ends[:1] if len(ends) > 2 else ()), strict=False))
 
-    name: str
-    at: complex
-    turn: float
-    points: dict[str, complex] = field(default_factory=dict)
-    mass: float = 0.0
-    center: complex = 0j
-    inertia: float = 0.0
 
-    def world(self, z: complex) -> complex:
-        """Return a place of its axes in the ground's."""
-        return self.at + z * cmath.rect(1.0, self.turn)
-
-    @property
-    def strokes(self) -> list[tuple[complex, complex]]:
-        """What it looks like: the sides of the hull of its points, in its axes."""
-        ends = hull(self.points.values())
-        return list(zip(ends, ends[1:] + (ends[:1] if len(ends) > 2 else ()), strict=False))
-
-    def boxes(self, size: float) -> Iterator[tuple[complex, float, tuple[float, float, float]]]:
-        """Yield its strokes as boxes for a mechanism of this size: the middle, the direction and the sides of each."""
-        for a, b in self.strokes:
-            yield (a + b) / 2, cmath.phase(b - a), (abs(b - a), 2 * THICK * size, 2 * THICK * size)
-
-    def inside(self, z: complex) -> complex:
-        """Return a place of the ground in its axes."""
-        return (z - self.at) * cmath.rect(1.0, -self.turn)
+def boxes(body: Body, size: float) -> Iterator[tuple[complex, float, tuple[float, float, float]]]:
+    """Yield the strokes as boxes for a mechanism of this size: the middle, the direction and the sides of each."""
+    for a, b in strokes(body):
+        yield (a + b) / 2, cmath.phase(b - a), (abs(b - a), 2 * THICK * size, 2 * THICK * size)
 
 
 @dataclass
@@ -92,11 +75,11 @@ class Joint:
     guide: int | None = None
     limits: tuple[float, float] | None = None
 
-    def axis(self, part: Part, sense: float) -> tuple[float, float, float]:
+    def axis(self, body: Body, sense: float) -> tuple[float, float, float]:
         """Return its axis in those of a body: about which it turns, or along which it slides."""
         if self.kind == "turn":
             return 0.0, 0.0, sense
-        along = sense * cmath.rect(1.0, self.direction - part.turn)
+        along = sense * cmath.rect(1.0, self.direction - body.turn)
         return along.real, along.imag, 0.0
 
     def turn_about(self) -> None:
@@ -129,12 +112,7 @@ class Skeleton:
         )
         if not self.start.assembled[0]:
             raise DataError("it cannot be assembled at that input: nothing is exported")
-        self.parts = {GROUND: Part(GROUND, 0j, 0.0, dict(m.ground))}
-        for name, link in m.links.items():
-            held = m.rigid[name]
-            at = complex(self.start.at(name, 0j).complex(0)[0])
-            turn = float(self.start.link(name).angle[0])
-            self.parts[name] = Part(name, at, turn, dict(link.points), held.mass, held.center, held.inertia)
+        self.bodies = bodies_of(m, self.start)
         self.joints: list[Joint] = []
         self._pins()
         self._guides()
@@ -178,21 +156,17 @@ class Skeleton:
     def _guides(self) -> None:
         m = self.m
         for k, g in enumerate(m.guides):
-            on, link = self.parts[g.on], self.parts[g.link]
+            on, link, rider = self.bodies[g.on], self.bodies[g.link], g.link
             slide = SlideMotion(self.start, k)
             value, at = float(slide.position[0]), link.points[g.point]
             direction = on.turn + g.angle
             if not g.is_slider:
-                block = Part(
-                    unused(f"block {g.point}", self.parts, " "), link.world(at), direction, {g.point: 0j}
-                )
-                self.parts[block.name] = block
-                self._turn(g.point, g.link, block.name, (at, 0j))
-                link, at = block, 0j
+                rider = unused(f"{BLOCK}{g.point}", self.bodies, " ")
+                link = self.bodies[rider] = Body({g.point: 0j}, link.world(at), direction)
+                self._turn(g.point, g.link, rider, (at, 0j))
+                at = 0j
                 self.joints[-1].rate = self._omega(g.on) - self._omega(g.link)
-            joint = Joint(
-                self._name(g.point), "slide", on.name, link.name, (on.inside(link.world(at)), at), g.point
-            )
+            joint = Joint(self._name(g.point), "slide", g.on, rider, (on.inside(link.world(at)), at), g.point)
             joint.direction, joint.value, joint.rate = direction, value, float(slide.speed[0])
             joint.guide = k
             driver = m.driver_of(k)
@@ -202,7 +176,7 @@ class Skeleton:
 
     def _indirect_inputs(self) -> None:
         """Take as an input's joint one of bodies that turn as its links do: along a guide nothing turns."""
-        self.alike = Groups(self.parts)
+        self.alike = Groups(self.bodies)
         for j in self.joints:
             if j.kind == "slide":
                 self.alike.join(j.on, j.link)
@@ -241,17 +215,16 @@ class Skeleton:
             return 3 if {j.on, j.link} in wanted else 4
 
         order = sorted(self.joints, key=rank)
-        taken = [order[k] for k in _spanning(self.parts, [(j.on, j.link) for j in order])]
+        taken = [order[k] for k in _spanning(self.bodies, [(j.on, j.link) for j in order])]
         self.closing = [j for j in self.joints if j not in taken]
         # a slide that closes a loop carries a block, which is fixed to the link
         self.welds: list[tuple[str, str]] = []
         for j in [j for j in self.closing if j.kind == "slide"]:
-            link = self.parts[j.link]
-            block = Part(unused(f"carriage {j.point}", self.parts, " "), link.at, link.turn)
-            self.parts[block.name] = block
-            self.welds.append((j.link, block.name))
+            link, block = self.bodies[j.link], unused(f"carriage {j.point}", self.bodies, " ")
+            self.bodies[block] = Body(at=link.at, turn=link.turn)
+            self.welds.append((j.link, block))
             self.closing.remove(j)
-            j.link = block.name
+            j.link = block
             taken.append(j)
         self.children: dict[str, list[Branching]] = {}
         # the pins that turn each body against the ground, with their sense
@@ -269,18 +242,18 @@ class Skeleton:
                 turned = {j.name: branching.sense} if j.kind == "turn" else {}
                 self.path[child] = self.path[parent] | turned
                 waiting.append(child)
-        lost = [name for name in self.parts if name not in self.path]
+        lost = [name for name in self.bodies if name not in self.path]
         if lost:
             raise DataError(f"{', '.join(lost)}: no pin or guide leads there from the ground: not exported")
 
     def world(self, body: str, z: complex) -> complex:
         """Return where a place of a body stands, m."""
-        return self.parts[body].world(z)
+        return self.bodies[body].world(z)
 
-    def free_points(self, part: Part) -> dict[str, complex]:
+    def free_points(self, name: str) -> dict[str, complex]:
         """Return the named points of a link that no joint holds, in its axes."""
         held = {*self.m.pins, *(j.point for j in self.joints)}
-        return {p: z for p, z in part.points.items() if p not in held and part.name != GROUND}
+        return {p: z for p, z in self.bodies[name].points.items() if p not in held and name != GROUND}
 
     def walk(self, parent: str = GROUND) -> Iterator[Branching]:
         """Yield the tree's joints, each branch to its end."""

@@ -8,18 +8,26 @@ from __future__ import annotations
 
 import cmath
 import math
-from fractions import Fraction
 
 import numpy as np
 
-from cli.imports.drawn import GROUND, Body, Drawing, Drive, Load, Mesh, Place, Slide, Toothed
-from cli.imports.plane import plane_of
-from cli.read.names import Groups, unused
-from cli.read.robots.robot import Motor, Robot, RobotJoint, RobotLink, Spring
+from cli.formats.drawn import (
+    GROUND,
+    Body,
+    Drawing,
+    Drive,
+    Groups,
+    Load,
+    Mesh,
+    Slide,
+    Toothed,
+    together,
+    unused,
+)
+from cli.formats.robot import Motor, Robot, RobotJoint, RobotLink, Spring, plane_of
+from cli.formats.skeleton import BLOCK
 from dalembert.errors import DataError
 
-# what the bodies are called that the export makes of slots
-BLOCK = "block "
 # two ends of a joint nearer than this share of the robot's size are one place
 SAME = 1e-6
 
@@ -27,18 +35,6 @@ SAME = 1e-6
 def drawing(robot: Robot) -> Drawing:
     """Return a robot's drawing."""
     return _Layer(robot).drawing()
-
-
-class _Group:
-    """Links that are fixed to one another: one body, in the axes of the first."""
-
-    def __init__(self, name: str, at: complex, turn: float) -> None:
-        self.name, self.at, self.turn = name, at, turn
-        self.body = Body(turn=turn)
-
-    def inside(self, z: complex) -> complex:
-        """Return a place of the plane in the body's axes."""
-        return (z - self.at) * cmath.rect(1.0, -self.turn)
 
 
 class _Layer:
@@ -70,13 +66,13 @@ class _Layer:
         self.digits = 15 - math.ceil(math.log10(self.size))
         self._groups()
         d.posed = all(self._closed(j) for j in moving)
-        self.pins: list[tuple[str, set[tuple[str, Place]]]] = []
+        self.pins: list[tuple[str, set[tuple[str, complex]]]] = []
         self.slides: dict[str, Slide] = {}
         for j in moving:
             if j.kind != "slide":
                 self._pin(j)
         for label, ends in self.pins:
-            for name, z in sorted(ends):
+            for name, z in sorted(ends, key=lambda end: end[0]):
                 d.bodies[name].points[label] = z
         for j in moving:
             if j.kind == "slide":
@@ -99,19 +95,17 @@ class _Layer:
     def _groups(self) -> None:
         robot, d = self.robot, self.d
         parts = {self.fixed.of(names[0]): names for names in self.fixed.all()}
-        ground = _Group(GROUND, 0j, 0.0)
-        d.bodies[GROUND] = ground.body
-        self.groups = {self.fixed.of(robot.ground): ground}
+        # the body of each group, by the link that the group is called as
+        self.names = {self.fixed.of(robot.ground): GROUND}
         for name, link in robot.links.items():
-            if name not in parts or name in self.groups:
+            if name not in parts or name in self.names:
                 continue
             at, turn = self.plane.place(link.pose[:3, 3]), self.plane.turn(link.pose[:3, :3])
-            group = self.groups[name] = _Group(unused(name, {GROUND}), at, turn)
-            group.body.at = self._place(at)
-            d.bodies[group.name] = group.body
-            self._masses(group, [robot.links[n] for n in parts[name]])
+            self.names[name] = unused(name, {GROUND})
+            body = d.bodies[self.names[name]] = Body(at=at, turn=turn)
+            self._masses(body, [robot.links[n] for n in parts[name]])
 
-    def _masses(self, group: _Group, links: list[RobotLink]) -> None:
+    def _masses(self, body: Body, links: list[RobotLink]) -> None:
         parts = []
         for link in links:
             held = link.inertial
@@ -120,7 +114,7 @@ class _Layer:
             world = link.pose @ held.pose
             n = self.plane.normal
             turned = world[:3, :3] @ held.tensor @ world[:3, :3].T
-            z = group.inside(self.plane.place(world[:3, 3]))
+            z = body.inside(self.plane.place(world[:3, 3]))
             if held.mass < 0:
                 raise DataError(
                     f"{self.robot.file}: link '{link.name}', mass: found {held.mass:g}, expected one of zero or more"
@@ -128,25 +122,20 @@ class _Layer:
             parts.append((held.mass, z, float(n @ turned @ n)))
         if not parts:
             return
-        mass = math.fsum(m for m, _, _ in parts)
-        z = parts[0][1] if len(parts) == 1 else sum(m * c for m, c, _ in parts) / mass
-        inertia = math.fsum(i + (m * abs(c - z) ** 2 if len(parts) > 1 else 0.0) for m, c, i in parts)
+        mass, center, inertia = together(parts)
         if inertia < 0:
             raise DataError(
                 f"{self.robot.file}: link '{links[0].name}', inertia about the plane's normal: found {inertia:g}, "
                 "expected one of zero or more: `dalembert body --check-inertias` says more"
             )
-        group.body.mass, group.body.center, group.body.inertia = mass, self._place(z), inertia
+        body.mass, body.center, body.inertia = mass, self._place(center), inertia
 
-    def _place(self, z: complex) -> Place:
-        return (
-            Fraction(repr(round(z.real, self.digits) + 0.0)),
-            Fraction(repr(round(z.imag, self.digits) + 0.0)),
-        )
+    def _place(self, z: complex) -> complex:
+        return complex(round(z.real, self.digits) + 0.0, round(z.imag, self.digits) + 0.0)
 
-    def group(self, link: str) -> _Group:
-        """Return the body that a link is, or is a part of."""
-        return self.groups[self.fixed.of(link)]
+    def name(self, link: str) -> str:
+        """Return what the body is called that a link is, or is a part of."""
+        return self.names[self.fixed.of(link)]
 
     # --- joints -----------------------------------------------------------------------------------------------
     def _closed(self, j: RobotJoint) -> bool:
@@ -159,8 +148,8 @@ class _Layer:
 
     def _sides(self, j: RobotJoint) -> list[tuple[str, complex]]:
         return [
-            (group.name, group.inside(self.plane.place(end)))
-            for group, end in zip((self.group(j.parent), self.group(j.child)), j.ends, strict=True)
+            (name, self.d.bodies[name].inside(self.plane.place(end)))
+            for name, end in zip((self.name(j.parent), self.name(j.child)), j.ends, strict=True)
         ]
 
     def _pin(self, j: RobotJoint) -> None:
@@ -169,11 +158,7 @@ class _Layer:
         near = SAME * self.size
         label = j.name
         for held, others in list(self.pins):
-            if any(
-                name == other and abs(_complex(z) - _complex(w)) <= near
-                for name, z in ends
-                for other, w in others
-            ):
+            if any(name == other and abs(z - w) <= near for name, z in ends for other, w in others):
                 self.pins.remove((held, others))
                 label = min(label, held, key=len)
                 ends = others | {e for e in ends if e[0] not in {name for name, _ in others}}
@@ -182,9 +167,10 @@ class _Layer:
     def _slide(self, j: RobotJoint) -> None:
         """Add a prism; its position is the joint's own coordinate."""
         (on, through), (link, z) = self._sides(j)
-        a, b, sense = self.group(j.parent), self.group(j.child), 1.0
+        sense = 1.0
         if link == GROUND:
-            on, link, through, z, a, b, sense = link, on, z, through, b, a, -1.0
+            on, link, through, z, sense = link, on, z, through, -1.0
+        a, b = self.d.bodies[on], self.d.bodies[link]
         angle = cmath.phase(self.plane.direction(j.axis) * sense) - a.turn
         start = self._place(through - j.value * cmath.rect(1.0, angle))
         at, held = self._place(z), self.d.bodies[link].points
@@ -213,35 +199,34 @@ class _Layer:
         frame, moved = d.bodies[carrier], d.bodies[block]
         # where the carrier moves along the block, the block moves against that along the carrier
         line = d.bodies[s.on].turn + s.angle + (0.0 if s.link == block else math.pi)
-        at = _complex(moved.at) + _complex(moved.points[pin]) * cmath.rect(1.0, moved.turn)
-        start = at - value * cmath.rect(1.0, line) - _complex(frame.at)
+        start = moved.world(moved.points[pin]) - value * cmath.rect(1.0, line)
         # a point made for the slide alone goes with it
         if s.link == carrier and s.point not in {label for label, _ in self.pins}:
             frame.points.pop(s.point)
         del d.bodies[block]
         s.point, s.link, s.on, s.turned = pin, rider, carrier, None
-        s.through, s.angle = self._place(start * cmath.rect(1.0, -frame.turn)), _turn(line - frame.turn)
+        s.through, s.angle = self._place(frame.inside(start)), _turn(line - frame.turn)
 
     def _named_points(self) -> None:
         """Named places of the file, and origins of links that are fixed to others and have no mass."""
         robot, d = self.robot, self.d
         for name, link in robot.links.items():
-            group = self.group(name)
-            if group.name == GROUND or group.name not in d.bodies:
+            body = self.name(name)
+            if body == GROUND or body not in d.bodies:
                 continue
             named = {p: link.pose @ np.append(at, 1.0) for p, at in link.points.items()}
             if self.fixed.of(name) != name and link.inertial is None:
                 named[name] = link.pose[:, 3]
-            held = d.bodies[group.name].points
+            held = d.bodies[body].points
             for point, at in named.items():
-                z = self._place(group.inside(self.plane.place(at[:3])))
+                z = self._place(d.bodies[body].inside(self.plane.place(at[:3])))
                 if point not in held and z not in held.values():
                     held[d.fresh(point)] = z
 
     # --- what ties and what drives ---------------------------------------------------------------------------
     def _turning_alike(self) -> Groups[str]:
         """Return the bodies that slides join, which turn alike. The ground stands for its own, blocks for none."""
-        result = Groups([GROUND, *(g.name for g in self.groups.values())])
+        result = Groups([GROUND, *self.names.values()])
         for s in self.slides.values():
             pair = result.of(s.link), result.of(s.on)
             keep = min(pair, key=lambda name: (name != GROUND, name.startswith(BLOCK)))
@@ -265,7 +250,7 @@ class _Layer:
                 return None
             sense = factor * self.plane.sense(j.axis)
             for link, c in ((j.child, sense), (j.parent, -sense)):
-                body = self.group(link).name
+                body = self.name(link)
                 top = self.alike.of(body)
                 result[top] = result.get(top, 0.0) + c
                 if body == wanted or (top not in names and body in self.d.bodies):
@@ -280,7 +265,7 @@ class _Layer:
     def _couplings(self) -> None:
         d = self.d
         for a, b, ratio, arm in self.robot.gears:
-            d.meshes.append(Mesh(self.group(a).name, self.group(b).name, ratio, self.group(arm).name))
+            d.meshes.append(Mesh(self.name(a), self.name(b), ratio, self.name(arm)))
         for name, terms in self.robot.couplings:
             if self._rack(terms, name):
                 continue
@@ -289,7 +274,7 @@ class _Layer:
                 d.leave(f"coupling {name}", "it is no gear of two bodies on an arm, and no rack")
                 continue
             first = self.robot.joints[terms[0][0]]
-            top = self.alike.of(self.group(first.parent).name)
+            top = self.alike.of(self.name(first.parent))
             carriers = [body for body in shares if self.alike.of(body) == top]
             # any of the three may be called the arm
             arm = GROUND if GROUND in shares else (carriers or list(shares))[0]
@@ -329,11 +314,13 @@ class _Layer:
                 ends = []
                 for link, at in s.ends:
                     place = self.plane.place((robot.links[link].pose @ np.append(at, 1.0))[:3])
-                    ends.append((self.group(link), place))
+                    ends.append((self.name(link), place))
                 length = abs(ends[0][1] - ends[1][1])
                 if s.stiffness:
                     values["free_length"] = length if s.rest is None else s.rest
-                held: list[tuple[str, Place | None]] = [(g.name, self._place(g.inside(z))) for g, z in ends]
+                held: list[tuple[str, complex | None]] = [
+                    (name, self._place(d.bodies[name].inside(z))) for name, z in ends
+                ]
                 d.loads.append(Load("springs", held, values))
                 continue
             shares = self._shares(s.terms, s.name)
@@ -354,8 +341,7 @@ class _Layer:
 
     def _drives(self, moving: list[RobotJoint]) -> None:
         d, robot = self.d, self.robot
-        ground = self.group(robot.ground)
-        here = [j for j in moving if ground in (self.group(j.parent), self.group(j.child))]
+        here = [j for j in moving if GROUND in (self.name(j.parent), self.name(j.child))]
         # what may drive it too, where the actuators of the file do not determine its motion
         ordered = [j for j in (*here, *(j for j in moving if j not in here)) if j.kind != "ball"]
         motors = list(robot.motors)
@@ -399,7 +385,3 @@ def _turn(angle: float) -> float:
     """Return an angle in (−π, π]; what is zero but for rounding is zero."""
     a = math.remainder(angle, 2 * math.pi)
     return 0.0 if abs(a) < 1e-15 else a
-
-
-def _complex(z: Place) -> complex:
-    return complex(float(z[0]), float(z[1]))

@@ -1,25 +1,82 @@
-"""A mechanism drawn in one pose, whatever program drew it: bodies with axes parallel to the ground's, joints, inputs.
+"""A planar mechanism in one pose: bodies, joints and inputs. Importers fill it; what robots and drawings export is read from its bodies.
 
-Coordinates are exact fractions of the decimals in the file, so that a difference of two of them is rounded once.
+A pin is a point that several bodies have by the same name. Coordinates that a file gives as decimals are exact
+fractions, so that the difference of two of them is rounded once.
 """
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import product
+from typing import Generic, TypeVar
 
-from cli.imports.messages import damaged
-from cli.read.names import Groups, unused
+from dalembert.errors import DataError, quote
 from dalembert.units import to_si
 
 GROUND = "ground"
-Place = tuple[Fraction, Fraction]
 LARGEST = 1e60
-# drawn places nearer than this share of the drawing's size are one
+# places nearer than this share of the drawing's size are one place
 SAME = 1e-9
+Thing = TypeVar("Thing", bound=Hashable)
+
+
+class Exact(complex):
+    """A place x + iy whose coordinates are exact fractions; the difference of two such places is exact too.
+
+    >>> a, b = place(0.3, 0), place(0.1, 0)
+    >>> (a - b).real, complex(0.3) - complex(0.1)
+    (0.2, (0.19999999999999998+0j))
+    """
+
+    x: Fraction
+    y: Fraction
+
+    def __new__(cls, x: Fraction, y: Fraction) -> Exact:
+        """Return a place from its two coordinates."""
+        z = super().__new__(cls, float(x), float(y))
+        z.x, z.y = x, y
+        return z
+
+    def __sub__(self, other: complex) -> complex:
+        """Return the way from another place."""
+        if isinstance(other, Exact):
+            return Exact(self.x - other.x, self.y - other.y)
+        return complex(self) - other
+
+    def __eq__(self, other: object) -> bool:
+        """Compare exactly, where both are exact."""
+        return (self.x, self.y) == (other.x, other.y) if isinstance(other, Exact) else complex(self) == other
+
+    # equal fractions are equal floats
+    __hash__ = complex.__hash__
+
+
+ORIGIN = Exact(Fraction(0), Fraction(0))
+
+
+def coordinates(z: complex) -> tuple[Fraction, Fraction]:
+    """Return the exact coordinates of a place; floats stand for their shortest decimals."""
+    return (z.x, z.y) if isinstance(z, Exact) else (exact(z.real), exact(z.imag))
+
+
+def together(parts: Sequence[tuple[float, complex, float]]) -> tuple[float, complex, float]:
+    """Return mass, centre and moment of inertia of several masses as one body (Huygens-Steiner)."""
+    heavy = [part for part in parts if part[0] != 0]
+    if len(heavy) <= 1:
+        return heavy[0] if heavy else parts[0]
+    mass = math.fsum(m for m, _, _ in heavy)
+    x, y = (sum(exact(m) * coordinates(c)[k] for m, c, _ in heavy) / exact(mass) for k in (0, 1))
+    center = Exact(Fraction(x), Fraction(y))
+    return mass, center, math.fsum(i + m * apart(c, center) ** 2 for m, c, i in heavy)
+
+
+def damaged(file: str, where: str, value: object, expected: str) -> DataError:
+    """Return the error of a file: where it is wrong, what stands there, what belongs there."""
+    return DataError(f"{file}: {where}: found {quote(str(value))}, expected {expected}")
 
 
 def exact(value: float) -> Fraction:
@@ -33,9 +90,9 @@ def exact(value: float) -> Fraction:
     return Fraction(repr(value))
 
 
-def place(x: float, y: float) -> Place:
-    """Return a place from its two coordinates."""
-    return exact(x), exact(y)
+def place(x: float, y: float) -> Exact:
+    """Return the place of two decimals; ValueError where one is no finite number."""
+    return Exact(exact(x), exact(y))
 
 
 def finite(file: str, where: str, word: object) -> float:
@@ -48,26 +105,35 @@ def finite(file: str, where: str, word: object) -> float:
     return value
 
 
-def apart(a: Place, b: Place) -> float:
+def apart(a: complex, b: complex) -> float:
     """Return the distance of two places."""
-    return math.hypot(float(a[0] - b[0]), float(a[1] - b[1]))
+    way = b - a
+    return math.hypot(way.real, way.imag)
 
 
-def direction(a: Place, b: Place) -> float:
+def direction(a: complex, b: complex) -> float:
     """Return the direction from one place to another, degrees from the x-axis."""
-    return math.degrees(math.atan2(float(b[1] - a[1]), float(b[0] - a[0])))
+    return math.degrees(cmath.phase(b - a))
 
 
 @dataclass
 class Body:
-    """A rigid body: its named points and its centre of mass in its own axes; how these stand in the pose, rad."""
+    """A rigid body: named points, mass, centre and moment of inertia in its own axes; where these axes stand in the pose."""
 
-    points: dict[str, Place] = field(default_factory=dict)
+    points: dict[str, complex] = field(default_factory=dict)
+    at: complex = ORIGIN
     turn: float = 0.0
-    at: Place = (Fraction(0), Fraction(0))
     mass: float = 0.0
-    center: Place = (Fraction(0), Fraction(0))
+    center: complex = ORIGIN
     inertia: float = 0.0
+
+    def world(self, z: complex) -> complex:
+        """Return a place of its axes in those of the ground."""
+        return self.at + z * cmath.rect(1.0, self.turn)
+
+    def inside(self, z: complex) -> complex:
+        """Return a place of the ground in its axes."""
+        return (z - self.at) * cmath.rect(1.0, -self.turn)
 
 
 @dataclass
@@ -77,7 +143,7 @@ class Slide:
     point: str
     link: str
     on: str
-    through: Place
+    through: complex
     angle: float
     turned: float | None = None
 
@@ -133,7 +199,7 @@ class Load:
     """
 
     table: str
-    ends: list[tuple[str, Place | None]]
+    ends: list[tuple[str, complex | None]]
     values: dict[str, object]
 
 
@@ -181,8 +247,7 @@ class Drawing:
         """Return the largest extent of the drawing, or of a body of it."""
         extents = [0.0]
         for places in [list(b.points.values()) for b in self.bodies.values()]:
-            for axis in (0, 1):
-                values = [float(p[axis]) for p in places]
+            for values in ([z.real for z in places], [z.imag for z in places]):
                 extents.append(max(values, default=0.0) - min(values, default=0.0))
         return max(extents)
 
@@ -230,14 +295,14 @@ class Drawing:
         yield from (((r.gear, r.slide.link, r.slide.on), 1) for r in self.racks)
         yield from ((e.pair, 2) for e in self.drives)
 
-    def guide(self, point: str, link: str, on: str, at: Place, angle: float, prism: bool = True) -> Slide:
+    def guide(self, point: str, link: str, on: str, at: complex, angle: float, prism: bool = True) -> Slide:
         """Add a prism or a slot between two bodies that stand at angle 0; a point that `link` has there already serves."""
         name = self.point_at(link, at, point)
         self.body(on)
         self.slides.append(Slide(name, link, on, at, angle, -angle if prism else None))
         return self.slides[-1]
 
-    def cylinder(self, names: tuple[str, str], ends: tuple[str, str], at: tuple[Place, Place]) -> Slide:
+    def cylinder(self, names: tuple[str, str], ends: tuple[str, str], at: tuple[Exact, Exact]) -> Slide:
         """Add a cylinder and its rod, pinned at their far ends, the one sliding in the other."""
         barrel, rod = names
         self.body(barrel).points[ends[0]] = at[0]
@@ -246,17 +311,17 @@ class Drawing:
         self.slides.append(Slide(ends[1], rod, barrel, at[1], angle, -angle))
         return self.slides[-1]
 
-    def point_at(self, body: str, at: Place, wanted: str) -> str:
+    def point_at(self, body: str, at: complex, wanted: str) -> str:
         """Return a body's point at a place, by its name; made where it has none there."""
         held = self.body(body).points
         name = next((p for p, z in held.items() if z == at), None) or self.fresh(wanted)
         held[name] = at
         return name
 
-    def moved(self, line: tuple[Place, Place], z: Place, what: str, point: str) -> None:
+    def moved(self, line: tuple[Exact, Exact], z: Exact, what: str, point: str) -> None:
         """Note by how much a guide's line is moved to go through its point, where it misses it."""
         (a, b), length = line, apart(*line)
-        off = float((b[0] - a[0]) * (z[1] - a[1]) - (b[1] - a[1]) * (z[0] - a[0])) / length
+        off = float((b.x - a.x) * (z.y - a.y) - (b.y - a.y) * (z.x - a.x)) / length
         if abs(off) > 1e3 * SAME * length:
             by = f"{abs(off):.3g} {self.length}"
             self.notes.append(f"{what}: its line is moved by {by} to go through {point}")
@@ -287,156 +352,47 @@ def _turning_at(d: Drawing, pins: dict[str, list[str]], point: str) -> list[str]
     return list(result)
 
 
-def merge(d: Drawing, keep: str, gone: str) -> None:
-    """Make two bodies one; both stand at the same angle."""
-    if gone == GROUND:
-        keep, gone = gone, keep
-    a, b = d.bodies[keep], d.bodies.pop(gone)
-    if keep != GROUND and b.mass > 0:
-        total = a.mass + b.mass
-        center = tuple(
-            (exact(a.mass) * p + exact(b.mass) * q) / exact(total)
-            for p, q in zip(a.center, b.center, strict=True)
-        )
-        both = (center[0], center[1])
-        a.inertia += a.mass * apart(a.center, both) ** 2 + b.inertia + b.mass * apart(b.center, both) ** 2
-        a.mass, a.center = total, both
-    for point, at in b.points.items():
-        a.points.setdefault(point, at)
+def unused(wanted: str, used: Iterable[str], between: str = "_") -> str:
+    """Return a name that is not used: the wanted one, or that with a number.
 
-    d.rename(lambda name: keep if name == gone else name)
+    >>> unused("B", {"B", "B_2"})
+    'B_3'
+    """
+    used, name, k = set(used), wanted, 1
+    while name in used:
+        k += 1
+        name = f"{wanted}{between}{k}"
+    return name
 
 
-def _rename_point(d: Drawing, old: str, new: str) -> None:
-    for body in d.bodies.values():
-        if old in body.points:
-            at = body.points.pop(old)
-            body.points.setdefault(new, at)
-    for s in d.slides:
-        s.point = new if s.point == old else s.point
+class Groups(Generic[Thing]):
+    """Things that are joined into groups, each of which is called as one of its things.
 
+    >>> groups = Groups("abcd")
+    >>> groups.join("b", "a", "d"), groups.join("d", "a")
+    (True, False)
+    >>> groups.of("a"), groups.all()
+    ('b', [['a', 'b', 'd'], ['c']])
+    """
 
-def _one_pin_at_a_place(d: Drawing) -> bool:
-    """Two joints of one body at the same place are one pin."""
-    near = SAME * d.size()
-    joints = set(d.pins()) | {s.point for s in d.slides}
-    for body in d.bodies.values():
-        held = [p for p in body.points if p in joints]
-        for i, p in enumerate(held):
-            for q in held[:i]:
-                if apart(body.points[p], body.points[q]) <= near:
-                    if body is d.bodies[GROUND]:
-                        # two shafts in one place of the ground are not pinned to each other
-                        continue
-                    _rename_point(d, p, q)
-                    return True
-    return False
+    def __init__(self, names: Iterable[Thing]) -> None:
+        self._above = {name: name for name in names}
 
+    def of(self, name: Thing) -> Thing:
+        """Return what the group of a thing is called."""
+        while self._above[name] != name:
+            name = self._above[name]
+        return name
 
-def _rigid_pair(d: Drawing) -> tuple[str, str] | None:
-    """Return two bodies that share two pins at different places: they cannot move against each other."""
-    near = SAME * d.size()
-    met: dict[tuple[str, str], list[str]] = {}
-    for point, names in d.pins().items():
-        for i, b in enumerate(names):
-            for a in names[:i]:
-                met.setdefault((a, b), []).append(point)
-    for (a, b), points in met.items():
-        at = d.bodies[a].points
-        if len(points) > 1 and any(apart(at[points[0]], at[p]) > near for p in points[1:]):
-            return a, b
-    return None
+    def join(self, *names: Thing) -> bool:
+        """Join the groups of things under the name of the first's; return whether they were several."""
+        groups = [self.of(name) for name in names]
+        self._above |= dict.fromkeys(groups, groups[0]) if groups else {}
+        return len(set(groups)) > 1
 
-
-def settle(d: Drawing) -> list[Drawing]:
-    """Return the mechanisms of a drawing: what is rigid is one body, what nothing drives or holds is left out."""
-    for _ in range(len(d.welds)):
-        a, b = d.welds.pop()
-        if a != b and a in d.bodies and b in d.bodies:
-            merge(d, a, b)
-    while not d.own_axes:
-        if _one_pin_at_a_place(d):
-            continue
-        pair = _rigid_pair(d)
-        if pair is None:
-            break
-        merge(d, *pair)
-        d.notes.append(f"{pair[1]} and {pair[0]} share two pins: they are one body")
-    _drop_what_is_rigid(d)
-    _drop_what_dangles(d)
-    return _parts(d)
-
-
-def _drop_what_is_rigid(d: Drawing) -> None:
-    for s in [s for s in d.slides if s.link == s.on]:
-        d.slides.remove(s)
-        d.leave(f"slide at {s.point}", "both sides are one body")
-    for m in [m for m in d.meshes if len({m.a, m.b, m.arm}) < 3]:
-        d.meshes.remove(m)
-        d.leave(f"gears {m.a}, {m.b}", "they are one body, or one is its own arm")
-    slides = list(map(id, d.slides))
-    for r in list(d.racks):
-        # a wheel in a slot may roll along a rack
-        held = (r.slide.on,) if r.slide.turned is None else (r.slide.on, r.slide.link)
-        if id(r.slide) in slides and r.gear not in held:
-            continue
-        d.racks.remove(r)
-        d.leave(f"rack at {r.slide.point}", "its wheel and its guide are one body")
-    for e in list(d.drives):
-        if (e.slide is not None and id(e.slide) not in slides) or (e.link is not None and e.link == e.on):
-            d.drives.remove(e)
-            d.leave(f"input {e.link or (e.slide and e.slide.point)}", "its two sides are one body")
-
-
-def _drop_what_dangles(d: Drawing) -> None:
-    """Leave out bodies that no joint holds, or one pin or slot alone that nothing drives."""
-    while True:
-        holds = dict.fromkeys(d.bodies, 0)
-        for names, joints in d.ties():
-            for name in names:
-                holds[name] += joints
-        gone = [name for name, n in holds.items() if n < 2 and name != GROUND]
-        if not gone:
-            return
-        for name in gone:
-            d.bodies.pop(name)
-            alone = "one joint alone holds it, and nothing drives it"
-            d.leave(name, alone if holds[name] else "it has no joint")
-        d.slides = [s for s in d.slides if {s.link, s.on} <= d.bodies.keys()]
-        d.racks = [r for r in d.racks if {r.gear, r.slide.link, r.slide.on} <= d.bodies.keys()]
-        for load in [a for a in d.loads if not {name for name, _ in a.ends} <= d.bodies.keys()]:
-            d.loads.remove(load)
-            d.notes.append(f"load on {', '.join(name for name, _ in load.ends)}: left out with its link")
-
-
-def _parts(d: Drawing) -> list[Drawing]:
-    """Split into mechanisms that have nothing but the ground in common; what nothing drives is left out."""
-    groups = Groups(d.bodies)
-    for names in (*(names for names, _ in d.ties()), *(dict(load.ends) for load in d.loads)):
-        groups.join(*(name for name in names if name != GROUND))
-    parts = []
-    for group in groups.all():
-        drives = [e for e in d.drives if e.pair[0] in group]
-        if drives:
-            parts.append(_part(d, set(group), drives))
-        elif group != [GROUND]:
-            d.leave(", ".join(group), f"nothing drives {'it' if len(group) == 1 else 'them'}")
-    return parts
-
-
-def _part(d: Drawing, names: set[str], drives: list[Drive]) -> Drawing:
-    bodies = {name: body for name, body in d.bodies.items() if name in names}
-    slides = [s for s in d.slides if {s.link, s.on} & names]
-    used = {p for body in bodies.values() for p in body.points} | {s.point for s in slides}
-    ground = Body({p: at for p, at in d.bodies[GROUND].points.items() if p in used})
-    return replace(
-        d,
-        bodies={GROUND: ground} | bodies,
-        slides=slides,
-        meshes=[m for m in d.meshes if m.a in names or m.b in names],
-        racks=[r for r in d.racks if r.gear in names],
-        drives=drives,
-        spare=[e for e in d.spare if set(e.pair) <= {GROUND, *names}],
-        loads=[load for load in d.loads if any(name in names for name, _ in load.ends)],
-        notes=[],
-    )
+    def all(self) -> list[list[Thing]]:
+        """Return the groups, in the order in which their first things were named."""
+        result: dict[Thing, list[Thing]] = {}
+        for name in self._above:
+            result.setdefault(self.of(name), []).append(name)
+        return list(result.values())

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from cli.imports.drawn import GROUND, Drawing, Drive, Place, Slide, direction, place
-from cli.imports.messages import damaged
+from cli.formats.drawn import GROUND, Drawing, Drive, Exact, Slide, damaged, direction, exact, place
 from dalembert.errors import DataError
 
 LENGTHS = ("mm", "cm", "m", "in", "ft")
@@ -58,7 +57,7 @@ class _Reader:
 
     def drawing(self) -> Drawing:
         d = self.d
-        self.at: dict[str, Place] = {}
+        self.at: dict[str, Exact] = {}
         self.welded: set[str] = set()
         for k, e in enumerate(self.entries("joints"), 1):
             here = e.get("position") if isinstance(e.get("position"), dict) else e
@@ -153,7 +152,7 @@ class _Reader:
         at, start = self.known(where, [e.get("at"), e.get("from")])
         velocity = e.get("velocity")
         try:
-            speed = None if velocity is None else float(place(velocity, 0)[0])
+            speed = None if velocity is None else float(exact(velocity))
         except ValueError:
             raise damaged(self.file, where, velocity, "a velocity") from None
         if e.get("type") == "linear" or e.get("to") is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-from cli.exports.drawing import DXF_UNITS, Drawing, dxf, svg
+from cli.formats.drawing import DXF_UNITS, Strokes, dxf, svg
 from cli.read.options import bad
 from dalembert.hints import nearest
 from dalembert.results.text import csv_text
@@ -57,7 +57,7 @@ def file_bytes(
 
 def _drawing(
     points: list[ProfilePoint], length: str, metres: float, center: complex, radius: float
-) -> Drawing:
+) -> Strokes:
     """The profile, the pitch curve and a cross at the axis."""
     from virtualwork.shapes import Line
 
@@ -70,7 +70,7 @@ def _drawing(
     ]
     if any(point.pitch != point.profile for point in points):
         shapes.append(Line("CURVES", GROUND, tuple(point.pitch / metres for point in points), closed=True))
-    return Drawing(length, list(shapes))
+    return Strokes(length, list(shapes))
 
 
 def _table(points: list[ProfilePoint], drive: CamDrive, length: str, metres: float, angle: str) -> bytes:

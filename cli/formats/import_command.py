@@ -7,7 +7,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.imports.messages import KINDS
+from cli.formats.programs import KINDS
 from cli.read.options import bad
 from cli.show.output import reported
 from dalembert.errors import DataError
@@ -46,9 +46,9 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
     Several mechanisms in one file
     become FILE-1.toml, FILE-2.toml and so on.
     """
-    from cli.imports.assembled import described
-    from cli.imports.drawn import settle
-    from cli.imports.programs import read
+    from cli.formats.description import described
+    from cli.formats.programs import read
+    from cli.formats.settled import settle
     from cli.show.result import Result
 
     if output is not None and output.suffix.lower() != ".toml":
@@ -84,13 +84,11 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
     ]
 
     def sheets() -> list[Sheet]:
-        from cli.imports.assembled import pages
-
         taken = [f"{name}: {KINDS[program].partition(' (')[0]}, {len(data)} bytes"]
         return [
             sheet
             for title, (made, its) in zip(titles, result, strict=True)
-            for sheet in pages(title, taken if lost or its else [*taken, "All of it is imported."], made)
+            for sheet in _pages(title, taken if lost or its else [*taken, "All of it is imported."], made)
         ]
 
     return Result(
@@ -102,3 +100,22 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
         method=METHOD,
         about={"title": drawings[0].name or "Imported mechanism"},
     )
+
+
+def _pages(title: str, taken: list[str], made: str) -> list[Sheet]:
+    """Return the sheets of a mechanism, and of its file; `taken`: the file that it was imported from."""
+    import tomllib
+
+    from cli.cases.picture import posed
+    from cli.show.report import CODE
+    from cli.show.result import Section, Sheet
+    from virtualwork import Mechanism, MechanismError
+
+    first = Section("Imported", taken)
+    file = Sheet("", [Section("The file for dalembert mechanism", [CODE + made.rstrip("\n")])])
+    try:
+        m = Mechanism.from_toml_text(made)
+        inputs = tuple(at if e.value is None else e.value for e, at in zip(m.inputs, m.at, strict=True))
+        return [posed(title, m, inputs, tomllib.loads(made).get("units", {}), first), file]
+    except MechanismError as error:
+        return [Sheet(title, [first, Section("Mechanism", [str(error)])]), file]

@@ -1,13 +1,14 @@
-"""SDF: links with poses of their own, so that loops are joints as any; poses may be relative to other frames."""
+"""SDF, read and written: links with poses of their own, loops closed by joints as any other, gears as gearboxes."""
 
 from __future__ import annotations
 
-from xml.etree.ElementTree import Element
+from collections.abc import Iterable
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from cli.read.robots.elements import At, child, children, named, placed, plain, stated, text
-from cli.read.robots.robot import (
+from cli.formats.markup import At, add, child, children, digits, document, named, placed, plain, stated, text
+from cli.formats.robot import (
     ROWS,
     WORLD,
     Array,
@@ -21,7 +22,9 @@ from cli.read.robots.robot import (
     printed,
     rpy,
 )
+from cli.formats.skeleton import LIGHT, Joint, Skeleton, Travel, boxes
 from dalembert.errors import DataError
+from virtualwork.describe.parts import GROUND, Belt, Gear
 
 KINDS: dict[str, Kind] = {
     "revolute": "turn",
@@ -31,6 +34,10 @@ KINDS: dict[str, Kind] = {
     "ball": "ball",
 }
 MODEL = "__model__"
+# name space of the marks on numbers that the format asks for and the mechanism does not have
+SPACE = "https://dalembert.invalid/sdf"
+MASSLESS, POINT_MASS = "massless", "point_mass"
+PLUGIN = {"filename": "gz-sim-joint-controller-system", "name": "gz::sim::systems::JointController"}
 
 
 def read(file: str, root: Element) -> Robot:
@@ -103,7 +110,7 @@ class _Model:
                 inside = np.linalg.inv(robot.links[held].pose) @ self.frame(name, at)
                 robot.links[held].points[name] = inside[:3, 3]
         for e in () if static else children(self.element, "joint"):
-            joint(robot, e, self)
+            read_joint(robot, e, self)
         if not any(WORLD in (j.parent, j.child) for j in robot.joints.values()):
             robot.ground = next((name for name in robot.links if name != WORLD), WORLD)
         self._motors()
@@ -154,10 +161,10 @@ def _inertial(at: At, element: Element | None) -> Inertial | None:
         at.number(key, word)
     mass = text(element, "mass")
     # what `dalembert export` writes beside numbers that the format asks for
-    if child(element, "massless") is not None:
+    if child(element, MASSLESS) is not None:
         return None
     tensor, half = printed(texts)
-    if child(element, "point_mass") is not None:
+    if child(element, POINT_MASS) is not None:
         tensor = np.zeros((3, 3))
     return Inertial(
         1.0 if mass is None else at.number("mass", mass),
@@ -167,7 +174,7 @@ def _inertial(at: At, element: Element | None) -> Inertial | None:
     )
 
 
-def joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
+def read_joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
     """Add a `<joint>`, of a model or of a `<gazebo>` block of URDF, where its pose is relative to its child."""
     name, at = placed(robot.file, e)
 
@@ -231,3 +238,109 @@ def driven(file: str, element: Element) -> dict[str, float | None]:
                 at = At(file, "plugin")
                 result[which] = None if speed is None else at.number("initial_velocity", speed)
     return result
+
+
+# --- writing ------------------------------------------------------------------------------------------------------
+def write(s: Skeleton, travel: Travel, comment: str) -> bytes:
+    """Return the file of a mechanism."""
+    m = s.m
+    root = Element("sdf", {"version": "1.9", "xmlns:dalembert": SPACE})
+    world = add(root, "world", name="default")
+    add(world, "gravity", digits(m.gravity.real, m.gravity.imag, 0.0))
+    model = add(world, "model", name=m.name or "mechanism")
+    light = LIGHT * max((p.mass for p in s.bodies.values()), default=0.0) or LIGHT
+    for name in s.bodies:
+        if name != GROUND:
+            _add_link(s, model, name, light)
+    for j in s.joints:
+        add_joint(model, s, j, travel)
+    add_welds(model, s)
+    add_gearboxes(model, (*m.gears, *m.belts), WORLD)
+    add_plugins(model, s)
+    return document(root, comment)
+
+
+def add_pose(element: Element, z: complex, turn: float = 0.0) -> None:
+    """Add the pose of a place of the plane."""
+    add(element, "pose", digits(z.real, z.imag, 0.0, 0.0, 0.0, turn))
+
+
+def _add_link(s: Skeleton, model: Element, name: str, light: float) -> None:
+    part, link = s.bodies[name], add(model, "link", name=name)
+    add_pose(link, part.at, part.turn)
+    inertial = add(link, "inertial")
+    mass, inertia = part.mass, part.inertia
+    if mass <= 0:
+        mass, inertia = light, light * s.m.size**2
+        SubElement(inertial, f"dalembert:{MASSLESS}")
+    elif inertia <= 0:
+        inertia = LIGHT * mass * s.m.size**2
+        SubElement(inertial, f"dalembert:{POINT_MASS}")
+    add_pose(inertial, part.center)
+    add(inertial, "mass", digits(mass))
+    tensor = add(inertial, "inertia")
+    for entry in ROWS:
+        # in the plane only izz acts
+        add(tensor, entry, digits(inertia if entry[1] == entry[2] else 0.0))
+    for k, (middle, turn, sides) in enumerate(boxes(part, s.m.size), 1):
+        visual = add(link, "visual", name=f"stroke {k}")
+        add_pose(visual, middle, turn)
+        add(add(add(visual, "geometry"), "box"), "size", digits(*sides))
+    for point, z in s.free_points(name).items():
+        add_pose(add(model, "frame", name=point, attached_to=name), z)
+
+
+def add_joint(model: Element, s: Skeleton, j: Joint, travel: Travel, ground: str = WORLD) -> None:
+    """Add a joint; its place is seen from the link, which cannot be the ground."""
+    on, link, ends, sense = j.on, j.link, j.ends, 1.0
+    if link == GROUND:
+        on, link, ends, sense = link, on, (ends[1], ends[0]), -1.0
+    kind = {"turn": "revolute", "slide": "prismatic"}[j.kind]
+    made = add(model, "joint", name=j.name, type=kind)
+    add(made, "parent", ground if on == GROUND else on)
+    add(made, "child", link)
+    add_pose(made, ends[1])
+    axis = add(made, "axis")
+    add(axis, "xyz", digits(*j.axis(s.bodies[link], sense)))
+    limit = add(axis, "limit")
+    if j.limits is not None:
+        for tag, value in zip(("lower", "upper"), j.limits, strict=True):
+            # the coordinate is 0 in the start pose
+            add(limit, tag, digits(value - j.value))
+    effort = 0.0 if j.input is None else -1.0 if travel.peak is None else travel.peak
+    add(limit, "effort", digits(effort))
+
+
+def add_welds(model: Element, s: Skeleton) -> None:
+    """Add the joints that fix blocks to their links."""
+    for link, block in s.welds:
+        made = add(model, "joint", name=f"{block} fixed", type="fixed")
+        add(made, "parent", link)
+        add(made, "child", block)
+
+
+def add_gearboxes(model: Element, gears: Iterable[Gear | Belt], ground: str) -> None:
+    """Add gears and belts: θ of the child is −gearbox_ratio times that of the parent, both against the reference body."""
+    for k, g in enumerate(gears, 1):
+        a, b, arm = (ground if x == GROUND else x for x in (*g.links, g.arm))
+        ratio = g.ratio
+        if b == ground:
+            a, b, ratio = b, a, 1 / ratio
+        made = add(model, "joint", name=f"gears {k}", type="gearbox")
+        add(made, "parent", a)
+        add(made, "child", b)
+        add(made, "gearbox_ratio", digits(-ratio))
+        add(made, "gearbox_reference_body", arm)
+        for tag in ("axis", "axis2"):
+            add(add(made, tag), "xyz", digits(0.0, 0.0, 1.0))
+
+
+def add_plugins(model: Element, s: Skeleton) -> None:
+    """Add what drives the inputs, with the speed they begin with."""
+    for k, e in enumerate(s.m.inputs):
+        j = s.driven(k)
+        if j is not None:
+            plugin = add(model, "plugin", None, **PLUGIN)
+            add(plugin, "joint_name", j.name)
+            if e.speed is not None:
+                add(plugin, "initial_velocity", digits(j.rate))

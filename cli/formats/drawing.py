@@ -9,8 +9,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from cli.exports.markup import add, digits, document
-from cli.exports.skeleton import Skeleton, Travel
+from cli.formats.markup import add, digits, document
+from cli.formats.skeleton import Skeleton, Travel
 from dalembert.errors import DataError
 from virtualwork import drawing
 from virtualwork.describe.parts import GROUND
@@ -59,8 +59,8 @@ class Text:
 
 
 @dataclass
-class Drawing:
-    """All strokes, from the back to the front; the role of each is its layer, `unit` the length that a number means."""
+class Strokes:
+    """All strokes of a drawing, from the back to the front; the role of each is its layer, `unit` the length of a number."""
 
     unit: str
     shapes: list[Line | Circle | Text]
@@ -71,11 +71,11 @@ class Drawing:
         return complex(z.real.min(), z.imag.min()), complex(z.real.max(), z.imag.max())
 
 
-def draw(s: Skeleton, travel: Travel, unit: str, factor: float) -> Drawing:
+def draw(s: Skeleton, travel: Travel, unit: str, factor: float) -> Strokes:
     """Return the drawing of the start pose and of the curves over the travel; `factor` metres are one of the unit."""
     ways = [travel.way(k) or (np.nan, np.nan) for k in range(len(s.m.guides))]
     drawn = drawing.draw(s.m, ways)
-    made = Drawing(unit, [])
+    made = Strokes(unit, [])
     for shape in drawn.shapes:
         stood = standing(shape, s.world, factor)
         made.shapes.append(replace(stood, role=LAYER[shape.role]))
@@ -100,7 +100,7 @@ def _run(z: Complexes) -> Line:
     return Line("CURVES", GROUND, tuple((z[:-1] if closed else z).tolist()), closed)
 
 
-def svg(drawing: Drawing, comment: str, millimetres: float) -> bytes:
+def svg(drawing: Strokes, comment: str, millimetres: float) -> bytes:
     """Return the drawing as SVG, in its true size; `millimetres` are one of its unit."""
     low, high = drawing.extent()
     extent = max(high.real - low.real, high.imag - low.imag) or 1.0
@@ -130,7 +130,7 @@ def svg(drawing: Drawing, comment: str, millimetres: float) -> bytes:
     return document(root, comment)
 
 
-def dxf(drawing: Drawing, comment: str) -> bytes:
+def dxf(drawing: Strokes, comment: str) -> bytes:
     """Return the drawing as DXF (AutoCAD 2010), by ezdxf."""
     try:
         from ezdxf.filemanagement import new

@@ -1,22 +1,28 @@
-"""An imported drawing put together: its inputs, its TOML text, whether it stands where it is drawn, the pages of its report."""
+"""Drawings and descriptions: a drawing as the TOML text of a mechanism, checked against its pose; a mechanism as bodies in a pose."""
 
 from __future__ import annotations
 
 import cmath
 import math
-import tomllib
 from collections.abc import Iterable, Iterator, Sequence
-from fractions import Fraction
 from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.cases.picture import posed
-from cli.imports.drawn import GROUND, Body, Drawing, Drive, Load, Place, Slide, exact
-from cli.read.names import unused
-from cli.show.report import CODE
-from cli.show.result import Section, Sheet
+from cli.formats.drawn import (
+    GROUND,
+    ORIGIN,
+    Body,
+    Drawing,
+    Drive,
+    Exact,
+    Load,
+    Slide,
+    coordinates,
+    exact,
+    unused,
+)
 from virtualwork import Mechanism
 from virtualwork.describe import MechanismError
 from virtualwork.describe.parts import Gear, Guess, Guide, Input, Link, Rack
@@ -36,11 +42,9 @@ class _Speeds:
         self.size = d.size() or 1.0
         self.columns = {name: 3 * k for k, name in enumerate(d.bodies)}
 
-    def at(self, body: str, z: Place) -> complex:
-        """Where a body's place stands, a share of the size."""
-        b = self.d.bodies[body]
-        x, y = (complex(float(p[0]), float(p[1])) for p in (b.at, z))
-        return (x + y * cmath.rect(1.0, b.turn)) / self.size
+    def at(self, body: str, z: complex) -> complex:
+        """Return where a place of a body stands, a share of the size."""
+        return self.d.bodies[body].world(z) / self.size
 
     def moves(self, body: str, at: complex) -> Rows:
         """The speed of a body's point, (2, columns)."""
@@ -114,9 +118,6 @@ def _note(d: Drawing, drives: Iterable[Drive], what: str) -> None:
     d.notes += [f"{e.pair[0]} against {e.pair[1]}: {what}" for e in drives]
 
 
-ORIGIN: Place = (Fraction(0), Fraction(0))
-
-
 def text(d: Drawing, source: str) -> str:
     """Return the TOML text; `source` says where the mechanism is from."""
     d = _named(d)
@@ -130,7 +131,7 @@ def text(d: Drawing, source: str) -> str:
     return written(tree | {"source": source, "units": {"length": d.length, "angle": d.angle}})
 
 
-def _parts(d: Drawing, origins: dict[str, Place]) -> dict[str, object]:
+def _parts(d: Drawing, origins: dict[str, complex]) -> dict[str, object]:
     """Return the parts of a description, their numbers in the units of the file."""
     links = {name: body for name, body in d.bodies.items() if name != GROUND}
     return {
@@ -139,7 +140,7 @@ def _parts(d: Drawing, origins: dict[str, Place]) -> dict[str, object]:
         "ground": _places(d.bodies[GROUND].points),
         "links": {name: _link(b, origins[name]) for name, b in links.items()},
         "guides": [
-            Guide(s.point, s.link, s.on, _place(s.through, origins[s.on]), s.angle, s.turned)
+            Guide(s.point, s.link, s.on, complex(s.through - origins[s.on]), s.angle, s.turned)
             for s in d.slides
         ],
         "gears": [Gear((m.a, m.b), m.ratio, m.arm) for m in d.meshes],
@@ -159,24 +160,24 @@ def _parts(d: Drawing, origins: dict[str, Place]) -> dict[str, object]:
 def _stands(d: Drawing, s: Slide) -> complex:
     """Return where the point of a slide stands in the pose."""
     body = d.bodies[s.link]
-    return _place(body.at) + _place(body.points[s.point]) * cmath.rect(1.0, body.turn)
+    return body.world(body.points[s.point])
 
 
-def _link(b: Body, origin: Place) -> Link:
+def _link(b: Body, origin: complex) -> Link:
     points = _places(b.points, origin)
-    return Link(points, b.mass, _place(b.center, origin), b.inertia) if b.mass > 0 else Link(points)
+    return Link(points, b.mass, complex(b.center - origin), b.inertia) if b.mass > 0 else Link(points)
 
 
-def _origin(d: Drawing, name: str, body: Body) -> Place:
+def _origin(d: Drawing, name: str, body: Body) -> complex:
     """Return where a link's axes begin: at the first of its joints."""
     if d.own_axes or name == GROUND:
         return ORIGIN
     joints = set(d.pins()) | {s.point for s in d.slides}
     first = next((z for p, z in body.points.items() if p in joints), None)
-    return first or next(iter(body.points.values()), ORIGIN)
+    return next(iter(body.points.values()), ORIGIN) if first is None else first
 
 
-def _ends(d: Drawing, load: Load, origins: dict[str, Place]) -> Table:
+def _ends(d: Drawing, load: Load, origins: dict[str, complex]) -> Table:
     """Name the bodies that a load holds on to; a spring's ends are points that `_named` has made."""
     if load.table == "torsion_springs":
         return {"links": [name for name, _ in load.ends]}
@@ -188,7 +189,7 @@ def _ends(d: Drawing, load: Load, origins: dict[str, Place]) -> Table:
     ((name, at),) = load.ends
     if at is None:
         return {"link": name}
-    z = _place(at, origins[name])
+    z = at - origins[name]
     return {"link": name, "point": [z.real, z.imag]}
 
 
@@ -234,19 +235,15 @@ def _own_points(d: Drawing) -> None:
             if s.turned is None:
                 s.link, s.turned = unused(f"{shared} shoe", set(d.bodies)), -s.angle
                 d.body(s.link).points[shared] = z
-            way, far = math.radians(s.angle), d.size()
-            s.through = z[0] + exact(far * math.cos(way)), z[1] + exact(far * math.sin(way))
+            (x, y), way, far = coordinates(z), math.radians(s.angle), d.size()
+            s.through = Exact(x + exact(far * math.cos(way)), y + exact(far * math.sin(way)))
             s.point = d.fresh(f"{shared} on {s.on}")
             d.bodies[s.link].points[s.point] = s.through
         guided.add(s.point)
 
 
-def _place(z: Place, origin: Place = ORIGIN) -> complex:
-    return complex(float(z[0] - origin[0]), float(z[1] - origin[1]))
-
-
-def _places(points: dict[str, Place], origin: Place = ORIGIN) -> dict[str, complex]:
-    return {p: _place(z, origin) for p, z in points.items()}
+def _places(points: dict[str, complex], origin: complex = ORIGIN) -> dict[str, complex]:
+    return {p: complex(z - origin) for p, z in points.items()}
 
 
 # degrees of an input that says nothing of where it begins
@@ -299,11 +296,9 @@ def _motion(m: Mechanism, d: Drawing, *ways: Sequence[float]) -> Motion:
 def _gaps(d: Drawing, motion: Motion) -> Iterator[tuple[float, str]]:
     """Yield how far each point stands from its drawn place."""
     for name, body in d.bodies.items():
-        turned = cmath.rect(1.0, body.turn)
         for point, z in body.points.items() if name != GROUND else ():
             x, y = motion.point(point).position[0]
-            drawn = complex(*map(float, body.at)) + complex(*map(float, z)) * turned
-            yield abs(complex(x, y) - drawn * d.metres), point
+            yield abs(complex(x, y) - body.world(z) * d.metres), point
 
 
 def _seek(d: Drawing, source: str) -> None:
@@ -345,13 +340,12 @@ def _seek(d: Drawing, source: str) -> None:
     d.notes.append(f"no assembly was found{': ' + why if why else ''}")
 
 
-def pages(title: str, taken: list[str], made: str) -> list[Sheet]:
-    """Return the sheets of a mechanism, and of its file; `taken`: the file that it was imported from."""
-    first = Section("Imported", taken)
-    file = Sheet("", [Section("The file for dalembert mechanism", [CODE + made.rstrip("\n")])])
-    try:
-        m = Mechanism.from_toml_text(made)
-        inputs = tuple(at if e.value is None else e.value for e, at in zip(m.inputs, m.at, strict=True))
-        return [posed(title, m, inputs, tomllib.loads(made).get("units", {}), first), file]
-    except MechanismError as error:
-        return [Sheet(title, [first, Section("Mechanism", [str(error)])]), file]
+# --- from a description ---------------------------------------------------------------------------------------------
+def bodies_of(m: Mechanism, motion: Motion) -> dict[str, Body]:
+    """Return the ground and the links as bodies that stand in the first pose of a motion; m, kg, rad."""
+    bodies = {GROUND: Body(dict(m.ground))}
+    for name, link in m.links.items():
+        at, turn = complex(motion.at(name, 0j).complex(0)[0]), float(motion.link(name).angle[0])
+        rigid = m.rigid[name]
+        bodies[name] = Body(dict(link.points), at, turn, rigid.mass, rigid.center, rigid.inertia)
+    return bodies
