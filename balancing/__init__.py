@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     )
     from balancing.unbalance import initial_unbalance
 
-# A rotor with known masses needs none of what vibration needs: each module is loaded when a name of it is asked for.
+# A rotor with known masses needs none of what vibration needs: each module is loaded when one of its names is used.
 _HOMES = {
     "balancing.amplitudes": "AmplitudeFit influence_from_amplitudes",
     "balancing.balance": "Balance least_squares minimax",

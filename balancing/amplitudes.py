@@ -23,7 +23,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 STARTS = 24
-"""Directions from which the fit is started: it has few minima, all found from so many."""
+"""Directions from which the fit is started: it has few minima, and this number finds all."""
 
 
 @record
@@ -261,7 +261,7 @@ def _fit(read: Real, t: Complex) -> tuple[complex, float, complex]:
     rival: complex = complex(np.nan, np.nan)
     if away.any():
         second = int(np.argmin(np.where(away, cost, np.inf)))
-        # a rival is one that the readings cannot tell from the best
+        # a rival is one that the readings cannot distinguish from the best
         if np.sqrt(cost[second] / len(t)) <= max(2 * misfit, 1e-3 * float(np.abs(read).max())):
             rival = complex(z[second])
     return complex(z[best]), misfit, rival

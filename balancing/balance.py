@@ -1,7 +1,7 @@
 """Measured vibration -> corrections, and the vibration they leave.
 
 The corrections are the w for which r = V + α w is small (`balancing.influence`): by least squares, or by its largest
-component, with limits on masses and residuals where asked for.
+component, with limits on masses and residuals where requested.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Balance:
     corrections: Complex
     """The masses to ADD, (..., p), complex kg."""
     weights: Real | None = None
-    """The weights that were asked for, (..., s)."""
+    """The weights that were requested, (..., s)."""
     bound: float | None = None
     """No corrections within the limits leave less than this (from the dual problem): of minimax the largest (weighted)
     residual, of least squares with limits Σ w|r|²; None for least squares without limits."""
@@ -57,9 +57,9 @@ class Balance:
     """Whether the largest residual is the least there is (minimax), and not the sum of squares."""
     ridge: float = 0.0
     max_mass: Real | None = None
-    """The limits of the corrections that were asked for, (p,)."""
+    """The limits of the corrections that were requested, (p,)."""
     max_residual: Real | None = None
-    """The limits of the residual that were asked for, (s,)."""
+    """The limits of the residual that were requested, (s,)."""
 
     singular_values: Real | None = field(default=None, repr=False, compare=False)
     """Of the scaled coefficients, (..., p), where they are known from the solution."""
@@ -283,7 +283,7 @@ def least_squares(
     Raises
     ------
     DependentPlanes
-        The sensors do not tell the planes apart (and `ridge` is 0): the combination they do not see is named.
+        The sensors cannot distinguish the planes (and `ridge` is 0): the combination they do not see is named.
     Infeasible
         `max_residual` cannot be met: the smallest that can is named.
     NotConverged
@@ -354,7 +354,7 @@ def minimax(
     Raises
     ------
     DependentPlanes
-        The sensors do not tell the planes apart, and no limit keeps their masses finite.
+        The sensors cannot distinguish the planes, and no limit keeps their masses finite.
     NotConverged
         The corrections cannot be proven optimal to a millionth (`Balance.gap`); above 1e-9 a warning `Doubtful` says so.
     ValueError

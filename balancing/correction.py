@@ -346,7 +346,7 @@ def correct(
         Axial positions of the correction planes, (p,) or (..., p), m: one plane for static balancing, two for
         dynamic balancing; with more, the corrections of least Σ|W|².
     executor
-        Works out parts of the rotors, `PART` each, with the same numbers.
+        Computes parts of the rotors, `PART` each, with the same numbers.
 
     Returns
     -------
@@ -399,7 +399,7 @@ def correct(
     if executor is not None and fix.moment.ndim == 2:
         rows = (slice(i, i + PART) for i in range(0, len(fix.moment), PART))
         parts = ((fix.moment[i], fix.z[i], fix.planes[i]) for i in rows)
-        # what is worked out on the first request
+        # what is computed on the first request
         unbalance = np.concatenate(list(in_parts(_unbalance, parts, executor)))
         object.__setattr__(fix, "unbalance", unbalance)
     return fix

@@ -1,4 +1,4 @@
-"""Do the readings tell the planes apart? Condition numbers, and the combinations of planes that no sensor sees.
+"""Can the readings distinguish the planes? Condition numbers, and the combinations of planes that no sensor sees.
 
 All of it is of coefficients whose columns are first brought to like size by powers of two: a plane of small effect
 does not count as a dependent one, and nothing is rounded.
@@ -230,5 +230,5 @@ def directions(z: Complex) -> Complex:
 
 
 def roundings(terms: int) -> float:
-    """Return by what share of its terms' size a computed sum of so many complex products can be wrong."""
+    """Return by what share of its terms' size a computed sum of this number of complex products can be wrong."""
     return (terms / 4 + 2) * EPS

@@ -56,7 +56,7 @@ def outlier_probability(fit: JointFit) -> Real:
 
 
 def _chance(share: Real, nu: Real, tests: Real | int) -> Real:
-    """Return the probability that one of so many shares is as large as this."""
+    """Return the probability that one of this number of shares is as large as this."""
     chance = np.minimum(tests * np.clip(1 - share, 0.0, 1.0) ** (nu - 1), 1.0)
     return np.asarray(np.where(np.isfinite(share), chance, np.nan))
 
@@ -124,7 +124,7 @@ class Drift(NamedTuple):
     """The rate at which the vibration changes with time, and the probability of such a rate by chance."""
 
     rate: Complex
-    """Of each channel, in readings per unit of time, (..., s); NaN where the times do not tell it."""
+    """Of each channel, in readings per unit of time, (..., s); NaN if the times do not determine it."""
     deviation: Real
     """Standard deviation of each component of the rate, (..., s); NaN where nothing is left over."""
     probability: Real

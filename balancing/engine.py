@@ -91,7 +91,7 @@ class Forces:
     against: Complex
     """(s, K)."""
     again: Callable[[], Forces] | None = field(default=None, compare=False)
-    """The same forces in 32 digits, worked out on request; None: the floats are exact."""
+    """The same forces in 32 digits, computed on request; None: the floats are exact."""
 
     def joined(self, *others: Forces) -> Forces:
         """Return the forces of these sources and of others together."""

@@ -40,7 +40,7 @@ def influence_coefficients(initial: ArrayLike, trials: ArrayLike, trial_masses: 
     Raises
     ------
     DependentTrials
-        The runs do not tell the planes apart: fewer runs than planes, a plane never tried, runs alike.
+        The runs cannot distinguish the planes: fewer runs than planes, a plane never tried, runs alike.
     ValueError
         Not finite, or shapes that do not fit.
 

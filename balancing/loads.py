@@ -42,7 +42,7 @@ class Loads(NamedTuple):
         Raises
         ------
         DependentTrials
-            The loads do not tell the planes apart.
+            The loads cannot distinguish the planes.
         """
         means = np.asarray(self.means(readings), dtype=complex)
         on = self.masses[..., self.first[1:], :]

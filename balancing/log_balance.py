@@ -223,7 +223,7 @@ class LogBalance:
 
     @property
     def coefficients(self) -> CoefficientSpread | None:
-        """How well the influence coefficients are known; None where nothing tells."""
+        """The uncertainty of the influence coefficients; None if it is undetermined."""
         fit, errors = self.fit, self.errors
         gain = fit.gain[..., 1:, :]
         unit, along, across = self._by_channel()

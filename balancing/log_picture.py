@@ -26,8 +26,8 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 ACROSS = 3  # panels side by side
-CIRCLES = 6  # so many sensors and states have a circle
-NAMED = 14  # so many places of readings are named by their runs
+CIRCLES = 6  # number of sensors and states with a circle
+NAMED = 14  # readings with the name of their run
 MARKS = "os^Dvp*XPhd<>8"
 BEFORE, AFTER, READ, FITTED, NEXT = "0.45", "tab:red", "tab:blue", "tab:orange", "tab:green"
 SUGGESTED = "tab:purple"
@@ -53,7 +53,7 @@ class History(NamedTuple):
     planes: Sequence[str]
     corrections: Complex
     spreads: Sequence[tuple[Real, float]]
-    """For each plane the covariance of the correction, and the factor of its 95 % region; none where nothing tells."""
+    """For each plane the covariance of the correction, and the factor of its 95 % region; none if it is undetermined."""
     predicted: tuple[complex | Complex, Spread] | None = None
     """The run to be predicted, (s,), and its spread, of all machines."""
     suggested: Complex | None = None
@@ -187,7 +187,7 @@ def _names(values: Complex, runs: list[str], near: float) -> Iterator[tuple[comp
 
 
 def _ellipse(center: complex, covariance: Real, k: float) -> Complex:
-    """Return the outline δᵀV⁻¹δ = k² about a vector, V along it and across; its own point where nothing is known."""
+    """Return the outline δᵀV⁻¹δ = k² about a vector, V along it and across; its own point without a covariance."""
     if not (np.isfinite(covariance).all() and np.isfinite(k)):
         return np.array([center])
     size, axes = np.linalg.eigh(covariance)

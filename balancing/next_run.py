@@ -1,4 +1,4 @@
-"""The run that would tell most: where to put which masses next."""
+"""The next run: which masses, at which angles, reduce the uncertainty most."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def suggest_run(balance: LogBalance, max_mass: ArrayLike) -> NextRun:
 
     Examples
     --------
-    Two runs lie at 0 and 1 kg; a correction of -2.5 kg is told best by a run near it.
+    Two runs lie at 0 and 1 kg; a correction of -2.5 kg is best confirmed by a run near it.
 
     >>> from balancing import joint_fit, least_squares
     >>> fit = joint_fit([[5], [7.1], [4.9]], [[0], [1], [0]])

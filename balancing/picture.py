@@ -30,7 +30,7 @@ MOST = 4
 NAMED = 16
 """So many vectors of a dial are named."""
 RIM_ROOM = 2.3
-"""How far a dial with places reaches: for what stands on the rim about the vectors."""
+"""How far a dial with places reaches: with room for the marks on the rim."""
 SENSE = "angles counter-clockwise as seen against +z"
 WHOLE = Look("0.55", 4.0)
 TOGETHER = Look("tab:red", 1.8)
@@ -324,7 +324,7 @@ def _measured(axes: PolarAxes, title: str, rotor: Vibration, scale: float) -> li
     names = [str(sensor) if few else "" for sensor in rotor.sensors]
     before, after = rotor.before * scale, rotor.after * scale
     size = _largest(before, after)
-    # a name at the tip of what is left too, where there are several to tell apart and room for it
+    # a name at the tip of what is left too, if there are several and there is room for it
     left = [
         name if len(names) > 1 and abs(r) > 0.15 * size else "" for name, r in zip(names, after, strict=True)
     ]

@@ -38,7 +38,7 @@ class Placement:
     bound: float = 0.0
     """No masses at these positions, within the limits, come nearer to the target than this, kg."""
     free: tuple[int, ...] = ()
-    """The positions whose masses were worked out; the others are full, empty, or weights from stock."""
+    """The positions whose masses were computed; the others are full, empty, or weights from stock."""
 
     def to_frame(self) -> pd.DataFrame:
         """Return a table with a row per position: angle_deg, mass_kg."""
@@ -352,7 +352,7 @@ def place_from_stock(
 def _sums(
     arms: Complex, cap: Real, loads: Real, counts: NDArray[np.intp], most: int | None
 ) -> tuple[Complex, Real, NDArray[np.intp], NDArray[np.int32]]:
-    """Return all sums of loads on positions, of at most so many pieces: the sum, its mass, its pieces, what stands where.
+    """Return all sums of loads on positions with at most this number of pieces: sum, mass, pieces, places.
 
     What stands where is a row of codes, one for each position that bears a load: (positions from here on)·(number of loads) + load;
     then zeros. The sums are in the order of these codes.
@@ -401,7 +401,7 @@ def _room(loads: int, positions: int, max_pieces: int | None) -> int:
 
 
 def _loads(weights: Real, pieces: int) -> tuple[Real, NDArray[np.intp]]:
-    """Return what up to so many pieces can weigh together, ascending from 0, and the fewest pieces for each."""
+    """Return the masses of up to this number of pieces, ascending from 0, and the fewest pieces for each."""
     fewest = {"0": (0.0, 0)}
     for number in range(1, pieces + 1):
         for load in [load for load, count in fewest.values() if count == number - 1]:

@@ -1,4 +1,4 @@
-"""What is known of a machine before its own runs: influence coefficients of sister machines, as prior knowledge of the fit.
+"""Prior knowledge of a machine: influence coefficients of sister machines, which enter the fit of its runs.
 
 Of m sister machines the coefficients α_k are known, each with the error of its own runs. The mean α̂ of m differs from the
 α of a further machine as machines differ from one another, and their scatter shows by how much. The trade calls the use of it
@@ -7,7 +7,7 @@ as mixed estimation (Theil and Goldberger, Int. Econ. Rev. 2 (1961) 65-78),
 
     min  Σ_j |y_j - x₀ - Σ_p α_p w_jp|²/σ²  +  (α - α̂)ᴴ Γ⁻¹ (α - α̂),
 
-so that the runs count the more, the more they tell.
+so that informative runs count more.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ def fit_with_prior(
         Of (s, p), or (..., s, p).
     deviation
         √E|ε|² of the readings, (..., r, s) or what broadcasts; None: as the runs alone scatter, and where they leave no
-        degree of freedom 0, so that what is known serves for what the runs do not determine.
+        degree of freedom 0, so that the prior serves for what the runs do not determine.
 
     Returns
     -------

@@ -29,7 +29,7 @@ def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> tuple[Comple
     Raises
     ------
     DependentPlanes
-        The readings do not tell the planes apart.
+        The readings cannot distinguish the planes.
 
     Examples
     --------

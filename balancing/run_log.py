@@ -63,7 +63,7 @@ class JointFit:
     readings: Complex
     """(..., r, s); NaN where a run lacks a channel."""
     masses: Complex
-    """What was ON the rotor, (..., r, p)."""
+    """The masses ON the rotor, (..., r, p)."""
     weights: Real | None
     """(..., r, s)."""
     unknowns: Complex
@@ -222,7 +222,7 @@ class JointFit:
         return Errors(ones, each, each, np.asarray(self.degrees_of_freedom, dtype=float))
 
     def known(self, sd: ArrayLike, degrees_of_freedom: ArrayLike = np.inf) -> Errors:
-        """Return errors of √E|ε|² = sd, (...), known with so many complex degrees of freedom."""
+        """Return errors of √E|ε|² = sd, (...), with this number of complex degrees of freedom."""
         each = np.broadcast_to(np.asarray(sd, dtype=float)[..., None, None] / np.sqrt(2), self.readings.shape)
         nu = np.broadcast_to(np.asarray(degrees_of_freedom, dtype=float), self.readings.shape[:-2])
         return Errors(np.ones(self.readings.shape, dtype=complex), each, each, nu)
@@ -245,7 +245,7 @@ def joint_fit(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None 
         Vibration, complex (..., r, s): runs and channels (a sensor in an operating state or at a speed). NaN where a
         run lacks the channel. A channel that was read twice in a run takes two rows of equal masses.
     masses
-        What was ON the rotor in each run, complex (..., r, p), kg. No run need be without masses.
+        The masses ON the rotor in each run, complex (..., r, p), kg. No run need be without masses.
     weights
         One over the readings' variances, in any common unit, (..., r, s). Default 1 each.
 

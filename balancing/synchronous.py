@@ -37,7 +37,7 @@ class OncePerTurn:
     """Standard deviation of the speeds of single turns, rad/s; NaN with one turn."""
     turns: int
     phase_resolution: float = 0.0
-    """By how much the phases may be off, either way, as samples tell the edge of a mark of two levels, rad."""
+    """By how much the phases may be off, either way, from the samples at the edge of a mark of two levels, rad."""
     recording: tuple[Any, ...] = field(default=(), compare=False)
     """Times, signals, mark, pulses and tacho."""
 
@@ -84,7 +84,7 @@ def marks(t: ArrayLike, mark: ArrayLike) -> Marks:
     """Find the times at which a mark rises through half its height.
 
     A mark of two levels rises somewhere between its last low sample and its first high one: in the middle, half an interval
-    either way. Where the marks come as evenly as the samples can tell they are taken as even, in the middle of what all of
+    either way. Where the marks are even within the samples they are taken as even, in the middle of what all of
     them allow. Any other mark rises between two samples by linear interpolation.
 
     >>> marks([0, 1, 2, 3], [0, 0, 1, 0]), marks([0, 1, 2, 3], [0, 0, 3, 4])
@@ -199,10 +199,10 @@ def once_per_turn(
     mark
         Any unit, (n,): it rises `pulses` times in a turn.
     pulses
-        With several pulses in a turn, evenly spaced, t = 0 is the first one of the recording: which it is of the shaft's
-        nobody can tell.
+        With several pulses in a turn, evenly spaced, t = 0 is the first one of the recording: the recording does
+        not show which one of the shaft it is.
     tacho
-        A second signal with several pulses in a turn, (n,), beside a mark that comes once: it tells the angle, and the mark
+        A second signal with several pulses in a turn, (n,), in addition to a mark that comes once: it gives the angle, and the mark
         where it is zero.
 
     Returns

@@ -49,7 +49,7 @@ def measured(
     """The tape of a machine's sheet: stored coefficients, readings of an initial run and of runs with masses.
 
     Inputs are `run K amplitude S`, `run K phase S` and `run K there S` (1 where it tells of the initial vibration, else 0), `run K mass P`
-    and `run K angle P` (what stands on the rotor in that run, nothing in the first), with `unbalance` also `run K read S` (1 where it was read, else 0). The initial vibration is the mean of what
+    and `run K angle P` (the masses on the rotor in that run, nothing in the first), with `unbalance` also `run K read S` (1 where it was read, else 0). The initial vibration is the mean of what
     every run says of it that is there. Outputs: corrections, the vibration they leave, the trim after each run (the corrections
     less what stands; `fresh`: what its own reading alone asks for), what each run's reading is off, the vibration of each run as read
     (without the run-out) and as the coefficients expect it, and with stated errors of readings the standard deviations of the corrections and the trims.

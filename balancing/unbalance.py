@@ -29,7 +29,7 @@ def initial_unbalance(
     -------
     ndarray
         u of V = α u, complex (..., p), kg; NaN in each plane where the readings do not determine it: planes that no
-        sensor tells apart, or fewer sensors than planes.
+        sensor distinguishes, or fewer sensors than planes.
 
     Raises
     ------

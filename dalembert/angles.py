@@ -56,7 +56,7 @@ def read_degrees(angle: float) -> float:
 
 
 def in_turn(angle: float, turns: int = 1) -> float:
-    """Return an angle in degrees, in [0, 360), or in so many turns.
+    """Return an angle in degrees, in [0, 360), or in this number of turns.
 
     The remainder of a tiny negative angle alone rounds to 360.
 

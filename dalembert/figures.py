@@ -144,14 +144,14 @@ def written(value: float | Decimal, figures: int) -> str:
 
 
 class Right:
-    """A right number and the figures asked: the judge of typed numbers.
+    """A right number and the required figures: the judge of typed numbers.
 
     Parameters
     ----------
     value : float or Fraction
         The right number.
     figures : int
-        How many significant figures are asked for.
+        The required number of significant figures.
 
     Examples
     --------
@@ -178,14 +178,14 @@ class Right:
 
     @property
     def unit(self) -> Decimal:
-        """One unit of the last figure asked."""
+        """One unit of the last required figure."""
         exponent = self.answer.adjusted() - self.figures + 1
         return Decimal((0, (1,), exponent))
 
     def verdict(self, number: Typed) -> str:
         """Judge a number: `right`, `rounding` (one unit of the last figure off), `figures` (too few) or `wrong`.
 
-        Right is what rounds to the right value at the figures asked, and the right value rounded to more figures.
+        Right is what rounds to the right value at the required figures, and the right value rounded to more figures.
         """
         a = number.value
         if not self.answer:

@@ -20,7 +20,7 @@ def nearest(word: str, names: Iterable[str], cutoff: float = 0.6) -> str:
 
 
 LISTED = 8
-"""Of many names a message lists so many."""
+"""The number of names that a message lists."""
 
 
 def choices(word: str, names: Iterable[str]) -> str:

@@ -183,7 +183,7 @@ class Body:
 
     @cached_property
     def in_32_digits(self) -> Body:
-        """The same body in doubled numbers: worked out once more, from the numbers it was made of."""
+        """The same body in doubled numbers: computed again, from the numbers it was made of."""
         if self.exact is not None:
             return self.exact()
         return Body(*map(in_32_digits, (self.mass, self.center, self.inertia)))
@@ -271,5 +271,5 @@ def _shaped(shape: str, mass: Array, center: Array, dimensions: Mapping[str, Arr
 
 
 def _again(work: Callable[..., Body], body: Body, *numbers: Any) -> Body:
-    """A body worked out of another, once more of doubled numbers."""
+    """A body computed from another, again in doubled numbers."""
     return work(body.in_32_digits, *numbers)

@@ -93,7 +93,7 @@ class FreeRotation:
             for i, h in enumerate((H1, H2, H3))
         )
         d12, d23, d13 = (I2 - I1) / (I1 * I2), (I3 - I2) / (I2 * I3), (I3 - I1) / (I1 * I3)
-        # 2E - |H|²/I3 and |H|²/I1 - 2E, as sums; and their weighted difference, whose sign tells the axis circled
+        # 2E - |H|²/I3 and |H|²/I1 - 2E, as sums; and their weighted difference, whose sign gives the circled axis
         c3 = (I1 * (I3 - I1) * w1**2 + I2 * (I3 - I2) * w2**2) / I3
         c1 = (I3 * (I3 - I1) * w3**2 + I2 * (I2 - I1) * w2**2) / I1
         # on the separatrix it is all cancellation

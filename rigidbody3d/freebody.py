@@ -43,7 +43,7 @@ class FreeBody:
     Notes
     -----
     See `free_rotation`. Separatrix, permanent rotation, symmetric and spherical bodies included. The
-    distance to the separatrix is worked out in doubled precision: it is exact for the numbers given.
+    distance to the separatrix is computed in doubled precision: it is exact for the numbers given.
 
     Examples
     --------
@@ -115,7 +115,7 @@ class FreeBody:
     def error_estimate(self, of: str = "period", exact: FreeBody | None = None) -> Array:
         """Return an estimate of the error of the period, the energy (...) or the momentum (..., 3).
 
-        Computed twice, with 16 and with 32 digits; `exact` is the body in doubled numbers, where more of it is known than floats.
+        Computed twice, with 16 and with 32 digits; `exact` is the body in doubled numbers, if it has more digits than floats.
         """
         require(of, "period", "momentum", "energy")
         second: Any = getattr(exact or self.in_32_digits, of)
@@ -204,7 +204,7 @@ class FreeState(AtTimes):
             "attitude", as an angle (..., n), rad, or "quaternion", its components (..., n, 4); "omega" or "momentum",
             (..., n, 3); "energy", (..., n).
         exact
-            The state in doubled numbers, where more is known than floats: default of the given data as exact.
+            The state in doubled numbers, if there are more digits than floats; default: the data count as exact.
 
         Examples
         --------

@@ -86,7 +86,7 @@ class Trajectory(AtTimes):
             "attitude", as an angle (n,), rad, or "quaternion", its components (n, 4); "omega" or "momentum", (n, 3);
             "energy", (n,).
         exact
-            The tensor in doubled numbers, (3, 3), where more of it is known than floats: a further run.
+            The tensor in doubled numbers, (3, 3), if it has more digits than floats: a second run.
 
         Notes
         -----
@@ -114,7 +114,7 @@ class Trajectory(AtTimes):
             bound = bound + walk * quaternion.length(here)
         off = np.zeros((3, 3)) if exact is None else (exact - self.tensor).value
         if off.any():
-            # by so many times what the tensor is off, that it shows; no moment becomes negative
+            # by a visible multiple of the tensor's error; no moment becomes negative
             moments = principal(self.tensor).moments
             times = max(1.0, float(min(1e-7 * moments[2], 1e-3 * moments[0]) / np.abs(off).max()))
             bound = bound + _apart(self._run_again(self.tensor + times * off), finer, of) / times

@@ -85,7 +85,7 @@ class Motion:
     velocity: Array
     acceleration: Array
     pivot: Array | None
-    """The point fixed in space that velocity and acceleration were worked out from; None: they are given."""
+    """The point fixed in space that velocity and acceleration were computed from; None: they are given."""
 
     def __init__(
         self,
@@ -146,7 +146,7 @@ class Motion:
         I, w, alpha = self.inertia, self.omega, self.true_alpha
         if I.ndim > 2 or w.ndim == 1 or w.shape != alpha.shape or is_doubled(w):
             return _times(I, alpha) + _cross(w, self.momentum)
-        # both in one pass, while a block of ω is in the cache; H is not worked out twice
+        # both in one pass, while a block of ω is in the cache; H is not computed twice
         momentum, rate = _momentum_and_rate(I, w, alpha, self.__dict__.get("momentum"))
         self.__dict__["momentum"] = momentum
         return rate
@@ -244,7 +244,7 @@ class Motion:
         point
             What momentum_about and rate_about are about, (..., 3), m.
         body
-            The body to 32 digits, where it was worked out (`Body.in_32_digits`).
+            The body to 32 digits, where it was computed (`Body.in_32_digits`).
 
         Examples
         --------

@@ -161,7 +161,7 @@ class Shaft:
         x, y = unbalance[..., 0], unbalance[..., 1]
         return np.stack([pull * x - push * y, pull * y + push * x], axis=-1) + 0.0
 
-    # --- what is asked for ---
+    # --- the requested quantities ---
 
     @property
     def static_unbalance(self) -> Complex:

@@ -13,7 +13,7 @@ from rigidbody3d.inertia import principal
 Array = NDArray[np.float64]
 
 ELLIPSOID = "ellipsoid"
-"""Stands for a body of which only the tensor is known: the homogeneous ellipsoid that has it."""
+"""The shape of a body with a tensor alone: the homogeneous ellipsoid that has it."""
 MESH = "mesh"
 TURN = np.linspace(0.0, 2 * np.pi, 73)
 

@@ -1,4 +1,4 @@
-"""What states in time have in common: they are worked out in blocks, and laid out as a table."""
+"""What states in time have in common: they are computed in blocks, and laid out as a table."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 BLOCK = 8192
-"""So many states are worked out at once: what is intermediate stays in the cache."""
+"""The number of states that are computed at once: intermediate results stay in the cache."""
 
 
 def in_blocks(work: Callable[[Array], Array], time: Array, lead: tuple[int, ...], width: int) -> Array:

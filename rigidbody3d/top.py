@@ -12,7 +12,7 @@ Im α), whose phases run at
 apart from the spin by which a top differs from a spherical one (Klein and Sommerfeld, Theorie des Kreisels).
 Each phase is one elliptic integral of the third kind, here split so that its sharp turn, where the axis passes
 near the vertical, is an arctangent and the rest is smooth. The three roots decide everything through their
-differences: they are worked out once per top with 200 digits.
+differences: they are computed once per top with 200 digits.
 """
 
 from __future__ import annotations
@@ -60,11 +60,11 @@ class Top:
     ------
     ValueError
         Two different moments across the axis, a moment that is not positive, shapes that do not fit; a rotation
-        so fast that 200 digits do not tell the weight.
+        so fast that the weight is below 200 digits.
 
     Examples
     --------
-    A fast top let go at 0.4 rad without precession, after 2π seconds.
+    A fast top released at 0.4 rad without precession, after 2π seconds.
 
     >>> q0 = [np.cos(0.2), np.sin(0.2), 0, 0]
     >>> top = Top([0.002, 0.002, 0.0008], 0.1962, [0, 0, 100.0], q0)
@@ -187,7 +187,7 @@ class TopState(AtTimes):
             "attitude", as an angle (..., n), rad, or "quaternion", its components (..., n, 4); "omega" or "momentum",
             (..., n, 3); "energy", (..., n).
         exact
-            The state in doubled numbers, where more is known than floats: default of the given data as exact.
+            The state in doubled numbers, if there are more digits than floats; default: the data count as exact.
         """
         require(of, *STATE)
         return difference(exact or self.in_32_digits, self, of)

@@ -1,4 +1,4 @@
-"""The constants of a heavy top's motion, from its cubic's three roots: worked out with 200 digits."""
+"""The constants of a heavy top's motion, from its cubic's three roots: computed with 200 digits."""
 
 from __future__ import annotations
 

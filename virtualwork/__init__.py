@@ -90,7 +90,7 @@ __all__ = [
     "sense",
 ]
 
-# where each name stands; a room is loaded when one of its names is asked for
+# where each name stands; a room is loaded when one of its names is used
 _ROOMS = {
     "virtualwork.describe": "AssemblyError DescriptionError MechanismError MobilityError",
     "virtualwork.describe.parts": "GROUND Belt Cam Force Friction Gear Guess Guide Input Link Motor Rack Segment Spring Torque TorsionSpring",

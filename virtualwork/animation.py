@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from virtualwork.plan.steps import Joint
 
 TURN = 6.0
-"""A turn of the input takes so many seconds at speed 1."""
+"""The time of a turn of the input at speed 1, s."""
 FINE = 181
-"""A path is drawn through so many poses a turn at least."""
+"""The least number of poses a turn of a drawn path."""
 # what keeps every digit, with inputs and times; of rates and forces the page keeps seven
 _PLACE = re.compile(r"_([xy]_m|position_m|deg|rad)\Z")
 _RATES = {"v": "v{}_m_s", "a": "a{}_m_s2"}

@@ -357,7 +357,7 @@ def computing_page(
     columns : mapping
         What is listed: of each column its quantity, or the number of an input, and its header with its unit.
     named : sequence of Component
-        What can be asked for by name.
+        The quantities by name.
     bare_units : mapping of kind to unit
         The units of lengths and angles that are typed and shown: those of the file.
     others : sequence of Series

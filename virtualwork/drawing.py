@@ -70,7 +70,7 @@ class Label:
 
 
 def standing(shape: Shape, at: Callable[[str, complex], complex], unit: float = 1.0) -> Line | Circle:
-    """Return a shape where its bodies stand, in the ground's axes and a unit of so many metres: a spring as its line.
+    """Return a shape where its bodies stand, in the ground's axes and in a unit of this number of metres: a spring as its line.
 
     `at` returns where a place of a body stands, m.
     """

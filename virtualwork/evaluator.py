@@ -1,6 +1,6 @@
-"""A few named quantities of one mechanism, asked for again and again: for loops, optimisers, controllers.
+"""A few named quantities of one mechanism, requested many times: for loops, optimisers, controllers.
 
-What is asked for is written down and made ready once; a call with numbers is then little more than its arithmetic, and
+The requested quantities are recorded and prepared once; a call with numbers is then little more than its arithmetic, and
 one with arrays is one pass of the engine for all quantities together.
 """
 
@@ -58,7 +58,7 @@ class Evaluator:
     def __call__(
         self, angle: ArrayLike, speed: ArrayLike = 0.0, acceleration: ArrayLike = 0.0, jerk: ArrayLike = 0.0
     ) -> dict[str, Any]:
-        """The quantities, by the names they were asked for with.
+        """The quantities, by the names they were requested with.
 
         Parameters
         ----------
@@ -108,7 +108,7 @@ class Evaluator:
         return values
 
     def operations(self, *, speed: bool = True, acceleration: bool = True) -> int:
-        """How many operations a pose costs: what is not asked for, and what a zero rate makes vanish, is not counted."""
+        """How many operations a pose costs: what is not requested, and what a zero rate makes vanish, is not counted."""
         return taped(self.assembly, recorded(self.assembly, (speed, acceleration, False)), self.keys).cost
 
 

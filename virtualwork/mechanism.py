@@ -1,4 +1,4 @@
-"""The door in: a mechanism as its designer describes it, and what can be asked of it."""
+"""The door in: a mechanism as its designer describes it, and everything that it can compute."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ class Mechanism(Description):
         acceleration: ArrayLike | None = None,
         jerk: ArrayLike | None = None,
     ) -> Motion:
-        """Motion of the assembly that the guess chooses; every quantity is solved when first asked for.
+        """Motion of the assembly that the guess chooses; every quantity is solved on the first request.
 
         Parameters
         ----------
@@ -201,7 +201,7 @@ class Mechanism(Description):
         return simulate(self.assembly, times, angle, speed, accuracy, until)
 
     def evaluator(self, *wanted: str) -> Evaluator:
-        """Named quantities of the assembly that the guess chooses, made ready once to be asked for again and again.
+        """Named quantities of the assembly that the guess chooses, prepared once for many requests.
 
         Parameters
         ----------
@@ -376,7 +376,7 @@ class Mechanism(Description):
         paths : sequence of str
             The dimensions, in the order in which their numbers are given.
         wanted : str
-            `points.H`, `links.rocker`, `slides.B`: what is asked for.
+            `points.H`, `links.rocker`, `slides.B`: the requested quantities.
 
         Returns
         -------

@@ -1,6 +1,6 @@
 """The door out: what a mechanism does over given inputs, its points, links, slides and forces.
 
-Each quantity is solved when first asked for, and never twice; the files of forces, bounds and studies are loaded then.
+Each quantity is solved on the first request, and never twice; the files of forces, bounds and studies are loaded then.
 
 >>> import numpy as np
 >>> from virtualwork import Input, Link, Mechanism
@@ -136,7 +136,7 @@ class Motion(MotionViews):
 
     @property
     def solved(self) -> list[tuple[Step, int]]:
-        """What has been worked out so far, (step, order); order 0 is position."""
+        """What has been computed so far, (step, order); order 0 is position."""
         return self.poses.solved
 
     @property
@@ -221,7 +221,7 @@ class Motion(MotionViews):
 
     @cached_property
     def rounding(self) -> Estimates:
-        """Estimates of the rounding errors of this motion, each formed when first asked for."""
+        """Estimates of the rounding errors of this motion, each formed on the first request."""
         from virtualwork.digits.estimates import Estimates
 
         return Estimates(self.poses, self.values)
@@ -270,7 +270,7 @@ class Motion(MotionViews):
     # --- forces -----------------------------------------------------------------------------------------------
     @cached_property
     def dynamics(self) -> Forces:
-        """All forces of this motion, each formed when first asked for."""
+        """All forces of this motion, each formed on the first request."""
         from virtualwork.forces import Forces
 
         return Forces(self.poses)
@@ -429,7 +429,7 @@ def _again(
     block_of: int | None,
     time: Reals | None = None,
 ) -> Motion:
-    """Make a motion again, as pickles and copies do; what it had solved is solved anew when asked for."""
+    """Make a motion again, as pickles and copies do; what it had solved is solved anew on request."""
     inputs, error, rest = own
     motion = Motion(assembly, inputs, block_of=block_of)
     poses = motion.poses

@@ -26,7 +26,7 @@ def columns(poses: Poses) -> dict[str, Any]:
 
 
 def moving_columns(m: Description, poses: Poses, orders: int) -> dict[str, Any]:
-    """Return the columns of links and points that move, so many orders of them."""
+    """Return the columns of links and points that move, up to this order."""
     links = {f"{name}_{LINK[k]}": Angle(name, k) for name in m.links for k in range(orders)}
     points = [
         (name, k, Point(body, 0j, name, k))

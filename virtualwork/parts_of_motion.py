@@ -1,4 +1,4 @@
-"""Points, links and slides of a motion: each quantity is asked of the whole on the first request."""
+"""Points, links and slides of a motion: each quantity is computed by the whole motion on the first request."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ class OfOneMechanism(PartOfMotion):
         """Return the rounding error (n,) of the position or angle (order 0), or of its rate of that order.
 
         It is the difference to a second run in 32 digits, in the unit of the quantity, the length of a point's error. The
-        decimals of a file are exact in it, and floats are exactly these. Infinite where no digit is known, within
+        decimals of a file are exact in it, and floats are exactly these. Infinite if no digit holds, within
         rounding of a limit of the input. See `virtualwork.digits.estimates`.
 
         Examples

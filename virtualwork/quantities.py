@@ -1,4 +1,4 @@
-"""The quantities of a pose, each once: what it is asked for by, its name, its header, its place in JSON.
+"""The quantities of a pose, each once: its request, its name, its header, its place in JSON.
 
 Tables, JSON, pages, bounds of errors, variants, motion in time and tolerances all walk these.
 """

@@ -39,7 +39,7 @@ def toml_template(m: Description, paths: Sequence[str]) -> list[Any] | None:
 
 
 def _words(line: str) -> list[str]:
-    """A line of TOML in numbers and what stands between them."""
+    """A line of TOML as numbers and the text between them."""
     return re.split(r"((?<![\w.\"+-])\d+\.\d+(?![\w.\"]))", line)
 
 

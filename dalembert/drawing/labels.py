@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Real = NDArray[np.float64]
 CELL = 2.0
-"""The picture is searched in cells of so many pixels."""
+"""The size of the cells in which the picture is searched, in pixels."""
 DISTANCES = (4.0, 8.0, 13.0, 20.0, 29.0, 40.0, 55.0, 75.0, 100.0)
 """How far from its point a label may stand, points; from the fourth on a thin line leads to it."""
 TURNS = np.arange(0, 360, 15.0)

@@ -141,7 +141,7 @@ def number(
 def apart(
     values: NDArray[np.float64], dimension: str, unit: str, exact: Callable[[], Doubled]
 ) -> Callable[[], NDArray[np.float64]]:
-    """By what numbers in a unit differ from the same in 32 digits, which are in the unit of JSON; worked out on request."""
+    """By what numbers in a unit differ from the same in 32 digits, which are in the unit of JSON; computed on request."""
 
     def errors() -> NDArray[np.float64]:
         import numpy as np
@@ -270,7 +270,7 @@ class _Lists:
     """The elements of the lists of a document that further tables may belong to."""
 
     document: Document
-    # list -> the names of the columns that tell its elements apart, and the elements by them
+    # list -> the names of the columns that distinguish its elements, and the elements by them
     keys: dict[str, tuple[str, ...]] = field(default_factory=dict)
     elements: dict[str, dict[tuple[Cell, ...], Document]] = field(default_factory=dict)
 
@@ -320,7 +320,7 @@ class _Lists:
 
 
 def _walk(home: Any, way: Iterable[str]) -> Any:
-    """Return what stands at the end of the way; None where null stands on it."""
+    """Return the value at the end of the path; None if there is null on it."""
     for name in way:
         if home is None:
             return None

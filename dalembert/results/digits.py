@@ -17,7 +17,7 @@ EPS = 2.0**-52
 
 
 def digits_that_hold(table: Table) -> tuple[Table, int]:
-    """Return the table with its numbers cut, and of how many no digit is known: their cells are empty."""
+    """Return the table with its numbers cut, and the number of those without a digit: their cells are empty."""
     cut = [_cut_column(column) for column in table.columns]
     return replace(table, columns=[column for column, _ in cut]), sum(unknown for _, unknown in cut)
 
@@ -28,7 +28,7 @@ def _cut_column(column: Column) -> tuple[Column, int]:
     errors = column.error()
     values = [_cut(value, error) for value, error in zip(column.values, errors, strict=True)]
     if column.unit == "deg":
-        # output angles lie in [0, 360); an input of 360 is one that was asked for
+        # output angles lie in [0, 360); an input of 360 is the user's
         values = [
             0.0 if cut == 360 and value != 360 else cut
             for value, cut in zip(column.values, values, strict=True)

@@ -27,7 +27,7 @@ def json_parts(document: Document) -> Iterator[str]:
 
 
 def json_members(document: Document, line: str = _LINE) -> str:
-    """Return what stands between the braces of a document, each member behind the beginning of its line."""
+    """Return the text between the braces of a document, each member behind the beginning of its line."""
     return ",".join(
         [
             # numbers are most of it

@@ -139,7 +139,7 @@ def transposed(rows: Sequence[Mapping[str, Cell]]) -> dict[str, list[Cell]]:
 def with_uncertainty(value: float, uncertainty: float | None, figures: int = 4) -> str:
     """Write a number as people do: to the place of its uncertainty, which has two figures below 3, else one.
 
-    Without one: so many figures.
+    Without one: this number of figures.
 
     >>> with_uncertainty(95.1234, 0.913), with_uncertainty(95.1234, 0.123), with_uncertainty(12345.6, 230.0)
     ('95.1 ± 0.9', '95.12 ± 0.12', '12350 ± 230')

@@ -183,7 +183,7 @@ def find_columns(
 
 
 def likeness(headings: Iterable[Heading], dimensions: Mapping[str, str], texts: Sequence[str]) -> int:
-    """Count the columns that a command knows, or may be meant to know: what tells a header from a title."""
+    """Count the columns that a command knows, or may be meant to know: this distinguishes a header from a title."""
     names = {name.lower() for name in texts}
     return sum(
         each.name.lower() in names

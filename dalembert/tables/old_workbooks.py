@@ -83,7 +83,7 @@ def _records(stream: bytes, at: int) -> Iterator[tuple[int, bytes]]:
 
 
 def _text(body: bytes, at: int, count: int) -> str:
-    """A string of so many characters: a byte that says how wide they are, and they."""
+    """A string of this number of characters: a byte that says how wide they are, and they."""
     wide = body[at] & 1
     return body[at + 1 : at + 1 + (count << wide)].decode("utf-16-le" if wide else "latin-1")
 

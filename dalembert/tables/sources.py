@@ -18,7 +18,7 @@ from dalembert.tables.headers import Heading, heading, is_unit, likeness, offers
 if TYPE_CHECKING:
     from dalembert.tables.workbooks import Sheet
 
-# so many rows are looked at for what parts the cells, and for the header
+# rows in which the delimiter and the header are looked for
 LOOKED_AT = 20
 
 LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
@@ -26,7 +26,7 @@ _CONTROLS = bytes([*range(9), *range(14, 32), 127])
 _QUOTED = re.compile(r'"[^"]*"')
 # rows from which importing pandas pays
 LARGE = 10_000
-SHOWN = 8  # hidden rows, percentages: so many are named
+SHOWN = 8  # hidden rows and percentages that a warning names
 
 
 @dataclass(eq=False, repr=False)

@@ -394,7 +394,7 @@ def _frame(source: Source, columns: Sequence[_Column], marker: str, decimal: str
 
     blanks = [each.place for each in columns if kind(each) is float and each.may_be_blank]
     version = tuple(map(int, pd.__version__.split(".")[:2]))
-    # from 3.1 numbers are read to the nearest double without being asked to
+    # from 3.1 numbers are read to the nearest double by default
     exact: dict[str, Literal["round_trip"]] = {} if version >= (3, 1) else {"float_precision": "round_trip"}
     return pd.read_csv(
         io.BytesIO(source.text.encode()),

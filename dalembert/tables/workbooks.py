@@ -178,7 +178,7 @@ def _faults(data: bytes, name: str) -> Iterator[tuple[Place, tuple[str, str]]]:
             else:
                 yield from _faults_in_office_open(archive, name)
         except (KeyError, ElementTree.ParseError):
-            # calamine has read the cells: no more can be said
+            # calamine has read the cells: no more is known
             return
 
 

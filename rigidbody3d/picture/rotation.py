@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 ROOM = 1.35
-"""The ellipsoids are drawn as far as so many times the reach of the polhode."""
+"""The ellipsoids are drawn to this multiple of the reach of the polhode."""
 
 
 def rotation(

@@ -146,7 +146,7 @@ class Pair(Form):
 
 @dataclass(eq=False, repr=False)
 class Lengths(Form):
-    """A list of so many lengths."""
+    """A list of this number of lengths."""
 
     count: int
 

@@ -351,7 +351,7 @@ class Spring(Part):
 class TorsionSpring(Part):
     """A torsion spring and damper between two links; its angle is θ_second − θ_first.
 
-    At the guess it is twisted by less than half a turn from free, and by so many whole `turns` besides.
+    At the guess it is twisted by less than half a turn from free, plus the whole `turns`.
     """
 
     tables: ClassVar = ("torsion_springs",)

@@ -47,7 +47,7 @@ def chosen(
     m : Description
     numbers : mapping of path to array (n,)
     low, high : array (n,), or (1,) where they are the same of all
-        The least and the largest input that is asked for, and the guess's. Of several inputs no way is looked along.
+        The least and the largest input that is requested, and the guess's. Of several inputs no way is looked along.
     """
     if not all(informed(m, group) for group in written.closed):
         return {}, np.zeros(n, dtype=bool)
@@ -80,7 +80,7 @@ def chosen(
 def signs(
     written: VariedFormulas, m: Description, numbers: Mapping[str, Any], n: int
 ) -> tuple[dict[str, Reals], Mask]:
-    """The sign of each closed form of each variant, (n,), and which variants tell theirs.
+    """The sign of each closed form of each variant, (n,), and for which variants it is decided.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def at_guess(written: VariedFormulas, m: Description, numbers: Mapping[str, Any]
 
 
 def with_signs(numbers: Mapping[str, Any], signs: Mapping[str, Any]) -> dict[str, Any]:
-    """What is known of variants: their dimensions, and the sign of each closed form by the group's name."""
+    """The decisions on variants: their dimensions, and the sign of each closed form by the group's name."""
     return {**numbers, **{f"sign {name}": sign for name, sign in signs.items()}}
 
 
@@ -219,12 +219,12 @@ def _way(m: Description, low: Reals, high: Reals, count: int) -> Reals:
 
 
 def _of(entering: Mapping[str, Any], rows: Any) -> dict[str, Any]:
-    """What is known of some variants."""
+    """The decisions on some variants."""
     return {name: values[rows] if np.ndim(values) else values for name, values in entering.items()}
 
 
 def _across(entering: Mapping[str, Any]) -> dict[str, Any]:
-    """What is known of each variant, as the rows of a grid."""
+    """The decisions on each variant, as the rows of a grid."""
     return {name: values[:, None] if np.ndim(values) else values for name, values in entering.items()}
 
 

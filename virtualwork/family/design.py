@@ -3,7 +3,7 @@
 The formulas are written down once with the dimensions as inputs of the tape. An evaluation is one run of it: the branch on
 which each loop closes, as the design's own guess has it; the quantities; and a look along the way from the guess to the
 poses, where another branch might be met. Derivatives, if asked for, are a second one with a sweep backwards. Where the
-branch is not told so simply, more is done; at worst the design is described alone.
+branch is not decided so simply, more is done; at worst the design is described alone.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ class Design:
         With one input.
     dimensions : tuple of Dimension
     keys : tuple
-        What is asked for: points, angles of links, slides, the effort.
+        The requested quantities: points, angles of links, slides, the effort.
     rates : tuple of float
-        Speed, acceleration and jerk of the input: those of the description where the effort is asked for, else none.
+        Speed, acceleration and jerk of the input: those of the description where the effort is requested, else none.
     evaluations : int
-        Designs worked out so far.
+        Designs computed so far.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Design:
     def hold(self, numbers: Reals | None) -> bool:
         """Close every loop from here on as the guess has it at these numbers; None: as it has it at each design's own.
 
-        Held, designs pass through places where the guess tells nothing, as a search has to; what it finds must be looked
+        Held, designs pass through places where the guess does not decide, as a search has to; what it finds must be looked
         at unheld. Returns whether it can be: not where the branch is more than signs.
         """
         written = self._first.written
@@ -108,7 +108,7 @@ class Design:
 
     # --- one design -----------------------------------------------------------------------------------------------
     def __call__(self, numbers: ArrayLike, inputs: ArrayLike) -> Reals:
-        """What is asked for, of one design.
+        """The requested quantities of one design.
 
         Parameters
         ----------
@@ -156,7 +156,7 @@ class Design:
         return rows[:, : len(q)], fine
 
     def _ready(self, q: Reals, enters: tuple[str, ...] | None) -> Repeated:
-        """What works out one design after another at some inputs; the last ones' is kept."""
+        """What computes one design after another at some inputs; the last ones' is kept."""
         own_signs = self._held is None
         key, same = (enters, own_signs), q.tobytes()
         kept = self._kept.get(key)
@@ -185,7 +185,7 @@ class Design:
         )
 
     def _goes(self, x: Reals, q: Reals) -> bool:
-        """Whether a design goes by its signs: the guess tells them, and no other branch is met on the way to the poses."""
+        """Whether a design goes by its signs: the guess decides them, and no other branch is met on the way to the poses."""
         entering, written = self._known(x), self._first.written
         if entering is None or written is None:
             return False
@@ -226,7 +226,7 @@ class Design:
 
     # --- many designs -----------------------------------------------------------------------------------------------
     def table(self, numbers: Reals, inputs: Reals) -> Reals:
-        """What is asked for of designs (v, d) at their inputs (v or 1, n): (rows, v, n)."""
+        """The requested quantities of designs (v, d) at their inputs (v or 1, n): (rows, v, n)."""
         self.evaluations += len(numbers)
         return table(self.solved(numbers, inputs, self.keys))
 
@@ -282,7 +282,7 @@ class Alone:
         return None if result.open_gears else result
 
     def values(self, x: Reals, q: Reals) -> Reals:
-        """What is asked for of one design, (rows, n); NaN where it cannot be assembled."""
+        """The requested quantities of one design, (rows, n); NaN where it cannot be assembled."""
         poses = self._poses(x, q)
         if poses is None:
             return np.full((sum(len(key.names) for key in self.keys), len(q)), np.nan)
@@ -292,7 +292,7 @@ class Alone:
         return table(poses.values(self.keys))
 
     def _rows(self, written: VariedFormulas | None, x: Reals, poses: Lanes) -> Reals:
-        """What is asked for, from the tape."""
+        """The requested quantities, from the tape."""
         of = [name for key in self.keys for name in key.names]
         if written is None:
             return np.full((len(of), poses.n), np.nan)
@@ -350,7 +350,7 @@ def place_key(m: Description, name: str) -> Quantity:
     Raises
     ------
     DescriptionError
-        With what is known in place of what is not.
+        With the known quantities in place of the unknown ones.
     """
     kind, _, of = name.rpartition(".")
     if kind == "effort":

@@ -110,7 +110,7 @@ class Family:
         acceleration: ArrayLike | None = None,
         executor: Executor | None = None,
     ) -> FamilyMotion:
-        """Motion of every variant over the same inputs; every quantity is solved when first asked for.
+        """Motion of every variant over the same inputs; every quantity is solved on the first request.
 
         Parameters
         ----------
@@ -119,7 +119,7 @@ class Family:
         speed, acceleration : same shape or scalar
             Its derivatives in time: what is given beats the description's own, and a varied one.
         executor : concurrent.futures.Executor
-            Works out parts of the variants; without it all are worked out here.
+            Computes parts of the variants; without it all are computed here.
 
         Returns
         -------
@@ -203,7 +203,7 @@ class FamilyMotion:
     Attributes
     ----------
     part : Part
-        The variants and the inputs they are asked at.
+        The variants and the inputs of their poses.
     executor : concurrent.futures.Executor or None
     """
 

@@ -40,11 +40,11 @@ class Fit(Generic[D]):
     reached : tuple of Reached
         What each point, link and slide of the target does.
     starts, evaluations : int
-        Tried, and mechanisms worked out over a target in all.
+        Tried, and mechanisms computed over a target in all.
     remarks : tuple of str
         What the designer should know: bounds reached, defects of assembly and of order.
     others : tuple of Fit
-        Further solutions, where more than one was asked for: the next best first.
+        Further solutions, where more than one was requested: the next best first.
     kept : tuple of Kept
         Of each bound the extreme over the sweep.
     """

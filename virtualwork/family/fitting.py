@@ -1,6 +1,6 @@
 """Dimensions of which points, links and slides come nearest to a target: dimensional synthesis by least squares.
 
-Starts of a low-discrepancy sequence (Sobol's, scrambled by a seed) are worked out together, as variants; the best are
+Starts of a low-discrepancy sequence (Sobol's, scrambled by a seed) are computed together, as variants; the best are
 refined with exact derivatives. Where the timing is free, the inputs begin at the poses of a coarse sweep that come
 nearest to the rows of the target in their order, and follow the dimensions.
 """
@@ -103,7 +103,7 @@ class _Problem(Generic[D]):
 
     @property
     def evaluations(self) -> int:
-        """Mechanisms worked out over a target so far."""
+        """Mechanisms computed over a target so far."""
         kept = 0 if self.bounds is None else self.bounds.evaluations
         return kept + sum(design.evaluations for design in self.designs)
 
@@ -124,7 +124,7 @@ class _Problem(Generic[D]):
         return self.bounds.judged(self.values(x), np.linspace(*self.sweep, JUDGED))
 
     def own(self) -> _Problem[D]:
-        """The same with designs of its own: what is worked out on one does not meet another on another thread."""
+        """The same with designs of its own: what is computed on one does not meet another on another thread."""
         return _Problem(self.m, self.targets, self.free, self.keep)
 
     def values(self, x: Reals) -> Reals:
@@ -189,7 +189,7 @@ class _Problem(Generic[D]):
 
     # --- solution ---------------------------------------------------------------------------------------------------
     def solved(self, starts: int, seed: int, best: int, executor: Executor | None) -> Fit[D]:
-        """Refine the best starts; stop when as many as asked for meet the target."""
+        """Refine the best starts; stop when as many as requested meet the target."""
         own = np.array([float(value(self.m, d.path).real) for d in self.dimensions])
         begun = self.begun(shares((own - self.low) / (self.high - self.low), starts, seed))
         evaluations = self.evaluations
@@ -250,7 +250,7 @@ class _Problem(Generic[D]):
     def refined(self, x: Reals, inputs: Sequence[Reals], steps: int) -> _Refined:
         """One start, by a trust region within the bounds.
 
-        Every loop is held on the branch that it begins on, for on the way the guess may tell nothing; what is found counts
+        Every loop stays on its first branch, for on the way the guess may not decide; what is found counts
         as its own guess has it.
         """
         before = self.evaluations
@@ -332,7 +332,7 @@ class _Problem(Generic[D]):
         return replace(fit, kept=refined.kept)
 
     def _remarks(self, values: Reals, inputs: Sequence[Reals]) -> list[str]:
-        """What is to be said of a solution."""
+        """The warnings about a solution."""
         lines = []
         for d, number, low, high in zip(self.dimensions, values, self.low, self.high, strict=True):
             if min(number - low, high - number) < 1e-6 * (high - low):

@@ -90,7 +90,7 @@ class Bounds:
 
     @property
     def evaluations(self) -> int:
-        """Mechanisms worked out over the sweep so far."""
+        """Mechanisms computed over the sweep so far."""
         return self._design.evaluations
 
     def hold(self, values: Reals | None) -> None:

@@ -1,6 +1,6 @@
 """Some variants over given inputs, self-contained, and what they do: on the tape together, or described one by one.
 
-On the tape a lane is one variant in one pose. Variants of which the branch is not told by a comparison at the guess, and
+On the tape a lane is one variant in one pose. Variants whose branch is not decided by a comparison at the guess, and
 mechanisms whose branch is more than signs (groups without a closed form, gears), are described one by one.
 """
 
@@ -49,7 +49,7 @@ KEPT = 500
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Variants and the inputs they are asked at: all that a worker needs to know.
+    """Variants and the inputs of their poses: everything that a worker needs.
 
     Attributes
     ----------
@@ -177,7 +177,7 @@ class Solver:
     def _span(self) -> tuple[Reals, Reals]:
         """The least and the largest value of the one input of each variant, with that of the guess.
 
-        (v,) each, or (1,) where all are asked for the same.
+        (v,) each, or (1,) where all are requested the same.
         """
         at, q = self.part.mechanism.at[0], self.part.inputs[:, :, 0]
         low = np.minimum(np.nanmin(q, axis=1, initial=np.inf), at)
@@ -242,7 +242,7 @@ class Solver:
             # what a table gives is known beforehand where it is over the input
             return False
         if m.friction:
-            # where nothing moves, that is said of each
+            # where nothing moves, each has a warning
             of = written.recording.forces
             return bool(of.case.contacts) and not of.redundant
         return written.recording.takes(keys)
@@ -371,7 +371,7 @@ class Solver:
             return value[rows] if len(value) > 1 else value
         j = int(name[1:])
         value = self.part.inputs[:, :, j] if name[0] == "q" else self.part.rates[NAMES.index(name[0]) - 1][j]
-        # what is the same in all lanes is worked out once
+        # what is the same in all lanes is computed once
         if np.size(value) == 1:
             return float(np.ravel(value)[0])
         return value[rows] if len(value) > 1 else value

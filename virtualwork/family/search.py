@@ -125,7 +125,7 @@ class Descent:
     Parameters
     ----------
     aims, designs : sequences
-        The targets, and what is asked of a design for each.
+        The targets, and the request to a design for each.
     values : callable
         The dimensions of shares.
     width : array (d,)

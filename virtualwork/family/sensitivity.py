@@ -26,7 +26,7 @@ from virtualwork.formulas.numbers import leave_out
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import NAMES
 
-# so many poses are looked at for whether a quantity varies
+# number of poses in which it is checked whether a quantity varies
 LOOKED_AT = 8
 GOLDEN = (5**0.5 - 1) / 2
 # relative: what is read from decimals, turned to radians, or found by iteration; and by how much it is moved to see what that does

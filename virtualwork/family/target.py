@@ -84,7 +84,7 @@ class Reached:
 
 @dataclass(frozen=True, eq=False)
 class Aim:
-    """A target read: what a design is asked, and how far its answer is from what is wanted.
+    """A target read: the request to a design, and how far its answer is from what is wanted.
 
     Attributes
     ----------

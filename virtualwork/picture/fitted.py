@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import FigureBase
 
-# from so many rows on they are not numbered
+# from this number of rows on they are not numbered
 NUMBERED = 24
 
 
@@ -53,7 +53,7 @@ def fitted(quantities: Sequence[Fitted], figure: FigureBase | None = None) -> li
     Parameters
     ----------
     quantities
-        What was asked for, and what was found.
+        The request and its result.
     figure
         See `dalembert.drawing.sheet`.
     """

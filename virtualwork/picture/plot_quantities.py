@@ -35,7 +35,7 @@ def plot_quantities(poses: Poses, names: Iterable[str]) -> list[PlotQuantity]:
     Raises
     ------
     DescriptionError
-        No link or point of that name, or it has no such quantity; the names that there are are told.
+        No link or point of that name, or it has no such quantity; the message lists the names.
     """
     return [_quantity(poses, name) for name in names]
 

@@ -1,6 +1,6 @@
 """The balance of virtual power from a plain table of link states: the second source document, eqs. (3) to (5).
 
-Of a mechanism only the state of each link is known: the velocity of its centre of mass, its angular velocity,
+Only the state of each link of a mechanism is needed: the velocity of its centre of mass, its angular velocity,
 and the loads on it. In equilibrium, at rest or (with inertia loads, d'Alembert) in motion, their power vanishes:
 
     Σ F·v_F + Σ T ω + Σ m g·v_G − Σ m a_G·v_G − Σ I α ω = 0                      (Riul, unit II, eq. 5)
