@@ -4,7 +4,8 @@ But for springs and friction, a force on a link is a fixed combination of a few 
 force that turns with its link), of second derivatives (−m·a_G = −m Σ z (e^{iθ})″) and of other joint forces. Such
 vectors are the terms; a `Combination` holds their coefficients, which depend on the mechanism alone. Combinations
 are added and weighed as numbers, once for each mechanism. An array over the poses is formed of a term or a
-combination when its value is asked for, and never twice.
+combination when its value is asked for, and never twice. The contact force of a cam is a term too: it balances all that bears on
+its follower's coordinate, along the normal.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ from typing import Any
 from dalembert.dataclass import dataclass
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block, Formed
-from virtualwork.formulas.numbers import Number
+from virtualwork.formulas.numbers import Number, cross
 from virtualwork.formulas.rates import Rates
-from virtualwork.plan.steps import Term
+from virtualwork.formulas.touches import Touch
+from virtualwork.plan.steps import Path, Term
 
 
 class ForceTerm:
@@ -239,3 +241,54 @@ def in_order(term: ForceTerm, formed: Container[Any]) -> list[ForceTerm]:
             stack.append((here, True))
             stack += [(part, False) for part in here.reads() if part is not None and part not in done]
     return result
+
+
+@dataclass(frozen=True, eq=False)
+class Lifted(ForceTerm):
+    """What bears on the coordinate of a follower, as it bears on its cam's angle: times y′."""
+
+    touch: Touch
+    of: Combination
+
+    def form(self, block: Block) -> tuple[float, Number]:
+        value = self.of.value(block)
+        return 1.0, None if value is None else self.touch.rate(block.st, 1) * value
+
+    def reads(self) -> Iterable[ForceTerm | None]:
+        return self.of
+
+
+@dataclass(frozen=True, eq=False)
+class ContactForce(ForceTerm):
+    """The contact force on the follower: what balances all that bears on its coordinate, along the normal."""
+
+    touch: Touch
+    of: Combination
+    lasts = True
+
+    def form(self, block: Block) -> tuple[float, Number]:
+        value = self.of.value(block)
+        return 1.0, None if value is None else value * self.touch.at(block.st).unit()
+
+    def reads(self) -> Iterable[ForceTerm | None]:
+        return self.of
+
+
+@dataclass(frozen=True, eq=False)
+class ContactMoment(ForceTerm):
+    """The moment of the contact force on the follower about a point that moves with `path`."""
+
+    touch: Touch
+    force: ForceTerm
+    path: Path
+
+    def form(self, block: Block) -> tuple[float, Number]:
+        factor, force = block.formed(self.force)
+        if force is None:
+            return 1.0, None
+        return factor, cross(
+            self.touch.axis(block.st) - block.st.at(self.path) + self.touch.at(block.st).place(), force
+        )
+
+    def reads(self) -> Iterable[ForceTerm | None]:
+        return (self.force,)

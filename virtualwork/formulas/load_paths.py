@@ -29,8 +29,16 @@ from dalembert.dataclass import dataclass
 from virtualwork.describe.meshes import Coordinate
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
-from virtualwork.formulas.contacts import ContactForce, ContactMoment, Lifted
-from virtualwork.formulas.force_terms import Carried, Combination, ForceTerm, Transmitted, in_order
+from virtualwork.formulas.force_terms import (
+    Carried,
+    Combination,
+    ContactForce,
+    ContactMoment,
+    ForceTerm,
+    Lifted,
+    Transmitted,
+    in_order,
+)
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.numbers import Number, dot
 from virtualwork.formulas.touches import Touch, Touches

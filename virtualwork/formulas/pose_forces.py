@@ -13,14 +13,17 @@ from functools import cached_property
 from typing import Any
 
 from dalembert.arithmetic.recorded import bare
-from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.block import Block
+from virtualwork.describe.parts import GROUND, TorsionSpring
+from virtualwork.formulas.block import Block, Shared, Table
 from virtualwork.formulas.effort import generalized_force
+from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.load_paths import LoadPaths
-from virtualwork.formulas.numbers import Number, dot, minus, plus
-from virtualwork.formulas.quantity import Quantity
+from virtualwork.formulas.loads import applied_loads, reduced, resultant, shaking_loads
+from virtualwork.formulas.numbers import WRITTEN, Number, dot, minus, plus
+from virtualwork.formulas.positions import State
+from virtualwork.formulas.quantity import Quantity, Recording
+from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.reactions import JointForces
-from virtualwork.formulas.resultants import applied_loads, reduced, resultant, shaking_loads
 from virtualwork.formulas.statics import Column, equations, mesh_column, unknowns
 
 # a rate of a contact beside those of all links that is rounding alone, also where the pose is ill-conditioned
@@ -234,3 +237,50 @@ class PoseForces:
             all_ = all_ if sliding is None else all_ + abs(sliding)
         least = all_ * (AT_REST if self.case.contacts[n][0].guide is not None else AT_REST / size)
         return block.kind.select(abs(rate) - least, rate, 0.0)
+
+
+class RecordedSetting(Shared):
+    """What the one recorded block is told of its poses."""
+
+    def __init__(self, recording: Recording) -> None:
+        super().__init__(recording.mechanism, recording.plan)
+        self.recording = recording
+
+    @property
+    def rates(self) -> tuple[Number, Number]:
+        """q̇ and q̈ of the one input."""
+        speed, acceleration, _ = self.recording.rates
+        return speed[0], acceleration[0]
+
+    def wound(self, spring: TorsionSpring, st: State, within: Number) -> Number:
+        """The twist next to the one that enters."""
+        number = self.mechanism.torsion_springs.index(spring)
+        return self.recording.unwrapped(f"near spring {number}", WRITTEN.exp(within))
+
+
+class RecordedBlock(Block):
+    """The recorded pose as the loads see it."""
+
+    def __init__(self, recording: Recording, along: Rates | None, by: list[Rates]) -> None:
+        super().__init__(RecordedSetting(recording), recording.st, along, by)
+        self.recording = recording
+
+    def table(self, load: Table) -> Number:
+        """The force of a table, as it enters."""
+        return self._entering("table", load)
+
+    def slope(self, load: Table) -> Number:
+        """How steep it is, as it enters."""
+        return self._entering("slope", load)
+
+    def _entering(self, what: str, load: Table) -> Number:
+        number = next(i for i, of in enumerate(self.recording.tables) if load.alike(of))
+        enter = self.recording.recorder.input
+        return WRITTEN.join(enter(f"{what} {number} x"), enter(f"{what} {number} y"))
+
+
+def forces_of(recording: Recording) -> PoseForces:
+    """The forces of the recorded pose; friction and redundant joint forces enter the tape."""
+    paths = LoadPaths(LoadCase(recording.mechanism, recording.plan, any(recording.moves[:2])))
+    block = RecordedBlock(recording, recording.together, recording.by)
+    return PoseForces(paths, block, recording.solve, recording.kind.system, recording.recorder.input)
