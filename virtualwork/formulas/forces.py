@@ -211,7 +211,7 @@ class LoadTorque(Force, kind="load torque"):
     number: int
 
     def form(self, forces: PoseForces) -> Number:
-        return forces.case.loads[self.number].form(forces.block)
+        return forces.case.loads[self.number].form(forces.pose)
 
 
 class Load(LoadTorque, kind="load"):

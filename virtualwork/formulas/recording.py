@@ -241,7 +241,7 @@ class Recording:
         """What is written down that much depends on: directions, slides, and of forces what blocks keep too."""
         yield from (*self.st.turn.values(), *self.st.slide.values())
         if self._forces:
-            yield from (value[1] for of, value in self._forces.block.kept.items() if of.lasts)
+            yield from (value[1] for of, value in self._forces.pose.kept.items() if of.lasts)
 
     @cached_property
     def loops(self) -> Group | None:

@@ -39,7 +39,7 @@ from virtualwork.formulas.tapes import entered, recorded, taped
 from virtualwork.plan.steps import Group
 
 if TYPE_CHECKING:
-    from virtualwork.formulas.block import Block
+    from virtualwork.formulas.loaded_pose import LoadedPose
     from virtualwork.formulas.loads import Tabled
     from virtualwork.formulas.statics import Statics
 
@@ -73,7 +73,7 @@ class Solving(Poses):
 
     def formed(
         self,
-        forms: Sequence[Callable[[Block], Number]],
+        forms: Sequence[Callable[[LoadedPose], Number]],
         kind: type,
         targets: Iterable[str] = (),
         order: int = 1,
@@ -110,7 +110,7 @@ class Solving(Poses):
 
     def _written(
         self,
-        forms: Sequence[Callable[[Block], Number]],
+        forms: Sequence[Callable[[LoadedPose], Number]],
         targets: tuple[str, ...],
         order: int,
         doubts: Sequence[Quantity],
@@ -121,7 +121,7 @@ class Solving(Poses):
         recording.forces.solve_places()
         recording.solve(targets, order)
         for i, form in enumerate(forms):
-            value = form(recording.forces.block)
+            value = form(recording.forces.pose)
             value = 0.0 if value is None else bare(value)
             outputs |= {f"{i} x": value.real, f"{i} y": value.imag}
         return recording.recorder.tape(outputs)
