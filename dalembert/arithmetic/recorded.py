@@ -11,10 +11,10 @@ from __future__ import annotations
 import cmath
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-from dalembert.arithmetic.tape import Operation, Tape, performed, reached, shortened
+from dalembert.arithmetic.tape import Operation, Tape, shortened
 
 Number = Any
 """A float, a complex, a `Real` or a `Complex`."""
@@ -87,37 +87,6 @@ class Recorder:
             Where an output is complex: its parts are two outputs.
         """
         return shortened(self.operations, self.numbers(outputs))
-
-    def again(self, outputs: Sequence[int], inputs: Sequence[Mapping[str, Number]]) -> list[list[Number]]:
-        """The values of operations where some inputs, each time the same, have other values; nothing else is done again.
-
-        >>> recorder = Recorder()
-        >>> x, y = recorder.input("x"), recorder.input("y")
-        >>> z = x * x + x * y
-        >>> [[at_one], [at_zero]] = recorder.again([z.number], [{"y": 1.0}, {"y": 0.0}])
-        >>> recorder.tape({"z": z, "at y = 1": at_one, "at y = 0": at_zero}).cost
-        4
-        """
-        known = [self.node("input", name) for name in inputs[0]]
-        below: dict[int, Operation] = {}
-        for number in reached(self.operations, outputs, known):
-            operation = self.operations[number]
-            if number in known or (
-                operation[0] not in ("const", "input") and not below.keys().isdisjoint(operation[1:])
-            ):
-                below[number] = operation
-        result = []
-        for enters in inputs:
-            values: dict[int, Number] = {}
-            for number, (kind, *of) in below.items():
-                if kind == "input":
-                    values[number] = enters[of[0]]
-                else:
-                    values[number] = performed(
-                        kind, [values[a] if a in values else Real(self, a) for a in of], RECORDED
-                    )
-            result.append([values[number] if number in values else Real(self, number) for number in outputs])
-        return result
 
     def numbers(self, outputs: Mapping[str, Number]) -> list[tuple[str, int]]:
         """The operations that have the values of named results; see `tape`."""

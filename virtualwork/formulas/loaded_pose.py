@@ -142,14 +142,14 @@ class Formed(Protocol):
     def lasts(self) -> bool:
         """Whether a motion keeps it for others that ask later."""
 
-    def form(self, block: Block) -> Any:
+    def form(self, pose: LoadedPose) -> Any:
         """Its value."""
 
 
 class Table(Protocol):
     """A load given by a table."""
 
-    def place_in(self, block: Block) -> Number:
+    def place_in(self, pose: LoadedPose) -> Number:
         """What the table is over, at a pose."""
 
     def over(self, q: Number) -> Number:
@@ -162,7 +162,7 @@ class Table(Protocol):
         """Whether another load gives the same force everywhere."""
 
 
-class Block:
+class LoadedPose:
     """A pose as the loads see it: positions, velocity coefficients, velocities, accelerations.
 
     A derivative that is identically zero is None.
@@ -206,14 +206,14 @@ class Block:
         return self.setting.time
 
     def second(self, derivative: Callable[[Rates, int], Number]) -> tuple[float, Number]:
-        """ẍ = K q̈ + L q̇² of what has the derivatives K, L over the input: a factor and an array."""
+        """ẍ = K q̈ + L q̇² of what has the derivatives K, L over the input: a factor and a value."""
         if not self.one:
             return 1.0, None if self.along is None else derivative(self.along, 2)
         speed, rate = self.rates
         normal = None if speed is None else derivative(self.by[0], 2)
         tangential = None if rate is None else derivative(self.by[0], 1)
         if tangential is None and isinstance(speed, float):
-            # one number for all poses: the array stays as it is
+            # a plain number: what is recorded of the rest stays as it is
             return speed * speed, normal
         return 1.0, plus(times(normal, times(speed, speed)), times(tangential, rate))
 
