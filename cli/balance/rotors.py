@@ -240,7 +240,7 @@ class Balancing:
         if request.angle_step is not None:
             step, step_unit = request.angle_step
             step = step if step_unit == "deg" else float(np.degrees(step))
-            angle = _to_step(angle, step) % 360.0
+            angle = _to_mark(angle, step)
         rounded = phasor(to_si(mass, "mass", unit) * radius, angle, "deg")
         return mass, angle, -rounded if request.remove else rounded
 
@@ -351,6 +351,12 @@ class Balancing:
             shapes = modes.exactly_at(there)
             result[rows] = least_norm(Vectors(shapes, shapes * 0.0), modal)
         return result
+
+
+def _to_mark(angle: Real, step: float) -> Real:
+    """Round to the nearest mark on a circle whose marks begin at 0°; where the step does not divide it, the last gap is smaller."""
+    mark = _to_step(angle, step)
+    return np.where((mark >= 360.0) | (360.0 - angle < np.abs(mark - angle)), 0.0, mark)
 
 
 def _to_step(value: Real, step: float) -> Real:
