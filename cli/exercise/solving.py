@@ -112,7 +112,7 @@ class Workshop:
     @cached_property
     def described(self) -> Any:
         """The mechanism as its file describes it."""
-        from cli.cases.call import load
+        from cli.cases.cases import load
 
         assert self.mechanism is not None
         return load(str(self.exercise.folder / self.mechanism))

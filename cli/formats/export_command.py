@@ -45,7 +45,7 @@ def run(file: str, output: Path, at: str | None = None, profile: str | None = No
     pose, closed to the last digit. Standard error names what the format cannot hold.
     """
     from cli.cases.axes import grids
-    from cli.cases.call import load
+    from cli.cases.cases import load
     from cli.cases.inputs import of_one
     from cli.formats.cam_profile import SUFFIXES, of_follower
     from cli.formats.cam_profile import file_bytes as profile_bytes

@@ -13,7 +13,7 @@ import pytest
 
 from cli.cases.analysis import Analysis, Request
 from cli.cases.axes import grids
-from cli.cases.call import load
+from cli.cases.cases import load
 from cli.cases.inputs import of_one
 from dalembert.errors import LONGEST
 from tests.conftest import Dalembert
