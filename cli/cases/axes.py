@@ -89,16 +89,25 @@ def assigned(m: Mechanism, bare: Mapping[str, str], texts: Sequence[str]) -> Mec
 
 
 def quantity(of: Driven | Varied, text: str, flag: str, bare: Mapping[str, str]) -> float:
-    """A value as it is shown: SI, angles in degrees; a bare number is in the unit of the file."""
-    if isinstance(of, Driven) or (
-        of.kind in ("length", "angle") and not (is_number(text) and of.kind not in bare)
-    ):
-        return place_or_angle(text, of.kind, flag, bare)
-    try:
-        si = Units({}).number(text.strip(), of.kind, of.label)
-    except DescriptionError as error:
-        raise options.bad(flag, error) from None
-    return read_degrees(si) if of.unit == "deg" else si
+    """Return a value as it is shown: SI, angles in degrees; a bare number is in the unit of the file."""
+    return quantities(of, [text], flag, bare)[0]
+
+
+def quantities(of: Driven | Varied, texts: Sequence[str], flag: str, bare: Mapping[str, str]) -> list[float]:
+    """Return values as they are shown: SI, angles in degrees; a bare number is in the unit of the file."""
+    kind, values = of.kind, []
+    for text in texts:
+        if isinstance(of, Driven) or (
+            kind in ("length", "angle") and not (is_number(text) and kind not in bare)
+        ):
+            values.append(place_or_angle(text, kind, flag, bare))
+            continue
+        try:
+            si = Units({}).number(text.strip(), kind, of.label)
+        except DescriptionError as error:
+            raise options.bad(flag, error) from None
+        values.append(read_degrees(si) if of.unit == "deg" else si)
+    return values
 
 
 def place_or_angle(text: str, kind: str, flag: str, bare: Mapping[str, str]) -> float:
@@ -161,7 +170,7 @@ def over_axis(m: Mechanism, text: str, bare: Mapping[str, str]) -> Axis:
         of = dimension_named(m, name.strip(), text, "--over")
 
     def values(parts: list[str]) -> list[float]:
-        return [quantity(of, part, "--over", bare) for part in parts]
+        return quantities(of, parts, "--over", bare)
 
     steps = options.steps("--over", span, values, "0deg:360deg:1deg")
     if steps.n > MOST:

@@ -160,20 +160,20 @@ def table(analysis: Analysis, computed: Sequence[Mapping[Quantity, Any]] = ()) -
 
     `computed`: what the poses of each assembly have computed already; there are no bounds of it.
     """
-    wanted, its = analysis.tabled, analysis.inputs.whole
-    n, shown, driven = len(its.shown), its.shown, analysis.set_angles
-    every = computed or [solved(motion, keys_of(wanted)) for motion in analysis.motions]
-    times = len(every)
+    wanted, driven, motions = analysis.tabled, analysis.set_angles, analysis.motions if not computed else ()
+    several, headers, inputs = analysis.several, analysis.input_columns, analysis.inputs.whole
+    every = computed or [solved(motion, keys_of(wanted)) for motion in motions]
+    n, times = len(inputs.shown), len(every)
     parts = [cells_of(wanted, each, n, driven) for each in every]
 
     @cache
     def formed() -> None:
-        for motion in analysis.motions:
+        for motion in motions:
             form_bounds(motion, wanted, driven)
 
     def error(each: Component) -> list[float]:
         formed()
-        bounds = [sum(bound(motion, key, driven) for key in keys_of([each])) for motion in analysis.motions]
+        bounds = [sum(bound(motion, key, driven) for key in keys_of([each])) for motion in motions]
         if each.polar == "angle":
             # across the vector, over its length
             lengths = [np.abs(of[each.key] - of[each.less]) for of in every]
@@ -183,13 +183,13 @@ def table(analysis: Analysis, computed: Sequence[Mapping[Quantity, Any]] = ()) -
                 ]
         return [b for each in bounds for b in bounds_of(each)]  # type: ignore[arg-type]
 
-    columns = [Column("step", "", [*its.steps] * times)]
-    if analysis.several:
+    columns = [Column("step", "", [*inputs.steps] * times)]
+    if several:
         numbers = [str(assembly.number) for assembly in analysis.assemblies for _ in range(n)]
         columns.append(Column("branch", "", numbers))
     columns += [
         column(header, values.tolist() * times, partial(bounds_of, np.tile(TURNED * np.abs(values), times)))
-        for header, values in zip(analysis.input_columns, shown.T, strict=True)
+        for header, values in zip(headers, inputs.shown.T, strict=True)
     ]
     for each in wanted:
         values = parts[0][each] if times == 1 else [v for part in parts for v in part[each]]

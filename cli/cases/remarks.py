@@ -47,16 +47,13 @@ def _listed(values: list[float], digits: int) -> str:
     return first if len(values) <= NAMED else f"{first} … ({len(values)} in all)"
 
 
-def limits(analysis: Analysis, counted: list[tuple[int, int]] | None = None) -> list[str]:
-    """One line for the poses that cannot be assembled, with the limit of the input that is near them; and branches.
+def limits(analysis: Analysis, gaps: Sequence[tuple[int, int]]) -> list[str]:
+    """Return the warnings of poses that cannot be assembled, with the limits of the input; and of branches.
 
-    `counted`: how many these are of each assembly, and the first, where blocks of poses have told it.
+    `gaps`: for each assembly the number of such poses, and the first of them.
     """
     lines = []
-    if counted is None:
-        gaps = [~analysis.assembled(motion) for motion in analysis.motions]
-        counted = [(int(gap.sum()), int(np.argmax(gap))) for gap in gaps]
-    for assembly, (missing, first) in zip(analysis.assemblies, counted, strict=True):
+    for assembly, (missing, first) in zip(analysis.assemblies, gaps, strict=True):
         track = assembly.track
         name = analysis.mechanism.inputs[0].name
         if missing:
@@ -93,7 +90,7 @@ def _shortfall(analysis: Analysis, assembly: Assembly, i: int) -> str:
 def _branch_lines(analysis: Analysis, assembly: Assembly) -> list[str]:
     """Change points on the way from the guess to the poses: which branch was taken, and the other."""
     track = assembly.track
-    if not track.active:
+    if not track.active or not any(track.changes.values()):
         return []
     least, largest = analysis.inputs.span
     low, high = min(least, track.start), max(largest, track.start)
@@ -276,6 +273,14 @@ class Remarks:
     def full(self) -> bool:
         """Whether no further warning is kept."""
         return len(self.kept) >= KEPT
+
+    def clear(self) -> None:
+        """Begin anew."""
+        self.kept, self.further, self.any_assembled = [], 0, False
+
+    def failed(self) -> bool:
+        """Whether no pose of any variant is assembled."""
+        return not self.any_assembled
 
     def add(self, name: str, warnings: Iterable[str], assembled: list[bool] | bool = False) -> None:
         """Add the warnings of a variant, which may be none, and whether its poses are assembled."""

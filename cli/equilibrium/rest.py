@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.cases.analysis import Analysis
-    from cli.cases.cases import Rows
     from dalembert.results.way import Topic
     from virtualwork.study.equilibrium import Equilibria as Found
     from virtualwork.study.equilibrium import Equilibrium
@@ -123,9 +122,9 @@ class Equilibria(Study):
         "the generalized mass."
     )
 
-    def case(self, row: Rows | None = None) -> Rest:
-        """Return the positions of rest of the variant of a row, or of the mechanism itself."""
-        analysis, moved = self.cases.analysis(row), self.cases.moved
+    def case(self, analysis: Analysis) -> Rest:
+        """Return the positions of rest of one mechanism."""
+        moved = self.cases.moved
         _ = analysis.mechanism.assembly
         return Rest(self, analysis, moved is not None and moved.axes[0].option != "[input] law")
 

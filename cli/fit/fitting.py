@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from cli.cases.cases import Rows
+    from cli.cases.analysis import Analysis
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
     from virtualwork.family.fitted import Fit
@@ -143,9 +143,9 @@ class Fits(Study):
     title = "fit"
     method = "Nonlinear least squares within bounds, from many starts, with exact derivatives."
 
-    def case(self, row: Rows | None = None) -> Fitted:
-        """Return the fit of the variant of a row, or of the mechanism itself."""
-        return Fitted(self, self.cases.mechanism if row is None else self.cases.variant(row))
+    def case(self, analysis: Analysis) -> Fitted:
+        """Return the fit of one mechanism."""
+        return Fitted(self, analysis.mechanism)
 
 
 def aims(

@@ -24,7 +24,6 @@ from virtualwork.study.loops import loops
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.cases.cases import Rows
     from dalembert.results.columns import Cell, Document, Json
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
@@ -90,9 +89,8 @@ class Inspection(Study):
     title = "check"
     method = METHOD
 
-    def case(self, row: Rows | None = None) -> Character:
-        """Return the character of the variant of a row, or of the mechanism itself."""
-        analysis = self.cases.analysis(row)
+    def case(self, analysis: Analysis) -> Character:
+        """Return the character of one mechanism."""
         _ = analysis.mechanism.assembly
         return Character(self, replace(analysis, inputs=analysis.inputs.part(0, 1)))
 

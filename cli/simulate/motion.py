@@ -164,7 +164,9 @@ class Motion(Case):
 
     def pattern(self) -> Table:
         """The columns, from the first time alone."""
-        first = replace(self.study, times=self.study.times[:1], until=None, digits=False)
+        first = replace(
+            self.study, times=self.study.times[:1], until=None, show=replace(self.study.show, digits=False)
+        )
         return Motion(first, self.analysis).table()
 
     @cached_property
@@ -264,7 +266,7 @@ class Simulation(Study):
     @property
     def needs_errors(self) -> bool:
         """Whether a table has the bounds of its numbers: of variants only where digits are cut by them."""
-        return self.digits or not self.cases.names
+        return self.show.digits or not self.cases.names
 
     def levels(self, m: Mechanism) -> dict[str, float] | None:
         """The inputs at which it ends, SI."""
@@ -276,9 +278,9 @@ class Simulation(Study):
             for j, value in shown.items()
         }
 
-    def case(self, row: Rows | None = None) -> Motion:
-        """Return the motion of the variant of a row, or of the mechanism itself."""
-        motion = Motion(self, self.cases.analysis(row), alone=row is None)
+    def case(self, analysis: Analysis) -> Motion:
+        """Return the motion of one mechanism."""
+        motion = Motion(self, analysis, alone=not self.cases.names)
         if len(motion.analysis.assemblies) > 1:
             raise options.bad("--branch", "simulate follows one assembly: expected its number")
         return motion
@@ -311,7 +313,7 @@ class Simulation(Study):
     def at_once(self) -> bool:
         """Whether the inputs and the energy are all that is shown, which variants have as lanes; JSON has points and links."""
         r = self.cases.request
-        return r.only is None and r.branch is None and not (r.forces or self.digits or self.json)
+        return r.only is None and r.branch is None and not (r.forces or self.show.digits or self.json)
 
     def each(self, rows: Rows) -> Iterator[tuple[Case | None, list[str]]]:
         """The cases of some variants, each with its remarks; None where one cannot be simulated."""

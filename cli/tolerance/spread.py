@@ -26,10 +26,9 @@ from virtualwork.quantities import Component
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
-    from cli.cases.cases import Rows
     from cli.cases.poses import Reals
-    from cli.show.commands import ShowOptions
     from dalembert.results.way import Topic
 
 # how far a drawn standard deviation may be from the linear one, in its sampling errors and by its size
@@ -43,6 +42,12 @@ class Tolerances(Case):
 
     study: Spreads
     analysis: Analysis
+
+    @cached_property
+    def mask(self) -> NDArray[np.bool_]:
+        """Which poses are assembled."""
+        (motion,) = self.analysis.motions
+        return self.analysis.assembled(motion)
 
     @property
     def draws(self) -> int:
@@ -117,7 +122,12 @@ class Tolerances(Case):
     def warnings(self) -> list[str]:
         """Return the warnings of the poses, and where the first order is not enough."""
         a = self.analysis
-        lines = [*a.warnings, *remarks.limits(a), *(remarks.of_forces(a) if a.forces else [])]
+        gap = ~self.mask
+        lines = [
+            *a.warnings,
+            *remarks.limits(a, [(int(gap.sum()), int(np.argmax(gap)))]),
+            *(remarks.of_forces(a) if a.forces else []),
+        ]
         return [*lines, *self.apart()]
 
     def apart(self) -> list[str]:
@@ -226,8 +236,7 @@ class Tolerances(Case):
 
     def assembled(self, rows: int = 0) -> list[bool] | bool:
         """Return whether the pose of each row is assembled; where the rows are no poses, whether any is."""
-        (motion,) = self.analysis.motions
-        whole: list[bool] = self.analysis.assembled(motion).tolist()
+        whole: list[bool] = self.mask.tolist()
         return whole if rows == len(whole) else any(whole)
 
     @property
@@ -274,14 +283,14 @@ class Spreads(Study):
         """Return the warnings of rates without a speed, and forces without a mass or a load."""
         return remarks.without_meaning(self.cases.nominal, self.cases.names)
 
-    def case(self, row: Rows | None = None) -> Tolerances:
-        """Return the effect on the variant of a row, or on the mechanism itself."""
-        analysis = self.cases.analysis(row)
+    def case(self, analysis: Analysis) -> Tolerances:
+        """Return the effect on one mechanism."""
         _ = analysis.motions
         return Tolerances(self, analysis)
 
-    def check_size(self, show: ShowOptions, times: int) -> None:
+    def check_size(self, times: int) -> None:
         """Refuse more poses than the memory holds."""
+        show = self.show
         self.cases.nominal.check_size(json=show.as_json, table=show.needs_table, times=times)
 
 
