@@ -32,7 +32,7 @@ TIMES = ("time", "t")
 
 # --- a name and its value ---------------------------------------------------------------------------------------------
 def driven(m: Mechanism, name: str, text: str, flag: str) -> int:
-    """The place of an input."""
+    """Return the index of an input."""
     names = [e.name for e in m.inputs]
     if name not in names:
         raise options.bad(
@@ -42,7 +42,7 @@ def driven(m: Mechanism, name: str, text: str, flag: str) -> int:
 
 
 def dimension_named(m: Mechanism, path: str, text: str, flag: str) -> Varied:
-    """The one number that a path names."""
+    """Return the one dimension that a path names."""
     from virtualwork.describe.dimensions import named
 
     try:
@@ -70,7 +70,7 @@ def assigned_paths(m: Mechanism, text: str, flag: str, what: str) -> tuple[tuple
 
 
 def assigned(m: Mechanism, bare: Mapping[str, str], texts: Sequence[str]) -> Mechanism:
-    """The mechanism after every `--set NAME=VALUE`; both coordinates of a point as `X,Y`."""
+    """Return the mechanism after every `--set NAME=VALUE`; a point takes both coordinates as `X,Y`."""
     numbers: dict[Dimension, float] = {}
     for text in texts:
         dimensions, value = assigned_paths(m, text, "--set", "VALUE")
@@ -89,20 +89,29 @@ def assigned(m: Mechanism, bare: Mapping[str, str], texts: Sequence[str]) -> Mec
 
 
 def quantity(of: Driven | Varied, text: str, flag: str, bare: Mapping[str, str]) -> float:
-    """A value as it is shown: SI, angles in degrees; a bare number is in the unit of the file."""
-    if isinstance(of, Driven) or (
-        of.kind in ("length", "angle") and not (is_number(text) and of.kind not in bare)
-    ):
-        return place_or_angle(text, of.kind, flag, bare)
-    try:
-        si = Units({}).number(text.strip(), of.kind, of.label)
-    except DescriptionError as error:
-        raise options.bad(flag, error) from None
-    return read_degrees(si) if of.unit == "deg" else si
+    """Return a value as it is shown: SI, angles in degrees; a bare number is in the unit of the file."""
+    return quantities(of, [text], flag, bare)[0]
+
+
+def quantities(of: Driven | Varied, texts: Sequence[str], flag: str, bare: Mapping[str, str]) -> list[float]:
+    """Return values as they are shown: SI, angles in degrees; a bare number is in the unit of the file."""
+    kind, values = of.kind, []
+    for text in texts:
+        if isinstance(of, Driven) or (
+            kind in ("length", "angle") and not (is_number(text) and kind not in bare)
+        ):
+            values.append(place_or_angle(text, kind, flag, bare))
+            continue
+        try:
+            si = Units({}).number(text.strip(), kind, of.label)
+        except DescriptionError as error:
+            raise options.bad(flag, error) from None
+        values.append(read_degrees(si) if of.unit == "deg" else si)
+    return values
 
 
 def place_or_angle(text: str, kind: str, flag: str, bare: Mapping[str, str]) -> float:
-    """A length in metres, or an angle in degrees: those of an angle in degrees stay as they are written."""
+    """Return a length in metres, or an angle in degrees; an angle that is typed in degrees keeps its digits."""
     named_unit = bare.get(kind)
     if named_unit is not None and is_number(text):
         if named_unit in ("deg", "°"):
@@ -120,7 +129,7 @@ def place_or_angle(text: str, kind: str, flag: str, bare: Mapping[str, str]) -> 
 
 # --- --at and --over --------------------------------------------------------------------------------------------------
 def at_axis(m: Mechanism, texts: Sequence[str], bare: Mapping[str, str]) -> Axis:
-    """`--at crank=60deg,arm=30deg`, repeated: a row for each."""
+    """Return the axis of `--at crank=60deg,arm=30deg`: a row for each option."""
     rows = [input_values(m, text, "--at", bare) for text in texts]
     names = [Driven.of(m, j) for j in sorted({j for row in rows for j in row})]
     shown = [[row.get(name.j, name.own(m)) for name in names] for row in rows]
@@ -128,7 +137,7 @@ def at_axis(m: Mechanism, texts: Sequence[str], bare: Mapping[str, str]) -> Axis
 
 
 def input_values(m: Mechanism, text: str, flag: str, bare: Mapping[str, str]) -> dict[int, float]:
-    """`crank=60deg,arm=30deg` as it is shown, by input; a bare value is the only input's."""
+    """Return the values of `crank=60deg,arm=30deg` by input, as they are shown; a bare value belongs to the only input."""
     names = [e.name for e in m.inputs]
     result: dict[int, float] = {}
     for part in text.split(","):
@@ -147,7 +156,7 @@ def input_values(m: Mechanism, text: str, flag: str, bare: Mapping[str, str]) ->
 
 
 def over_axis(m: Mechanism, text: str, bare: Mapping[str, str]) -> Axis:
-    """`--over 0deg:360deg:1deg`, or `--over NAME=FROM:TO:STEP` for any input or dimension."""
+    """Return the axis of `--over 0deg:360deg:1deg`, or of `--over NAME=FROM:TO:STEP` for any input or dimension."""
     name, equals, span = text.rpartition("=")
     of: Driven | Varied
     if not equals:
@@ -161,7 +170,7 @@ def over_axis(m: Mechanism, text: str, bare: Mapping[str, str]) -> Axis:
         of = dimension_named(m, name.strip(), text, "--over")
 
     def values(parts: list[str]) -> list[float]:
-        return [quantity(of, part, "--over", bare) for part in parts]
+        return quantities(of, parts, "--over", bare)
 
     steps = options.steps("--over", span, values, "0deg:360deg:1deg")
     if steps.n > MOST:
@@ -171,7 +180,7 @@ def over_axis(m: Mechanism, text: str, bare: Mapping[str, str]) -> Axis:
 
 # --- --cases ----------------------------------------------------------------------------------------------------------
 def cases_axis(m: Mechanism, path: str, elsewhere: set[int], remarks: list[str]) -> Axis:
-    """`--cases FILE.csv`: a column for each input or dimension, `crank_deg`, `links.crank.B.x_mm`; a row for each case.
+    """Return the axis of `--cases FILE.csv`: columns are inputs or dimensions, `crank_deg`, `links.crank.B.x_mm`; rows are cases.
 
     With `t_s` the speeds of the inputs follow from a spline over time; columns such as `crank_speed_rad_s` give them.
     `elsewhere` are the inputs that other options hold.
@@ -238,7 +247,7 @@ def _headers(of: Driven) -> str:
 def _with_rates_at_rest(
     m: Mechanism, order: list[Driven | Varied], shown: list[Reals], values: Reals
 ) -> tuple[list[Driven | Varied], list[Reals], Reals]:
-    """Where a table has the speed of one input, others have none: zero."""
+    """Add zero rates of the other inputs to a table that has a rate of one input."""
     zero = np.zeros(len(values))
     for k in (1, 2):
         if any(isinstance(name, Driven) and name.order == k for name in order):
@@ -250,7 +259,7 @@ def _with_rates_at_rest(
 
 
 def rates_over_time(path: str, time: Reals, q: Reals) -> tuple[Reals, Reals]:
-    """Speed and acceleration of a law of motion over time: those of the cubic spline through its rows."""
+    """Return speed and acceleration of a law of motion over time, from the cubic spline through its rows."""
     if len(time) < 4 or not (np.diff(time) > 0).all():
         raise DataError(
             f"{path}: time_s: expected at least 4 rows with rising time, for the speeds of the law of motion"
@@ -269,7 +278,7 @@ def rates_over_time(path: str, time: Reals, q: Reals) -> tuple[Reals, Reals]:
 
 
 def history_axis(m: Mechanism) -> Axis:
-    """The laws of motion that stand in the file as tables over time."""
+    """Return the axis of the laws of motion that the file has as tables over time."""
     laws = [np.array(e.history) if e.history else None for e in m.inputs]
     first = next(law for law in laws if law is not None)
     time = first[:, 0]
@@ -299,7 +308,7 @@ def grids(
     bare: Mapping[str, str],
     remarks: list[str],
 ) -> tuple[Grid | None, Grid | None]:
-    """The grid of what makes variants, and that of inputs alone; None where no option moves such."""
+    """Return the grid of the variants, and the grid of inputs that all variants go through; None where no option moves them."""
     axes = [over_axis(m, text, bare) for text in over or ()]
     if at:
         axes = [at_axis(m, at, bare), *axes]

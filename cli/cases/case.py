@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from cli.cases.analysis import Analysis
     from cli.cases.cases import Rows
     from cli.show.commands import ShowOptions
     from dalembert.results.columns import Cell, Document
@@ -120,17 +121,14 @@ class Study:
     Attributes
     ----------
     cases : Cases
-    digits : bool
-        Whether the errors of the numbers are needed.
-    json : bool
-        Whether the JSON document is formed.
+    show : ShowOptions
+        The forms that are requested.
     key : UUID
         The key of what a process keeps from one part to the next.
     """
 
     cases: Cases
-    digits: bool
-    json: bool
+    show: ShowOptions
     key: UUID = field(default_factory=uuid4)
 
     title = ""
@@ -141,8 +139,13 @@ class Study:
     one_blank_row = True
     """Whether a variant that cannot be assembled has one row; else as many rows as the others."""
 
-    def case(self, row: Rows | None = None) -> Case:
-        """Return the case of a row of variants, or of the mechanism itself.
+    @property
+    def json(self) -> bool:
+        """Whether the JSON document is formed."""
+        return self.show.as_json
+
+    def case(self, analysis: Analysis) -> Case:
+        """Return the case of one mechanism at its inputs.
 
         Raises
         ------
@@ -154,7 +157,7 @@ class Study:
         """Yield the cases of some variants, each with its warnings; None where one cannot be assembled."""
         for row in rows:
             try:
-                yield self.case(row), []
+                yield self.case(self.cases.analysis(row)), []
             except MechanismError as error:
                 yield None, [str(error)]
 
@@ -175,11 +178,12 @@ class Study:
         """Return the warnings of the request itself, which hold for every variant."""
         return []
 
-    def check_size(self, show: ShowOptions, times: int) -> None:
+    def check_size(self, times: int) -> None:
         """Refuse so many variants (`times`) that would take more memory than there is, before they are solved."""
 
     # --- files ----------------------------------------------------------------------------------------------------
-    def in_blocks(self, show: ShowOptions) -> bool:
+    @property
+    def in_blocks(self) -> bool:
         """Whether the table of the mechanism itself is written block by block."""
         return False
 

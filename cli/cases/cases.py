@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cli.cases.inputs import InputGrid, Inputs
     from virtualwork import Mechanism
     from virtualwork.describe.dimensions import Dimension
     from virtualwork.family.part import Part
@@ -232,35 +231,20 @@ class Cases:
         return replace(self, mechanism=m, varied=None, moved=None)
 
     # --- one variant, some variants -------------------------------------------------------------------------------
-    def analysis(self, row: Rows | None = None) -> Analysis:
-        """Return the analysis of the variant of a row, or of the mechanism itself.
+    def analysis(self, row: Rows) -> Analysis:
+        """Return the analysis of the variant with the numbers of a row.
 
         Raises
         ------
         MechanismError
         """
-        if row is None:
-            return self.nominal
-        m = self.variant(row)
-        return Analysis(self.request, m, self.inputs(m, row))
-
-    def variant(self, row: Rows) -> Mechanism:
-        """Return the mechanism with the numbers of a row.
-
-        Raises
-        ------
-        MechanismError
-        """
-        return with_numbers(self.mechanism, self.dimensions, self.numbers(row[None])[0].tolist())
-
-    def inputs(self, m: Mechanism, row: Rows) -> Inputs | InputGrid:
-        """Return the inputs of the variant of a row."""
-        values = [
+        m = with_numbers(self.mechanism, self.dimensions, self.numbers(row[None])[0].tolist())
+        inputs = [
             (name, float(x), float(np.radians(x)) if name.unit == "deg" else float(x))
             for name, x in zip(self.names, row, strict=True)
             if isinstance(name, Driven)
         ]
-        return of_one(m, self.moved, values)
+        return Analysis(self.request, m, of_one(m, self.moved, inputs))
 
     @property
     def dimensions(self) -> list[Dimension]:
@@ -285,7 +269,7 @@ class Cases:
 
         m, v = self.mechanism, len(rows)
         family = Family(m, self.in_si(rows))
-        nominal = of_one(m, self.moved).whole
+        nominal = self.nominal.inputs.whole
         names = () if self.moved is None else self.moved.names
         moved = {name.j for name in names if isinstance(name, Driven)}
         si, shown = nominal.values[None], nominal.shown[None]

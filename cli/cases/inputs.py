@@ -52,27 +52,27 @@ class Driven:
 
     @classmethod
     def of(cls, m: Mechanism, j: int) -> Driven:
-        """The value of an input."""
+        """Return the value of an input."""
         return cls(j, m.inputs[j].name, m.inputs[j].is_slide)
 
     @classmethod
     def all(cls, m: Mechanism, j: int) -> Iterator[Driven]:
-        """The value of an input and its rates."""
+        """Return the value of an input and its rates."""
         value = cls.of(m, j)
         return (value.rate(k) for k in range(3))
 
     def rate(self, order: int) -> Driven:
-        """Its rate of this order."""
+        """Return the rate of this order."""
         return Driven(self.j, self.name, self.slides, order)
 
     @property
     def label(self) -> str:
-        """What a header calls it, without its unit: `crank`, `crank_speed`."""
+        """Its header without the unit: `crank`, `crank_speed`."""
         return f"{self.name}_{RATES[self.order]}" if self.order else self.name
 
     @property
     def dimension(self) -> str:
-        """Which of the tables' dimensions it has."""
+        """Its dimension, as the tables name it."""
         kinds = (
             ("length", "velocity", "acceleration")
             if self.slides
@@ -86,11 +86,11 @@ class Driven:
         return ("m" if self.slides else "deg") if not self.order else next(iter(UNITS[self.dimension]))
 
     def shown(self, si: float) -> float:
-        """A value as it is shown."""
+        """Return a value as it is shown."""
         return si if self.slides or self.order else read_degrees(si)
 
     def own(self, m: Mechanism) -> float:
-        """The file's own value as it is shown; where it has none, that of the guess."""
+        """Return the file's own value as it is shown; where the file has none, that of the guess."""
         value = m.inputs[self.j].value
         return self.shown(m.at[self.j] if value is None else value)
 
@@ -113,7 +113,7 @@ class Varied:
 
     @property
     def dimension(self) -> str:
-        """Which of the tables' dimensions it has."""
+        """Its dimension, as the tables name it."""
         return self.of.kind
 
     @property
@@ -123,16 +123,16 @@ class Varied:
 
     @property
     def kind(self) -> str:
-        """Which quantity it is."""
+        """The unit that a bare number of it takes, as `[units]` of a file has it."""
         return self.of.kind
 
     def si(self, shown: float) -> float:
-        """A value in SI."""
+        """Return a value in SI."""
         return math.radians(shown) if self.of.unit == "deg" else shown
 
 
 def with_numbers(m: Mechanism, dimensions: Sequence[Dimension], shown: Sequence[float]) -> Mechanism:
-    """The mechanism with other numbers, as they are shown."""
+    """Return the mechanism with other numbers, which are as they are shown."""
     from virtualwork.describe.dimensions import changed
 
     numbers = {d.path: Varied(d).si(value) for d, value in zip(dimensions, shown, strict=True)}
@@ -143,7 +143,7 @@ def with_numbers(m: Mechanism, dimensions: Sequence[Dimension], shown: Sequence[
 
 
 def _factor(dimension: Dimension) -> tuple[float, float]:
-    """What a number as it is shown has to be multiplied by."""
+    """Return numerator and denominator that take a number as it is shown to SI."""
     return (math.pi, 180) if dimension.unit == "deg" else (1, 1)
 
 
@@ -196,13 +196,13 @@ class Axis:
 
     @property
     def n(self) -> int:
-        """How many values."""
+        """The number of values."""
         if self.steps is not None:
             return self.steps.n
         return 0 if self.rows is None else len(self.rows.shown)
 
     def at(self, i: NDArray[np.intp]) -> Values:
-        """The values at some places."""
+        """Return the values at some places."""
         if self.rows is not None:
             return Values(self.rows.shown[i], self.rows.si[i])
         assert self.steps is not None
@@ -218,7 +218,7 @@ def listed(
     labels: Sequence[str] | None = None,
     time: Reals | None = None,
 ) -> Axis:
-    """An axis of rows."""
+    """Return an axis of rows."""
     rows = Values(shown, _in_si(names, shown) if si is None else si)
     return Axis(option, tuple(names), rows=rows, labels=labels, time=time)
 
@@ -236,16 +236,16 @@ class Grid:
 
     @cached_property
     def names(self) -> tuple[Driven | Varied, ...]:
-        """What the columns are values of."""
+        """The inputs, rates and dimensions of the columns."""
         return tuple(name for axis in self.axes for name in axis.names)
 
     @cached_property
     def n(self) -> int:
-        """How many there are."""
+        """The number of combinations."""
         return math.prod(axis.n for axis in self.axes)
 
     def part(self, low: int, high: int) -> Part:
-        """The rows from low to high, or to the last."""
+        """Return the rows from low to high, or to the last."""
         axes, high = self.axes, min(high, self.n)
         places: Any = np.arange(low, high)
         each = np.unravel_index(places, [axis.n for axis in axes]) if len(axes) > 1 else [places]
@@ -274,12 +274,12 @@ class Inputs:
 
     @property
     def n(self) -> int:
-        """How many poses."""
+        """The number of poses."""
         return len(self.shown)
 
     @property
     def orders(self) -> set[int]:
-        """Of which orders there are rates."""
+        """The orders of the rates that are given."""
         return {order for order, rate in enumerate((self.speed, self.acceleration), 1) if rate is not None}
 
     @property
@@ -293,7 +293,7 @@ class Inputs:
         return float(self.values[:, 0].min()), float(self.values[:, 0].max())
 
     def rest(self) -> Reals:
-        """What the inputs are exactly, by their decimals in degrees or metres, less the floats in SI, (n, k)."""
+        """Return the exact inputs, by their decimals in degrees or metres, less the floats in SI, (n, k)."""
         from dalembert.arithmetic.doubled import PI, Doubled
 
         rest = np.zeros(self.values.shape)
@@ -305,7 +305,7 @@ class Inputs:
         return rest
 
     def part(self, low: int, high: int) -> Inputs:
-        """The poses from low to high."""
+        """Return the poses from low to high."""
         speed, acceleration = (None if r is None else r[low:high] for r in (self.speed, self.acceleration))
         time = None if self.time is None else self.time[low:high]
         return Inputs(
@@ -314,7 +314,7 @@ class Inputs:
 
 
 def decimals(shown: Reals) -> Doubled:
-    """The decimals that numbers are written with, in 32 digits; numbers without few decimals are what they are.
+    """Return the decimals of numbers in 32 digits; numbers with many decimals stay as they are.
 
     >>> float(decimals(np.array([0.1, 2.5])).low[0])
     -5.551115123125783e-18
@@ -349,12 +349,12 @@ class InputGrid:
 
     @property
     def n(self) -> int:
-        """How many poses."""
+        """The number of poses."""
         return self.grid.n
 
     @property
     def orders(self) -> set[int]:
-        """Of which orders there are rates."""
+        """The orders of the rates that are given."""
         named = (*self.grid.names, *self.rates)
         return {name.order for name in named if isinstance(name, Driven) and name.order}
 
@@ -370,7 +370,7 @@ class InputGrid:
         return min(ends), max(ends)
 
     def part(self, low: int, high: int) -> Inputs:
-        """The poses from low to high, or to the last."""
+        """Return the poses from low to high, or to the last."""
         moved = self.grid.part(low, high)
         n = len(moved.shown)
         # what is held, and in its place what the grid moves
@@ -395,7 +395,7 @@ class InputGrid:
 def of_one(
     m: Mechanism, grid: Grid | None, row: Sequence[tuple[Driven, float, float]] = ()
 ) -> Inputs | InputGrid:
-    """The inputs of a mechanism: those of a grid, held at its own pose where the grid moves none.
+    """Return the inputs of a mechanism: those of a grid; an input that the grid does not move stays at the file's pose.
 
     `row`: inputs and rates that a row of variants sets, as they are shown and in SI.
     """

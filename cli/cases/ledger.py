@@ -47,12 +47,12 @@ class Entry(NamedTuple):
 
     @property
     def symbol(self) -> str:
-        """How an equation calls the load: `W3`, `Fi4`, `T2`."""
+        """The symbol of the load in an equation: `W3`, `Fi4`, `T2`."""
         return of_link(SYMBOLS.get(self.kind, "F" if self.force is not None else "T"), self.link)
 
     @property
     def rate(self) -> str:
-        """How an equation calls the velocity that it is multiplied with."""
+        """The symbol of the velocity in an equation."""
         return of_link("ω" if self.force is None else "V", self.link)
 
     def equation(self) -> str:
@@ -78,7 +78,7 @@ def why_not(load: complex | float, rate: complex | float, works: bool, fastest: 
 
 
 def entries_of(motion: Motion, unit: int | None = None) -> list[list[Entry]]:
-    """The loads of a mechanism at every pose, none of one that is not assembled; `unit`: for a unit speed of that input."""
+    """Return the loads of a mechanism at every pose, none where it is not assembled; `unit`: for a unit speed of that input."""
     from virtualwork.study.ledger import items
 
     every = items(motion.dynamics, unit)
@@ -178,7 +178,7 @@ def ledger(
 
 
 def components(letter: str, unit: str, values: Sequence[complex | None]) -> list[Column]:
-    """The two components of vectors, as they are shown."""
+    """Return the two components of vectors, as they are shown."""
     return [
         Column(f"{letter}{axis}", unit, [None if v is None else getattr(v, part) + 0.0 for v in values])
         for axis, part in (("x", "real"), ("y", "imag"))
@@ -186,11 +186,11 @@ def components(letter: str, unit: str, values: Sequence[complex | None]) -> list
 
 
 def _vectors(place: str, values: Sequence[complex | None]) -> Column:
-    """Vectors as JSON has them; null where there is none."""
+    """Return vectors for JSON; null where there is none."""
     stored: list[Any] = [None if v is None else [_plain(v.real), _plain(v.imag)] for v in values]
     return Column(place, "", [None] * len(stored), place=place, stored=stored)
 
 
 def _plain(value: float) -> Cell:
-    """A number as JSON can have it; no −0."""
+    """Return a number that JSON can have; no −0."""
     return float(value) + 0.0 if value - value == 0 else None

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from cli.cases.case import Together
     from cli.cases.cases import Rows
     from cli.read.root_search import Found
-    from cli.show.commands import ShowOptions
     from cli.show.result import Form, Part
     from dalembert.results.columns import Document
     from dalembert.results.way import Topic
@@ -41,9 +40,9 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
 
 
-def result(study: Study, options: SimpleNamespace, show: ShowOptions, root: Found | None = None) -> Result:
+def result(study: Study, options: SimpleNamespace, root: Found | None = None) -> Result:
     """Return the result of a study of all its cases, in the requested forms; `root`: the number that --find seeks."""
-    cases = study.cases
+    cases, show = study.cases, study.show
     values = vars(options)
     page = values.get("page")
     with naming(cases.request.file):
@@ -55,18 +54,18 @@ def result(study: Study, options: SimpleNamespace, show: ShowOptions, root: Foun
 
             refuse_long(study.frames * cases.count)
         if cases.varied is not None:
-            result = _of_variants(loop, show, warnings)
-        elif study.in_blocks(show):
+            result = _of_variants(loop, warnings)
+        elif study.in_blocks:
             result = Result(
                 blocks=loop.blocks,
                 beside=study.files(),
                 warnings=warnings,
-                late_warnings=loop.warnings,
-                failed=loop.failed,
+                late_warnings=loop.remarks.lines,
+                failed=loop.remarks.failed,
             )
         else:
-            study.check_size(show, 1)
-            result = study.case().result()
+            study.check_size(1)
+            result = study.case(cases.nominal).result()
             result.warnings = [*warnings, *result.warnings]
     if page is not None:
         result.beside = {**result.beside, page: lambda: study.page(loop.by_name(), show.units)}
@@ -79,9 +78,9 @@ def result(study: Study, options: SimpleNamespace, show: ShowOptions, root: Foun
     return result
 
 
-def _of_variants(loop: Loop, show: ShowOptions, warnings: list[str]) -> Result:
+def _of_variants(loop: Loop, warnings: list[str]) -> Result:
     """Return the result of all variants: one table or document, written part by part, or all requested forms at once."""
-    name = loop.study.cases.mechanism.name
+    show, name = loop.study.show, loop.study.cases.mechanism.name
     if show.streams or show.streams_json:
         return Result(
             document=lambda: {"name": name},
@@ -89,10 +88,10 @@ def _of_variants(loop: Loop, show: ShowOptions, warnings: list[str]) -> Result:
             blocks_name="variants",
             shared=loop.workers > 1,
             warnings=warnings,
-            late_warnings=loop.warnings,
-            failed=loop.failed,
+            late_warnings=loop.remarks.lines,
+            failed=loop.remarks.failed,
         )
-    loop.study.check_size(show, loop.study.cases.count)
+    loop.study.check_size(loop.study.cases.count)
     # the document has the warnings too: all is computed before them
     _ = (show.as_json and loop.documents), (show.needs_table and loop.table)
     return Result(
@@ -101,7 +100,7 @@ def _of_variants(loop: Loop, show: ShowOptions, warnings: list[str]) -> Result:
         notes=lambda: name,
         method=loop.study.method,
         warnings=[*warnings, *loop.remarks.lines()],
-        failed=loop.failed,
+        failed=loop.remarks.failed,
     )
 
 
@@ -155,17 +154,9 @@ class Loop:
     workers: int = 1
     remarks: Remarks = field(default_factory=Remarks)
 
-    def warnings(self) -> list[str]:
-        """Return the warnings, once all is computed."""
-        return self.remarks.lines()
-
-    def failed(self) -> bool:
-        """Whether nothing could be assembled."""
-        return not self.remarks.any_assembled
-
     def blocks(self, form: Form, json: bool = False) -> Iterator[Written]:
         """Yield what is written of the table, or of the documents, part by part, in their order."""
-        self.remarks = Remarks()
+        self.remarks.clear()
         if self.study.cases.varied is None:
             yield from self._alone(form)
             return
@@ -194,7 +185,7 @@ class Loop:
 
     def _alone(self, form: Form) -> Iterator[Written]:
         """Yield the rows of the mechanism itself, a block of poses at a time."""
-        case = self.study.case()
+        case = self.study.case(self.study.cases.nominal)
         for i, table in enumerate(case.tables()):
             yield form(table, i)
         self.remarks.add("", case.warnings(), case.assembled())
@@ -206,21 +197,20 @@ class Loop:
         for i in range(cases.count):
             with suppress(MechanismError):
                 row = cases.rows(i, i + 1)[0]
-                pattern = without_errors(study.case(row).pattern())
+                pattern = without_errors(study.case(cases.analysis(row)).pattern())
                 break
         else:
             return Plan(study.size(json, together=False), lanes=lanes)
         # however few they are: refusals and warnings do not depend on the number of variants
-        together = study.together(row, json) is not None
+        together = _together(study, row, json) is not None
         return Plan(study.size(json, together), pattern, row, together, lanes)
 
     @cached_property
     def table(self) -> Table:
         """All tables, one below the other."""
         # errors of numbers are computed when they are needed, and cannot be sent
-        loop = replace(self, workers=1) if self.study.digits else self
+        loop = replace(self, workers=1) if self.study.show.digits else self
         tables = [written.data for written in loop.blocks(unchanged)]
-        self.remarks = loop.remarks
         return joined([table for table in tables if isinstance(table, Table)])
 
     @cached_property
@@ -233,11 +223,12 @@ class Loop:
         """Return each variant that can be assembled, by its name; the mechanism itself has none."""
         cases = self.study.cases
         if cases.varied is None:
-            return [("", self.study.case())]
+            return [("", self.study.case(cases.nominal))]
         result = []
         for i in range(cases.count):
             with suppress(MechanismError):
-                result.append((str(i + 1), self.study.case(cases.rows(i, i + 1)[0])))
+                analysis = cases.analysis(cases.rows(i, i + 1)[0])
+                result.append((str(i + 1), self.study.case(analysis)))
         return result
 
 
@@ -259,8 +250,16 @@ def unchanged(part: Part, number: int) -> Written:
     return Written(part, 0)
 
 
-_together: dict[tuple[UUID, bool], Together] = {}
-"""The function that solves the variants of a study at once: a process records its formulas once."""
+_kept: dict[tuple[UUID, bool], Together | None] = {}
+
+
+def _together(study: Study, row: Rows, json: bool) -> Together | None:
+    """Return the function that solves the variants of a study at once: a process records its formulas once."""
+    name = study.key, json
+    if name not in _kept:
+        _kept.clear()
+        _kept[name] = study.together(row, json)
+    return _kept[name]
 
 
 @dataclass
@@ -278,7 +277,7 @@ class Variants:
         answer: Any = None
         assembled: list[bool] | bool = False
         try:
-            case = self.study.case(self.rows[i]) if case is None else case
+            case = self.study.case(self.study.cases.analysis(self.rows[i])) if case is None else case
             if json:
                 answer = case.document()
                 assembled = case.assembled()
@@ -347,7 +346,7 @@ class Variants:
         ]
         keys = ("variant", *(d.header for d in dimensions), *pattern.keys)
         table = Table([*lead, *below.columns], keys)
-        return table if self.study.digits else without_errors(table)
+        return table if self.study.show.digits else without_errors(table)
 
     def _rows(self, answer: Any) -> tuple[Table, list[Any]]:
         """Return the rows of an answer of `one`, and of each whether its pose is assembled."""
@@ -377,14 +376,10 @@ class Variants:
     # --- at once --------------------------------------------------------------------------------------------------
     def at_once(self, json: bool) -> tuple[Any, Mask, Mask]:
         """Solve all of them at once."""
-        name = self.study.key, json
-        if name not in _together:
-            assert self.plan.row is not None
-            together = self.study.together(self.plan.row, json)
-            assert together is not None
-            _together.clear()
-            _together[name] = together
-        return _together[name](*self.study.cases.part(self.rows))
+        assert self.plan.row is not None
+        together = _together(self.study, self.plan.row, json)
+        assert together is not None
+        return together(*self.study.cases.part(self.rows))
 
     def left(self, assembled: Mask, alone: Mask, json: bool) -> Iterator[tuple[int, Any]]:
         """Yield the answers of `one` for variants that were left alone; for others only note why poses are missing."""

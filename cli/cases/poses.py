@@ -42,22 +42,22 @@ def column(header: str, values: Sequence[Cell], error: Callable[[], list[float]]
 
 # --- what they are ----------------------------------------------------------------------------------------------------
 def keys_of(wanted: Iterable[Component]) -> list[Quantity]:
-    """What they are asked for by, each once."""
+    """Return the keys of components for a motion, each once."""
     return list(dict.fromkeys(key for each in wanted for key in (each.key, each.less) if key))
 
 
 def solved(motion: Motion, keys: Sequence[Quantity]) -> dict[Quantity, Any]:
-    """Quantities of a motion by their keys, (n,), in one pass."""
+    """Solve quantities of a motion in one pass; return them by their keys, (n,)."""
     return dict(zip(keys, motion.values(keys), strict=True))
 
 
 def cells(values: Reals, finite: NDArray[np.bool_] | None = None) -> Numbers:
-    """Numbers as Python's own; None where there is none; no −0."""
+    """Return Python's numbers; None where there is none; no −0."""
     finite = np.isfinite(values) if finite is None else finite
     listed: list[float] = (values + 0.0).tolist()
     if finite.all():
         return listed
-    return [v if there else None for v, there in zip(listed, finite.tolist(), strict=True)]
+    return [v if is_finite else None for v, is_finite in zip(listed, finite.tolist(), strict=True)]
 
 
 def cells_of(
@@ -67,16 +67,16 @@ def cells_of(
     driven: Mapping[str, Reals],
     where: NDArray[np.bool_] | None = None,
 ) -> dict[Component, Numbers]:
-    """The numbers of n poses as they are shown.
+    """Return the numbers of n poses as they are shown.
 
     Parameters
     ----------
     computed : mapping
-        What the motion has computed.
+        The quantities that the motion has computed.
     driven : mapping
-        Of driven links the angles as requested, degrees.
+        The requested angles of driven links, degrees.
     where : array (n,) of bool, optional
-        The poses that have any.
+        The poses that have numbers.
     """
     shown: dict[Component, Numbers] = {}
     finite = np.ones(n, dtype=bool)
@@ -109,7 +109,7 @@ def number_at(analysis: Analysis, component: Component) -> float | None:
 
 
 def exact_degrees(angle: Reals) -> Reals:
-    """Degrees in [0, 360)."""
+    """Return angles in [0, 360) degrees."""
     reduced = np.mod(angle, 360.0)
     return np.where(reduced >= 360.0, 0.0, reduced)
 
@@ -156,24 +156,24 @@ def pose_keys(analysis: Analysis) -> tuple[str, ...]:
 
 
 def table(analysis: Analysis, computed: Sequence[Mapping[Quantity, Any]] = ()) -> Table:
-    """A row for each pose, one assembly after the other.
+    """Return a table with a row for each pose, one assembly after the other.
 
-    `computed`: what the poses of each assembly have computed already; there are no bounds of it.
+    `computed`: quantities of each assembly that are computed already; they have no errors.
     """
-    wanted, its = analysis.tabled, analysis.inputs.whole
-    n, shown, driven = len(its.shown), its.shown, analysis.set_angles
-    every = computed or [solved(motion, keys_of(wanted)) for motion in analysis.motions]
-    times = len(every)
+    wanted, driven, motions = analysis.tabled, analysis.set_angles, analysis.motions if not computed else ()
+    several, headers, inputs = analysis.several, analysis.input_columns, analysis.inputs.whole
+    every = computed or [solved(motion, keys_of(wanted)) for motion in motions]
+    n, times = len(inputs.shown), len(every)
     parts = [cells_of(wanted, each, n, driven) for each in every]
 
     @cache
     def formed() -> None:
-        for motion in analysis.motions:
+        for motion in motions:
             form_bounds(motion, wanted, driven)
 
     def error(each: Component) -> list[float]:
         formed()
-        bounds = [sum(bound(motion, key, driven) for key in keys_of([each])) for motion in analysis.motions]
+        bounds = [sum(bound(motion, key, driven) for key in keys_of([each])) for motion in motions]
         if each.polar == "angle":
             # across the vector, over its length
             lengths = [np.abs(of[each.key] - of[each.less]) for of in every]
@@ -183,13 +183,13 @@ def table(analysis: Analysis, computed: Sequence[Mapping[Quantity, Any]] = ()) -
                 ]
         return [b for each in bounds for b in bounds_of(each)]  # type: ignore[arg-type]
 
-    columns = [Column("step", "", [*its.steps] * times)]
-    if analysis.several:
+    columns = [Column("step", "", [*inputs.steps] * times)]
+    if several:
         numbers = [str(assembly.number) for assembly in analysis.assemblies for _ in range(n)]
         columns.append(Column("branch", "", numbers))
     columns += [
         column(header, values.tolist() * times, partial(bounds_of, np.tile(TURNED * np.abs(values), times)))
-        for header, values in zip(analysis.input_columns, shown.T, strict=True)
+        for header, values in zip(headers, inputs.shown.T, strict=True)
     ]
     for each in wanted:
         values = parts[0][each] if times == 1 else [v for part in parts for v in part[each]]
@@ -218,7 +218,7 @@ def _has_column(analysis: Analysis, each: Component, values: Numbers) -> bool:
 
 
 def by_link(analysis: Analysis) -> Table:
-    """A row for each pose and link of the first assembly, for a file of expected values in that form."""
+    """Return a table with a row for each pose and link of the first assembly: files of expected values may have that form."""
     wanted = [each for each in analysis.places if each.path[0] == "links"]
     names = list(dict.fromkeys(each.path[1] for each in wanted))
     heads = list(dict.fromkeys(each.path[2] for each in wanted))
@@ -246,7 +246,7 @@ def by_link(analysis: Analysis) -> Table:
 
 # --- as JSON ----------------------------------------------------------------------------------------------------------
 def documents(analysis: Analysis) -> list[Document]:
-    """The poses as the JSON document has them, every assembly after the other at each input."""
+    """Return the poses for the JSON document, one assembly after the other at each input."""
     listed = []
     keys = keys_of(in_json(analysis))
     for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
@@ -258,7 +258,7 @@ def documents(analysis: Analysis) -> list[Document]:
 
 
 def in_json(analysis: Analysis) -> list[Component]:
-    """What the document has of every pose."""
+    """Return the components that the document has."""
     return _moving(analysis) + analysis.forces
 
 
@@ -276,7 +276,7 @@ def poses_of(
     condition: Reals | None,
     marks: list[list[str]],
 ) -> Iterator[Document]:
-    """The poses of one assembly, from what they have computed."""
+    """Yield the documents of the poses of one assembly, from computed quantities."""
     n, driven, m = len(assembled), analysis.set_angles, analysis.mechanism
     shown = {
         e.name: {analysis.input_names[e.name]: values.tolist()}
@@ -293,7 +293,7 @@ def poses_of(
 
 
 def pose_head(analysis: Analysis, i: int) -> Document:
-    """What names a pose in JSON: `input_deg`, or `inputs` of several."""
+    """Return the inputs of a pose for JSON: `input_deg`, or `inputs` of several."""
     shown = analysis.inputs.whole.shown[i].tolist()
     every = {
         e.name: {analysis.input_names[e.name]: value}
@@ -303,14 +303,14 @@ def pose_head(analysis: Analysis, i: int) -> Document:
 
 
 def over_poses(analysis: Analysis, entries: list[Document]) -> Document:
-    """What a topic has in JSON: of one pose its entry, of several the list `poses`."""
+    """Return a topic for JSON: the entry of one pose, or the list `poses`."""
     if len(entries) == 1:
         return entries[0]
     return {"poses": [{**pose_head(analysis, i), **entry} for i, entry in enumerate(entries)]}
 
 
 def marks_of(analysis: Analysis, motion: Motion) -> list[list[str]]:
-    """What is special about each pose: a change point, a limit of the input, a dead point."""
+    """Return the marks of each pose: a change point, a limit of the input, a dead point."""
     result: list[list[str]] = [[] for _ in range(motion.n)]
     track = motion.assembly.track
     if not track.active:
@@ -330,7 +330,7 @@ def marks_of(analysis: Analysis, motion: Motion) -> list[list[str]]:
 
 
 def nested(numbers: Mapping[Component, Numbers], n: int) -> dict[str, Any]:
-    """Columns of n poses where they stand in JSON."""
+    """Return the columns of n poses as a tree, at their places in JSON."""
     result: dict[str, Any] = {}
     for each, values in numbers.items():
         if each.path:
@@ -347,7 +347,7 @@ def nested(numbers: Mapping[Component, Numbers], n: int) -> dict[str, Any]:
 
 
 def in_rows(tree: Any, n: int) -> Iterator[Any]:
-    """A tree of columns, its branches mappings and tuples, as n trees of their values, one after the other."""
+    """Yield n trees of values from a tree of columns, whose branches are mappings and tuples."""
     if not isinstance(tree, (dict, tuple)):
         return iter(tree)
     if not tree:
@@ -361,6 +361,6 @@ def in_rows(tree: Any, n: int) -> Iterator[Any]:
 
 # --- further tables ---------------------------------------------------------------------------
 def listed(names: Sequence[str], rows: Sequence[Sequence[Cell]]) -> Table:
-    """A table of rows below headers."""
+    """Return a table of rows below headers."""
     columns = [column(name, [row[i] for row in rows]) for i, name in enumerate(names)]
     return Table(columns, keys=("step", "branch", "quantity", "of", "k", "link"))

@@ -27,7 +27,7 @@ NAMED = 10
 
 
 def _on_branch(analysis: Analysis, assembly: Assembly, inputs: list[float], digits: int) -> list[float]:
-    """Inputs as they are shown, each once, deg in [0, period of the branch) or m."""
+    """Return inputs as they are shown, each once, deg in [0, period of the branch) or m."""
     if analysis.mechanism.inputs[0].is_slide:
         return sorted({round(v, digits) for v in inputs})
     turns = assembly.reach.turns
@@ -47,16 +47,13 @@ def _listed(values: list[float], digits: int) -> str:
     return first if len(values) <= NAMED else f"{first} … ({len(values)} in all)"
 
 
-def limits(analysis: Analysis, counted: list[tuple[int, int]] | None = None) -> list[str]:
-    """One line for the poses that cannot be assembled, with the limit of the input that is near them; and branches.
+def limits(analysis: Analysis, gaps: Sequence[tuple[int, int]]) -> list[str]:
+    """Return the warnings of poses that cannot be assembled, with the limits of the input; and of branches.
 
-    `counted`: how many these are of each assembly, and the first, where blocks of poses have told it.
+    `gaps`: for each assembly the number of such poses, and the first of them.
     """
     lines = []
-    if counted is None:
-        gaps = [~analysis.assembled(motion) for motion in analysis.motions]
-        counted = [(int(gap.sum()), int(np.argmax(gap))) for gap in gaps]
-    for assembly, (missing, first) in zip(analysis.assemblies, counted, strict=True):
+    for assembly, (missing, first) in zip(analysis.assemblies, gaps, strict=True):
         track = assembly.track
         name = analysis.mechanism.inputs[0].name
         if missing:
@@ -73,7 +70,7 @@ def limits(analysis: Analysis, counted: list[tuple[int, int]] | None = None) -> 
 
 
 def _shortfall(analysis: Analysis, assembly: Assembly, i: int) -> str:
-    """By how much a pose does not close, and the nearest input where it would."""
+    """Return by how much a pose does not close, and the nearest input at which it closes."""
     pose = analysis.inputs.part(i, i + 1)
     gap = assembly.reach.shortfall(tuple(pose.values[0].tolist()))
     if gap is None:
@@ -85,15 +82,15 @@ def _shortfall(analysis: Analysis, assembly: Assembly, i: int) -> str:
     )
     text = f"; at {shown}: {gap.text(lambda v: f'{v * factor:.6g} {unit}')}"
     if gap.nearest is not None:
-        there = gap.nearest if analysis.unit == "m" else math.degrees(gap.nearest)
-        text += f"; it would close at {there:.10g} {analysis.unit}"
+        closing = gap.nearest if analysis.unit == "m" else math.degrees(gap.nearest)
+        text += f"; it would close at {closing:.10g} {analysis.unit}"
     return text
 
 
 def _branch_lines(analysis: Analysis, assembly: Assembly) -> list[str]:
-    """Change points on the way from the guess to the poses: which branch was taken, and the other."""
+    """Return the warnings of change points between the guess and the poses: the branch that is taken, and the other."""
     track = assembly.track
-    if not track.active:
+    if not track.active or not any(track.changes.values()):
         return []
     least, largest = analysis.inputs.span
     low, high = min(least, track.start), max(largest, track.start)
@@ -121,13 +118,13 @@ def _branch_lines(analysis: Analysis, assembly: Assembly) -> list[str]:
 
 
 def of_forces(analysis: Analysis) -> list[str]:
-    """What the forces cannot say, pose by pose: dead points, change points, locked friction, redundant joints."""
+    """Return the warnings of forces without a value: dead points, change points, locked friction, redundant joints."""
     result = [listed(analysis, what, places, len(places)) for what, places in troubles(analysis)]
     return list(dict.fromkeys([*result, *statements(analysis)]))
 
 
 def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
-    """What the forces cannot say, and the inputs where they cannot."""
+    """Return the reasons why forces have no value, with the inputs where."""
     troubles: list[tuple[str, list[float]]] = []
 
     def note(bad: NDArray[np.bool_], what: str) -> None:
@@ -136,14 +133,14 @@ def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
 
     for motion in analysis.motions:
         d = motion.dynamics
-        there = motion.assembled
+        whole = motion.assembled
         for number, meet in d.without_length.items():
             note(
-                there & meet,
+                whole & meet,
                 f"the ends of [[springs]] {number} meet, so that its pull has no direction: the forces that hang "
                 "on it have no value",
             )
-            there = there & ~meet
+            whole = whole & ~meet
         for values, what in (
             (
                 d.effort,
@@ -155,20 +152,20 @@ def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
             ),
         ):
             if not motion.assembly.track.folded:  # singular in every pose: that is warned of once
-                note(there & ~np.isfinite(values).all(axis=1) & ~d.locked, what)
+                note(whole & ~np.isfinite(values).all(axis=1) & ~d.locked, what)
         for number, drive in enumerate(analysis.mechanism.cam_drives):
             press = d.contact(number)
             with np.errstate(invalid="ignore"):
                 pulls = press < -1e-12 * np.nanmax(np.abs(press), initial=0.0)
-            if (there & pulls).any():
-                note(there & pulls, contact_lost(motion, drive))
+            if (whole & pulls).any():
+                note(whole & pulls, contact_lost(motion, drive))
         if d.scene.friction:
-            note(there & d.locked, "friction locks the mechanism: no reaction balances its own friction")
+            note(whole & d.locked, "friction locks the mechanism: no reaction balances its own friction")
     return troubles
 
 
 def contact_lost(motion: Motion, drive: CamDrive) -> str:
-    """What to know of a cam that would have to pull its follower."""
+    """Return the warning of a cam that would have to pull its follower."""
     from virtualwork.study.cams import lift_off
 
     off = lift_off(motion.assembly, drive.number)
@@ -181,7 +178,7 @@ def contact_lost(motion: Motion, drive: CamDrive) -> str:
 
 
 def statements(analysis: Analysis) -> list[str]:
-    """What is to be said of the forces whatever the pose."""
+    """Return the warnings of the forces that hold for all poses."""
     result: list[str] = []
     for motion in analysis.motions:
         d = motion.dynamics
@@ -212,9 +209,9 @@ def pinned(m: Description, body: str, center: complex) -> bool:
 
 
 def without_meaning(analysis: Analysis, varied: Sequence[Driven | Varied] = ()) -> list[str]:
-    """What cannot mean anything: rates without a speed, forces without a mass or a load.
+    """Return the warnings of numbers without a meaning: rates without a speed, forces without a mass or a load.
 
-    `varied` is what variants set: a speed, a mass or a load among it gives the others their meaning.
+    `varied`: what variants set; a speed, a mass or a load among it gives numbers a meaning.
     """
     m, request, lines = analysis.mechanism, analysis.request, []
     paths = [name.of.where for name in varied if isinstance(name, Varied)]
@@ -242,7 +239,7 @@ def without_meaning(analysis: Analysis, varied: Sequence[Driven | Varied] = ()) 
 
 
 def listed(analysis: Analysis, what: str, places: list[float], count: int) -> str:
-    """One line for what happens at some inputs: the first five of them, and how many more there are."""
+    """Return one line for what happens at some inputs: the first five of them, and the number of the others."""
     named = ", ".join(f"{place:g} {analysis.unit}" for place in places[:5])
     more = f" and {count - 5} further poses" if count > 5 else ""
     return f"at input {named}{more}: {what}"
@@ -276,6 +273,14 @@ class Remarks:
     def full(self) -> bool:
         """Whether no further warning is kept."""
         return len(self.kept) >= KEPT
+
+    def clear(self) -> None:
+        """Begin anew."""
+        self.kept, self.further, self.any_assembled = [], 0, False
+
+    def failed(self) -> bool:
+        """Whether no pose of any variant is assembled."""
+        return not self.any_assembled
 
     def add(self, name: str, warnings: Iterable[str], assembled: list[bool] | bool = False) -> None:
         """Add the warnings of a variant, which may be none, and whether its poses are assembled."""

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from cli.cases.cases import Rows
     from cli.cases.inputs import Varied
     from cli.read.root_search import Found
-    from cli.show.commands import ShowOptions
     from dalembert.results.columns import Document
     from virtualwork import Mechanism
     from virtualwork.quantities import Component
@@ -77,7 +76,7 @@ class PoseCase(Case):
     def tables(self, form: Callable[[Analysis], Table] = poses.table) -> Iterator[Table]:
         """Yield those rows, block by block where the poses fill more than one block."""
         a = self.analysis
-        if not a.is_long:
+        if a.inputs.n <= BLOCK:
             yield form(a)
             return
         pattern: Table | None = None
@@ -113,7 +112,7 @@ class PoseCase(Case):
             if self.study.cases.names:
                 # each row of a variant says whether its pose is assembled
                 self.whole.append(~gap)
-            if a.forces:
+            if a.request.forces and a.forces:
                 for what, places in remarks.troubles(block):
                     listed, number = self.troubles.get(what, ([], 0))
                     self.troubles[what] = [*listed, *places[: 5 - len(listed)]], number + len(places)
@@ -136,25 +135,31 @@ class PoseCase(Case):
         """Return the poses, and the tables below them."""
         return {"poses": poses.documents(self.analysis), **result_document(self.extra.values())}
 
+    @cached_property
+    def masks(self) -> list[NDArray[np.bool_]]:
+        """Which poses of each assembly are assembled, where they fill one block."""
+        return [self.analysis.assembled(motion) for motion in self.analysis.motions]
+
     def assembled(self, rows: int = 0) -> list[bool] | bool:
         """Return whether the pose of each row is assembled; where the rows are no poses, whether any is."""
-        a = self.analysis
+        masks = self.whole if self.gaps else self.masks
+        if rows and rows == sum(map(len, masks)):
+            return [assembled for mask in masks for assembled in mask.tolist()]
         if self.gaps:
-            whole = np.concatenate(self.whole).tolist() if self.whole else []
-            return whole if rows and rows == len(whole) else any(n < a.inputs.n for n, _ in self.gaps)
-        listed = [pose for motion in a.motions for pose in a.assembled(motion).tolist()]
-        return listed if rows == len(listed) else any(listed)
+            return any(count < self.analysis.inputs.n for count, _ in self.gaps)
+        return any(mask.any() for mask in masks)
 
     def warnings(self) -> list[str]:
         """Return the warnings of limits, branches, and forces that have no value."""
-        a = self.analysis
-        lines = [*a.warnings, *remarks.limits(a, self.gaps or None)]
-        if a.forces and self.gaps:
-            lines += [remarks.listed(a, what, *at) for what, at in self.troubles.items()]
-            lines += self.statements
-        elif a.forces:
-            lines += remarks.of_forces(a)
-        return lines
+        a, request = self.analysis, self.study.cases.request
+        gaps = self.gaps or [(int((~mask).sum()), int(np.argmax(~mask))) for mask in self.masks]
+        lines = [*a.warnings, *remarks.limits(a, gaps)]
+        if not request.forces or not a.forces:
+            return lines
+        if self.gaps:
+            troubles = [remarks.listed(a, what, *at) for what, at in self.troubles.items()]
+            return [*lines, *troubles, *self.statements]
+        return [*lines, *remarks.of_forces(a)]
 
     def result(self) -> Result:
         """Return the result of this mechanism alone, in every form."""
@@ -165,7 +170,7 @@ class PoseCase(Case):
         result.expected = (*self.further().values(), lambda: poses.by_link(a))
         result.afterword = self.afterword
         result.sheets = lambda: [Sheet("", _sections(tables), self.figure)]
-        result.failed = lambda: not any(a.assembled(motion).any() for motion in a.motions)
+        result.failed = lambda: not self.assembled()
         return result
 
 
@@ -194,12 +199,15 @@ class PoseStudy(Study):
         """Whether the JSON document of each variant has more than its poses."""
         return False
 
-    def case(self, row: Rows | None = None) -> PoseCase:
-        """Return the poses of the variant of a row, or of the mechanism itself."""
-        return self.kind(self, self.cases.analysis(row))
+    def case(self, analysis: Analysis) -> PoseCase:
+        """Return the poses of one mechanism."""
+        return self.kind(self, analysis)
 
     def warnings(self) -> list[str]:
         """Return the warnings of rates without a speed, and forces without a mass or a load."""
+        request = self.cases.request
+        if not (request.order or request.only or request.forces):
+            return []
         return remarks.without_meaning(self.cases.nominal, self.cases.names)
 
     def together(self, row: Rows, json: bool) -> Together | None:
@@ -208,19 +216,22 @@ class PoseStudy(Study):
         from virtualwork.family.part import Solver
 
         cases = self.cases
-        if cases.request.branch is not None or self.digits or (json and self.extra_in_json):
+        if cases.request.branch is not None or self.show.digits or (json and self.extra_in_json):
             return None
         # a rate that only the variants have makes for more columns
         request = cases.request._replace(order=cases.analysis(row).order)
         family = Family(replace(cases.nominal, request=request), Solver(cases.part(row[None])[0]), json)
         return family.solved if family.is_possible else None
 
-    def in_blocks(self, show: ShowOptions) -> bool:
+    @property
+    def in_blocks(self) -> bool:
         """Whether the table alone is written, block by block."""
+        show = self.show
         return self.poses_alone and show.streams and (show.holds_one or self.cases.nominal.is_long)
 
-    def check_size(self, show: ShowOptions, times: int) -> None:
+    def check_size(self, times: int) -> None:
         """Refuse more poses than the memory holds."""
+        show = self.show
         self.cases.nominal.check_size(json=show.as_json, table=show.needs_table, times=times)
 
     def page(self, cases: Sequence[tuple[str, Case]], units: str | None) -> bytes:

@@ -106,8 +106,8 @@ class Family:
         """Solve some variants; `shown`: their inputs as they are shown, (v or 1, n, k)."""
         solver = Solver(part, self.solver)
         v, n = part.shape
-        (there, *values), alone = solver.lanes([ASSEMBLED, *self.keys])
-        assembled = np.isfinite(there)
+        (closed, *values), alone = solver.lanes([ASSEMBLED, *self.keys])
+        assembled = np.isfinite(closed)
         # they have a warning
         alone |= solver.open_at_guess
         forces = bool(self.analysis.forces)

@@ -35,4 +35,4 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
             "--at",
             "equilibrium searches a range of the input: expected --over, such as --over 0deg:90deg:1deg",
         )
-    return result(Equilibria(cases, show.digits, show.as_json), options, show)
+    return result(Equilibria(cases, show), options)

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.cases.analysis import Analysis
-    from cli.cases.cases import Rows
     from dalembert.results.way import Topic
     from virtualwork.study.equilibrium import Equilibria as Found
     from virtualwork.study.equilibrium import Equilibrium
@@ -56,7 +55,7 @@ class Rest(Case):
         return self.analysis.mechanism.equilibria(spans)
 
     def table(self) -> Table:
-        """A row for each position."""
+        """Return a row for each position."""
         m, positions = self.analysis.mechanism, self.equilibria.found
         one = len(m.inputs) == 1
         columns = []
@@ -76,7 +75,7 @@ class Rest(Case):
         return Table(columns, place="equilibria[]")
 
     def warnings(self) -> list[str]:
-        """What the table cannot tell."""
+        """Return the warnings: what the table does not show."""
         equilibria, lines = self.equilibria, list(self.analysis.warnings)
         if not equilibria.loaded:
             lines.append("nothing acts at rest: every position is one of equilibrium")
@@ -97,11 +96,11 @@ class Rest(Case):
         return lines
 
     def way(self) -> list[Topic]:
-        """The virtual work of every load at each position."""
+        """Return the virtual work of every load at each position."""
         return way(self.analysis, self.equilibria.found)
 
     def figure(self) -> Figure:
-        """The mechanism in its positions of rest; in its own pose where there is none."""
+        """Draw the mechanism in its positions of rest; in its own pose where there is none."""
         from cli.cases.picture import drawn
 
         a = self.analysis
@@ -123,15 +122,15 @@ class Equilibria(Study):
         "the generalized mass."
     )
 
-    def case(self, row: Rows | None = None) -> Rest:
-        """Return the positions of rest of the variant of a row, or of the mechanism itself."""
-        analysis, moved = self.cases.analysis(row), self.cases.moved
+    def case(self, analysis: Analysis) -> Rest:
+        """Return the positions of rest of one mechanism."""
+        moved = self.cases.moved
         _ = analysis.mechanism.assembly
         return Rest(self, analysis, moved is not None and moved.axes[0].option != "[input] law")
 
 
 def way(a: Analysis, positions: Sequence[Equilibrium]) -> list[Topic]:
-    """The topics: the condition, and the ledger at every position found."""
+    """Return the topics: the condition, and the ledger at every position."""
     m = a.mechanism
     text = [
         "At rest no virtual displacement of an input does work: Q_j = Σ F·∂P/∂q_j + Σ T·∂θ/∂q_j = 0 (Riul, unit II, eq. 3);",

@@ -59,8 +59,7 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     workers = 1 if cases.varied is not None else options.workers or 1
     study = Fits(
         cases,
-        show.digits,
-        show.as_json,
+        show,
         aims=targets,
         free=free,
         keep=keep,
@@ -69,4 +68,4 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
         best=options.best or 1,
         workers=workers,
     )
-    return result(study, options, show)
+    return result(study, options)

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from cli.cases.cases import Rows
+    from cli.cases.analysis import Analysis
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
     from virtualwork.family.fitted import Fit
@@ -69,11 +69,11 @@ class Fitted(Case):
         return [self.best, *self.best.others]
 
     def table(self) -> Table:
-        """A row for each solution."""
+        """Return a row for each solution."""
         return _numbers(self.solutions)
 
     def further(self) -> dict[str, Callable[[], Table]]:
-        """Of several targets how near the best comes to each."""
+        """Return the distances of the best solution from each of several targets, and the constraints."""
         several, tables = len(self.best.reached) > 1, dict[str, Callable[[], Table]]()
         if several:
             tables["misses"] = lambda: _misses_by_target([self.best], "fit")
@@ -82,7 +82,7 @@ class Fitted(Case):
         return tables
 
     def documented(self) -> list[Table]:
-        """The best solution, and below it the others."""
+        """Return the best solution, and below it the others."""
         best, *others = self.solutions
         tables = [_numbers([best], "fit"), _misses_by_target([best], "fit"), _kept([best], "fit")]
         if others:
@@ -90,7 +90,7 @@ class Fitted(Case):
         return [table for table in tables if table.columns]
 
     def warnings(self) -> list[str]:
-        """Fewer solutions than requested, and what is doubtful about each."""
+        """Return the warnings: fewer solutions than requested, and doubts about each solution."""
         solutions, lines = self.solutions, []
         if len(solutions) < self.study.best:
             lines.append(f"fit: {len(solutions)} distinct of the {self.study.best} solutions of --best")
@@ -100,7 +100,7 @@ class Fitted(Case):
         return lines
 
     def way(self) -> list[Topic]:
-        """What is minimised, and what is left."""
+        """Return the sum that is minimised, and the remaining distances."""
 
         return way(self.best, self.table(), _misses_by_target([self.best], "fit"))
 
@@ -143,15 +143,15 @@ class Fits(Study):
     title = "fit"
     method = "Nonlinear least squares within bounds, from many starts, with exact derivatives."
 
-    def case(self, row: Rows | None = None) -> Fitted:
-        """Return the fit of the variant of a row, or of the mechanism itself."""
-        return Fitted(self, self.cases.mechanism if row is None else self.cases.variant(row))
+    def case(self, analysis: Analysis) -> Fitted:
+        """Return the fit of one mechanism."""
+        return Fitted(self, analysis.mechanism)
 
 
 def aims(
     m: Mechanism, paths: Sequence[str], names: Sequence[str], weight: Sequence[str] | None, remarks: list[str]
 ) -> list[Target]:
-    """The targets of the tables."""
+    """Read the targets from the tables."""
     if len(m.inputs) != 1:
         raise options.bad("FILE.toml", f"{len(m.inputs)} inputs: expected a mechanism with one")
     every = wanted(m, names)
@@ -159,7 +159,7 @@ def aims(
 
 
 def bounds(m: Mechanism, free: Sequence[str], bare: Mapping[str, str]) -> dict[str, tuple[float, float]]:
-    """Every `--free NAME=LOW:HIGH` in SI."""
+    """Read every `--free NAME=LOW:HIGH`, SI."""
     bounds: dict[str, tuple[float, float]] = {}
     for text in free:
         (first, *both), span = assigned_paths(m, text, "--free", "LOW:HIGH")
@@ -191,7 +191,7 @@ def _dimension(fit: Fit[Mechanism], each: Reached) -> str:
 
 
 def _size(each: Reached, value: Any) -> Any:
-    """A distance in the unit of JSON."""
+    """Return a distance in the unit of JSON."""
     return np.degrees(value) if each.kind == "angle" else value
 
 
@@ -200,7 +200,7 @@ def _shown(dimension: Dimension, si: float) -> float:
 
 
 def _misses(fit: Fit[Mechanism], every: Sequence[Sequence[Reached]]) -> list[Column]:
-    """Root of the mean square and largest distance of lengths together, of angles and of efforts; a row for each group."""
+    """Return r.m.s. and largest distance of all lengths, of all angles and of all efforts; a row for each group."""
     columns = []
     for dimension in ("length", "angle", "torque", "force"):
         rows = [[_size(r, r.distances) for r in group if _dimension(fit, r) == dimension] for group in every]
@@ -222,18 +222,18 @@ def _rms(distances: NDArray[np.float64]) -> float:
 
 
 def _numbers(solutions: Sequence[Fit[Mechanism]], place: str | None = None) -> Table:
-    """A row for each solution: the dimensions, and how near they come."""
+    """Return a row for each solution: the dimensions, and the distances from the target."""
     best, others = solutions[0], place is not None and place.endswith("[]")
     columns = [
         Column(
             d.path,
             d.unit,
-            [_shown(d, float(found.values[i])) for found in solutions],
+            [_shown(d, float(solution.values[i])) for solution in solutions],
             place=("parameters", d.header),
         )
         for i, d in enumerate(best.dimensions)
     ]
-    columns += _misses(best, [found.reached for found in solutions])
+    columns += _misses(best, [solution.reached for solution in solutions])
     if not others:
         counts = {"starts": best.starts, "evaluations": best.evaluations}
         columns += [
@@ -250,19 +250,19 @@ def _solution(solutions: Sequence[Fit[Mechanism]]) -> Column:
 
 
 def _misses_by_target(solutions: Sequence[Fit[Mechanism]], place: str) -> Table:
-    """A row for each solution and target."""
-    every = [r for found in solutions for r in found.reached]
+    """Return a row for each solution and target."""
+    every = [r for solution in solutions for r in solution.reached]
     columns = [names("name", [_name(r) for r in every]), *_misses(solutions[0], [[r] for r in every])]
     keys: tuple[str, ...] = ("name",)
     if place.endswith("[]"):
-        numbers = [str(i) for i, found in enumerate(solutions, 1) for _ in found.reached]
+        numbers = [str(i) for i, solution in enumerate(solutions, 1) for _ in solution.reached]
         columns, keys = [names("solution", numbers, None), *columns], ("solution", "name")
     return Table(columns, keys, f"{place}.targets[]")
 
 
 def _kept(solutions: Sequence[Fit[Mechanism]], place: str) -> Table:
-    """A row for each solution and bound: the extreme of the quantity over the sweep; no columns where nothing is kept."""
-    every = [(str(i), kept) for i, found in enumerate(solutions, 1) for kept in found.kept]
+    """Return a row for each solution and constraint: the extreme of the quantity over the sweep; no columns without --keep."""
+    every = [(str(i), kept) for i, solution in enumerate(solutions, 1) for kept in solution.kept]
     if not every:
         return Table([])
     effort = ".force" if solutions[0].before.inputs[0].is_slide else ".torque"
@@ -282,7 +282,7 @@ def _kept(solutions: Sequence[Fit[Mechanism]], place: str) -> Table:
 
 
 def _of_bound(kept: Kept, effort: str) -> str:
-    """What --keep calls it."""
+    """Return the name of the quantity in --keep."""
     kind, _, name = kept.bound.name.partition(".")
     part = {"links": ".angle", "slides": ".position", "effort": effort}.get(kind, "")
     return f"{name}{part}" if name else kind
@@ -294,7 +294,7 @@ def _shown_extreme(kept: Kept) -> float:
 
 
 def _places(fit: Fit[Mechanism]) -> dict[str, Callable[[], Table]]:
-    """A table for each target, a row for each of its rows."""
+    """Return a table for each target, with a row for each of its rows."""
     by_target: dict[int, list[Reached]] = {}
     for each in fit.reached:
         by_target.setdefault(id(each.inputs), []).append(each)
@@ -311,7 +311,8 @@ def _places(fit: Fit[Mechanism]) -> dict[str, Callable[[], Table]]:
             for title, values in (("", each.values), ("target_", each.target)):
                 parts = {what: _size(each, values)} if what else {"x": values.real, "y": values.imag}
                 columns += [
-                    number(f"{name}{title}{part}", _dimension(fit, each), its) for part, its in parts.items()
+                    number(f"{name}{title}{part}", _dimension(fit, each), values)
+                    for part, values in parts.items()
                 ]
             columns.append(number(f"{name}distance", _dimension(fit, each), _size(each, each.distances)))
         return Table(columns)
@@ -321,7 +322,7 @@ def _places(fit: Fit[Mechanism]) -> dict[str, Callable[[], Table]]:
 
 
 def _text(file: str, fit: Fit[Mechanism], bare: Mapping[str, str]) -> str:
-    """The file's own text with the fitted numbers."""
+    """Return the file's own text with the fitted numbers."""
     import tomlkit
 
     from virtualwork import Mechanism
@@ -366,7 +367,7 @@ def _write(document: Any, dimension: Dimension, si: float, units: Units) -> None
 
 
 def way(best: Fit[Mechanism], solutions: Table, misses: Table) -> list[Topic]:
-    """The topics."""
+    """Return the topics."""
     parameters = {of.header: of.documented[0] for of in solutions.columns if of.keys[:1] == ("parameters",)}
     text = [
         "Σ weight²·|q(d) − q_target|² over all rows of the target is least over the free dimensions d within their bounds;"

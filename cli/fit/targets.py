@@ -40,7 +40,7 @@ class Wanted:
 
     @property
     def path(self) -> str:
-        """What the library calls it."""
+        """Its name in the library."""
         return f"{KINDS[self.kind][1]}.{self.name}"
 
     @property
@@ -50,14 +50,14 @@ class Wanted:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What the options call it."""
+        """Its names in the options."""
         parts = KINDS[self.kind][0]
         full = tuple(f"{self.name}.{part}" for part in parts) if len(parts) == 1 else ()
         return (self.name, *full) if self.kind in ("point", "link") else full
 
 
 def every_wanted(m: Mechanism) -> list[Wanted]:
-    """All that a fit can aim at."""
+    """Return all quantities that a fit can aim at."""
     points = dict.fromkeys(point for named in m.bodies.values() for point in named)
     slides = dict.fromkeys(str(guide.point) for guide in m.guides)
     return [
@@ -69,28 +69,28 @@ def every_wanted(m: Mechanism) -> list[Wanted]:
 
 
 def wanted(m: Mechanism, names: Sequence[str]) -> list[Wanted]:
-    """What `--want` names: `H`, `coupler.angle`, `B.position`; a name that is not there is an error that names the nearest."""
+    """Read the names of `--want`: `H`, `coupler.angle`, `B.position`; the error of an unknown name suggests the nearest."""
     every = every_wanted(m)
-    known = {name: each for each in reversed(every) for name in each.names}
+    choices = {name: each for each in reversed(every) for name in each.names}
     result: list[Wanted] = []
     for text in (part.strip() for name in names for part in name.split(",")):
         owner, _, part = text.rpartition(".")
-        if text not in known:
-            if part in ("x", "y") and owner in known:
+        if text not in choices:
+            if part in ("x", "y") and owner in choices:
                 raise options.bad("--want", f"'{text}': a point has both coordinates: expected {owner}")
             others = ", ".join(dict.fromkeys(each.names[-1] for each in every))
             raise options.bad(
                 "--want",
-                f"no point, link or slide is named '{text}'{nearest(text, known)}: expected one of {others}",
+                f"no point, link or slide is named '{text}'{nearest(text, choices)}: expected one of {others}",
             )
-        if known[text] in result:
+        if choices[text] in result:
             raise options.bad("--want", f"'{text}' is given twice")
-        result.append(known[text])
+        result.append(choices[text])
     return result
 
 
 def weights(texts: Sequence[str] | None, aims: Sequence[Wanted]) -> dict[str, float]:
-    """Every `--weight NAME=NUMBER`, by the library's name."""
+    """Read every `--weight NAME=NUMBER`, by the library's name."""
     weights: dict[str, float] = {}
     for text in texts or ():
         name, equals, number = text.rpartition("=")
@@ -109,30 +109,30 @@ def weights(texts: Sequence[str] | None, aims: Sequence[Wanted]) -> dict[str, fl
 
 
 def kept(m: Mechanism, texts: Sequence[str] | None, bare: Mapping[str, str]) -> list[Bound]:
-    """Every `--keep QUANTITY>=VALUE` (or `<=`), SI."""
+    """Read every `--keep QUANTITY>=VALUE` (or `<=`), SI."""
     from virtualwork.family.keep import Bound
 
     every = every_wanted(m)
-    known: dict[str, tuple[str, str]] = {"transmission": ("transmission", "angle")}
+    choices: dict[str, tuple[str, str]] = {"transmission": ("transmission", "angle")}
     for each in reversed(every):
         for part, kind in KINDS[each.kind][0].items():
             path = f"{each.path}.{part}" if each.kind == "point" else each.path
-            known[f"{each.name}.{part}"] = path, kind
+            choices[f"{each.name}.{part}"] = path, kind
     result = []
     for text in texts or ():
-        found = re.fullmatch(r"\s*(\S+?)\s*(>=|<=|≥|≤)\s*(\S.*?)\s*", text)
-        if found is None:
+        match = re.fullmatch(r"\s*(\S+?)\s*(>=|<=|≥|≤)\s*(\S.*?)\s*", text)
+        if match is None:
             raise options.bad(
                 "--keep",
                 f"'{text}': expected QUANTITY>=VALUE or QUANTITY<=VALUE, such as transmission>=40deg",
             )
-        name, sense, value = found.groups()
-        if name not in known:
+        name, sense, value = match.groups()
+        if name not in choices:
             raise options.bad(
                 "--keep",
-                f"no quantity is named '{name}'{nearest(name, known)}: expected one of {', '.join(known)}",
+                f"no quantity is named '{name}'{nearest(name, choices)}: expected one of {', '.join(choices)}",
             )
-        path, kind = known[name]
+        path, kind = choices[name]
         if kind in ("length", "angle"):
             number = place_or_angle(value, kind, "--keep", bare)
             number = math.radians(number) if kind == "angle" else number
@@ -148,26 +148,26 @@ def kept(m: Mechanism, texts: Sequence[str] | None, bare: Mapping[str, str]) -> 
 
 
 def targets(
-    m: Mechanism, paths: Sequence[str], asked: Sequence[Wanted], by_name: dict[str, float], said: list[str]
+    m: Mechanism, paths: Sequence[str], aims: Sequence[Wanted], by_name: dict[str, float], warnings: list[str]
 ) -> list[Target]:
-    """One target of each table: what of `asked` it has columns for."""
-    found, met = [], set[Wanted]()
+    """Read one target from each table: the wanted quantities that it has columns for."""
+    result, met = [], set[Wanted]()
     for path in paths:
-        target, there = _target(m, path, asked, by_name, said)
-        found.append(target)
-        met |= there
-    missing = [each for each in asked if each not in met]
+        target, present = _target(m, path, aims, by_name, warnings)
+        result.append(target)
+        met |= present
+    missing = [each for each in aims if each not in met]
     if missing:
         parts = ", ".join(
             f"{missing[0].name}_{part}_{'m' if kind == 'length' else 'deg'}"
             for part, kind in KINDS[missing[0].kind][0].items()
         )
         raise DataError(f"{paths[-1]}: no columns of {missing[0].name}: expected {parts}")
-    return found
+    return result
 
 
 def _target(
-    m: Mechanism, path: str, asked: Sequence[Wanted], by_name: dict[str, float], said: list[str]
+    m: Mechanism, path: str, aims: Sequence[Wanted], by_name: dict[str, float], warnings: list[str]
 ) -> tuple[Target, set[Wanted]]:
     from dalembert.tables.table import read
     from virtualwork.family.target import Target
@@ -175,9 +175,9 @@ def _target(
     turning = not m.inputs[0].is_slide
     kinds = {"input": "angle" if turning else "length", "weight": "number"}
     short: dict[str, str] = {}
-    for each in asked:
+    for each in aims:
         kinds |= each.columns
-        if sum(other.kind == each.kind for other in asked) == 1:
+        if sum(other.kind == each.kind for other in aims) == 1:
             # one alone may go without its name: x_mm, angle_deg, position_mm
             short |= {f"{part}_": f"{each.name}_{part}_".lower() for part in KINDS[each.kind][0]}
 
@@ -190,23 +190,23 @@ def _target(
         ]
 
     table = read(path, numbers=kinds, texts=("step",), headers=meant)
-    there = [each for each in asked if any(column in table.numbers for column in each.columns)]
-    for each in there or asked[:1]:
+    present = [each for each in aims if any(column in table.numbers for column in each.columns)]
+    for each in present or aims[:1]:
         for column, kind in each.columns.items():
             part = column.removeprefix(f"{each.name}_".lower())
             if column not in table.numbers:
                 table.require(part if f"{part}_" in short else f"{each.name}_{part}", kind)
     if table.rows < 2:
         raise DataError(f"{table.file}: a target of one point: expected two or more rows")
-    said += table.warnings
+    warnings += table.warnings
     si: dict[str, Any] = {name: c.si for name, c in table.numbers.items()}
     row_weight = si.get("weight")
     if row_weight is not None:
         table.reject(row_weight < 0, "weight", "a weight of 0 or more")
     places, weight = {}, {}
-    for each in there:
+    for each in present:
         columns = [si[column] for column in each.columns]
         places[each.path] = np.stack(columns, axis=1) if len(columns) == 2 else columns[0]
         number = by_name.get(each.path, 1.0)
         weight[each.path] = number if row_weight is None else number * row_weight
-    return Target(places, si.get("input"), weight), set(there)
+    return Target(places, si.get("input"), weight), set(present)

@@ -44,11 +44,10 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     cases, root = with_root(Cases.of(options, forces=True), options)
     study = Forces(
         cases,
-        show.digits,
-        show.as_json,
+        show,
         flywheel=options.flywheel,
         counterweights=weights,
         states=options.states,
     )
     study.check_options()
-    return result(study, options, show, root)
+    return result(study, options, root)

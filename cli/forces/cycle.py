@@ -147,7 +147,7 @@ class Forces(PoseStudy):
         if self.states is None:
             return {}
         case = ForceCase(self, self.cases.nominal).states()
-        return {self.states: lambda: _csv_parts(case, self.digits)}
+        return {self.states: lambda: _csv_parts(case, self.show.digits)}
 
 
 def _csv_parts(case: PoseCase, digits: bool) -> Iterator[bytes]:

@@ -61,7 +61,7 @@ class Place(NamedTuple):
 
 
 def table(analysis: Analysis) -> Table:
-    """Centre of mass, angle, rates and loads of every link at every pose."""
+    """Return centre of mass, angle, rates and loads of every link at every pose."""
     listed = rows(analysis)
     keys = {key for _, row in listed for key in row}
 
@@ -100,7 +100,7 @@ def table(analysis: Analysis) -> Table:
 
 
 def rows(analysis: Analysis) -> list[tuple[Place, Row]]:
-    """The table's rows, each with what it holds."""
+    """Return the rows of the table, each with its link, pose and field."""
     rows: list[tuple[Place, Row]] = []
     several = analysis.several
     for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
@@ -171,20 +171,20 @@ def _part(analysis: Analysis, motion: Motion, name: str, order: int) -> Part:
 def _vector(
     names: Sequence[str], z: NDArray[np.complex128], finite: NDArray[np.bool_] | bool = True
 ) -> dict[str, Numbers]:
-    """Components of vectors by their names."""
-    there = np.isfinite(z) & finite
-    return dict(zip(names, (cells(z.real, there), cells(z.imag, there)), strict=True))
+    """Return the components of vectors by their names."""
+    whole = np.isfinite(z) & finite
+    return dict(zip(names, (cells(z.real, whole), cells(z.imag, whole)), strict=True))
 
 
 def _virtual(motion: Motion, name: str, j: int) -> Part:
-    """The virtual velocities of a link for a unit of input j."""
+    """Return the virtual velocities of a link for a unit of input j."""
     center = motion.at(name, motion.mechanism.rigid[name].center)
     turning = cells(motion.link(name).coefficient(j))
     return {**_vector(POINT[1], center.coefficient(j)), "omega_rad_s": turning}
 
 
 def _marks(motion: Motion, field: int | None) -> list[Mark]:
-    """The marks of every input's effort, with the velocities of one field (None: the motion's own)."""
+    """Return the marks of every input's effort, with the velocities of one field (None: the motion's own)."""
     m, n = motion.mechanism, motion.n
     marks: list[Mark] = []
 
@@ -203,8 +203,8 @@ def _marks(motion: Motion, field: int | None) -> list[Mark]:
             plain = len(m.inputs) == 1 and reacts == GROUND
             for link, mark in ((str(entry.link), "?" if plain else name), (reacts, f"{name}*-1")):
                 if link != GROUND:
-                    its = {"torque_N_m": [mark] * n, "omega_rad_s": cells(turning(link))}
-                    marks.append(Mark(link, its))
+                    effort = {"torque_N_m": [mark] * n, "omega_rad_s": cells(turning(link))}
+                    marks.append(Mark(link, effort))
             continue
         i = next(i for i, g in enumerate(m.guides) if g.point == entry.slider)
         g = m.guides[i]
@@ -227,14 +227,14 @@ def _marks(motion: Motion, field: int | None) -> list[Mark]:
 
 
 def _share(name: str, factor: float) -> str:
-    """`?NAME*factor`; empty where the component is none."""
+    """Return `?NAME*factor`; empty where the factor is zero."""
     if not np.isfinite(factor) or factor == 0:
         return ""
     return name if factor == 1.0 else f"{name}*{factor!r}"
 
 
 def _guided(motion: Motion, guide: int, link: str) -> NDArray[np.float64]:
-    """The bound of the velocity of the point of a link at which a driven slider's force acts."""
+    """Bound the error of the velocity of the point at which a driven slider's force acts on a link."""
     m, r = motion.mechanism, motion.rounding
     g = m.guides[guide]
     if link == g.link:

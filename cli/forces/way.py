@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def way(analysis: Analysis) -> list[Topic]:
-    """The topics of one mechanism."""
+    """Return the topics of one mechanism."""
     instants: list[tuple[list[Column], list[Entry]]] = []
     equations: list[str] = []
     for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
@@ -41,7 +41,7 @@ def way(analysis: Analysis) -> list[Topic]:
 
 
 def _motors(analysis: Analysis) -> list[Topic]:
-    """Links that carry a motor: their common centre G′ and inertia, and the motor's torque on both (Ibrahim §2.3)."""
+    """Return the links that carry a motor: their common centre G′ and inertia, and the motor's torque on both (Ibrahim §2.3)."""
     m, motors = analysis.mechanism, []
     for motor in m.motors:
         if motor.carrier == GROUND:
@@ -85,7 +85,7 @@ def _pair(z: complex) -> str:
 
 
 def _free_bodies(analysis: Analysis) -> list[Topic]:
-    """Every link cut loose: what acts on it, as a table and as a diagram to scale."""
+    """Return the free-body diagram of every link, as a table and to scale."""
     from virtualwork.study.free_bodies import free_bodies
 
     motion = analysis.motions[0]
@@ -149,7 +149,7 @@ def _diagrams(bodies: list[FreeBody], i: int) -> Figure:
 
 
 def _pose(analysis: Analysis, i: int) -> list[Column]:
-    """The columns that name a pose: its inputs, as they are shown and as JSON has them."""
+    """Return the columns that name a pose: its inputs, as they are shown and for JSON."""
     shown = analysis.inputs.whole.shown[i].tolist()
     inputs = analysis.mechanism.inputs
     if len(inputs) == 1:
@@ -164,7 +164,7 @@ def _pose(analysis: Analysis, i: int) -> list[Column]:
 
 
 def _equations(analysis: Analysis, motion: Motion, entries: list[list[Entry]], moves: bool) -> list[str]:
-    """The balance of the first pose with its numbers."""
+    """Return the balance of the first pose with its numbers."""
     lines = []
     if motion.n * len(analysis.motions) > 1:
         lines.append(f"Pose {analysis.inputs.whole.shown[0][0]:g}; the others in the same way.")

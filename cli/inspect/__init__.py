@@ -35,4 +35,4 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     cases.refuse_inputs(
         "inspect speaks of the whole range of the input: expected a dimension, links.crank.B.x=..."
     )
-    return result(Inspection(cases, show.digits, show.as_json), options, show)
+    return result(Inspection(cases, show), options)

@@ -24,7 +24,6 @@ from virtualwork.study.loops import loops
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.cases.cases import Rows
     from dalembert.results.columns import Cell, Document, Json
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
@@ -47,19 +46,19 @@ class Character(Case):
 
     @cached_property
     def statements(self) -> list[Statement]:
-        """What the study says."""
+        """The statements of the study."""
         return statements(self.check, self.analysis.unit)
 
     def documented(self) -> list[Table]:
-        """The statements as JSON has them."""
+        """Return the statements for JSON."""
         return [Table([names(each.name, [each.value]) for each in self.statements], place="check")]
 
     def table(self) -> Table:
-        """A row for each number of a statement, named as in JSON."""
+        """Return a row for each number of a statement, named as in JSON."""
         return listed(("quantity", "of", "value"), [row for each in self.statements for row in each.rows])
 
     def further(self) -> dict[str, Callable[[], Table]]:
-        """The order of solution; what does work."""
+        """Return the order of solution, the operations, and the loads that do work."""
         return {
             "order of solution": lambda: order(self.analysis),
             "operations a pose": lambda: operations(self.analysis),
@@ -67,17 +66,17 @@ class Character(Case):
         }
 
     def warnings(self) -> list[str]:
-        """What is remarkable about its branches."""
+        """Return the warnings of its branches and cams."""
         own = self.analysis.mechanism.assembly.track.warnings()
         return [*self.analysis.warnings, *own, *(line for cam in self.check.cams for line in cam.warnings)]
 
     def way(self) -> list[Topic]:
-        """Mobility, loops, four-bars."""
+        """Return mobility, loops and four-bars."""
         four_bars = next(each.value for each in self.statements if each.name == "four_bars")
         return way(self.analysis.mechanism, self.check, four_bars)
 
     def figure(self) -> Figure:
-        """The mechanism in its own pose."""
+        """Draw the mechanism in its own pose."""
         from cli.cases.picture import drawn
 
         return drawn(self.analysis)
@@ -90,9 +89,8 @@ class Inspection(Study):
     title = "check"
     method = METHOD
 
-    def case(self, row: Rows | None = None) -> Character:
-        """Return the character of the variant of a row, or of the mechanism itself."""
-        analysis = self.cases.analysis(row)
+    def case(self, analysis: Analysis) -> Character:
+        """Return the character of one mechanism."""
         _ = analysis.mechanism.assembly
         return Character(self, replace(analysis, inputs=analysis.inputs.part(0, 1)))
 
@@ -113,7 +111,7 @@ class Statement(NamedTuple):
 
 
 def statements(check: Check, unit: str) -> list[Statement]:
-    """The character of a mechanism; `unit`: of its input, deg or m."""
+    """Return the character of a mechanism; `unit`: of its input, deg or m."""
     groups, four_bars = list(check.groups), list(map(_four_bar, check.four_bars))
     strokes = [_stroke(stroke, unit) for stroke in check.strokes]
     kinds = [("group", " + ".join(g["links"]), f"{g['kind']}, {g['method']}") for g in groups]
@@ -146,7 +144,7 @@ def statements(check: Check, unit: str) -> list[Statement]:
 
 
 def _cams(check: Check) -> Statement:
-    """Of every cam the largest pressure angle, the least radius of its profile, the speed of lift-off."""
+    """Return the largest pressure angle, the least radius of the profile and the speed of lift-off of every cam."""
     entries: list[Document] = []
     for number, cam in enumerate(check.cams):
         entry: Document = {
@@ -167,7 +165,7 @@ def _cams(check: Check) -> Statement:
 
 
 def _stroke(stroke: Stroke, unit: str) -> tuple[str, dict[str, float]]:
-    """Its name, and its numbers by their keys."""
+    """Return the name of a stroke, and its numbers by their keys."""
     own = "deg" if stroke.turns else "m"
     numbers = {"least": (stroke.least, own), "at": (stroke.at, unit)}
     numbers |= {"most": (stroke.most, own), "most_at": (stroke.most_at, unit)}
@@ -177,7 +175,7 @@ def _stroke(stroke: Stroke, unit: str) -> tuple[str, dict[str, float]]:
 
 
 def _four_bar(four_bar: FourBar) -> tuple[Document, list[tuple[str, str, Cell]]]:
-    """Its entry in JSON, and its rows."""
+    """Return the entry of a four-bar in JSON, and its rows."""
     links, name = list(four_bar.links), ", ".join(four_bar.links)
     angles = [finite(math.degrees(angle)) for angle in four_bar.transmission]
     entry: Document = {"links": links, "grashof": four_bar.grashof, "transmission_deg": angles}
@@ -189,7 +187,7 @@ def _four_bar(four_bar: FourBar) -> tuple[Document, list[tuple[str, str, Cell]]]
 
 
 def _inputs(header: str, values: Sequence[float] | None, unit: str) -> Statement:
-    """Special inputs; an end of the range where it goes on is open, null in JSON."""
+    """Return special inputs; an open end of the range is null in JSON."""
     shown = None if values is None else [finite(v if unit == "m" else math.degrees(v)) for v in values]
     cells: list[Cell] = ["open" if value is None else value for value in shown or ()] or ["none"]
     several = len(cells) > 1
@@ -200,7 +198,7 @@ def _inputs(header: str, values: Sequence[float] | None, unit: str) -> Statement
 
 # --- how it is solved -------------------------------------------------------------------------------------------------
 def order(analysis: Analysis) -> Table:
-    """The order of solution, a row for each step."""
+    """Return the order of solution, a row for each step."""
     m, plan = analysis.mechanism, analysis.assemblies[0].plan
     rows: list[tuple[Cell, ...]] = []
     for i, step in enumerate(plan.steps, 1):
@@ -221,7 +219,7 @@ def order(analysis: Analysis) -> Table:
 
 
 def operations(analysis: Analysis) -> Table:
-    """Operations that a pose costs: all its points and links, with rates where the input has any, and all its forces.
+    """Count the operations of a pose: all its points and links, with rates where the input has any, and all its forces.
 
     Before them those of the quantities that --only names.
     """
@@ -247,7 +245,7 @@ def operations(analysis: Analysis) -> Table:
 
 
 def working(analysis: Analysis) -> Table:
-    """Of each load whether it does work at each input, and which kinds of loads there are none of."""
+    """Return whether each load does work at each input, and the kinds of loads that are absent."""
     from virtualwork.study.ledger import ledger
 
     motion = analysis.motions[0]
@@ -281,7 +279,7 @@ def _angle_text(analysis: Analysis, step: Turn) -> str:
 
 
 def way(m: Mechanism, check: Check, four_bars: Any) -> list[Topic]:
-    """The topics; `four_bars`: what JSON has of them."""
+    """Return the topics; `four_bars`: their entries in JSON."""
     n = len(m.links)
     held = sum((len(joint.bodies) - 1) * 2 if joint.guide is None else 1 for joint in joints(m))
     tied = [r for r in relations(m) if r.kind != "input"]

@@ -52,4 +52,4 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     from cli.mechanism.newton import Poses
 
     cases, root = with_root(Cases.of(options), options)
-    return result(Poses(cases, show.digits, show.as_json, newton=options.newton), options, show, root)
+    return result(Poses(cases, show, newton=options.newton), options, root)

@@ -72,7 +72,7 @@ class Poses(PoseStudy):
 
 
 def iterates(analysis: Analysis) -> dict[str, Table]:
-    """Newton-Raphson from the guess at every pose; the iterates of the first, the largest difference of all."""
+    """Solve every pose by Newton-Raphson from the guess; return the iterates of the first and the largest difference."""
     from virtualwork.study.newton_table import all_at_once
 
     assembly = analysis.assemblies[0]

@@ -53,7 +53,7 @@ KEYS = (
 
 
 def way(analysis: Analysis, *, newton: bool = False) -> list[Topic]:
-    """The topics of one mechanism, of each assembly after the other."""
+    """Return the topics of one mechanism, one assembly after the other."""
     result: list[Topic] = []
     several = analysis.several
     for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
@@ -106,11 +106,11 @@ def _groups(analysis: Analysis, motion: Motion) -> list[Topic]:
         if first is None:
             parts.append("It cannot be assembled.")
         else:
-            its = at[first]
-            assert its is not None
+            instant = at[first]
+            assert instant is not None
             if len(at) > 1:
                 parts.append(f"At {analysis.pose_text(first)}:")
-            parts += _root_text(group, its)
+            parts += _root_text(group, instant)
         parts.append(_root_table(analysis, m, group, name, at))
         groups.append(Topic("group", parts, title, head))
     return groups
@@ -184,10 +184,10 @@ def _vector(z: complex) -> str:
 
 def _root_table(analysis: Analysis, m: Any, group: Group, name: str, at: list[GroupAt | None]) -> Table:
     rows = [
-        (i, k, root, its.taken == k)
-        for i, its in enumerate(at)
-        if its is not None
-        for k, root in enumerate(its.roots, 1)
+        (i, k, root, instant.taken == k)
+        for i, instant in enumerate(at)
+        if instant is not None
+        for k, root in enumerate(instant.roots, 1)
     ]
     inputs = [
         Column(
@@ -285,7 +285,7 @@ def _finite(values: list[float]) -> list[float | None]:
 
 
 def _first_step(keys: list[str], entry: Document) -> list[str | Table]:
-    """The system of the first step with its numbers."""
+    """Return the system of the first step with its numbers."""
     names_of = [key.rpartition("_")[0] for key in keys]
     system = Table(
         [

@@ -45,5 +45,5 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
         raise bad("--until", "expected no --page: its variants have one clock; --set shows one of them")
     times, accuracy = times_and_accuracy(options.time, options.accuracy)
     cases = Cases.of(options, 2, forces=options.forces).at_start()
-    study = Simulation(cases, show.digits, show.as_json, times=times, accuracy=accuracy, until=options.until)
-    return result(study, options, show)
+    study = Simulation(cases, show, times=times, accuracy=accuracy, until=options.until)
+    return result(study, options)

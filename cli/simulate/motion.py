@@ -22,7 +22,6 @@ from dalembert.arithmetic.engines import anew
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table, document, names, number
-from dalembert.results.way import Topic, figures
 from virtualwork import MechanismError, quantities
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.forces import Shaking
@@ -34,9 +33,9 @@ if TYPE_CHECKING:
 
     from cli.cases.cases import Rows
     from dalembert.results.columns import Document
+    from dalembert.results.way import Topic
     from virtualwork import Mechanism
     from virtualwork.animation import Series
-    from virtualwork.describe.parts import Input
     from virtualwork.intime.run import Run
     from virtualwork.intime.travel import Moved, Travel
 
@@ -57,7 +56,7 @@ TOGETHER, ONE_BY_ONE = 512, 8
 
 
 def times_and_accuracy(time: str, accuracy: float | None) -> tuple[list[float], float]:
-    """The times and the accuracy."""
+    """Read the times and the accuracy."""
     times = options.time_range("--time", time)
     if len(times) > 1 and times[1] < times[0]:
         raise options.bad("--time", f"'{time}': expected rising times")
@@ -99,7 +98,7 @@ class Motion(Case):
 
     @cached_property
     def _wanted(self) -> list[Component]:
-        """What is requested in addition to the inputs and the energy."""
+        """The components that are requested in addition to the inputs and the energy."""
         return [*(self.analysis.places if self.analysis.request.only is not None else []), *self._forces]
 
     @property
@@ -117,7 +116,7 @@ class Motion(Case):
     def values(
         self, way: Travel, wanted: Sequence[Component], times: Reals | None = None, moved: Moved | None = None
     ) -> Values:
-        """The inputs, the energy and some quantities, of one of the two solutions; `moved`: with other states."""
+        """Return the inputs, the energy and some quantities of one of the two solutions; `moved`: with other states."""
         m, t = self.analysis.mechanism, self.run.t if times is None else times
         q, v, acceleration, _ = way.at(t)
         if moved is not None:
@@ -158,13 +157,15 @@ class Motion(Case):
         return errors
 
     def table(self) -> Table:
-        """A row for each time."""
+        """Return a row for each time."""
         columns = columns_of(self.run.t, self.shown, self._error if self.study.needs_errors else None)
         return Table(columns, keys=("t_s",))
 
     def pattern(self) -> Table:
-        """The columns, from the first time alone."""
-        first = replace(self.study, times=self.study.times[:1], until=None, digits=False)
+        """Return the columns, from the first time alone."""
+        first = replace(
+            self.study, times=self.study.times[:1], until=None, show=replace(self.study.show, digits=False)
+        )
         return Motion(first, self.analysis).table()
 
     @cached_property
@@ -180,11 +181,11 @@ class Motion(Case):
         return bounds_of(error)
 
     def further(self) -> dict[str, Callable[[], Table]]:
-        """How it was integrated, and how exactly."""
+        """Return the table of the integration."""
         return {"integration": self.integration}
 
     def integration(self) -> Table:
-        """How it was integrated, and how exactly: method, steps, errors of the inputs, energy."""
+        """Return how it was integrated, and how exactly: method, steps, errors of the inputs, energy."""
         run, inputs = self.run, self.analysis.mechanism.inputs
         of_run = [
             Column(
@@ -202,7 +203,7 @@ class Motion(Case):
         return Table([drift(run.energy_drift), *of_run, *errors], place="")
 
     def document(self) -> Document:
-        """What the JSON document has of it."""
+        """Return the JSON document."""
         shown, request = self.shown, self.analysis.request
         if request.only is None:
             # in addition to the forces all points and links
@@ -211,15 +212,17 @@ class Motion(Case):
         return documents(self.run.t, shown, self.integration())
 
     def warnings(self) -> list[str]:
-        """Where it ends, and what is doubtful."""
+        """Return the warnings: an early end, and doubts."""
         return [*self.analysis.warnings, *self.run.warnings]
 
     def way(self) -> list[Topic]:
-        """The start, and the energy."""
+        """Return the start, and the energy."""
+        from cli.simulate.way import way
+
         return way(self.run, self.analysis.mechanism.inputs)
 
     def figure(self) -> Figure:
-        """Inputs, speeds and energy over time, and the mechanism at instants."""
+        """Draw inputs, speeds and energy over time, and the mechanism at instants."""
         from cli.show.picture import blank
 
         drawn = blank()
@@ -227,7 +230,7 @@ class Motion(Case):
         return drawn
 
     def series(self, variant: str, units: str | None) -> Series:
-        """All points and links over time for a page, whatever --only names."""
+        """Return all points and links over time for a page, whatever --only names."""
         from virtualwork.animation import JointForce
 
         a, m = self.analysis, self.analysis.mechanism
@@ -264,10 +267,10 @@ class Simulation(Study):
     @property
     def needs_errors(self) -> bool:
         """Whether a table has the bounds of its numbers: of variants only where digits are cut by them."""
-        return self.digits or not self.cases.names
+        return self.show.digits or not self.cases.names
 
     def levels(self, m: Mechanism) -> dict[str, float] | None:
-        """The inputs at which it ends, SI."""
+        """Return the inputs at which it ends, SI."""
         if self.until is None:
             return None
         shown = input_values(m, self.until, "--until", self.cases.bare)
@@ -276,24 +279,24 @@ class Simulation(Study):
             for j, value in shown.items()
         }
 
-    def case(self, row: Rows | None = None) -> Motion:
-        """Return the motion of the variant of a row, or of the mechanism itself."""
-        motion = Motion(self, self.cases.analysis(row), alone=row is None)
+    def case(self, analysis: Analysis) -> Motion:
+        """Return the motion of one mechanism."""
+        motion = Motion(self, analysis, alone=not self.cases.names)
         if len(motion.analysis.assemblies) > 1:
             raise options.bad("--branch", "simulate follows one assembly: expected its number")
         return motion
 
     def size(self, json: bool, together: bool) -> int:
-        """How many variants a part has."""
+        """Return the number of variants of a part."""
         return TOGETHER if self.at_once else ONE_BY_ONE
 
     @property
     def frames(self) -> int:
-        """How many states of a variant the page shows."""
+        """The number of states of a variant that the page shows."""
         return len(self.times)
 
     def page(self, cases: Sequence[tuple[str, Case]], units: str | None) -> bytes:
-        """The page of motions under forces: that which goes on for longest is drawn in full, the others as ghosts."""
+        """Return the page of motions under forces: the longest is drawn in full, the others as ghosts."""
         from virtualwork.animation import moving_page
 
         series = []
@@ -311,10 +314,10 @@ class Simulation(Study):
     def at_once(self) -> bool:
         """Whether the inputs and the energy are all that is shown, which variants have as lanes; JSON has points and links."""
         r = self.cases.request
-        return r.only is None and r.branch is None and not (r.forces or self.digits or self.json)
+        return r.only is None and r.branch is None and not (r.forces or self.show.digits or self.json)
 
     def each(self, rows: Rows) -> Iterator[tuple[Case | None, list[str]]]:
-        """The cases of some variants, each with its remarks; None where one cannot be simulated."""
+        """Yield the cases of some variants, each with its warnings; None where one cannot be simulated."""
         anew()
         if self.at_once:
             yield from _lanes(self, rows)
@@ -331,16 +334,16 @@ class Lane(Case):
     drift: Reals
 
     def tables(self) -> Iterator[Table]:
-        """A row for each time."""
+        """Yield a row for each time."""
         yield Table(columns_of(self.t, self.values), keys=("t_s",))
 
     def document(self) -> Document:
-        """What the JSON document has of it."""
+        """Return the JSON document."""
         return documents(self.t, self.values, Table([drift(self.drift)], place=""))
 
 
 def _lanes(study: Simulation, rows: Rows) -> Iterator[tuple[Case | None, list[str]]]:
-    """Variants that are simulated together."""
+    """Simulate variants together, and yield them."""
     m = study.cases.mechanism
     try:
         runs = m.vary(study.cases.in_si(rows)).simulate(
@@ -348,22 +351,26 @@ def _lanes(study: Simulation, rows: Rows) -> Iterator[tuple[Case | None, list[st
         )
     except ValueError as error:
         raise DataError(f"{study.cases.request.file}: {error}") from None
-    for i, there in enumerate(np.isfinite(runs.times)):
+    for i, reached in enumerate(np.isfinite(runs.times)):
         remarks = list(runs.warnings.get(i, ()))
-        if not there.any():
+        if not reached.any():
             yield None, remarks
             continue
         of = (runs.angle, runs.speed, runs.acceleration, runs.error_estimate)
-        values = inputs_of(m, *(x[i, there] for x in of)) | {ENERGY: runs.energy[i, there]}
+        values = inputs_of(m, *(x[i, reached] for x in of)) | {ENERGY: runs.energy[i, reached]}
         yield (
-            Lane(runs.times[i, there], trusted(values, runs.unknown[i, there]), runs.energy_drift[i, there]),
+            Lane(
+                runs.times[i, reached],
+                trusted(values, runs.unknown[i, reached]),
+                runs.energy_drift[i, reached],
+            ),
             remarks,
         )
 
 
 # --- numbers over time ------------------------------------------------------------------------------------------------
 def inputs_of(m: Mechanism, q: Reals, v: Reals, a: Reals, error: Reals) -> Values:
-    """The inputs, their rates and errors (n, k), as they are shown."""
+    """Return the inputs, their rates and errors (n, k), as they are shown."""
     result: Values = {}
     for j, entry in enumerate(m.inputs):
         lead = f"{entry.name}_input_" if len(m.inputs) > 1 else "input_"
@@ -372,14 +379,14 @@ def inputs_of(m: Mechanism, q: Reals, v: Reals, a: Reals, error: Reals) -> Value
             values = (_degrees(q[:, j]), *values[1:3], np.degrees(error[:, j]))
         unit = "m" if entry.is_slide else "deg"
         names = *(SLIDE if entry.is_slide else INPUT)[:3], f"error_estimate_{unit}"
-        for name, its in zip(names, values, strict=True):
+        for name, numbers in zip(names, values, strict=True):
             header = f"{lead}{unit if name in (SLIDE[0], INPUT[0]) else name}"
-            result[Component(("inputs", entry.name, name), header)] = its
+            result[Component(("inputs", entry.name, name), header)] = numbers
     return result
 
 
 def _degrees(q: Reals) -> Reals:
-    """An input in degrees; where it starts, and where it may have been told to end, as it was written."""
+    """Return an input in degrees; its first and last value as they are written."""
     angle = np.degrees(q)
     for i in {0, len(q) - 1}:
         angle[i] = read_degrees(float(q[i]))
@@ -391,7 +398,7 @@ def _is_error(each: Component) -> bool:
 
 
 def trusted(values: Values, unknown: NDArray[np.bool_]) -> Values:
-    """Values without those of which no digit holds: what stays are the errors, and the energy, which has its own."""
+    """Return the values with NaN where no digit holds; the errors stay, and the energy, which has its own error."""
     if not unknown.any():
         return values
     return {
@@ -403,7 +410,7 @@ def trusted(values: Values, unknown: NDArray[np.bool_]) -> Values:
 def columns_of(
     t: Reals, values: Mapping[Component, Reals], error: Callable[[Component], list[float]] | None = None
 ) -> list[Column]:
-    """The numbers at each time as columns."""
+    """Return the numbers at each time as columns."""
     columns = [column("t_s", t.tolist())]
     for each, of in values.items():
         bounds = None if error is None or _is_error(each) else partial(error, each)
@@ -412,39 +419,13 @@ def columns_of(
 
 
 def documents(t: Reals, values: Values, further: Table) -> Document:
-    """The numbers at each time, and how they were computed, as JSON has them."""
+    """Return the numbers at each time and the integration, for JSON."""
     numbers = {each: cells(of) for each, of in values.items()}
     rows = list(in_rows({"t_s": t.tolist(), **nested(numbers, len(t))}, len(t)))
     return {"time": rows, **document([further])}
 
 
 def drift(change: Reals) -> Column:
-    """The change of energy that the work of the loads does not explain: the largest, with its sign."""
-    there = change[np.isfinite(change)]
-    return number("energy_drift", "energy", [there[np.argmax(np.abs(there))] if len(there) else np.nan])
-
-
-def way(run: Run, inputs: Sequence[Input]) -> list[Topic]:
-    """The topics."""
-    q, v, a = (np.asarray(each, dtype=float) for each in (run.angle[0], run.speed[0], run.acceleration[0]))
-    law = [
-        "The inputs are free: by d'Alembert's principle M(q)·q̈ + h(q, q̇, t) = 0, the effort at every input being nothing "
-        "(Riul, unit II, eq. 5, solved for the accelerations).",
-    ]
-    for entry, place, speed, rate in zip(inputs, q.tolist(), v.tolist(), a.tolist(), strict=True):
-        unit = "m" if entry.is_slide else "rad"
-        law.append(
-            f"  at t = {figures(float(run.t[0]))} s: {entry.name} = {figures(place)} {unit}, speed {figures(speed)} {unit}/s, "
-            f"acceleration {figures(rate)} {unit}/s²"
-        )
-    energy = np.asarray(run.energy, dtype=float)
-    first, last = float(energy[0]), float(energy[-1])
-    drift = float(np.abs(run.energy_drift).max())
-    balance = [
-        f"E = T + V (gravity, springs): {figures(first)} J at t = {figures(float(run.t[0]))} s, "
-        f"{figures(last)} J at t = {figures(float(run.t[-1]))} s",
-        f"  E_end − E_start = {figures(last - first)} J is the work of applied loads, dampers and friction; unexplained {figures(drift)} J",
-    ]
-    start = {"angle": q.tolist(), "speed": v.tolist(), "acceleration": a.tolist()}
-    head = {"start_J": first, "end_J": last, "energy_drift_J": drift}
-    return [Topic("start", law, "Equation of motion", start), Topic("energy", balance, "Energy", head)]
+    """Return the largest change of energy that the work of the loads does not explain, with its sign."""
+    finite = change[np.isfinite(change)]
+    return number("energy_drift", "energy", [finite[np.argmax(np.abs(finite))] if len(finite) else np.nan])

@@ -49,11 +49,10 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     workers = 1 if cases.varied is not None else options.workers or 1
     study = Spreads(
         cases,
-        show.digits,
-        show.as_json,
+        show,
         draws=options.draws or 0,
         seed=options.seed,
         distribution=options.distribution,
         workers=workers,
     )
-    return result(study, options, show)
+    return result(study, options)

@@ -1,4 +1,4 @@
-"""What the tolerances of the file do to every number that is shown: to first order, by drawn mechanisms, as a picture."""
+"""The effect of the tolerances of the file on every number: to first order, from drawn mechanisms, as a picture."""
 
 from __future__ import annotations
 
@@ -26,10 +26,9 @@ from virtualwork.quantities import Component
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
-    from cli.cases.cases import Rows
     from cli.cases.poses import Reals
-    from cli.show.commands import ShowOptions
     from dalembert.results.way import Topic
 
 # how far a drawn standard deviation may be from the linear one, in its sampling errors and by its size
@@ -44,9 +43,15 @@ class Tolerances(Case):
     study: Spreads
     analysis: Analysis
 
+    @cached_property
+    def mask(self) -> NDArray[np.bool_]:
+        """Which poses are assembled."""
+        (motion,) = self.analysis.motions
+        return self.analysis.assembled(motion)
+
     @property
     def draws(self) -> int:
-        """How many mechanisms are drawn; 0 for none."""
+        """The number of drawn mechanisms; 0 for none."""
         return self.study.draws
 
     @cached_property
@@ -62,7 +67,7 @@ class Tolerances(Case):
 
     @cached_property
     def numbers(self) -> list[Component]:
-        """What is shown and varies with the tolerances."""
+        """The components that are shown and vary with the tolerances."""
         shown = [each for each in self.analysis.tabled if each.key and not each.less]
         keys = keys_of(shown)
         varies = dict(zip(keys, self.analysis.motions[0].sensitivities.vary(keys, self.limits), strict=True))
@@ -75,7 +80,7 @@ class Tolerances(Case):
 
     @cached_property
     def slopes(self) -> dict[Quantity, list[Any]]:
-        """Of each quantity to each dimension."""
+        """The derivative of each quantity to each dimension."""
         result = self.analysis.motions[0].sensitivities.of(self.keys, list(self.limits))
         return dict(zip(self.keys, result, strict=True))
 
@@ -102,8 +107,8 @@ class Tolerances(Case):
                 whole &= assembled.all(axis=1)
                 solved = dict(zip(self.keys, values, strict=True))
                 for number in self.numbers:
-                    its, mean = number.of(solved[number.key]), number.of(nominal[number.key][rows])
-                    parts[number.header].append(summary(its, mean, 360.0 if number.link else None))
+                    sample, mean = number.of(solved[number.key]), number.of(nominal[number.key][rows])
+                    parts[number.header].append(summary(sample, mean, 360.0 if number.link else None))
         joined = {
             header: Drawn(*(np.concatenate([getattr(p, name) for p in some], axis=-1) for name in _FIELDS))
             for header, some in parts.items()
@@ -117,11 +122,16 @@ class Tolerances(Case):
     def warnings(self) -> list[str]:
         """Return the warnings of the poses, and where the first order is not enough."""
         a = self.analysis
-        lines = [*a.warnings, *remarks.limits(a), *(remarks.of_forces(a) if a.forces else [])]
+        gap = ~self.mask
+        lines = [
+            *a.warnings,
+            *remarks.limits(a, [(int(gap.sum()), int(np.argmax(gap)))]),
+            *(remarks.of_forces(a) if a.forces else []),
+        ]
         return [*lines, *self.apart()]
 
     def apart(self) -> list[str]:
-        """Where the first order is not enough: the drawn standard deviation is another."""
+        """Return the warnings of numbers whose drawn standard deviation differs from that of first order."""
         if not self.numbers:
             return [
                 "none of the numbers shown varies with [tolerances]: they have none, nor a picture of them"
@@ -133,17 +143,17 @@ class Tolerances(Case):
         sampling = SURE / np.sqrt(2 * max(self.draws - 1, 1))
         # a uniform distribution between the limits is wider than a normal one of a third of them
         wider = np.sqrt(3.0) if self.study.distribution == "uniform" else 1.0
-        for header, its in samples.items():
+        for header, sample in samples.items():
             linear = self.linear[header].sd * wider
             with np.errstate(invalid="ignore", divide="ignore"):
-                apart = np.abs(its.sd - linear) / linear
+                apart = np.abs(sample.sd - linear) / linear
             apart[~(linear > 1e-9 * np.nanmax(linear, initial=0.0))] = 0.0
             if np.nanmax(apart, initial=0.0) > sampling + APART:
                 i = int(np.nanargmax(apart))
                 shown = self.analysis.inputs.whole.shown[i, 0]
                 lines.append(
                     f"{header}: linear estimate unreliable at input {shown:g} {self.analysis.unit}: standard deviation "
-                    f"{linear[i]:.6g}, but {its.sd[i]:.6g} from the drawn mechanisms"
+                    f"{linear[i]:.6g}, but {sample.sd[i]:.6g} from the drawn mechanisms"
                 )
         if whole < 1:
             lines.append(
@@ -152,7 +162,7 @@ class Tolerances(Case):
         return lines
 
     def table(self) -> Table:
-        """The table of poses, each number with its worst case and its standard deviation."""
+        """Return the table of poses, each number with its worst case and its standard deviation."""
         base = poses.table(self.analysis)
         columns: list[Column] = []
         further: list[Column] = []
@@ -166,9 +176,9 @@ class Tolerances(Case):
                 place = (*lead, "columns", base.header, name)
                 return Column(f"{base.name}_{shown}", base.unit, cells(values), place=place)
 
-            its = self.linear[header]
+            effect = self.linear[header]
             columns += [
-                of(name, values, shown=name) for name, values in (("worst", its.worst), ("sd", its.sd))
+                of(name, values, shown=name) for name, values in (("worst", effect.worst), ("sd", effect.sd))
             ]
             if self.draws:
                 sample = self.drawn[0][header]
@@ -183,20 +193,20 @@ class Tolerances(Case):
         return Table(columns, base.keys, "tolerance", by_column=True, documented=further)
 
     def further(self) -> dict[str, Callable[[], Table]]:
-        """Which share of the variance each dimension has; how the mechanisms were drawn."""
+        """Return the largest shares of the variance, and how the mechanisms were drawn."""
         tables: dict[str, Callable[[], Table]] = {"largest shares": self.largest} if self.linear else {}
         return tables | ({"drawn": self.drawing} if self.draws else {})
 
     def documented(self) -> list[Table]:
-        """The numbers of every pose, of which there may be none, and the shares of them."""
+        """Return the numbers of every pose, which may be none, and their shares."""
         tables = [Table([], place="tolerance.columns", by_column=True), self.table(), self.shares()]
         return [*tables, *([self.drawing()] if self.draws else [])]
 
     def shares(self) -> Table:
-        """The shares of the variance over the poses, a row for each number and dimension."""
+        """Return the shares of the variance over the poses, a row for each number and dimension."""
         rows = [
-            (d.path, header, cells(its.shares[i]))
-            for header, its in self.linear.items()
+            (d.path, header, cells(effect.shares[i]))
+            for header, effect in self.linear.items()
             for i, d in enumerate(self.limits)
         ]
         columns = [
@@ -205,11 +215,11 @@ class Tolerances(Case):
         return Table(columns, ("column", "path"), "tolerance.shares[]")
 
     def largest(self) -> Table:
-        """Which dimensions matter most to each number, in the mean of the poses."""
+        """Return the dimensions with the largest shares of each number, in the mean of the poses."""
         texts = []
-        for its in self.linear.values():
-            finite = np.isfinite(its.shares).any()
-            mean = np.nanmean(its.shares, axis=1) if finite else np.zeros(len(self.limits))
+        for effect in self.linear.values():
+            finite = np.isfinite(effect.shares).any()
+            mean = np.nanmean(effect.shares, axis=1) if finite else np.zeros(len(self.limits))
             order = np.argsort(-mean, kind="stable")[:3]
             paths = [d.path for d in self.limits]
             texts.append(", ".join(f"{paths[i]} {mean[i] * 100:.3g} %" for i in order if mean[i] > 0))
@@ -218,7 +228,7 @@ class Tolerances(Case):
         return Table(columns, ("column",), "", above=above)
 
     def drawing(self) -> Table:
-        """How the mechanisms were drawn."""
+        """Return how the mechanisms were drawn."""
         study = self.study
         columns = [names("draws", [self.draws]), names("seed", [study.seed])]
         columns += [names("distribution", [study.distribution]), names("assembled", [self.drawn[1]])]
@@ -226,8 +236,7 @@ class Tolerances(Case):
 
     def assembled(self, rows: int = 0) -> list[bool] | bool:
         """Return whether the pose of each row is assembled; where the rows are no poses, whether any is."""
-        (motion,) = self.analysis.motions
-        whole: list[bool] = self.analysis.assembled(motion).tolist()
+        whole: list[bool] = self.mask.tolist()
         return whole if rows == len(whole) else any(whole)
 
     @property
@@ -236,24 +245,24 @@ class Tolerances(Case):
         return bool(self.numbers)
 
     def way(self) -> list[Topic]:
-        """The terms of every dimension."""
+        """Return the terms of every dimension."""
         from cli.tolerance.way import way
 
         return way(self.analysis, self.numbers, self.slopes, self.limits)
 
     def figure(self) -> Figure:
-        """The band of paths, and which dimension has which share."""
+        """Draw the band of paths, and the share of each dimension."""
         return draw(self)
 
 
 @dataclass(frozen=True)
 class Spreads(Study):
-    """What the tolerances do to every case.
+    """Compute the effect of the tolerances on every case.
 
     Attributes
     ----------
     draws : int
-        How many mechanisms are drawn; 0 for none.
+        The number of drawn mechanisms; 0 for none.
     seed : int
     distribution : str
         `normal` or `uniform`.
@@ -274,20 +283,20 @@ class Spreads(Study):
         """Return the warnings of rates without a speed, and forces without a mass or a load."""
         return remarks.without_meaning(self.cases.nominal, self.cases.names)
 
-    def case(self, row: Rows | None = None) -> Tolerances:
-        """Return the effect on the variant of a row, or on the mechanism itself."""
-        analysis = self.cases.analysis(row)
+    def case(self, analysis: Analysis) -> Tolerances:
+        """Return the effect on one mechanism."""
         _ = analysis.motions
         return Tolerances(self, analysis)
 
-    def check_size(self, show: ShowOptions, times: int) -> None:
+    def check_size(self, times: int) -> None:
         """Refuse more poses than the memory holds."""
+        show = self.show
         self.cases.nominal.check_size(json=show.as_json, table=show.needs_table, times=times)
 
 
-def _sample(its: Drawn) -> dict[str, Reals]:
-    """Mean, standard deviation and quantiles of what was drawn, by the names that they are shown under."""
-    return dict(zip(("mean", "sd", *NAMES), (its.mean, its.sd, *its.quantiles), strict=True))
+def _sample(sample: Drawn) -> dict[str, Reals]:
+    """Return mean, standard deviation and quantiles of drawn mechanisms, by the names of their columns."""
+    return dict(zip(("mean", "sd", *NAMES), (sample.mean, sample.sd, *sample.quantiles), strict=True))
 
 
 _FIELDS = ("mean", "sd", "quantiles", "errors")
@@ -299,7 +308,7 @@ BARS = 10
 
 
 def draw(tolerances: Tolerances) -> Figure:
-    """The band of the path of each point, and the shares; without points, bands over the input."""
+    """Draw the band of the path of each point, and the shares; without points, bands over the input."""
     from matplotlib.figure import Figure
 
     points = [each.key for each in tolerances.numbers if isinstance(each.key, Point) and not each.key.order]
@@ -362,7 +371,7 @@ def _paths(axes: Axes, tolerances: Tolerances, points: list[Point]) -> None:
 
 
 def _over_input(axes: Axes, tolerances: Tolerances, header: str) -> None:
-    """A number over the input, with its worst case."""
+    """Draw a number over the input, with its worst case."""
     base = next(c for c in tolerances.table().columns if c.header == header)
     q = tolerances.analysis.inputs.whole.shown[:, 0]
     values = np.array([np.nan if v is None else float(v) for v in base.values])
@@ -376,7 +385,7 @@ def _over_input(axes: Axes, tolerances: Tolerances, header: str) -> None:
 
 
 def _shares(axes: Axes, tolerances: Tolerances, keys: Sequence[Quantity], of: str) -> None:
-    """Bars of the shares, means over the poses."""
+    """Draw bars of the shares, means over the poses."""
     variances = np.zeros(len(tolerances.limits))
     for key in keys:
         slopes = (

@@ -24,7 +24,7 @@ def way(
     slopes_of: Mapping[Quantity, Sequence[Any]],
     limits: Mapping[Dimension, float],
 ) -> list[Topic]:
-    """The one topic: at the first pose that is assembled."""
+    """Return the one topic: the terms at the first pose that is assembled."""
     whole = analysis.motions[0].assembled
     if not shown or not whole.any():
         return [

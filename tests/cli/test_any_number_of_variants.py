@@ -14,6 +14,7 @@ from cli.cases.inputs import Grid, Varied, listed
 from cli.cases.loop import Loop
 from cli.forces.cycle import Forces
 from cli.mechanism.newton import Poses
+from cli.show.commands import ShowOptions
 from virtualwork import Mechanism
 from virtualwork.describe.dimensions import dimensions
 
@@ -82,7 +83,7 @@ def many(text, rows, at=range(0, 360, 60), one_by_one=False, **request):
     _, moved = grids(m, None if at is None else [f"{angle}deg" for angle in at], None, None, {}, [])
     kinds = (Forces, ForcesOneByOne) if request.get("forces") else (Poses, PosesOneByOne)
     cases = Cases(Request("m.toml", **request), m, {}, varied, moved)
-    study = kinds[one_by_one](cases, False, False)
+    study = kinds[one_by_one](cases, ShowOptions())
     if not one_by_one:
         assert study.together(np.array(list(OWN[text].values())), json=True) is not None
     return Loop(study)

@@ -16,6 +16,7 @@ from cli.cases.cases import Cases
 from cli.cases.inputs import Grid, Varied, listed
 from cli.cases.loop import Loop, unchanged
 from cli.mechanism.newton import Poses
+from cli.show.commands import ShowOptions
 from dalembert.errors import DataError
 from virtualwork import Mechanism
 from virtualwork.describe.dimensions import dimensions
@@ -160,7 +161,7 @@ def question(v):
     )
     _, moved = grids(m, ["40deg"], None, None, {}, [])
     cases = Cases(Request("m.toml", order=0, branch="1"), m, {}, varied, moved)
-    return Loop(Poses(cases, False, False), 2)
+    return Loop(Poses(cases, ShowOptions()), 2)
 
 
 def test_a_part_whose_worker_died_is_done_again(tmp_path):
