@@ -165,7 +165,11 @@ def _stands(d: Drawing, s: Slide) -> complex:
 
 def _link(b: Body, origin: complex) -> Link:
     points = _places(b.points, origin)
-    return Link(points, b.mass, complex(b.center - origin), b.inertia) if b.mass > 0 else Link(points)
+    return (
+        Link(points, b.mass, complex(b.center - origin), b.inertia)
+        if b.mass > 0 or b.inertia > 0
+        else Link(points)
+    )
 
 
 def _origin(d: Drawing, name: str, body: Body) -> complex:

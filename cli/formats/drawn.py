@@ -67,11 +67,13 @@ def together(parts: Sequence[tuple[float, complex, float]]) -> tuple[float, comp
     """Return mass, centre and moment of inertia of several masses as one body (Huygens-Steiner)."""
     heavy = [part for part in parts if part[0] != 0]
     if len(heavy) <= 1:
-        return heavy[0] if heavy else parts[0]
+        # wheels on fixed axles may have a moment of inertia and no mass
+        mass, center, _ = heavy[0] if heavy else parts[0]
+        return mass, center, math.fsum(i for _, _, i in parts)
     mass = math.fsum(m for m, _, _ in heavy)
     x, y = (sum(exact(m) * coordinates(c)[k] for m, c, _ in heavy) / exact(mass) for k in (0, 1))
     center = Exact(Fraction(x), Fraction(y))
-    return mass, center, math.fsum(i + m * apart(c, center) ** 2 for m, c, i in heavy)
+    return mass, center, math.fsum(i + m * apart(c, center) ** 2 for m, c, i in parts)
 
 
 def damaged(file: str, where: str, value: object, expected: str) -> DataError:

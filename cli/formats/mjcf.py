@@ -408,7 +408,7 @@ def _body(s: Skeleton, b: Branching, inside: Element) -> Element:
 def _add_contents(s: Skeleton, name: str, body: Element) -> None:
     """Add what a body has: mass, named points, a drawing."""
     part = s.bodies[name]
-    if part.mass > 0:
+    if part.mass > 0 or part.inertia > 0:
         add(
             body,
             "inertial",

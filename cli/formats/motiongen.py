@@ -14,8 +14,10 @@ KEYS = {"mechanism", "units", "joints", "links", "slots", "cylinders", "actuator
 
 def read(file: str, data: Any) -> list[Drawing]:
     """Read every mechanism of a document."""
-    result = data if isinstance(data, list) else data.get("mechanisms", [data])
-    return [_Reader(file, entry).drawing() for entry in result]
+    entries = data.get("mechanisms", [data]) if isinstance(data, dict) else data
+    if not isinstance(entries, list):
+        raise damaged(file, "mechanisms", type(entries).__name__, "a list of mechanisms")
+    return [_Reader(file, entry).drawing() for entry in entries]
 
 
 def listed(entry: dict[str, Any], *keys: str) -> list[Any]:

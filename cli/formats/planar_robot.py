@@ -109,7 +109,7 @@ class _Layer:
         parts = []
         for link in links:
             held = link.inertial
-            if held is None or held.mass == 0:
+            if held is None:
                 continue
             world = link.pose @ held.pose
             n = self.plane.normal
@@ -186,12 +186,25 @@ class _Layer:
         for name, s in self.slides.items():
             for block, carrier in ((s.link, s.on), (s.on, s.link)):
                 pins = [label for label, ends in self.pins if block in {body for body, _ in ends}]
-                if not block.startswith(BLOCK) or d.bodies[block].mass > 0 or len(pins) != 1:
+                if not self._is_block(block) or len(pins) != 1:
                     continue
                 riders = [n for n, body in d.bodies.items() if pins[0] in body.points and n != block]
                 if len(riders) == 1 and riders[0] != carrier:
                     self._slot(s, self.robot.joints[name].value, block, carrier, riders[0], pins[0])
                     break
+
+    def _is_block(self, name: str) -> bool:
+        """Return whether a body has no use but in a slot: without mass, in one slide, with no gear or spring on it."""
+        body, robot = self.d.bodies[name], self.robot
+        slides = [s for s in self.slides.values() if name in (s.link, s.on)]
+        others = [link for a, b, _, arm in robot.gears for link in (a, b, arm)]
+        others += [link for spring in robot.springs for link, _ in spring.ends]
+        return (
+            name.startswith(BLOCK)
+            and body.mass == body.inertia == 0
+            and len(slides) == 1
+            and name not in map(self.name, others)
+        )
 
     def _slot(self, s: Slide, value: float, block: str, carrier: str, rider: str, pin: str) -> None:
         """Make a slot of a slide and a pin: the line goes through the pin, in the axes of the carrier."""

@@ -100,11 +100,12 @@ class _List:
                     raise damaged(self.file, what, joint, f"one of the joints {', '.join(joints)}")
                 body.points[joint] = at[joint]
             if not unset and name not in self.pistons:
-                body.mass, inertia = (finite(self.file, what, v) for v in rest[:2])
-                body.inertia = inertia * self.d.metres**2
-                body.center = self._at(what, rest[2], rest[3])
-                if body.mass < 0 or body.inertia < 0:
+                mass, inertia = (finite(self.file, what, v) for v in rest[:2])
+                center = self._at(what, rest[2], rest[3])
+                if mass < 0 or inertia < 0:
                     raise damaged(self.file, what, rest[:2], "a mass and an inertia of zero or more")
+                if mass > 0:
+                    body.mass, body.center, body.inertia = mass, center, inertia * self.d.metres**2
 
     def _drive(
         self, joints: dict[str, list[str]], slides: dict[str, Slide], rpm: str, clockwise: bool

@@ -36,7 +36,7 @@ KINDS: dict[str, Kind] = {
 MODEL = "__model__"
 # name space of the marks on numbers that the format asks for and the mechanism does not have
 SPACE = "https://dalembert.invalid/sdf"
-MASSLESS, POINT_MASS = "massless", "point_mass"
+MASSLESS, POINT_MASS, INERTIA_ALONE = "massless", "point_mass", "inertia_alone"
 PLUGIN = {"filename": "gz-sim-joint-controller-system", "name": "gz::sim::systems::JointController"}
 
 
@@ -159,7 +159,7 @@ def _inertial(at: At, element: Element | None) -> Inertial | None:
     texts = {key: text(element, "inertia", key) or str(int(key[1] == key[2])) for key in ROWS}
     for key, word in texts.items():
         at.number(key, word)
-    mass = text(element, "mass")
+    mass = "0" if child(element, INERTIA_ALONE) is not None else text(element, "mass")
     # what `dalembert export` writes beside numbers that the format asks for
     if child(element, MASSLESS) is not None:
         return None
@@ -270,7 +270,10 @@ def _add_link(s: Skeleton, model: Element, name: str, light: float) -> None:
     add_pose(link, part.at, part.turn)
     inertial = add(link, "inertial")
     mass, inertia = part.mass, part.inertia
-    if mass <= 0:
+    if mass <= 0 < inertia:
+        mass = light
+        SubElement(inertial, f"dalembert:{INERTIA_ALONE}")
+    elif mass <= 0:
         mass, inertia = light, light * s.m.size**2
         SubElement(inertial, f"dalembert:{MASSLESS}")
     elif inertia <= 0:

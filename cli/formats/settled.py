@@ -12,7 +12,7 @@ def merge(d: Drawing, keep: str, gone: str) -> None:
     if gone == GROUND:
         keep, gone = gone, keep
     a, b = d.bodies[keep], d.bodies.pop(gone)
-    if keep != GROUND and b.mass > 0:
+    if keep != GROUND:
         a.mass, a.center, a.inertia = together([(x.mass, x.center, x.inertia) for x in (a, b)])
     for point, at in b.points.items():
         a.points.setdefault(point, at)
@@ -117,6 +117,9 @@ def _drop_what_dangles(d: Drawing) -> None:
             d.leave(name, alone if holds[name] else "it has no joint")
         d.slides = [s for s in d.slides if {s.link, s.on} <= d.bodies.keys()]
         d.racks = [r for r in d.racks if {r.gear, r.slide.link, r.slide.on} <= d.bodies.keys()]
+        for m in [m for m in d.meshes if not {m.a, m.b, m.arm} <= d.bodies.keys()]:
+            d.meshes.remove(m)
+            d.notes.append(f"gears {m.a}, {m.b}: left out with their link")
         for load in [a for a in d.loads if not {name for name, _ in a.ends} <= d.bodies.keys()]:
             d.loads.remove(load)
             d.notes.append(f"load on {', '.join(name for name, _ in load.ends)}: left out with its link")

@@ -262,7 +262,7 @@ def write(s: Skeleton, travel: Travel, comment: str) -> bytes:
 
 def _add_link(s: Skeleton, root: Element, name: str, origin: complex) -> None:
     part, link = s.bodies[name], add(root, "link", name=name)
-    if part.mass > 0:
+    if part.mass > 0 or part.inertia > 0:
         inertial = add(link, "inertial")
         add(inertial, "origin", xyz=spatial(part.center - origin), rpy="0 0 0")
         add(inertial, "mass", value=part.mass)

@@ -136,6 +136,27 @@ def turned(motion: Any, body: str) -> Any:
     return 0.0 if body == "ground" else motion.link(body).angle
 
 
+WHEEL = """
+[ground]
+O = [0, 0]
+[links.wheel]
+points = { O = [0, 0] }
+inertia = 0.25
+[input]
+link = "wheel"
+angle = 0
+"""
+
+
+@pytest.mark.whole
+@pytest.mark.parametrize("suffix", ROBOTS)
+def test_a_wheel_with_a_moment_of_inertia_and_no_mass_keeps_it(suffix: str) -> None:
+    """Its effort is I·α."""
+    back = taken_back(exported(Mechanism.from_toml_text(WHEEL), suffix))
+    assert back.rigid["wheel"].mass == 0
+    assert back.motion(0.0, 0.0, 8.0).effort[0] == pytest.approx(2.0, rel=1e-15)
+
+
 def test_mjcf_keeps_the_value_of_the_input() -> None:
     m = Mechanism.from_toml(EXAMPLES / "scissors-lift" / "lift.toml")
     back = taken_back(exported(m, ".xml"))

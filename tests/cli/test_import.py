@@ -226,6 +226,16 @@ def test_fixed_bodies_and_point_masses_become_one_body() -> None:
     assert coupler.points["Y"] == pytest.approx(0.31)
 
 
+def test_a_moment_of_inertia_without_mass_is_kept() -> None:
+    """As of a wheel on a fixed axle; a mass on it adds its own m·r²."""
+    data = four_bar()
+    data["bodies"]["crank"] |= {"mass": 0.0, "izz_cg": 0.02}
+    assert only(json.dumps(data)).rigid["crank"].inertia == 0.02
+    data["bodies"]["crank"]["point_masses"] = [{"mass": 0.5, "local_pos": [0.1, 0]}]
+    crank = only(json.dumps(data)).rigid["crank"]
+    assert (crank.mass, crank.center, crank.inertia) == (0.5, 0.1, 0.02)
+
+
 def test_bodies_drawn_in_the_axes_of_the_ground_stand_there() -> None:
     data = four_bar()
     places = {
