@@ -22,7 +22,7 @@ def warnings(b: FieldBalancing) -> list[str]:
     """What was done otherwise than a reader might expect, each once."""
     groups = [_Group(b, solved) for solved in b.solved]
     sentences = (sentence for group in groups for sentence in group.warnings())
-    fits = (sentence for group in groups for sentence in group.fitted()) if b.runs.fitted else ()
+    fits = (sentence for group in groups for sentence in group.of_fit()) if b.runs.fitted else ()
     return [*dict.fromkeys([*b.runs.warnings, *b.warnings, *sentences]), *fits]
 
 
@@ -109,8 +109,8 @@ class _Group:
     def _alternatives(self) -> Iterator[str]:
         """Yield the other corrections that fit amplitudes as well."""
         b = self.b
-        for i, (fit, *_) in enumerate(self.solved.fits):
-            for s, (first, rival) in enumerate(zip(self.group.initial[i], fit.other, strict=True)):
+        for i, (fit, *_) in enumerate(self.solved.group.amplitude_fits):
+            for s, (first, rival) in enumerate(zip(self.group.fit.initial[i], fit.other, strict=True)):
                 if rival == rival:
                     other = -first / rival
                     yield (
@@ -131,30 +131,30 @@ class _Group:
         )
 
     def _thirty(self) -> Iterator[str]:
-        """The 30/30 rule."""
-        group, standing = self.group, self.group.initial
-        for j, trial in enumerate(group.trials):
-            before, standing = standing, group.means[:, j] if trial.kept else standing
-            if not trial.tried:
-                continue
-            effect = trial_effect(before, group.means[:, j])
+        """The 30/30 rule, where no reading is left over to show how well the coefficients are known."""
+        group, means, rotors = self.group, self.group.means, np.arange(len(self.group.rotors))
+        bare = (group.fit.degrees_of_freedom == 0) & (group.before is None)
+        for j in range(means.shape[1]):
+            before = group.before_run(j)
+            effect = trial_effect(means[rotors, before], means[:, j])
             most, turn = np.max(effect.amplitude, axis=1), np.degrees(np.max(effect.phase, axis=1))
+            little = ~((effect.amplitude >= 0.3) | (effect.phase >= np.radians(30))).any(axis=1)
+            run = group.lines.runs(0)[j]
             yield from self._each(
-                ~((effect.amplitude >= 0.3) | (effect.phase >= np.radians(30))).any(axis=1),
-                lambda i, run=trial.run, most=most, turn=turn: (  # type: ignore[misc]
-                    f"run {run}: the trial mass changed the vibration by {most[i]:.0%} and {turn[i]:.0f}° "
+                bare & (before >= 0) & little,
+                lambda i, j=j, most=most, turn=turn: (  # type: ignore[misc]
+                    f"run {group.lines.runs(i)[j]}: the trial mass changed the vibration by {most[i]:.0%} and {turn[i]:.0f}° "
                     "at most: less than 30 % and 30°, its coefficients may be noise; expected a larger trial mass"
                 ),
-                f"run {trial.run} changed the vibration by less than 30 % and 30°",
+                f"run {run} changed the vibration by less than 30 % and 30°",
             )
 
-    # -- of a log --------------------------------------------------------------------------------------------
+    # -- about the fit ---------------------------------------------------------------------------------------
 
-    def fitted(self) -> Iterator[str]:
-        """Yield those about the fit of a log."""
-        b, group, fit, error = self.b, self.group, self.group.fit, self.b.request.reading_error
-        if fit is None or self.solved.balance is None:
-            return
+    def of_fit(self) -> Iterator[str]:
+        """Yield those about the fit."""
+        b, group, error = self.b, self.group, self.b.request.reading_error
+        fit = group.fit
         uncertain = group.before is not None and group.before.reading is not None
         if error is None and not uncertain:
             bare = np.flatnonzero(fit.degrees_of_freedom == 0)[:1]
@@ -184,7 +184,7 @@ class _Group:
         """Repeats with the same masses that contradict each other: by the test, or by 30 % of the vibration."""
         from balancing import repeats
 
-        group, one = self.group, self.solved.fitted.machine(i)
+        group, one, unit = self.group, self.solved.fitted.machine(i), self.unit
         fit, lines = one.fit, self.group.lines.of(i)
         largest = np.abs(np.where(fit.present, fit.readings, 0.0)).max(axis=0)
         pairs = (
@@ -194,12 +194,14 @@ class _Group:
         )
         for pair in islice(pairs, SHOWN):
             runs = list(dict.fromkeys(lines[j] for j in pair.runs))
-            read = [fit.readings[j, pair.channel] for j in pair.runs]
-            first, second = (f"{abs(v):.4g} at {degrees(v):.4g}°" for v in read)
+            read = group.readings[i, list(pair.runs), pair.channel]
+            shown = read.conj() if self.b.against else read
+            first, second = (f"{abs(v):.6g} {unit} at {degrees(v):.6g}°" for v in shown)
             yield (
                 f"{self.b.of(group, i)}run{'s' * (len(runs) > 1)} {' and '.join(runs)}, sensor {group.channels[pair.channel]}: with "
                 f"the same masses on it was read {first} and {second}: the readings contradict each other by "
-                f"{pair.difference:.4g} {self.unit}"
+                f"{pair.difference:.4g} {unit}, and their mean has the size {abs(read.mean()):.4g}: read again, or leave out what is "
+                "wrong"
             )
 
     def _drifts(self) -> Iterator[str]:

@@ -11,15 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from balancing import (
-    AmplitudeFit,
     Balance,
     DependentPlanes,
     Infeasible,
-    JointFit,
     LogBalance,
     NotConverged,
     condition_number,
-    initial_alone,
     initial_unbalance,
     least_squares,
     place,
@@ -27,11 +24,10 @@ from balancing import (
 )
 from balancing.dependence import directions
 from balancing.objective import Objective
-from cli.field.groups import by_amplitudes
 from cli.field.request import Request, ceiling_in, limits_in, masses_at
 from cli.read.options import bad
 from cli.read.runs.runs import SHOWN, Complex, Group, Real, Runs
-from cli.read.runs.stored import Stored
+from cli.read.stored import Stored
 from dalembert.angles import degrees, in_turn
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.parts import in_parts
@@ -53,15 +49,8 @@ class Solved:
     """A group and its corrections."""
 
     group: Group
-    planes: list[str]
-    fit: JointFit
-    """Initial vibration and coefficients, run-out and all."""
-    fits: list[list[AmplitudeFit]]
-    """Of the four-run method, rotor by rotor, plane by plane."""
     initial: Complex
     """(g, s), run-out off."""
-    standing: Complex
-    """(g, p): what is on the rotor in its last run."""
     start: Complex
     """(g, p): what is on the rotor where the corrections start from: that, or nothing."""
     objective: Objective
@@ -79,9 +68,19 @@ class Solved:
     """Where the errors of the readings are known: what the corrections leave, and how sure it is."""
 
     @property
+    def planes(self) -> list[str]:
+        """The correction planes."""
+        return self.group.planes
+
+    @property
+    def standing(self) -> Complex:
+        """What is on the rotor in its last run, (g, p)."""
+        return self.group.standing
+
+    @property
     def alpha(self) -> Complex:
         """The influence coefficients, (g, s, p)."""
-        return self.fit.influence
+        return self.group.fit.influence
 
     @cached_property
     def here(self) -> Complex:
@@ -177,77 +176,26 @@ class FieldBalancing:
 
     def _solve(self, group: Group) -> Solved:
         request = self.request
-        planes, fit, fits = self._fit(group)
-        standing = self._standing(group, planes)
+        planes, standing = group.planes, group.standing
         start = standing if request.from_here else np.zeros_like(standing)
         if request.from_here and not standing.any():
             self.warnings.append(
                 "--from-here: the last run has no mass on the rotor, so that it stands as in the initial run"
             )
-        initial = group.initial - self.runout(group)
+        initial = group.fit.initial - self.runout(group)
         limits = self._limits(planes), self.ceiling, request.ridge
         objective = Objective(request.objective == "minimax", *limits)
-        solved = Solved(group, planes, fit, fits, initial, standing, start, objective, 0 * standing)
+        solved = Solved(group, initial, start, objective, 0 * standing)
         self._correct(solved)
         if request.view is not None and len(planes) != 2:
             raise bad(
                 "--view", f"static and couple parts need two planes, found {len(planes)}: {', '.join(planes)}"
             )
         if request.tolerance is not None:
-            solved.unbalance = initial_unbalance(fit.influence, initial, group.weights, singular=SINGULAR)
-        if self.runs.fitted or request.reading_error is not None or self._repeats_tell(group):
+            solved.unbalance = initial_unbalance(solved.alpha, initial, group.weights, singular=SINGULAR)
+        if self.runs.fitted or request.reading_error is not None:
             self._doubt(solved)
         return solved
-
-    def matches(self, group: Group, planes: list[str]) -> list[tuple[int, int]]:
-        """Return which plane of a group is which of these."""
-        named = group.planes
-        if len(planes) == 1 and "trial_plane" not in self.runs.table.texts:
-            named = planes[: len(named)]
-        return [(own, planes.index(plane)) for own, plane in enumerate(named) if plane in planes]
-
-    def _standing(self, group: Group, planes: list[str]) -> Complex:
-        """Return what is on the rotors in their last run in these planes, (g, p)."""
-        standing = np.zeros((len(group.rotors), len(planes)), dtype=complex)
-        matches = self.matches(group, planes)
-        for own, p in matches:
-            standing[:, p] = group.standing[:, own]
-        for own in sorted(set(range(len(group.planes))) - {own for own, _ in matches}):
-            plane = group.planes[own]
-            if group.standing[:, own].any():
-                self.warnings.append(
-                    f"{self.of(group)}the last run has a mass in plane {plane}, of which no coefficient is stored: the trim "
-                    "leaves it out"
-                )
-        return standing
-
-    def _fit(self, group: Group) -> tuple[list[str], JointFit, list[list[AmplitudeFit]]]:
-        """Return the planes, and the fit of initial vibration and coefficients: these stored, or from amplitudes alone."""
-        if group.fit is not None:
-            return group.planes, group.fit, []
-        if self.request.four_run:
-            fits = by_amplitudes(group, self.runs, self.warnings)
-            alpha = np.array([[fit.influence for fit in one] for one in fits]).swapaxes(1, 2)
-            first = group.readings[:, group.trials[0].lines]
-            return group.planes, initial_alone(first, alpha), fits
-        assert self.stored is not None
-        planes, matrices = group.planes, []
-        for rotor in group.rotors:
-            planes, matrix = self.stored.matrix(self.runs.rotors[rotor], group.channels, self.runs)
-            matrices.append(matrix)
-            if "rotor" not in self.stored.table.texts:
-                break
-        alpha = np.broadcast_to(np.stack(matrices), (len(group.rotors), *matrices[0].shape))
-        return planes, initial_alone(group.readings, alpha), []
-
-    def _repeats_tell(self, group: Group) -> bool:
-        """Whether the scatter of repeats is to give uncertainties that nobody asked for."""
-        if self.request.four_run or not group.repeats.reading_sd.any():
-            return False
-        if len(group.rotors) <= (SHOWN if self.limited else MANY):
-            return True
-        self.warnings.append("uncertainties of so many rotors are worked out with --reading-error alone")
-        return False
 
     def _limits(self, planes: list[str]) -> Real | None:
         bound = self.max_mass
@@ -339,10 +287,9 @@ class FieldBalancing:
             raise DataError(f"{self.of(solved.group, i or 0)}{error}") from None
 
     def _errors(self, solved: Solved) -> Errors:
-        """Return the errors of the readings: stated, as repeats or residuals scatter, or as those of sisters did."""
-        fit, group, stated = solved.fit, solved.group, self.request.reading_error
-        if group.trials:
-            return group.repeats.errors(fit, *(stated or (0.0, 0.0)))
+        """Return the errors of the readings: stated, or as residuals scatter, or as those of sisters did."""
+        group, stated = solved.group, self.request.reading_error
+        fit = group.fit
         if stated is not None:
             return fit.stated(*stated)
         before = group.before
@@ -358,15 +305,15 @@ class FieldBalancing:
     def _doubt(self, solved: Solved) -> None:
         """Carry the errors of the readings to the corrections, and to what they leave."""
         request, group = self.request, solved.group
-        still, errors = solved.fit.without(self.runout(group)), self._errors(solved)
+        still, errors = group.fit.without(self.runout(group)), self._errors(solved)
         balance = LogBalance(still, solved.total, errors, group.weights, solved.corrections, request.ridge)
         solved.balance = balance
         if not np.isfinite(errors.along).any():
             return
-        if self.runs.fitted and len(solved.corrections) > MANY:
+        if request.reading_error is None and len(solved.corrections) > MANY:
             if self.limited:
                 self.warnings.append(
-                    "uncertainties of so many rotors are not worked out under limits or with minimax"
+                    "under limits or with minimax the uncertainties of so many rotors are computed with --reading-error alone"
                 )
             else:
                 solved.covariance = balance.covariance
@@ -419,7 +366,7 @@ class FieldBalancing:
 
     @property
     def uncertain(self) -> bool:
-        """Whether reading errors are known, stated or from repeats."""
+        """Whether reading errors are known, stated or from the scatter of the fit."""
         return any(solved.covariance is not None for solved in self.solved)
 
 

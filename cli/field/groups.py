@@ -1,8 +1,8 @@
-"""Rotors that were measured in the same way, side by side, and what is fitted to their runs."""
+"""Rotors that were measured in the same way, side by side, and the one fit of their runs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from balancing import (
     AmplitudeFit,
-    DependentTrials,
     JointFit,
-    Undetermined,
     determined,
     fit_with_prior,
     influence_from_amplitudes,
+    initial_alone,
     joint_fit,
     phase_sense,
 )
@@ -23,9 +22,8 @@ from cli.field.request import Request
 from cli.read import options
 from cli.read.runs.reading import Measured, read_measured
 from cli.read.runs.runs import SHOWN, Before, Complex, Group, Rows, Runs
-from cli.read.runs.stored import Stored, read_runout
-from dalembert.angles import degrees
-from dalembert.errors import DataError, quote
+from cli.read.stored import Stored, read_runout
+from dalembert.errors import DataError
 
 Flags = NDArray[np.bool_]
 
@@ -46,7 +44,9 @@ def measured_groups(
         against=request.against,
     )
     runs, stored = measured.rows.rows.of, measured.stored
-    _Groups(measured, request).read()
+    runs.groups = list(_Groups(measured, request).fitted())
+    # the one fact that shows a fit: it is asked for, or something is left over to judge it by, or no run is without masses
+    runs.fitted = not request.four_run and (measured.fit or any(_spares(group) for group in runs.groups))
     runs.warnings = [*runs.table.warnings, *runs.warnings, *measured.warnings]
     lags = request.against or runs.lags
     if runout is not None:
@@ -54,6 +54,11 @@ def measured_groups(
     elif lags:
         runs.runout = {sensor: vector.conjugate() for sensor, vector in runs.runout.items()}
     return runs, stored
+
+
+def _spares(group: Group) -> bool:
+    """Whether a rotor has more readings than unknowns, or no run without masses."""
+    return bool((group.fit.degrees_of_freedom > 0).any() or not group.bare.any(axis=1).all())
 
 
 def _sense(
@@ -88,38 +93,54 @@ class _Groups:
 
     def __init__(self, measured: Measured, request: Request) -> None:
         self.sorted, self.sisters, self.stored = measured.rows, measured.sisters, measured.stored
-        self.runs, self.request = measured.rows.rows.of, request
+        self.runs, self.request, self.asked = measured.rows.rows.of, request, measured.fit
         self.lost = 0
 
-    def read(self) -> None:
-        """Make groups of the rotors, and fit their runs; with stored coefficients the initial run stands alone."""
-        sisters = self.sisters
-        named = None if sisters is None else [sisters.key(name) for name in self.runs.rotors]
-        for group in self.sorted.parts(named, self.stored is not None):
+    def fitted(self) -> Iterator[Group]:
+        """Yield the groups with the fits of their runs."""
+        coefficients = self.sisters or self.stored
+        named = None if coefficients is None else [coefficients.key(name) for name in self.runs.rotors]
+        for group in self.sorted.parts(named):
             for part in self._determined(group):
+                self._repeated(part)
                 self._fit(part)
+                yield part
         self.runs.warnings += self.sorted.warnings
         if self.lost > SHOWN:
             self.runs.warnings.append(
                 f"… and {self.lost - SHOWN} further channels that the runs do not determine"
             )
+        if not self.sorted.read.all():
+            self.runs.warnings.append("--influence gives the coefficients: the trial runs are not used")
 
-    # -- which of them the runs determine ---------------------------------------------------------------------
+    def _repeated(self, group: Group) -> None:
+        """Warn of sensors that were read more than once in a run."""
+        for rows in group.lines.rows:
+            counts = np.isfinite(group.readings[0, rows]).sum(axis=0).tolist()
+            self.runs.warnings += [
+                f"{self.runs.of(group.rotors[0])}sensor {channel.sensor} was read {n} times in one run: the mean is taken "
+                "(as vectors)"
+                for channel, n in zip(group.channels, counts, strict=True)
+                if n > 1
+            ]
+
+    # -- what the runs determine ------------------------------------------------------------------------------
 
     def _determined(self, group: Group) -> list[Group]:
         """Part a group into those whose runs determine the same channels; what they do not determine is left out."""
-        if group.trials:
-            # with nothing to spare nothing can be left out
-            self._complete(group)
-            self._means(group)
-            return [group]
-        if self.sisters is not None:
-            return [self._in_known_planes(group)]
+        if self.sisters is not None or self.stored is not None:
+            return [self._in_stored_planes(group)]
         present = np.isfinite(group.readings)
-        keep = determined(group.masses, present)
+        if self.request.four_run:
+            keep = np.asarray(np.isfinite(group.means).all(axis=1))
+        else:
+            keep = determined(group.masses, present)
         if keep.all():
             return [group]
-        self._undetermined(group, keep)
+        # with nothing to spare nothing is left out
+        more = (present.sum(axis=1) > 1 + len(group.planes)) & keep
+        spare = self.asked | more.any(axis=1) | ~group.bare.any(axis=1)
+        self._undetermined(group, keep, np.asarray(spare & keep.any(axis=1)))
         # without channels that the runs do not determine, and without runs in which no other was read
         left = (present & keep[:, None, :]).any(axis=2)
         kinds, kind = np.unique(np.concatenate([keep, left], axis=1), axis=0, return_inverse=True)
@@ -130,106 +151,123 @@ class _Groups:
             for k, channels, lines in split
         ]
 
-    def _means(self, group: Group) -> None:
-        """Warn of sensors that were read more than once in a run."""
-        of = self.runs.of(group.rotors[0])
-        for trial in group.trials:
-            many = np.isfinite(group.readings[0, trial.lines]).sum(axis=0).tolist()
-            self.runs.warnings += [
-                f"{of}sensor {channel.sensor} was read {n} times in one run: the mean is taken (as vectors)"
-                for channel, n in zip(group.channels, many, strict=True)
-                if n > 1
-            ]
+    def _undetermined(self, group: Group, keep: Flags, spare: Flags) -> None:
+        """Warn of channels (g, s) that the runs do not determine; refuse a rotor without others, or with nothing to spare."""
+        for i in np.flatnonzero(~keep.all(axis=1) & ~spare)[:1].tolist():
+            raise DataError(f"{self.runs.table.file}: {self._refusal(group, i, int(np.argmin(keep[i])))}")
+        for i, s in np.argwhere(~keep).tolist():
+            self.lost += 1
+            if self.lost <= SHOWN:
+                self.runs.warnings.append(f"{self._lost(group, i, s)}; it takes no part in the fit")
 
-    def _complete(self, group: Group) -> None:
-        """Refuse a trial run that lacks a channel of the initial one."""
-        first = group.trials[0]
-        for trial in group.trials:
-            lacking = ~np.isfinite(group.readings[:, trial.lines]).any(axis=1)
-            if lacking.any():
-                i, s = np.argwhere(lacking)[0].tolist()
+    def _refusal(self, group: Group, i: int, s: int) -> str:
+        """Write why a rotor cannot be balanced: too few trial runs, a reading that is missing, or runs that tell too little."""
+        of, planes = self.runs.of(group.rotors[i]), group.planes
+        trials = int((~group.bare[i]).sum())
+        if group.bare[i].any() and trials < len(planes):
+            return (
+                f"{of}{len(planes)} planes ({', '.join(planes)}) and {trials} trial run{'s' * (trials != 1)}: expected a trial "
+                "run for every plane"
+            )
+        unread = np.isnan(group.means[i, :, s])
+        if group.bare[i].any() and unread.any():
+            runs = [run for run, no in zip(group.lines.runs(i), unread, strict=True) if no]
+            near = "; speeds more than 5 % apart are different ones" if group.channels[s].speed else ""
+            return (
+                f"{of}no reading of sensor {group.channels[s]} in run{'s' * (len(runs) > 1)} {', '.join(runs)}, and with as many "
+                f"readings as unknowns none may be missing{near}"
+            )
+        return self._lost(group, i, s)
+
+    def _lost(self, group: Group, i: int, s: int) -> str:
+        """Write why a channel of a rotor is not determined, and which run would determine it."""
+        read = np.flatnonzero(np.isfinite(group.readings[i, :, s]))
+        masses, lines = group.masses[i, read], group.lines.of(i)
+        runs = [lines[j] for j in read]
+        clause = "its vibration without masses is known, " if not masses.any() else ""
+        times = "once" if len(read) == 1 else f"{len(read)} times"
+        return (
+            f"{self.runs.of(group.rotors[i])}sensor {group.channels[s]} was read {times} (run{'s' * (len(runs) > 1)} {', '.join(runs)}), which "
+            f"does not determine {1 + len(group.planes)} unknowns: {clause}{_missing(group.planes, masses)}"
+        )
+
+    def _in_stored_planes(self, group: Group) -> Group:
+        """Return rotors with the planes whose coefficients are stored; a table that names none has the only one."""
+        coefficients, of = self.sisters or self.stored, self.runs.of(group.rotors[0])
+        assert coefficients is not None
+        covered = coefficients.planes(self.runs.rotors[group.rotors[0]])
+        planes = group.planes
+        if len(covered) == 1 and "trial_plane" not in self.runs.table.texts:
+            planes = covered[: len(planes)]
+        at = [covered.index(plane) if plane in covered else -1 for plane in planes]
+        for own, plane in enumerate(planes):
+            if at[own] < 0 and group.masses[..., own].any():
                 raise DataError(
-                    f"{self.runs.table.file}: {self.runs.of(group.rotors[i])}run {quote(trial.run)} has no reading of sensor "
-                    f"{group.channels[s]}, which the initial run {quote(first.run)} has"
+                    f"{self.runs.table.file}: {of}a mass in plane {plane}, of which no coefficient is stored: expected "
+                    f"{', '.join(covered)}"
                 )
-
-    def _unused(self, group: Group) -> None:
-        """Warn that stored coefficients take the place of the trial runs."""
-        ordered, rotor = self.sorted, int(group.rotors[0])
-        start = ordered.runs.start[rotor]
-        if not ordered.tried[start : start + ordered.runs.count[rotor]].any():
-            return
-        of, stated = self.runs.of(rotor), ordered.rows.masses.stated
-        self.runs.warnings.append(f"{of}--influence gives the coefficients: the trial runs are not used")
-        if stated.size and not stated.any():
+            if at[own] < 0 and group.standing[:, own].any():
+                self.runs.warnings.append(
+                    f"{of}the last run has a mass in plane {plane}, of which no coefficient is stored: the trim leaves it out"
+                )
+        if self.runs.other_masses:
+            at = [-1] * len(at)
             self.runs.warnings.append(
-                f"{of}the stored coefficients are per {self.runs.per}, and the runs have other masses: what is on the "
-                "rotor in its last run is not known, and the trim leaves it out"
+                f"{of}the stored coefficients are per {self.runs.per}, and the runs have other masses: what is on the rotor in "
+                "its last run is not known, and the trim leaves it out"
             )
-
-    def _contradictions(self, group: Group) -> None:
-        """Warn of repeats that contradict each other, with their figures."""
-        repeats = group.repeats
-        if not repeats.degrees_of_freedom:
-            return
-        contradictory = np.argwhere(repeats.contradictory & (repeats.counts > 1))
-        unit, against = self.runs.amplitude_unit, self.request.against
-        for i, j, s in contradictory[:SHOWN].tolist():
-            trial = group.trials[j]
-            read = group.readings[i, trial.lines, s]
-            read = read[np.isfinite(read)]
-            figures = [
-                f"{abs(v):.6g} {unit}"
-                if self.request.four_run
-                else f"{abs(v):.6g} {unit} at {float(degrees(v.conjugate() if against else v)):.6g}°"
-                for v in read[:SHOWN].tolist()
-            ]
-            more = f" and {len(read) - SHOWN} more" if len(read) > SHOWN else ""
-            self.runs.warnings.append(
-                f"{self.runs.of(group.rotors[i])}run {trial.run}: sensor {group.channels[s]} was read {len(read)} times, and the "
-                f"readings contradict each other: {', '.join(figures)}{more}; their mean has the size "
-                f"{abs(group.means[i, j, s]):.4g}: read again, or leave out what is wrong"
-            )
-        if len(contradictory) > SHOWN:
-            self.runs.warnings.append(
-                f"… and {len(contradictory) - SHOWN} further readings that contradict each other"
-            )
+        kept, there = [k for k, p in enumerate(at) if p >= 0], [p for p in at if p >= 0]
+        masses, standing = (
+            np.zeros((*of.shape[:-1], len(covered)), dtype=complex) for of in (group.masses, group.standing)
+        )
+        masses[..., there], standing[..., there] = group.masses[..., kept], group.standing[..., kept]
+        return replace(
+            group,
+            planes=covered,
+            masses=masses,
+            standing=standing,
+            exact=lambda: group.exact().in_planes(kept, there, len(covered)),
+        )
 
     # -- the fit ---------------------------------------------------------------------------------------------
 
     def _fit(self, group: Group) -> None:
-        """Fit a group, in the sense of the phase that its runs show; none where the coefficients come from elsewhere."""
-        self.runs.groups.append(group)
-        if self.stored:
-            self._unused(group)
-        elif not self.request.four_run:
-            self._fit_runs(group)
-        self._contradictions(group)
-
-    def _fit_runs(self, group: Group) -> None:
-        """Fit initial vibration and coefficients to the runs of a group."""
-        readings, masses, prior = group.readings, group.masses, None
+        """Fit initial vibration and coefficients to the runs of a group, in the sense of the phase that its runs show."""
+        if self.request.four_run:
+            group.amplitude_fits = by_amplitudes(group, self.runs)
+            by_rotor = [[fit.influence for fit in one] for one in group.amplitude_fits]
+            # the runs with masses have told the coefficients
+            loaded = np.asarray(group.masses.any(axis=2))[..., None]
+            alone = np.where(loaded, np.nan, group.readings)
+            group.fit = initial_alone(alone, np.array(by_rotor).swapaxes(1, 2))
+            return
+        names = [self.runs.rotors[r] for r in group.rotors.tolist()]
+        if self.stored is not None:
+            own = names if "rotor" in self.stored.table.texts else names[:1]
+            each = [self.stored.matrix(name, group.channels, self.runs) for name in own]
+            alpha = np.broadcast_to(np.stack(each), (len(names), *each[0].shape))
+            group.fit = initial_alone(group.readings, alpha)
+            return
         if self.sisters is not None:
-            prior = self.sisters.before(self.runs.rotors[group.rotors[0]], group.channels, self.runs)
-        try:
-            fit = self._fitted(readings, masses, prior)
-        except (DependentTrials, Undetermined) as error:
-            of = self.runs.of(group.rotors[error.case[0]])
-            raise DataError(f"{of}{_dependent(group, error)}") from None
+            group.before = self.sisters.before(names[0], group.channels, self.runs)
+        readings, masses = group.readings, group.masses
+        group.fit = self._fitted(readings, masses, group.before)
         # with nothing to spare the runs fit in either sense
-        if not group.trials and (prior is None or determined(masses, np.isfinite(readings)).all()):
-            fit, group.lines.senses = _sense(
+        if not (group.fit.degrees_of_freedom > 0).any():
+            return
+        if group.before is None or determined(masses, np.isfinite(readings)).all():
+            group.fit, group.lines.senses = _sense(
                 self.runs,
                 group.rotors,
-                fit,
+                group.fit,
                 self.request.lagging,
-                lambda turned: self._fitted(turned, masses, prior),
+                lambda turned: self._fitted(turned, masses, group.before),
             )
-        turned = (np.nan_to_num(fit.readings) != np.nan_to_num(readings)).any(axis=(1, 2))
+        turned = (np.nan_to_num(group.fit.readings) != np.nan_to_num(readings)).any(axis=(1, 2))
         if turned.any():
             before = group.exact
             group.exact = lambda: before().turned(turned)
-        group.readings, group.fit, group.before = fit.readings, fit, prior
+        group.readings = group.fit.readings
 
     def _fitted(self, readings: Complex, masses: Complex, prior: Before | None) -> JointFit:
         """Fit runs, with coefficients that are stored from earlier ones."""
@@ -245,55 +283,6 @@ class _Groups:
             sd = np.where(fit.degrees_of_freedom > 0, fit.residual_sd, prior.reading[0])
             fit = fit_with_prior(readings, masses, prior.prior, sd[:, None, None])
         return fit
-
-    def _in_known_planes(self, group: Group) -> Group:
-        """Return rotors with the planes whose coefficients are stored; a log that names none has the only one."""
-        assert self.sisters is not None
-        covered = self.sisters.planes(self.runs.rotors[group.rotors[0]])
-        planes = group.planes
-        if len(covered) == 1 and "trial_plane" not in self.runs.table.texts:
-            planes = covered[: len(planes)]
-        for plane in planes:
-            if plane not in covered:
-                raise DataError(
-                    f"{self.runs.table.file}: {self.runs.of(group.rotors[0])}a mass in plane {plane}, of which no coefficient is stored: "
-                    f"expected {', '.join(covered)}"
-                )
-        at = [covered.index(plane) for plane in planes]
-        masses, standing = (
-            np.zeros((*of.shape[:-1], len(covered)), dtype=of.dtype) for of in (group.masses, group.standing)
-        )
-        masses[..., at], standing[..., at] = group.masses, group.standing
-        return replace(
-            group,
-            planes=covered,
-            masses=masses,
-            standing=standing,
-            exact=lambda: group.exact().with_planes(at, len(covered)),
-        )
-
-    def _undetermined(self, group: Group, keep: Flags) -> None:
-        """Warn of channels (g, s) that the runs do not determine; refuse a rotor without others."""
-        some = keep.any(axis=1)
-        if not some.all():
-            i = int(np.argmin(some))
-            raise DataError(f"{self.runs.table.file}: {self._lost(group, i, 0)}")
-        for i, s in np.argwhere(~keep).tolist():
-            self.lost += 1
-            if self.lost <= SHOWN:
-                self.runs.warnings.append(f"{self._lost(group, i, s)}; it takes no part in the fit")
-
-    def _lost(self, group: Group, i: int, s: int) -> str:
-        """Write why a channel of a rotor is not determined, and which run would determine it."""
-        read = np.flatnonzero(np.isfinite(group.readings[i, :, s]))
-        masses, lines = group.masses[i, read], group.lines.of(i)
-        runs = [lines[j] for j in read]
-        clause = "its vibration without masses is known, " if not masses.any() else ""
-        times = "once" if len(read) == 1 else f"{len(read)} times"
-        return (
-            f"{self.runs.of(group.rotors[i])}sensor {group.channels[s]} was read {times} (run{'s' * (len(runs) > 1)} {', '.join(runs)}), which "
-            f"does not determine {1 + len(group.planes)} unknowns: {clause}{_missing(group.planes, masses)}"
-        )
 
 
 def _missing(planes: list[str], masses: Complex) -> str:
@@ -312,64 +301,47 @@ def _missing(planes: list[str], masses: Complex) -> str:
     return "the masses of these runs do not tell the planes apart; a run with one plane's mass alone changed would"
 
 
-def _dependent(group: Group, error: DependentTrials | Undetermined) -> str:
-    """Write which planes the trial runs do not separate."""
-    runs = len(group.trials) - 1
-    if runs < len(group.planes):
-        return (
-            f"{len(group.planes)} planes ({', '.join(group.planes)}) and {runs} trial run{'s' * (runs != 1)}: expected a trial run "
-            "for every plane"
-        )
-    shares = error.combination[-len(group.planes) :]
-    unseen = [name for name, share in zip(group.planes, shares, strict=True) if abs(share) > 1e-6]
-    return (
-        f"the trial runs do not tell the planes {' and '.join(unseen)} apart: expected each plane tried by itself, or in "
-        "different proportions"
-    )
-
-
-def by_amplitudes(group: Group, runs: Runs, warnings: list[str]) -> list[list[AmplitudeFit]]:
-    """The four-run method, rotor by rotor, plane by plane: each run with masses has them in one plane.
+def by_amplitudes(group: Group, runs: Runs) -> list[list[AmplitudeFit]]:
+    """Fit the four-run method, rotor by rotor, plane by plane: each run with masses has them in one plane.
 
     Several planes (Everett, J. Vib. Acoust. 109 (1987) 162-167): at each sensor the phases of all coefficients count from
     that sensor's own initial vibration, so that O + Σ α w = 0 is one linear system whatever these phases are.
     """
-    several = np.flatnonzero((group.on[:, 1:] != 0).sum(axis=2).max(axis=0, initial=0) > 1)
-    if len(several):
+    file, of = runs.table.file, runs.of(group.rotors[0])
+    if not group.bare.any(axis=1).all():
+        raise DataError(f"{file}: {of}every run has a trial mass: expected an initial run without")
+    for i, j in np.argwhere((group.on != 0).sum(axis=2) > 1)[:1].tolist():
         raise DataError(
-            f"{runs.of(group.rotors[0])}run {group.trials[1 + several[0]].run}: masses in several planes: without phase each trial run "
+            f"{runs.of(group.rotors[i])}run {group.lines.runs(i)[j]}: masses in several planes: without phase each trial run "
             "has a mass in one plane, the others empty: four runs for the first plane, then three for each other one"
         )
     return [
-        [_of_plane(group, i, p, runs, warnings) for p in range(len(group.planes))]
-        for i in range(len(group.rotors))
+        [_of_plane(group, i, p, runs) for p in range(len(group.planes))] for i in range(len(group.rotors))
     ]
 
 
-def _of_plane(group: Group, i: int, p: int, runs: Runs, warnings: list[str]) -> AmplitudeFit:
+def _of_plane(group: Group, i: int, p: int, runs: Runs) -> AmplitudeFit:
     """Fit one plane's coefficients to the amplitudes of its trial runs."""
-    named = f" plane {group.planes[p]}:" if len(group.planes) > 1 else ""
-    first, *read = group.means[i].real
-    tried = np.flatnonzero(group.on[i, 1:, p] != 0)
+    named = f"plane {group.planes[p]}: " if len(group.planes) > 1 else ""
+    of, means, on = runs.of(group.rotors[i]), group.means[i].real, group.on[i, :, p]
+    first, tried = means[group.bare[i]].mean(axis=0), np.flatnonzero(on != 0)
     try:
-        fit = influence_from_amplitudes(first, np.array(read)[tried], group.on[i, 1 + tried, p])
+        fit = influence_from_amplitudes(first, means[tried], on[tried])
     except ValueError as error:
-        raise DataError(
-            f"{runs.table.file}: {runs.of(group.rotors[i])}{named.lstrip()}{' ' * bool(named)}{error}"
-        ) from None
+        raise DataError(f"{runs.table.file}: {of}{named}{error}") from None
     unit = runs.amplitude_unit
     for channel, misfit, size in zip(group.channels, fit.misfit, first, strict=True):
         text = (
-            f"{runs.of(group.rotors[i])}sensor {channel}:{named} the readings are inconsistent: no influence coefficient fits them "
-            f"better than {misfit:.3g} {unit} (r.m.s.), {misfit / size:.0%} of the initial reading"
+            f"{of}sensor {channel}: {named}the readings are inconsistent: no influence coefficient fits them better than "
+            f"{misfit:.3g} {unit} (r.m.s.), {misfit / size:.0%} of the initial reading"
         )
         if misfit > 0.25 * size:
             raise DataError(f"{runs.table.file}: {text}: expected four readings that fit one plane's effect")
         if misfit > 0.05 * size:
-            warnings.append(text)
+            runs.warnings.append(text)
     if named and not np.isnan(fit.other).all():
         raise DataError(
-            f"{runs.table.file}: {runs.of(group.rotors[i])}two coefficients of plane {group.planes[p]} fit the amplitudes: expected "
-            "a third trial run in this plane, at an angle off the line of the others"
+            f"{runs.table.file}: {of}two coefficients of plane {group.planes[p]} fit the amplitudes: expected a third trial "
+            "run in this plane, at an angle off the line of the others"
         )
     return fit

@@ -52,7 +52,7 @@ def suggested(rotor: Rotor) -> NextRun | None:
 
 def robust(b: FieldBalancing, solved: Solved) -> tuple[Complex, Complex]:
     """The initial vibration of the robust fits of a group, (g, s), and their corrections by least squares, (g, p)."""
-    fit, before, readings = solved.fitted.fit, solved.group.before, solved.group.fitted.readings
+    fit, before, readings = solved.fitted.fit, solved.group.before, solved.group.fit.readings
     if before is None:
         fit = robust_fit(fit)
     else:
@@ -70,7 +70,7 @@ def robust(b: FieldBalancing, solved: Solved) -> tuple[Complex, Complex]:
 def drifts(group: Group) -> Drift | None:
     """How the vibration of each rotor changes in a year, and how often so much by chance; None without dates."""
     years = group.lines.years
-    return None if years is None else drift(group.fitted, years)
+    return None if years is None else drift(group.fit, years)
 
 
 def tables(b: FieldBalancing) -> Tables:
@@ -130,10 +130,10 @@ def of_fit(b: FieldBalancing) -> Table:
     rows, rotors = Rows.each(b), list(each(b))
     senses = [rotor.group.lines.senses[rotor.i] for rotor in rotors]
     named = [sense or "not determined" for sense in senses]
-    freedom, sd = rows.several(lambda s: (s.group.fitted.degrees_of_freedom, s.group.fitted.residual_sd))
+    freedom, sd = rows.several(lambda s: (s.group.fit.degrees_of_freedom, s.group.fit.residual_sd))
     columns = [
         names("runs", [len(rotor.group.lines.runs(rotor.i)) for rotor in rotors]),
-        names("readings", [int(rotor.group.fitted.present[rotor.i].sum()) for rotor in rotors]),
+        names("readings", [int(rotor.group.fit.present[rotor.i].sum()) for rotor in rotors]),
         names("degrees_of_freedom", [int(n) for n in freedom]),
         amplitude(b, "residual_sd", sd),
         Column("phase_sense", "", named, None, "phase_sense", senses),
@@ -174,7 +174,7 @@ def of_fit(b: FieldBalancing) -> Table:
 def initial(b: FieldBalancing) -> Table:
     """The vibration without masses as fitted, and its uncertainty."""
     rows = Rows.sensors(b)
-    value = rows.numbers(lambda s: s.group.fitted.initial)
+    value = rows.numbers(lambda s: s.group.fit.initial)
     deviation = rows.numbers(lambda s: s.fitted.vibration_deviation(np.zeros_like(s.total)))
     columns = [*vibration(b, value), amplitude(b, "amplitude_uncertainty", deviation)]
     return rows.table(columns, READINGS, "fit.initial[]", "vibration without masses, as fitted")

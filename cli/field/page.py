@@ -55,7 +55,7 @@ def sheet(b: FieldBalancing) -> Page:
         unbalance = np.stack([initial_unbalance(solved.alpha[0], one, weights) for one in readings])
     return machine_sheet(
         np.asarray(solved.alpha[0]),
-        np.asarray(group.initial[0]),
+        np.asarray(group.fit.initial[0]),
         [str(channel) for channel in group.channels],
         solved.planes,
         weights=None if weights is None else np.asarray(weights),
@@ -64,7 +64,9 @@ def sheet(b: FieldBalancing) -> Page:
         covariance=covariance,
         runout=b.runout(group),
         against=request.against or runs.lags,
-        first=group.trials[0].run if group.trials else "initial",
+        first=next(
+            (run for run, bare in zip(group.lines.runs(0), group.bare[0], strict=True) if bare), "initial"
+        ),
         amplitude_unit=runs.amplitude_unit,
         mass=(runs.per, runs.mass_unit),
         channels=[(channel.sensor, channel.speed_written) for channel in group.channels],

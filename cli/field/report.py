@@ -233,10 +233,12 @@ class _Pages:
         if self.b.runs.fitted:
             fit = self.tables["fit"]
             parts += [fit, fit.below, *self._as_read(self.tables["residuals"])]
-        for j, trial in enumerate(group.trials[1:], 1):
-            on = masses_text(self.b, self.rotor.planes, group.on[self.i, j], ".6g")
-            parts.append(f"Run {trial.run}{': ' + on if on else ''}{', kept' if trial.kept else ''}")
-            runs[f"run {trial.run}"] = group.means[self.i, j]
+        else:
+            for j, run in enumerate(group.lines.runs(self.i)):
+                if not group.bare[self.i, j]:
+                    on = masses_text(self.b, self.rotor.planes, group.on[self.i, j], ".6g")
+                    parts.append(f"Run {run}: {on}")
+                    runs[f"run {run}"] = group.means[self.i, j]
         if runs:
             parts.append(self._vibration(runs))
         if not self.b.stored:

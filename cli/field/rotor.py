@@ -153,7 +153,7 @@ class Rotor:
         """Yield the readings of its log."""
         from balancing.doubt import LEVEL
 
-        fit, lines = self.group.fitted, self.group.lines.of(self.i)
+        fit, lines = self.group.fit, self.group.lines.of(self.i)
         for j, s in np.argwhere(fit.present[self.i]).tolist():
             value, residual, far, chance = (
                 of[self.i, j, s].item()

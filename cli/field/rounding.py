@@ -8,8 +8,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from balancing import AmplitudeFit, Balance, condition_number
+from balancing import Balance, condition_number
 from cli.field.field_balancing import FieldBalancing, Solved
 from cli.read.runs.runs import Real
 from dalembert.arithmetic.doubled import Doubled
@@ -43,41 +44,38 @@ class SecondRun:
 
     def __init__(self, balancing: FieldBalancing, solved: Solved) -> None:
         self.balancing, self.solved, self.group = balancing, solved, solved.group
-        self.readings, self.masses, standing = self.group.exact()
-        self.standing = Vectors.of(np.zeros(solved.standing.shape))
-        for own, p in balancing.matches(self.group, solved.planes):
-            self.standing[:, p] = standing[:, own]
+        self.readings, self.masses, self.standing = self.group.exact()
 
-    def means(self, run: int) -> Vectors:
-        """Return what was read in a run, (g, s): the mean of repeats."""
-        lines = self.group.trials[run].lines
-        count: Real = np.isfinite(self.group.readings[:, lines]).sum(axis=1).astype(float)
-        return self.readings[:, lines].total(1) / count
+    def _mean(self, present: NDArray[np.bool_]) -> Vectors:
+        """Return the mean of these readings (g, r, s) of each sensor, (g, s)."""
+        sums: Vectors = (self.readings * present.astype(float)).total(1)
+        count: Real = present.sum(axis=1).astype(float)
+        return sums / count
 
     @cached_property
     def unknowns(self) -> Vectors:
         """Initial vibration, run-out and all, and coefficients, (g, s, 1 + p)."""
-        balancing, group, fit = self.balancing, self.group, self.solved.fit
-        if balancing.stored is None and not self.solved.fits:
-            return fit.second_run(self.readings, self.masses)
-        alpha = Vectors.of(np.zeros(self.solved.alpha.shape))
+        balancing, group = self.balancing, self.group
+        if balancing.stored is None and not group.amplitude_fits:
+            return group.fit.second_run(self.readings, self.masses)
+        alpha, first = Vectors.of(np.zeros(self.solved.alpha.shape)), self._mean(group.fit.present)
         if balancing.stored is not None:
             for i, rotor in enumerate(group.rotors):
                 name = balancing.runs.rotors[rotor]
                 alpha[i] = balancing.stored.exact_matrix(name, group.channels, balancing.runs)
-        for i, fits in enumerate(self.solved.fits):
-            for p, one in enumerate(fits):
-                alpha[i, :, p] = self._of_amplitudes(one, i, p)
-        return Vectors.joined([self.means(0)[..., None], alpha], axis=-1)
+        else:
+            for i, p in np.ndindex(len(group.rotors), len(group.planes)):
+                alpha[i, :, p] = self._of_amplitudes(first, i, p)
+        return Vectors.joined([first[..., None], alpha], axis=-1)
 
-    def _of_amplitudes(self, fit: AmplitudeFit, i: int, p: int) -> Vectors:
+    def _of_amplitudes(self, first: Vectors, i: int, p: int) -> Vectors:
         """Return the coefficients of a plane without phase, (s,)."""
-        tried = 1 + np.flatnonzero(self.group.on[i, 1:, p] != 0)
-        trials = Vectors.joined([self.means(run)[i][None] for run in tried.tolist()])
-        masses = Vectors.joined(
-            [self.masses[i, self.group.trials[run].lines[0], p][None] for run in tried.tolist()]
-        )
-        return fit.second_run(self.means(0)[i].x, trials.x, masses)[0]
+        rows = [of for of in self.group.lines.rows if self.group.masses[i, of[0], p] != 0]
+        read = np.isfinite(self.group.readings)
+        each = [self._mean(read & np.isin(np.arange(read.shape[1]), of)[:, None])[i][None] for of in rows]
+        masses = Vectors.joined([self.masses[i, of[0], p][None] for of in rows])
+        fit = self.group.amplitude_fits[i][p]
+        return fit.second_run(first[i].x, Vectors.joined(each).x, masses)[0]
 
     @cached_property
     def here(self) -> Vectors:
@@ -132,7 +130,7 @@ class SecondRun:
 
 def digits(balancing: FieldBalancing, solved: Solved, warnings: list[str]) -> Digits:
     """Return corrections and trims in 32 digits, (g, p) each, and the relative errors of the uncertainties."""
-    if solved.fit.foreknown is not None:
+    if solved.group.fit.foreknown is not None:
         sentence = "--digits: the corrections are given in full, for no bound of the rounding of a fit with --influence is known"
         if sentence not in warnings:
             warnings.append(sentence)
@@ -154,28 +152,22 @@ def uncertainty_share(run: SecondRun, corrections: Vectors) -> Real:
     the relative errors of what they are of, and the corrections they are for to their own.
     """
     balancing, solved = run.balancing, run.solved
-    of_all = run.unknowns.apart(solved.fit.unknowns)
+    of_all = run.unknowns.apart(solved.group.fit.unknowns)
     of_alpha = np.linalg.norm(of_all[..., 1:], axis=-2)
     norms = np.linalg.norm(solved.alpha, axis=-2)
     relative = 8 * EPS + (of_alpha / np.where(norms > 0, norms, 1.0)).max(axis=-1)
     share = condition_number(solved.alpha, solved.group.weights) * relative
-    fit = solved.fit
-    if balancing.runs.fitted:
-        # the scatter of the residuals is a difference of readings, and the design is that of the masses
-        of_fit = of_all.max(axis=1) / np.abs(fit.unknowns).max(axis=1)
+    fit = solved.group.fit
+    of_fit = of_all.max(axis=1) / np.abs(fit.unknowns).max(axis=1)
+    share = share + of_fit.max(axis=-1)
+    if balancing.stored is None:
+        # the design is that of the masses
+        on = solved.group.masses
+        share = share + 8 * EPS * condition_number(on[:, np.abs(on).any(axis=(0, 2))])
+    if balancing.request.reading_error is None:
+        # the scatter of the residuals is a difference of readings
         scatter = np.where(fit.residual_sd > 0, fit.residual_sd, np.inf)
-        rounding = 32 * EPS * np.nanmax(np.abs(fit.readings), axis=(1, 2))
-        share = (
-            share
-            + of_fit.max(axis=-1)
-            + (rounding / scatter if balancing.request.reading_error is None else 0.0)
-        )
-    elif balancing.stored is None:
-        share = share + 8 * EPS * condition_number(solved.group.on[:, 1:])
-    # the scatter of repeats is a difference of readings
-    sd = solved.group.repeats.reading_sd
-    of_scatter = EPS * 8 * np.abs(solved.group.initial).max(axis=1) / np.where(sd > 0, sd, 1.0)
-    share = share + np.where(sd > 0, of_scatter, 0.0)
+        share = share + 32 * EPS * np.nanmax(np.abs(fit.readings), axis=(1, 2)) / scatter
     size = np.abs(solved.corrections)
     own = np.where(size > 0, corrections.apart(solved.corrections) / np.where(size > 0, size, 1.0), 0.0)
     return np.asarray(4 * share[:, None] + own)

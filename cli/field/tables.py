@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.run_means import RunMeans
 from cli.field.field_balancing import FieldBalancing, Solved
 from cli.field.rotor import Rotor, Trim, each
 from cli.field.rows import READINGS, Rows, Tables, amplitude, masses, uncertainties
@@ -235,16 +234,6 @@ def rotors(b: FieldBalancing, further: Sequence[Column] = ()) -> Table:
         )
     columns.append(number("condition_number", "number", rows.numbers(lambda s: s.condition)))
 
-    def repeated(name: str, of: Callable[[RunMeans], ArrayLike], unit: str = "") -> None:
-        def of_group(solved: Solved) -> ArrayLike | None:
-            repeats = solved.group.repeats
-            return of(repeats) if repeats.degrees_of_freedom else None
-
-        some(f"repeated_{name}", of_group, f"repeats.{name}", unit)
-
-    repeated("readings", lambda of: of.counts[of.counts > 1].sum())
-    repeated("degrees_of_freedom", lambda of: of.degrees_of_freedom)
-    repeated("reading_sd", lambda of: of.reading_sd, unit)
     hidden = [names("objective", [request.objective] * len(b.runs.rotors))]
     if request.tolerance is not None:
         grade, permissible = request.tolerance.grade, request.tolerance.permissible
@@ -259,17 +248,13 @@ def rotors(b: FieldBalancing, further: Sequence[Column] = ()) -> Table:
 
 def _errors(b: FieldBalancing) -> str:
     """Name the errors of the readings that the uncertainties are of."""
-    scatter = any(solved.group.repeats.reading_sd.any() for solved in b.solved)
     if b.request.reading_error is not None:
         relative, angle = b.request.reading_error
-        stated = (
+        return (
             f"reading errors of {100 * relative:.3g} % and {np.degrees(angle):.3g}° (one standard deviation)"
         )
-        return f"{stated}, or as the repeats scatter where that is more" if scatter else stated
-    if b.runs.fitted:
-        left = any((s.fit.degrees_of_freedom > 0).any() for s in b.solved)
-        return f"reading errors as the {'residuals of the fit' if left else 'readings behind the coefficients'} scatter"
-    return "reading errors as the repeats scatter"
+    left = any((s.group.fit.degrees_of_freedom > 0).any() for s in b.solved)
+    return f"reading errors as the {'residuals of the fit' if left else 'readings behind the coefficients'} scatter"
 
 
 def split(b: FieldBalancing, of: Callable[[Rotor], Complex], name: str, *, shown: bool = True) -> Table:
@@ -336,7 +321,7 @@ def zones(b: FieldBalancing) -> Table:
 def misfit(b: FieldBalancing) -> Table:
     """How far the amplitudes of each sensor are from any vector's, by the four-run method."""
     rows = Rows.each(b, lambda solved: len(solved.group.channels) * len(solved.planes))
-    off = rows.numbers(lambda solved: [[fit.misfit for fit in one] for one in solved.fits])
+    off = rows.numbers(lambda solved: [[fit.misfit for fit in one] for one in solved.group.amplitude_fits])
     plane = names("plane", rows.cells(lambda s: [name for name in s.planes for _ in s.group.channels]))
     columns = [
         names("sensor", rows.cells(lambda s: [c.sensor for c in s.group.channels] * len(s.planes))),
@@ -352,7 +337,9 @@ def alternatives(b: FieldBalancing) -> Table:
     of = [
         (rotor.name, rotor.planes[0], -v / a)
         for rotor in each(b)
-        for v, a in zip(rotor.group.initial[rotor.i], rotor.solved.fits[rotor.i][0].other, strict=True)
+        for v, a in zip(
+            rotor.group.fit.initial[rotor.i], rotor.solved.group.amplitude_fits[rotor.i][0].other, strict=True
+        )
         if a == a
     ]
     fix = masses(b, np.array([w for *_, w in of], dtype=complex))

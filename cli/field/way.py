@@ -75,7 +75,7 @@ class _Way:
 
     def topics(self) -> list[Topic]:
         """Return the steps."""
-        effects = self.group.trials and not self.b.request.four_run and self.group.fit is not None
+        effects = not (self.b.runs.fitted or self.b.request.four_run or self.b.stored)
         return [
             self._vectors(),
             *([self._effects()] if effects else []),
@@ -85,13 +85,9 @@ class _Way:
         ]
 
     def _rows(self) -> list[tuple[str, list[complex], list[complex]]]:
-        """Every run: its name, its readings (s,), what was on the rotor (p,)."""
+        """Every run: its name, its mean readings (s,), what was on the rotor (p,)."""
         group, i = self.group, self.i
-        if group.trials:
-            runs, read, on = [trial.run for trial in group.trials], group.means[i], group.on[i]
-        else:
-            runs, read, on = group.lines.of(i), group.readings[i], group.masses[i]
-        return list(zip(runs, read.tolist(), on.tolist(), strict=True))
+        return list(zip(group.lines.runs(i), group.means[i].tolist(), group.on[i].tolist(), strict=True))
 
     def _masses(self, on: list[complex]) -> list[dict[str, Any]]:
         return [
@@ -145,10 +141,11 @@ class _Way:
     def _effects(self) -> Topic:
         entries, text = [], ["What a trial mass does is the difference of two runs, T = V_run − V_before:"]
         rows = self._rows()
-        for j, (run, read, on) in enumerate(rows[1:], 1):
-            # against the first run whose masses differ in one plane; else the initial one
-            differ = (sum(m != n for m, n in zip(on, rows[r][2], strict=True)) for r in range(j))
-            before, other, under = rows[next((r for r, many in enumerate(differ) if many == 1), 0)]
+        for j, (run, read, on) in enumerate(rows):
+            at = int(self.group.before_run(j)[self.i])
+            if at < 0:
+                continue
+            before, other, under = rows[at]
             put = [m - n for m, n in zip(on, under, strict=True)]
             text.append(f"Run {run} against run {before}, {self._amounts(put) or 'no mass'}:")
             effects = [v - w for v, w in zip(read, other, strict=True)]
@@ -182,9 +179,9 @@ class _Way:
         ]
         if self.b.request.four_run:
             text = "From amplitudes alone (four runs): the coefficient whose circles fit the readings best."
-        elif self.group.fit is None:
+        elif self.b.stored:
             text = "Stored coefficients:"
-        elif self.group.trials:
+        elif not self.b.runs.fitted:
             text = f"α = T/m of each trial mass ({unit}); with trial masses left on, the runs' equations together:"
         else:
             text = f"Initial vibration and coefficients by least squares on all runs, V_run = V0 + Σ α·m ({unit}):"

@@ -325,7 +325,8 @@ def test_speeds_that_differ_a_little_are_one_speed(dalembert: Dalembert, tmp_pat
     )
     done = dalembert("field", "-", stdin=far)
     assert done.returncode == 1
-    assert "expected a sensor and speed of the initial run" in done.stderr
+    assert "no reading of sensor x at 901 in run 1" in done.stderr
+    assert "speeds more than 5 % apart" in done.stderr
 
 
 def test_the_split_onto_places(dalembert: Dalembert) -> None:

@@ -120,7 +120,7 @@ def test_two_readings_that_differ_by_more_than_their_stated_error(dalembert: Dal
         for error in ("1%,1deg", "5%,3deg")
     ]
     (said,) = [warning for warning in told[0] if "contradict" in warning]
-    for word in ("run 1, sensor 1", "with the same masses on", "90 at 41°", "97 at 43°"):
+    for word in ("run 1, sensor 1", "with the same masses on", "90 um at 41°", "97 um at 43°"):
         assert word in said
     assert not any("contradict" in warning for warning in told[1])
 

@@ -1,22 +1,18 @@
-"""The layouts in which logs occur, brought to the columns of a table of runs."""
+"""The layouts in which tables of runs and logs occur, brought to the columns of a table of runs."""
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
-import numpy as np
-
-from cli.read.runs.wide import is_wide, long_form
-from dalembert.angles import phasor
-from dalembert.errors import DataError
+from cli.read.runs.vectors import Layout, vectors_of
+from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number
-from dalembert.tables.files import read_bytes, remember, split_sheet
-from dalembert.tables.sources import LINE, decoded, open_source
-from dalembert.tables.table import Cells, Numbers, Table, read
+from dalembert.tables.headers import Heading, plain_word, quantity_meant
+from dalembert.tables.sources import Source
+from dalembert.tables.table import Cells, Table, read
+from dalembert.units import find_unit, parted
 
 NAMES = {
     "mode": "state",
@@ -31,48 +27,48 @@ NAMES = {
     "unbalance": "trial_unbalance_kg_m",
     "mass_angle_deg": "trial_angle_deg",
 }
-ANGLE = re.compile(r"(?:phase|(mass_|unbalance_)?angle(?:_(\w+))?)")
-KEYS = ("A", "B", "U", "ALPHA", "A0", "keep_trial", "weight_const")
+OF_ANGLE = re.compile(r"(?:phase|(mass_|unbalance_)?angle(?:_(\w+))?)")
 WITH = re.compile(
     r"without\b.*|with\s+(?P<mass>[\d.,]+)\s*(?P<unit>[a-z]+)(?:\s*(?:@|at)\s*(?P<angle>[-+\d.,]+)\s*(?:°|deg)?)?"
 )
 
 
-@dataclass(frozen=True)
-class Layout:
-    """A log as a table of runs, and what it states besides."""
-
-    table: Table
-    max_mass: dict[str, float] = field(default_factory=dict)
-    """Limits of the corrections, plane -> kg."""
-    runout: dict[str, complex] = field(default_factory=dict)
-    """Slow roll, sensor -> vector."""
+TEXTS = ("rotor", "run", "sensor", "state", "trial_plane", "trial_kept", "ref", "use", "date")
 
 
-def runs_table(
-    path: str,
-    texts: Sequence[str] = (
-        "rotor",
-        "run",
-        "sensor",
-        "trial_plane",
-        "trial_kept",
-        "date",
-        "ref",
-        "use",
-    ),
-    headers: Callable[[list[str]], list[str]] | None = None,
-) -> Table:
-    """Read a file as a table of runs."""
-    return read(
+def runs_layout(path: str) -> Layout:
+    """Read a table of runs, or a log in any of the layouts, and what it states besides."""
+    vectors = vectors_of(path)
+    if vectors is not None:
+        return vectors
+    of_log = False
+
+    def headers(header: list[str]) -> list[str]:
+        nonlocal of_log
+        of_log = is_log(header)
+        return headed(header) if of_log else header
+
+    table = read(
         path,
         numbers={"speed": "speed", "amplitude": "amplitude", "phase": "angle", "weight": "number"},
-        texts=texts,
+        texts=TEXTS,
         cells={"trial_mass": "mass", "trial_unbalance": "unbalance", "trial_angle": "angle"},
         blank=["speed", "weight", "amplitude", "phase"],
         headers=headers,
         layout=long_form,
     )
+    states = [WITH.fullmatch(state.lower()) for state in table.texts.get("state", ())]
+    if states and all(states) and "trial_mass" not in table.cells:
+        _states_are_masses(table, [match for match in states if match])
+    return Layout(table, of_log)
+
+
+def is_log(header: list[str]) -> bool:
+    """Whether a header is a log's, whose runs may be told apart by their masses alone."""
+    columns = {name.strip().lower() for name in header}
+    own = any(name.startswith(("mass_", "unbalance_")) for name in columns)
+    own = own and not any(name.startswith(("trial_mass", "trial_unbalance")) for name in columns)
+    return not header[0].strip() or own or bool(columns & {"state", *NAMES} - {"plane", "amplitude"})
 
 
 def headed(header: list[str]) -> list[str]:
@@ -90,64 +86,13 @@ def headed(header: list[str]) -> list[str]:
         meant = "state" if not word and k == 0 else NAMES.get(word, word)
         if word.startswith(("mass_", "unbalance_")) and word not in NAMES:
             meant = f"trial_{word}"
-        if angle := ANGLE.fullmatch(word):
+        if angle := OF_ANGLE.fullmatch(word):
             of, unit = angle.groups()
             meant = f"{'trial_angle' if of or of_mass else 'phase'}_{unit or 'deg'}"
         if meant.startswith(("trial_mass", "trial_unbalance", "amplitude")):
             of_mass = not meant.startswith("amplitude")
         out.append(name if meant == word else meant)
     return out
-
-
-def is_log(path: str) -> bool:
-    """Tell by its first line whether a file is a log in a layout of its own, and no table of runs."""
-    if _keyed_file(path)[1] is not None:
-        return True
-    source = open_source(path, {}, None)
-    if is_wide(source):
-        return False
-    columns = {each.name.lower() for each in source.headings}
-    own = any(name.startswith(("mass_", "unbalance_")) for name in columns)
-    own = own and not any(name.startswith(("trial_mass", "trial_unbalance")) for name in columns)
-    return not source.headings[0].name or own or bool(columns & {"state", *NAMES} - {"plane", "amplitude"})
-
-
-class Alpha(NamedTuple):
-    """The coefficients `ALPHA` of a file of vectors."""
-
-    file: str
-    rows: list[list[tuple[float, float]]]
-    """(size, degrees), a row for each sensor, a column for each plane."""
-    trials: bool
-    """Whether the file has trial runs too."""
-
-
-def alpha_of(path: str) -> Alpha | None:
-    """Return the coefficients of a file of vectors; None where it is none, or has no ALPHA."""
-    file, text = _keyed_file(path)
-    values = {} if text is None else _values(file, text)
-    if "ALPHA" not in values:
-        return None
-    rows = [
-        [(float(size), float(turn)) for size, turn in (_polar(file, "ALPHA", cell) for cell in _flat(row))]
-        for row in _listed(values["ALPHA"])
-    ]
-    if len({len(row) for row in rows}) > 1:
-        raise DataError(f"{file}: ALPHA has rows of different lengths: expected a column for each plane")
-    return Alpha(file, rows, "B" in values)
-
-
-def log_table(path: str) -> Layout:
-    """Read a log in any of the layouts, and what it states besides."""
-    file, text = _keyed_file(path)
-    if text is not None:
-        return _vectors(file, text)
-    texts = ("rotor", "run", "sensor", "state", "trial_plane", "trial_kept", "ref", "use", "date")
-    table = runs_table(path, texts, headed)
-    states = [WITH.fullmatch(state.lower()) for state in table.texts.get("state", ())]
-    if states and all(states) and "trial_mass" not in table.cells:
-        _states_are_masses(table, [match for match in states if match])
-    return Layout(table)
 
 
 def _states_are_masses(table: Table, states: list[re.Match[str]]) -> None:
@@ -169,216 +114,252 @@ def _states_are_masses(table: Table, states: list[re.Match[str]]) -> None:
     del table.texts["state"]
 
 
-def _keyed_file(path: str) -> tuple[str, str | None]:
-    """Return a file's name, and its text where it holds vectors: `KEY:` and lists, or a sheet or an object of JSON like it."""
-    file, data = read_bytes(split_sheet(path)[0])
-    # quotes of JSON are no quotes of a table
-    if re.match(rb'(?:\xef\xbb\xbf)?\s*\{\s*"\w+"\s*:', data):
-        remember(path)
-        return file, decoded(file, data, [])
-    source = open_source(path, {}, None)
-    text = source.text if source.sheet is None else _sheet_text(source.sheet.rows)
-    return source.file, text if _keyed(text) else None
+# -- sheets with a row a run and a column pair for each sensor, in English or German -----------------------------
+
+AMPLITUDE = (
+    "amplitude",
+    "amp",
+    "schwinggeschwindigkeit",
+    "schwingweg",
+    "schwingung",
+    "schwingungen",
+    "vibration",
+)
+PHASE = ("phase", "phasenwinkel", "phasenlage")
+ANGLE = ("angle", "winkel", "winkellage")
+MASS = ("mass", "masse", "gewicht", "weight", "testmasse", "probemasse", "testgewicht", "probegewicht")
+UNBALANCE = ("unbalance", "unwucht")
+PLACE = ("sensor", "lager", "messstelle", "messpunkt", "messebene", "aufnehmer", "bearing", "at", "am", "an")
+PLANE = ("plane", "ebene", "in", "der", "trial", "test", "probe", "ausgleichsebene")
+KEPT = ("bleibt", "kept", "trial_kept", "bleibt_drauf")
+WHOLE = ("rotor", "run", "state", "speed", "weight", "ref", "use", "date", "trial_plane", "trial_kept")
 
 
-def _sheet_text(rows: list[list[str]]) -> str:
-    """Write the rows of a sheet as a file of vectors has them; a row without a key is a further sensor's."""
-    lines: list[str] = []
-    for row in rows:
-        first, *cells = (cell.strip() for cell in row) if row else [""]
-        cells = [cell for cell in cells if cell]
-        key = first.rstrip(" :=")
-        if key in KEYS and cells:
-            lines.append(f"{key}: [[{', '.join(cells)}]]")
-        elif not first and cells and lines and lines[-1].endswith("]]"):
-            lines[-1] = f"{lines[-1][:-1]}, [{', '.join(cells)}]]"
-        elif first or cells:
-            lines.append(" ".join([first, *cells]))
-    return "\n".join(lines)
+@dataclass(frozen=True)
+class _Column:
+    """A column, and what it was taken for."""
+
+    place: int
+    heading: Heading
+    kind: str
+    """`amplitude`, `phase`, `trial_mass`, `trial_unbalance`, `trial_angle`, or a column of every row."""
+    of: str
+    """The sensor, or the plane; empty where the header names none."""
+    unit: str = ""
 
 
-def _keyed(text: str) -> bool:
-    """Tell whether the first line that says something is `KEY:` and a list."""
-    for line in LINE.finditer(text):
-        head = line.group().split("#")[0].strip()
-        if head and head != "---":
-            return re.match(r"[A-Za-z_]\w*\s*[:=]\s*(\[|$|[-+\d.]+\s*@)", head) is not None
-    return False
-
-
-def _vectors(file: str, text: str) -> Layout:
-    """Read `A`, `B`, `U` … whose cells are `amplitude@phase`."""
-    values = _values(file, text)
-    # with coefficients no trial run is needed
-    stored = "ALPHA" in values and "B" not in values
-    for key in ("A",) if stored else ("A", "B", "U"):
-        if key not in values:
-            more = ": its coefficients are for --influence" if key == "A" and "ALPHA" in values else ""
+def long_form(source: Source) -> Source:
+    """Return a table of runs with a row for each reading; of one that is such a table already only foreign names change."""
+    if not is_wide(source):
+        return _translated(source)
+    columns = list(_columns(source.headings))
+    source.check_cells(column.place for column in columns)
+    for column in columns:
+        twin = next(c for c in columns if (c.kind, c.of) == (column.kind, column.of))
+        if twin is not column:
+            both = f"{twin.heading.written} and {column.heading.written}"
             raise DataError(
-                f"{file}: no {key}: expected A (initial vectors), B (trial runs) and U (trial masses), or A and ALPHA{more}"
+                f"{source.file}: the columns {both} are both {_taken(column)}: expected one of them"
             )
-    first = [_polar(file, "A", cell) for cell in _flat(values["A"])]
-    trials = (
-        [[] for _ in first]
-        if stored
-        else [[_polar(file, "B", cell) for cell in _flat(row)] for row in _listed(values["B"])]
+    unit = _one_unit(source.file, [c for c in columns if c.kind == "amplitude"])
+    for column in columns:
+        partner = {"amplitude": "phase", "phase": "amplitude"}.get(column.kind)
+        if partner and not any((c.kind, c.of) == (partner, column.of) for c in columns):
+            raise DataError(
+                f"{source.file}: the column {column.heading.written} is {_taken(column)}, and no column is the {partner} there: "
+                "expected a pair of columns for each sensor"
+            )
+    taken = "; ".join(
+        f"{quote(c.heading.written)} is {_taken(c)}" for c in columns if c.of or c.kind not in WHOLE
     )
-    masses = [] if stored else [_polar(file, "U", cell) for cell in _flat(values["U"])]
-    slow = [_polar(file, "A0", cell) for cell in _flat(values.get("A0", []))]
-    if len(trials) != len(first) or any(len(row) != len(masses) for row in trials):
-        raise DataError(
-            f"{file}: B has {len(trials)} rows of {len(trials[0]) if trials else 0}: expected a row for each of {len(first)} sensors "
-            f"with a column for each of {len(masses)} trial runs"
+    source.warnings.append(f"{source.file}: read with a row a run: {taken}")
+    used = {column.place for column in columns}
+    left = [each.written for k, each in enumerate(source.headings) if k not in used and each.written]
+    if left:
+        source.warnings.append(
+            f"{source.file}: ignored the column{'s' * (len(left) > 1)} {', '.join(map(quote, left))}"
         )
-    if slow and len(slow) != len(first):
-        raise DataError(f"{file}: A0 has {len(slow)} vectors: expected one for each of {len(first)} sensors")
-    kept = "yes" if "".join(_flat(values.get("keep_trial", ""))).lower() in ("true", "yes", "1") else "no"
-    runs = [(0, s, first[s]) for s in range(len(first))]
-    runs += [(j + 1, s, row[j]) for j in range(len(masses)) for s, row in enumerate(trials)]
-    on = [masses[j - 1] if j else ("", "") for j, _, _ in runs]
-    table = Table(file, list(values), len(runs))
-    table.texts = {
-        "run": [str(j) if j else "initial" for j, _, _ in runs],
-        "sensor": [str(s + 1) for _, s, _ in runs],
-        "trial_plane": [str(j) if j else "" for j, _, _ in runs],
-        "trial_kept": [kept if j else "" for j, _, _ in runs],
-    }
-    table.cells = {
-        "trial_mass": Cells("U", "kg", [size for size, _ in on]),
-        "trial_angle": Cells("U", "deg", [turn for _, turn in on]),
-    }
-    size, turn = (np.array([float(read[k]) for _, _, read in runs]) for k in (0, 1))
-    table.numbers = {
-        "amplitude": Numbers("A", "um", size, "amplitude"),
-        "phase": Numbers("A", "deg", turn, "angle"),
-    }
-    table.warnings.append(f"{file}: no units: amplitudes are taken as um, masses as kg, angles as deg")
-    for key in set(values) - {
-        "A",
-        "B",
-        "U",
-        "A0",
-        "keep_trial",
-        "weight_const",
-        *(["ALPHA"] if stored else []),
-    }:
-        why = ": the trial runs tell the coefficients" if key == "ALPHA" else ""
-        table.warnings.append(f"{file}: {key} is not used{why}")
-    rest, around = (np.array([float(one[k]) for one in slow]) for k in (0, 1))
-    limits = re.findall(r"([\d.]+)\s*:\s*([\d.]+)", str(values.get("weight_const", "")))
-    # planes are numbered from 0 there
-    return Layout(
-        table,
-        {str(int(float(plane)) + 1): float(limit) for plane, limit in limits},
-        {str(s + 1): v for s, v in enumerate(phasor(rest, around, "deg").tolist())} if slow else {},
-    )
+    return _Long(source, columns, unit).source()
 
 
-def _values(file: str, text: str) -> dict[str, object]:
-    """Return key -> text, or nested lists of texts: JSON, and YAML as far as such files use it."""
-    if text.lstrip().startswith("{"):
-        return _of_json(file, text)
-    whole = "\n".join(line.split("#")[0].rstrip() for line in text.splitlines())
-    parts = re.split(r"^([A-Za-z_]\w*)\s*[:=]", whole, flags=re.MULTILINE)
-    out: dict[str, object] = {}
-    for key, value in zip(parts[1::2], parts[2::2], strict=True):
-        value_text = value.strip()
-        if key in out:
-            raise DataError(f"{file}: {key} stands twice: expected it once")
-        if value_text.startswith("-"):
-            value_text = _dashed(value_text)
-        listed = value_text.startswith("[") or (key in ("A", "B", "U", "A0", "ALPHA") and "@" in value_text)
-        out[key] = (
-            _nested(file, key, value_text if value_text.startswith("[") else f"[{value_text}]")
-            if listed
-            else value_text
-        )
-    return out
+def _translated(source: Source) -> Source:
+    """Return a table with a row for each reading under the names of its columns that the command knows.
+
+    A foreign word for the sensor makes it one; a name that is known already, or that two columns would share, stays.
+    """
+    names, before = [each.name for each in source.headings], ""
+    if not any(_is_foreign_sensor(each) for each in source.headings):
+        return source
+    for place, each in enumerate(source.headings):
+        column = _known(place, each, before)
+        before = "" if column is None else column.kind
+        unit = find_unit("amplitude", each.unit or parted(each.name)[1])
+        words = plain_word(each.base).split("_")
+        if _is_foreign_sensor(each):
+            names[place] = "sensor"
+        elif unit and any(word in AMPLITUDE for word in words):
+            names[place] = f"amplitude_{unit}"
+        elif quantity_meant(each.base, ["trial_plane", "plane"]):
+            names[place] = "trial_plane"
+        elif column is not None:
+            names[place] = f"{column.kind}_{column.unit}" if column.unit else column.kind
+    read = [
+        (k, each, name)
+        for k, (each, name) in enumerate(zip(source.headings, names, strict=True))
+        if name != each.name and names.count(name) == 1
+    ]
+    taken = ", ".join(f"{quote(each.written)} as {name}" for _, each, name in read)
+    source.warnings.append(f"{source.file}: read {taken}")
+    headings = list(source.headings)
+    for k, each, name in read:
+        headings[k] = Heading(each.written, name)
+    return replace(source, headings=headings)
 
 
-def _of_json(file: str, text: str) -> dict[str, object]:
-    """Return key -> text, or nested lists of texts, of an object of JSON."""
-
-    def leaves(value: object) -> object:
-        if isinstance(value, list):
-            return [leaves(each) for each in value]
-        if isinstance(value, dict):
-            return ", ".join(f"{key}: {leaves(each)}" for key, each in value.items())
-        return value if isinstance(value, str) else json.dumps(value)
-
-    def once(pairs: list[tuple[str, object]]) -> dict[str, object]:
-        for k, (key, _) in enumerate(pairs):
-            if key in (name for name, _ in pairs[:k]):
-                raise DataError(f"{file}: {key} stands twice: expected it once")
-        return dict(pairs)
-
-    try:
-        values: dict[str, object] = json.loads(text, object_pairs_hook=once)
-    except json.JSONDecodeError as error:
-        raise DataError(
-            f"{file}: line {error.lineno}: no JSON: {error.msg[:1].lower()}{error.msg[1:]}"
-        ) from None
-    except RecursionError:
-        raise DataError(f"{file}: lists too deep: expected rows of vectors such as 80@40") from None
-    return {key: leaves(value) for key, value in values.items()}
+def _is_foreign_sensor(each: Heading) -> bool:
+    return plain_word(each.base) != "sensor" and bool(quantity_meant(each.base, ["sensor"]))
 
 
-def _dashed(text: str) -> str:
-    """Write a list of dashes, one or two deep, with brackets."""
-    rows: list[list[str]] = []
-    nested = False
-    for line in text.splitlines():
-        stripped = line.strip()
-        if stripped.startswith("- -"):
-            rows.append([stripped[3:].strip()])
-            nested = True
-        elif stripped.startswith("-"):
-            inner = nested and line.startswith((" ", "\t")) and rows
-            if inner and line.index("-") > 0:
-                rows[-1].append(stripped[1:].strip())
-            else:
-                rows.append([stripped[1:].strip()])
-    return "[" + ", ".join(f"[{', '.join(row)}]" if nested else row[0] for row in rows) + "]"
+def is_wide(source: Source) -> bool:
+    """Tell by its header whether a sheet has a column pair for each sensor."""
+    columns = list(_columns(source.headings))
+    pairs = {c.of for c in columns if c.kind == "amplitude"} & {c.of for c in columns if c.kind == "phase"}
+    return bool(pairs) and not any(quantity_meant(each.base, ["sensor"]) for each in source.headings)
 
 
-def _nested(file: str, key: str, text: str) -> list[object]:
-    """Read brackets and commas."""
-    stack: list[list[object]] = [[]]
-    for token in re.findall(r"[\[\],]|[^\[\],]+", text):
-        if token == "[":
-            inner: list[object] = []
-            stack[-1].append(inner)
-            stack.append(inner)
-        elif token == "]":
-            if len(stack) == 1:
-                raise DataError(f"{file}: {key}: a bracket ']' too many")
-            stack.pop()
-        elif token != "," and token.strip():
-            stack[-1].append(token.strip().strip("'\""))
-    if len(stack) != 1:
-        raise DataError(f"{file}: {key}: a bracket is not closed")
-    if len(stack[0]) > 1:
-        raise DataError(f"{file}: {key}: found {len(stack[0])} lists, expected one")
-    return _listed(stack[0][0]) if stack[0] else []
+def _columns(headings: Sequence[Heading]) -> Iterator[_Column]:
+    """Yield the columns that are known, with what they are taken for."""
+    before = ""
+    for place, each in enumerate(headings):
+        column = _known(place, each, before)
+        before = "" if column is None else column.kind
+        if column is not None:
+            yield column
 
 
-def _listed(value: object) -> list[object]:
-    return value if isinstance(value, list) else [value]
-
-
-def _flat(value: object) -> list[str]:
-    """Return the texts of a list, or of a list of lists of one."""
-    return [
-        text for item in _listed(value) for text in (_flat(item) if isinstance(item, list) else [str(item)])
+def _known(place: int, each: Heading, before: str) -> _Column | None:
+    stem, unit = (each.base, each.unit) if each.unit else parted(each.name)
+    words = [plain_word(word) for word in stem.split("_")]
+    meant = plain_word(stem)
+    named = [
+        word for word, plain in zip(stem.split("_"), words, strict=True) if plain not in (*PLACE, *PLANE)
     ]
 
+    def name(*kinds: Sequence[str]) -> str:
+        drop = [word for kind in kinds for word in kind]
+        return "_".join(word for word in named if plain_word(word) not in drop)
 
-def _polar(file: str, key: str, cell: str) -> tuple[str, str]:
-    size, mark, turn = cell.partition("@")
+    def has(*kinds: Sequence[str]) -> bool:
+        return any(word in kind for word in words for kind in kinds)
+
+    angle, amplitude = find_unit("angle", unit), find_unit("amplitude", unit)
+    if meant in KEPT:
+        return _Column(place, each, "trial_kept", "")
+    if has(MASS) and find_unit("mass", unit):
+        return _Column(place, each, "trial_mass", name(MASS), find_unit("mass", unit) or "")
+    if has(UNBALANCE) and find_unit("unbalance", unit):
+        return _Column(place, each, "trial_unbalance", name(UNBALANCE), find_unit("unbalance", unit) or "")
+    if angle or (has(PHASE, ANGLE) and not unit):
+        of_mass = before in ("trial_mass", "trial_unbalance") or (has(ANGLE) and "trial" in words)
+        kind = "trial_angle" if of_mass and not has(PHASE) else "phase"
+        return _Column(place, each, kind, name(PHASE, ANGLE), angle or "deg")
+    if amplitude and name(AMPLITUDE):
+        return _Column(place, each, "amplitude", name(AMPLITUDE), amplitude)
+    quantity = quantity_meant(stem, WHOLE) or (meant if meant in WHOLE else "")
+    if quantity == "speed":
+        speed = find_unit("speed", unit)
+        return _Column(place, each, "speed", "", speed) if speed else None
+    return _Column(place, each, quantity, "") if quantity else None
+
+
+def _taken(column: _Column) -> str:
+    """Say what a column was taken for."""
+    words = {
+        "trial_mass": "trial mass",
+        "trial_unbalance": "trial unbalance",
+        "trial_angle": "angle of the trial mass",
+    }
+    where = "plane" if column.kind in words else "sensor"
+    return f"the {words.get(column.kind, column.kind)}{f' at {where} {column.of}' if column.of else ''}"
+
+
+def _one_unit(file: str, columns: Sequence[_Column]) -> str:
+    units = list(dict.fromkeys(column.unit for column in columns))
+    if len(units) > 1:
+        raise DataError(f"{file}: the sensors are in {' and '.join(units)}: expected one unit of vibration")
+    return units[0]
+
+
+class _Long:
+    """The rows of a wide sheet, one for each reading."""
+
+    def __init__(self, wide: Source, columns: Sequence[_Column], unit: str) -> None:
+        self.wide, self.unit = wide, unit
+        self.at = {(c.kind, c.of): c for c in columns}
+        self.sensors = [c.of for c in columns if c.kind == "amplitude"]
+        self.size = next((c for c in columns if c.kind in ("trial_mass", "trial_unbalance")), None)
+        self.planes = [c.of for c in columns if self.size and c.kind == self.size.kind and c.of]
+        self.whole = [c for c in columns if c.kind in WHOLE]
+        if not any(c.kind == "run" for c in self.whole):
+            wide.warnings.append(f"{wide.file}: no column run: each row is a run, numbered from 1")
+
+    def source(self) -> Source:
+        """Return the table of readings."""
+        names = ["sensor", f"amplitude_{self.unit}", "phase_deg"]
+        turns = {c.unit for (kind, _), c in self.at.items() if kind == "phase"}
+        if turns == {"rad"}:
+            names[-1] = "phase_rad"
+        elif "rad" in turns:
+            raise DataError(f"{self.wide.file}: phases in deg and rad: expected one unit")
+        names += [c.kind if not c.unit else f"{c.kind}_{c.unit}" for c in self.whole]
+        if not any(c.kind == "run" for c in self.whole):
+            names.append("run")
+        if self.size is not None:
+            names += [f"{self.size.kind}_{self.size.unit}", f"trial_angle_{self._angle_unit()}"]
+            names += ["trial_plane"] if self.planes else []
+        headings = [Heading(name, name) for name in names]
+        records = [(0, names), *self._records()]
+        return replace(
+            self.wide,
+            headings=headings,
+            records=records,
+            sheet=None,
+            above=0,
+            units_below=False,
+            unnamed_first=False,
+        )
+
+    def _angle_unit(self) -> str:
+        return next((c.unit for (kind, _), c in self.at.items() if kind == "trial_angle"), "deg")
+
+    def _records(self) -> Iterator[tuple[int, list[str]]]:
+        for number, (line, cells) in enumerate(self.wide.rows(), 1):
+            cells = [*cells, *[""] * (len(self.wide.headings) - len(cells))]
+            rest = [cells[c.place].strip() for c in self.whole]
+            if not any(c.kind == "run" for c in self.whole):
+                rest.append(str(number))
+            rest += self._masses(cells)
+            for sensor in self.sensors:
+                read = [cells[self.at[kind, sensor].place].strip() for kind in ("amplitude", "phase")]
+                if any(read):
+                    yield line, [sensor, *read, *rest]
+
+    def _masses(self, cells: Sequence[str]) -> list[str]:
+        """Return size, angle and plane of a row's trial masses, several joined by ';'; blank where there is none."""
+        if self.size is None:
+            return []
+        entries = []
+        for plane in self.planes or [""]:
+            size = cells[self.at[self.size.kind, plane].place].strip()
+            turn = self.at.get(("trial_angle", plane)) or self.at.get(("trial_angle", ""))
+            if size and not _is_zero(size):
+                entries.append((size, cells[turn.place].strip() if turn else "", plane))
+        joined = [";".join(part) for part in zip(*entries, strict=True)] if entries else ["", "", ""]
+        return joined if self.planes else joined[:2]
+
+
+def _is_zero(text: str) -> bool:
     try:
-        if not mark or parse_number(size) < 0:
-            raise ValueError
-        parse_number(turn)
+        return parse_number(text.replace(",", ".")) == 0
     except ValueError:
-        raise DataError(f"{file}: {key}: found '{cell}', expected amplitude@phase, such as 80@40") from None
-    return size.strip(), turn.strip()
+        return False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
@@ -13,7 +14,7 @@ from dalembert.angles import phasor
 from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number
 from dalembert.tables.table import Cells, Numbers, Table, numbered
-from dalembert.units import LARGEST, SMALLEST, UNITS, to_si
+from dalembert.units import LARGEST, SMALLEST, to_si
 
 if TYPE_CHECKING:
     from dalembert.arithmetic.doubled_vectors import Vectors
@@ -88,82 +89,58 @@ class Masses(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class MassColumns:
-    """The columns that say what was on the rotor."""
+    """The columns that state what was on the rotor."""
 
     table: Table
     size: Cells
     """Masses or unbalances."""
     per: str
     """`mass` or `unbalance`."""
-    fitted: bool
-    """Whether all runs are fitted together: then each row states what was on, in an initial run with trial runs one of each."""
     rotor: Rows
     """Of each row."""
 
-    def rows(self, run_names: list[str], run: Rows, stored: bool) -> tuple[Flags, Flags]:
-        """Find the rows that name a plane, or a mass where there is but one; and those whose masses are read.
+    @cached_property
+    def stated(self) -> Flags:
+        """Which rows state a mass, (n,)."""
+        return np.array([bool(cell) for cell in self.size.values])
 
-        With `stored` coefficients the runs need no names.
-        """
-        table, size = self.table, self.size
-        loaded = np.array([bool(cell) for cell in size.values])
-        planes, plane = table.numbered("trial_plane")
-        if self.fitted:
-            return loaded, loaded | np.array([bool(name) for name in planes])[plane]
-        if "run" not in table.texts and not stored:
-            raise DataError(f"{table.file}: no column run {table.told}")
-        named = np.array([bool(name) for name in planes])[plane] if "trial_plane" in table.texts else loaded
+    @cached_property
+    def named(self) -> Flags:
+        """Which rows name a plane, (n,)."""
+        planes, plane = self.table.numbered("trial_plane")
+        return np.array([bool(name) for name in planes])[plane]
+
+    def check_runs(self, run_names: list[str], run: Rows) -> None:
+        """Refuse rows that contradict those of their run: another plane, or a plane, a mark that it is kept, and no mass."""
         of_run = numbered(self.rotor * len(run_names) + run)[0]
-        self._kept(named, of_run, run_names, run)
-        tried = np.isin(of_run, of_run[named])
-        if (loose := loaded & ~tried).any():
-            raise self._wrong(int(np.argmax(loose)), "trial_plane", "", "the plane of the trial mass")
-        if size.unit not in UNITS[self.per]:
-            # what stored coefficients of masses are for is no unbalance
-            return named, np.zeros(table.rows, dtype=bool)
-        first = _first_of_run(of_run, named)
-        for i in np.flatnonzero(named & (plane != plane[first]))[:1].tolist():
-            one = planes[plane[first[i]]]
+        states = first_of_run(of_run, self.stated)
+        for i in np.flatnonzero(self.named & (states < 0))[:1].tolist():
+            raise self._wrong(i, self.size.header, "", "a trial mass")
+        names, plane = self.table.numbered("trial_plane")
+        for i in np.flatnonzero(self.named & (plane != plane[states]) & self.named[states])[:1].tolist():
+            one, other = names[plane[states[i]]], names[plane[i]]
             raise self._wrong(
                 i,
                 "trial_plane",
-                planes[plane[i]],
-                f"{quote(one)} as elsewhere in run {run_names[run[i]]}; several masses in one run are "
-                f"joined by ';' ({one};{planes[plane[i]]})",
+                other,
+                f"{quote(one)} as elsewhere in run {run_names[run[i]]}; several masses in one run are joined by ';' "
+                f"({one};{other})",
             )
-        # the row that states the mass: the others may leave it out
-        stated = _first_of_run(of_run, named & loaded)
-        bare = named & (stated < 0)
-        if bare.any():
-            raise self._wrong(int(np.argmax(bare)), size.header, "", "a trial mass above 0")
-        for cells in (size, table.cells.get("trial_angle")):
-            if cells is None:
-                continue
-            code = _codes(cells.values)
-            for i in np.flatnonzero(named & (code > 0) & (code != code[stated]))[:1].tolist():
-                expected = f"{quote(cells.values[stated[i]])} as elsewhere in run {run_names[run[i]]}"
-                raise self._wrong(i, cells.header, cells.values[i], expected)
-        return named, named & (stated == np.arange(table.rows))
-
-    def _kept(self, named: Flags, of_run: Rows, run_names: list[str], run: Rows) -> None:
-        """Refuse a mark that a mass is kept where none was put on."""
         words, code = self.table.numbered("trial_kept")
         kept = np.array([word.lower() in YES for word in words])[code]
-        for i in np.flatnonzero(kept & ~np.isin(of_run, of_run[named]))[:1].tolist():
+        for i in np.flatnonzero(kept & (states < 0))[:1].tolist():
             expected = f"the trial mass that is kept after run {run_names[run[i]]}"
             raise self._wrong(i, "trial_plane", "", expected)
 
     def _wrong(self, row: int, column: str, value: str, expected: str) -> DataError:
         return self.table.error(row, column, value, expected)
 
-    def masses(self, loaded: Flags) -> Masses:
-        """Read the masses of each row, several joined by ';'."""
+    def masses(self) -> Masses:
+        """Read the masses of each row, several joined by ';'; a mass of zero is none."""
         table, size, per = self.table, self.size, self.per
-        angle = table.cells.get("trial_angle")
-        if angle is None and not self.fitted and loaded.any():
-            raise DataError(f"{table.file}: no column trial_angle_deg {table.told}")
-        if not loaded.any():
+        if not self.stated.any():
             return Masses.of([None] * table.rows)
+        angle = table.cells.get("trial_angle")
         names, code = table.numbered("trial_plane")
         planes: dict[str, int] = {}
         for name in names:
@@ -171,18 +148,17 @@ class MassColumns:
                 planes.setdefault(part.strip(), len(planes))
         plane = np.array([planes.get(name or "1", -1) for name in names])[code]
         # one mass in a row, its numbers in order: all these rows together, and the others one by one
-        plain = loaded & np.array([bool(cell) for cell in size.values])
-        plain &= np.array([";" not in name for name in names])[code]
+        plain = self.stated & np.array([";" not in name for name in names])[code]
+        if "trial_plane" in table.texts:
+            plain &= self.named
         sizes, angles = size.parsed, None if angle is None else angle.parsed
         if sizes is None or angles is None:
             plain[:] = False
             sizes = angles = np.zeros(table.rows)
-        plain &= (
-            (sizes >= (0 if self.fitted else SMALLEST)) & (sizes <= LARGEST) & (np.abs(angles) <= LARGEST)
-        )
+        plain &= (sizes >= 0) & (sizes <= LARGEST) & (np.abs(angles) <= LARGEST)
         others = [
             (i, planes[name], mass, turn)
-            for i in np.flatnonzero(loaded & ~plain).tolist()
+            for i in np.flatnonzero(self.stated & ~plain).tolist()
             for name, mass, turn in self._of_row(i, names[code[i]], angle)
         ]
         row, where, more, turns = (
@@ -205,16 +181,12 @@ class MassColumns:
             each = vectors(Numbers("", size.unit, amounts, per).exact, Numbers("", unit, around, "angle"))
             return _added(each, entry, len(first))
 
-        says = np.array([bool(cell) for cell in size.values]) if self.fitted else loaded
-        return Masses(list(planes), row[first], where[first], value, says, exact)
+        return Masses(list(planes), row[first], where[first], value, self.stated, exact)
 
     def _of_row(self, i: int, name: str, angle: Cells | None) -> Iterator[tuple[str, float, float]]:
         """Yield plane, size and angle of each mass of a row, as the file has them."""
         size = self.size
-        what = "mass" if self.fitted else "trial mass"
         cell, turn = size.values[i], "" if angle is None else angle.values[i]
-        if not cell:
-            raise self._wrong(i, size.header, cell, f"the mass in plane {name}")
         names = [part.strip() for part in name.split(";")] if name else ["1"]
         if "" in names:
             raise self._wrong(i, "trial_plane", name, "a plane's name before and after each ';'")
@@ -224,20 +196,22 @@ class MassColumns:
                 joined = f"{len(names)} joined by ';' as in trial_plane"
                 raise self._wrong(i, cells.header, cells.values[i], f"masses and angles, {joined}")
         for one, part, at in zip(names, parts, around, strict=True):
-            mass = self._number(size, i, part, f"a {what}" if self.fitted else f"a {what}, positive")
-            if not self.fitted and not mass >= SMALLEST:
-                raise self._wrong(i, size.header, cell, f"a positive {what}")
-            if mass < 0:
-                raise self._wrong(i, size.header, cell, f"a {what} that is not negative")
+            mass = self._number(size, i, part, "a trial mass")
+            if mass < 0 or 0 < mass < SMALLEST:
+                raise self._wrong(i, size.header, cell, "a positive trial mass, or 0 where none is on")
             if not at.strip() and mass:
                 header = angle.header if angle is not None else "trial_angle_deg"
-                raise self._wrong(i, header, turn, f"the angle of the {what}")
-            angled = at.strip() and angle is not None
-            yield (
-                one,
-                mass,
-                self._number(angle, i, at, f"the angle of the {what}") if angled and angle else 0.0,
+                raise self._wrong(i, header, turn, "the angle of the trial mass")
+            if not name and "trial_plane" in self.table.texts:
+                if not mass:
+                    continue
+                raise self._wrong(i, "trial_plane", "", "the plane of the trial mass")
+            turned_by = (
+                0.0
+                if angle is None or not at.strip()
+                else self._number(angle, i, at, "the angle of the trial mass")
             )
+            yield one, mass, turned_by
 
     def _number(self, cells: Cells, row: int, text: str, expected: str) -> float:
         try:
@@ -247,13 +221,7 @@ class MassColumns:
             raise self._wrong(row, cells.header, cells.values[row], expected + more) from None
 
 
-def _codes(values: Sequence[str]) -> Rows:
-    """Number texts, 0 for a blank."""
-    first = {"": 0}
-    return np.array([first.setdefault(text, len(first)) for text in values])
-
-
-def _first_of_run(of_run: Rows, rows: Flags) -> Rows:
+def first_of_run(of_run: Rows, rows: Flags) -> Rows:
     """Return for each row the first of its run among some rows, -1 where there is none."""
     first = np.full(int(of_run.max(initial=0)) + 1, -1)
     at = np.flatnonzero(rows)[::-1]

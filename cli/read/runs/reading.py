@@ -1,4 +1,4 @@
-"""Measured runs as people keep them: a table or a log to rows, with the masses that were on and what each row reads."""
+"""Measured runs as people keep them: a table, a wide sheet or a log, to rows with what was on and what each row reads."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cli.read import options
-from cli.read.runs.layouts import Layout, alpha_of, is_log, log_table, runs_table
+from cli.read.runs.layouts import runs_layout
 from cli.read.runs.masses import MassColumns, Masses, on_top, turned, turned_exactly
-from cli.read.runs.rows import NoInitialRun, Sorted
-from cli.read.runs.runs import Complex, LogRows, OfInitialRun, Real, Rows, Runs, near_speeds
-from cli.read.runs.stored import Sisters, Stored, read_stored, stored_alpha
+from cli.read.runs.rows import LogRows, Sorted
+from cli.read.runs.runs import Complex, Real, Rows, Runs, channels_of
+from cli.read.runs.vectors import Layout
+from cli.read.stored import Sisters, Stored, read_stored, stored_alpha
 from dalembert.angles import phasor
 from dalembert.errors import DataError, quote
 from dalembert.tables.table import Cells, Table
@@ -23,8 +24,6 @@ from dalembert.units import UNITS
 
 if TYPE_CHECKING:
     from dalembert.arithmetic.doubled_vectors import Vectors
-
-OF_LOGS = ("date", "ref", "use")  # columns that count where all runs are fitted
 
 
 class Measured(NamedTuple):
@@ -37,6 +36,8 @@ class Measured(NamedTuple):
     """Those that take part in a fit."""
     warnings: list[str]
     """Those of the files of coefficients."""
+    fit: bool
+    """Whether the fit is shown whatever it leaves over: a log asks for it, and so do stored coefficients that take part in it."""
 
 
 def read_measured(
@@ -55,7 +56,7 @@ def read_measured(
     path, influence
         The runs, and the files of stored coefficients.
     fit
-        Whether an option needs a fit of all runs.
+        Whether an option needs a fit of all runs: stored coefficients take part in it.
     exclude
         Runs that take no part in it.
     four_run
@@ -63,74 +64,31 @@ def read_measured(
     against
         Whether phases are counted against the sense of the mass angles.
     """
+    layout = runs_layout(path)
     files = [read_stored(file) for file in influence]
-    log = not four_run and is_log(path)
-    fitted = log or fit or len(files) > 1 or any(one.along is not None for one in files)
-    fitted = fitted and not four_run
-    if fitted and not files and (own := alpha_of(path)) is not None and not own.trials:
-        files = [stored_alpha(own)]
-    layout = log_table(path) if fitted else Layout(runs_table(path))
-    fitted = fitted or (not (files or four_run) and more_than_unknowns(layout.table))
-    try:
-        return _Reading(layout, files, fitted, exclude, four_run, against).measured()
-    except NoInitialRun:
-        if files or four_run:
-            raise
-        # none of the runs is the initial one: its vibration is an unknown of the fit
-        return _Reading(layout, files, True, exclude, four_run, against).measured()
-
-
-def more_than_unknowns(table: Table) -> bool:
-    """Whether a rotor has more runs than unknowns: the initial vibration and a coefficient of each plane."""
-    sizes = [table.cells[name] for name in ("trial_mass", "trial_unbalance") if name in table.cells]
-    if "run" not in table.texts or len(sizes) != 1:
-        return False
-    _, rotor = table.numbered("rotor", "1")
-    _, run = table.numbered("run")
-    names, plane = table.numbered("trial_plane")
-    if "trial_plane" not in table.texts:
-        names, plane = ["", "1"], np.array([bool(cell) for cell in sizes[0].values]).astype(np.intp)
-    planes: dict[str, int] = {}
-    each = [
-        [planes.setdefault(part.strip(), len(planes)) for part in name.split(";") if part.strip()]
-        for name in names
-    ]
-
-    def count(codes: Rows, of: Rows) -> Rows:
-        """Count what differs, rotor by rotor."""
-        many = int(codes.max(initial=0)) + 1
-        # with indices: without them numpy loads its masked arrays, which takes longer than a small table
-        each, _ = np.unique(of * many + codes, return_index=True)
-        return np.bincount(each // many, minlength=int(rotor.max()) + 1)
-
-    most = max(map(len, each))
-    several = np.array([one + one[-1:] * (most - len(one)) if one else [-1] * most for one in each])[plane]
-    loaded = several[:, 0] >= 0 if most else np.zeros(table.rows, dtype=bool)
-    if not loaded.any():
-        return False
-    unknowns = count(several[loaded].ravel(), np.repeat(rotor[loaded], most))
-    return bool(((count(run, rotor) > 1 + unknowns) & (unknowns > 0)).any())
+    if not files and not four_run and layout.alpha is not None:
+        files = [stored_alpha(layout.alpha)]
+    return _Reading(layout, files, fit, exclude, four_run, against).measured()
 
 
 class _Reading:
-    """The rows of a table of runs: of a log that is fitted, or of an initial run and trial runs."""
+    """The rows of a table of runs, and the coefficients that are stored of its machines."""
 
     def __init__(
         self,
         layout: Layout,
         files: Sequence[Stored],
-        fitted: bool,
+        fit: bool,
         exclude: Collection[str],
         four_run: bool,
         against: bool,
     ) -> None:
-        self.table, self.fitted, self.exclude = layout.table, fitted, exclude
+        self.layout, self.table, self.files, self.exclude = layout, layout.table, files, exclude
         self.four_run, self.against = four_run, against
-        self.warnings = [warning for one in files for warning in one.table.warnings]
+        self.together = fit or layout.is_log or len(files) > 1 or any(one.along is not None for one in files)
+        """Whether all runs are fitted together, with the stored coefficients: on request, of a log, of coefficients with errors."""
         table = self.table
         self.amplitude = table.require("amplitude", "amplitude")
-        self.stored = files[0] if files and not fitted else None
-        self.sisters = Sisters(files) if files and fitted else None
         sizes = [table.cells[name] for name in ("trial_mass", "trial_unbalance") if name in table.cells]
         if len(sizes) > 1:
             raise DataError(
@@ -141,55 +99,56 @@ class _Reading:
                 f"{table.file}: no column trial_mass_kg (or trial_mass_g, trial_unbalance_g_mm …): expected trial masses, "
                 f"or stored coefficients by --influence {table.told}"
             )
-        per_unit = self.stored.unit if self.stored else self.sisters.unit if self.sisters else "kg"
-        size = sizes[0] if sizes else Cells("", per_unit, [""] * table.rows)
+        size = sizes[0] if sizes else Cells("", files[0].unit, [""] * table.rows)
         names, rotor = table.numbered("rotor", "1")
-        unit = per_unit if self.stored else size.unit
-        self.runs = Runs(table, names, unit, fitted, max_mass=layout.max_mass, runout=layout.runout)
-        self.masses = MassColumns(table, size, self.runs.per, fitted, rotor)
-        if self.sisters is not None and self.sisters.unit not in UNITS[self.runs.per]:
-            raise DataError(
-                f"{table.file}: the runs have a {self.runs.per}, the stored coefficients are per {self.sisters.unit}"
-            )
+        self.runs = Runs(table, names, size.unit, max_mass=layout.max_mass, runout=layout.runout)
+        self.masses = MassColumns(table, size, self.runs.per, rotor)
 
     def measured(self) -> Measured:
         """Read the rows, sorted by rotor."""
-        table, runs, rotor = self.table, self.runs, self.masses.rotor
-        vibration = self._vibration()
-        when = None
-        if self.fitted:
-            when = years(table)
-            if "use" in table.texts:
-                table.warnings.append(
-                    f"{table.file}: the column use is the keeper's own mark: every row takes part in the fit"
-                )
-        else:
-            table.warnings += [
-                f"{table.file}: ignored the column {name}" for name in OF_LOGS if name in table.texts
-            ]
+        ordered, files, runs = Sorted(self._rows(), self.exclude), self.files, self.runs
+        if not files:
+            return Measured(ordered, None, None, [], self.together)
+        unit, warnings = files[0].unit, [warning for one in files for warning in one.table.warnings]
+        runs.other_masses = unit not in UNITS[runs.per]
+        # stored coefficients stand for trial runs; without an initial run, or with several, all runs are fitted with them
+        if not self.together and ordered.leave_out_loaded():
+            runs.mass_unit = unit
+            return Measured(ordered, files[0], None, warnings, False)
+        if runs.other_masses:
+            raise DataError(
+                f"{self.table.file}: the runs have a {runs.per}, the stored coefficients are per {unit}"
+            )
+        return Measured(ordered, None, Sisters(files), warnings, True)
+
+    def _rows(self) -> LogRows:
+        table, rotor, of_log = self.table, self.masses.rotor, self.layout.is_log
+        vibration, when = self._vibration(), years(table)
+        if "use" in table.texts:
+            table.warnings.append(
+                f"{table.file}: the column use is the keeper's own mark: every row takes part in the fit"
+            )
+        if "run" not in table.texts and not (of_log or self.files):
+            raise DataError(f"{table.file}: no column run {table.told}")
         run_names, run = table.numbered("run", "initial")
-        named, loaded = self.masses.rows(run_names, run, self.stored is not None)
-        masses = self.masses.masses(loaded)
-        if self.fitted:
-            if "ref" in table.texts:
-                alone = masses
-                masses = Masses.of(
-                    on_top(table, rotor, alone.by_row(), turned),
-                    lambda: on_top(table, rotor, alone.exact_by_row(), turned_exactly),
-                )
-            channels, channel = near_speeds(table, rotor)
-            if "run" not in table.texts:
-                run_names, run = _run_names(rotor, channel, when, masses)
-            for name in self.exclude:
-                if name not in run_names:
-                    raise options.bad("--exclude", f"no run {quote(name)} in {table.file}")
-        rows = LogRows(runs, rotor, vibration, masses, named, run, run_names, self._exact, when)
-        ordered = Sorted(rows, self.exclude)
-        if not self.fitted:
-            ordered.find_initial(self.stored is not None)
-            channels, channel = OfInitialRun(table, rotor, runs, ordered.is_initial).channels()
-        rows.channels, rows.channel = channels, channel
-        return Measured(ordered, self.stored, self.sisters, self.warnings)
+        if "run" in table.texts or not of_log:
+            self.masses.check_runs(run_names, run)
+        masses = self.masses.masses()
+        if "ref" in table.texts:
+            alone = masses
+            masses = Masses.of(
+                on_top(table, rotor, alone.by_row(), turned),
+                lambda: on_top(table, rotor, alone.exact_by_row(), turned_exactly),
+            )
+        channels, channel = channels_of(table, rotor)
+        if "run" not in table.texts and of_log:
+            run_names, run = _run_names(rotor, channel, when, masses)
+        for name in self.exclude:
+            if name not in run_names:
+                raise options.bad("--exclude", f"no run {quote(name)} in {table.file}")
+        return LogRows(
+            self.runs, rotor, vibration, masses, run, run_names, self._exact, when, channels, channel
+        )
 
     def _exact(self) -> Vectors:
         """Return what each row reads in 32 digits, of the decimals as they are written; 0 where it is blank."""
@@ -217,12 +176,9 @@ class _Reading:
             table.reject(unread, "amplitude", "a number")
             return amplitude.values.astype(complex)
         phase = table.require("phase", "angle")
-        expected = "a number"
-        if self.fitted:
-            # a state that a run lacks may be a row with blank cells
-            unread, expected = unread & np.isnan(phase.values), "a number, or amplitude and phase both blank"
-        else:
-            unread = np.zeros(table.rows, dtype=bool)
+        # a sensor that a run lacks may be a row with blank cells
+        unread = unread & np.isnan(phase.values)
+        expected = "a number, or amplitude and phase both blank"
         for numbers, name in ((amplitude, "amplitude"), (phase, "phase")):
             table.reject(np.isnan(numbers.values) & ~unread, name, expected)
         turn = np.where(unread, 0.0, -phase.values if self.against else phase.values)

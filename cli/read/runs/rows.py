@@ -2,22 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.read.runs.masses import NO, YES
-from cli.read.runs.runs import SHOWN, Complex, Exact, Group, Lines, LogRows, Real, Rows, Trial
-from dalembert.errors import DataError, quote
+from cli.read.runs.masses import NO, YES, Masses
+from cli.read.runs.runs import SHOWN, Channel, Complex, Exact, Group, Lines, Real, Rows, Runs
+from dalembert.errors import DataError
 from dalembert.tables.table import numbered
 
 if TYPE_CHECKING:
     from dalembert.arithmetic.doubled_vectors import Vectors
 
 T = TypeVar("T", Complex, "Vectors")
+
+
+@dataclass(eq=False, repr=False)
+class LogRows:
+    """The rows of a table of runs, as arrays."""
+
+    of: Runs
+    """What the rows are of."""
+    rotor: Rows
+    vibration: Complex
+    masses: Masses
+    run: Rows
+    runs: list[str]
+    exact: Callable[[], Vectors]
+    """`vibration` in 32 digits, as the table has it; computed on request."""
+    years: Real | None
+    """When it was read; NaN where the row does not say."""
+    channels: list[Channel]
+    channel: Rows
+    """The sensor, state and speed of each row."""
 
 
 class _Listed:
@@ -46,10 +67,6 @@ class _Listed:
         return label
 
 
-class NoInitialRun(DataError):
-    """No run is without a mass: all have to be fitted together."""
-
-
 class Sorted:
     """The rows of all rotors, sorted by rotor; what was on in each run, and which runs take part."""
 
@@ -63,6 +80,8 @@ class Sorted:
         """Of each row its rotor's run."""
         out = np.array([name in excluded for name in rows.runs])
         self.takes_part = ~out[self.runs.code]
+        self.read = np.ones(len(out[self.runs.code]), dtype=bool)
+        """Of which runs the readings count."""
         self._on()
 
     def _on(self) -> None:
@@ -92,8 +111,7 @@ class Sorted:
         self.has[self.run[at], self.planes.place] = True
         self.on = on
         self.stays = stays = self._stays()
-        self.after_kept = self._left_on(on, np.zeros((rotors, width), dtype=complex))
-        """Whether an earlier run of the rotor has left a mass on."""
+        self._leave_on(on, np.zeros((rotors, width), dtype=complex))
         if stays.any():
             self.has |= on != 0
         read = np.zeros(len(first), dtype=bool)
@@ -102,21 +120,14 @@ class Sorted:
         self.last = np.maximum.reduceat(numbers, self.runs.start)
         """The last run of each rotor in which anything was read."""
 
-    def _left_on(self, on: T, standing: T) -> NDArray[np.bool_]:
-        """Add to the masses of each run (runs, planes) what earlier ones left on, and return which runs have any.
-
-        `standing` is nothing, (rotors, planes).
-        """
-        stays, after = self.stays, np.zeros(len(self.runs.first), dtype=bool)
-        kept = np.zeros(len(self.runs.count), dtype=bool)
-        for j in range(int(self.runs.count.max()) if stays.any() else 0):
+    def _leave_on(self, on: T, standing: T) -> None:
+        """Add to the masses of each run (runs, planes) what earlier ones left on; `standing` is nothing, (rotors, planes)."""
+        for j in range(int(self.runs.count.max()) if self.stays.any() else 0):
             mine = np.flatnonzero(self.runs.count > j)
             run = self.runs.start[mine] + j
-            after[run] = kept[mine]
             on[run] = on[run] + standing[mine]
-            stay, here = mine[stays[run]], run[stays[run]]
-            standing[stay], kept[stay] = on[here], True
-        return after
+            stay = self.stays[run]
+            standing[mine[stay]] = on[run[stay]]
 
     @cached_property
     def _exactly_on(self) -> Vectors:
@@ -126,45 +137,8 @@ class Sorted:
         run, place, entry = self._puts
         on = Vectors.of(np.zeros(self.on.shape))
         on[run, place] = self.rows.masses.exact()[entry]
-        self._left_on(on, Vectors.of(np.zeros((len(self.runs.count), self.on.shape[1]))))
+        self._leave_on(on, Vectors.of(np.zeros((len(self.runs.count), self.on.shape[1]))))
         return on
-
-    def find_initial(self, stored: bool) -> None:
-        """Find the initial run of each rotor, and refuse runs that are none with trial runs."""
-        rows, file = self.rows, self.rows.of.table.file
-        self.tried = np.zeros(len(self.runs.first), dtype=bool)
-        self.tried[self.run[rows.named[self.order]]] = True
-        bare = ~self.tried & ~self.after_kept
-        rotors = len(rows.of.rotors)
-        rotor_of = np.repeat(np.arange(rotors), self.runs.count)
-        many = np.bincount(rotor_of[bare], minlength=rotors)
-        if (many > 1).any():
-            rotor = int(np.argmax(many > 1))
-            run, again = np.flatnonzero(bare & (rotor_of == rotor))[:2].tolist()
-            one, two = (quote(rows.runs[self.runs.code[k]]) for k in (run, again))
-            if stored:
-                raise DataError(
-                    f"{file}: {rows.of.of(rotor)}runs {one} and {two} both have no trial mass: expected one run, for --influence "
-                    "gives the coefficients"
-                )
-            one, two = (rows.runs[self.runs.code[k]] for k in (run, again))
-            expected = f"a trial mass in run {two}, for run {one} is the initial one already"
-            raise rows.of.table.error(int(self.order[self.runs.first[again]]), "trial_plane", "", expected)
-        if not many.all():
-            raise NoInitialRun(
-                f"{file}: {rows.of.of(int(np.argmin(many)))}every run has a trial mass: expected an initial run with trial_plane, "
-                "trial_mass and trial_angle empty"
-            )
-        if not stored and (self.runs.count < 2).any():
-            raise DataError(
-                f"{file}: {rows.of.of(int(np.argmin(self.runs.count)))}no trial run: expected a run with a trial mass for every "
-                "plane, or stored coefficients by --influence"
-            )
-        self.initial = np.flatnonzero(bare)
-        """The initial run of each rotor."""
-        self.is_initial = np.zeros(len(self.order), dtype=bool)
-        self.is_initial[self.order] = bare[self.run]
-        """Which rows are of it."""
 
     def _agree(
         self, loaded: Rows, first: Rows, at: Rows, plane: Rows, value: Complex, counts: NDArray[np.bool_]
@@ -222,19 +196,24 @@ class Sorted:
         rotor, place = np.nonzero(active)
         return _Listed(rotor, self.planes.code[self.planes.start[rotor] + place], len(active)), place
 
-    def parts(self, named: Sequence[str | None] | None, stored: bool = False) -> Iterator[Group]:
-        """Yield rotors of like channels, planes and number of readings, and of like names where these count.
+    @property
+    def bare(self) -> NDArray[np.bool_]:
+        """Which runs are without masses, (runs,)."""
+        return np.asarray(~self.on.any(axis=1))
 
-        Of an initial run and trial runs the names of the runs count too; with stored coefficients the initial run is all.
-        """
+    def leave_out_loaded(self) -> bool:
+        """Leave out the runs with masses, where each rotor has one run without; return whether that is so."""
+        rotor_of = np.repeat(np.arange(len(self.runs.count)), self.runs.count)
+        if (np.bincount(rotor_of[self.bare & self.takes_part], minlength=len(self.runs.count)) != 1).any():
+            return False
+        self.read = self.bare
+        return True
+
+    def parts(self, named: Sequence[str | None] | None) -> Iterator[Group]:
+        """Yield rotors of like channels, planes and rows of runs, and of like `named` coefficients where such are stored."""
         rows, rotors = self.rows, len(self.rows.of.rotors)
-        takes_part = self.takes_part[self.run] & np.isfinite(rows.vibration[self.order])
-        if stored:
-            takes_part &= self.is_initial[self.order]
+        takes_part = (self.takes_part & self.read)[self.run] & np.isfinite(rows.vibration[self.order])
         mine = np.flatnonzero(takes_part)
-        if not rows.of.fitted:
-            # the initial run first
-            mine = mine[np.lexsort((~self.is_initial[self.order[mine]], self.rotor[mine]))]
         rotor, run, channel = self.rotor[mine], self.run[mine], rows.channel[self.order[mine]]
         lacking = np.flatnonzero(np.bincount(rotor, minlength=rotors) == 0)
         if len(lacking):
@@ -250,13 +229,12 @@ class Sorted:
         lines = _Listed(rotor, run * repeats + again, rotors)
         channels = _Listed(rotor, channel, rotors)
         planes, places = self._planes()
-        if named is None and rows.of.fitted:
+        if named is None:
             self._require_masses()
         label = planes.labelled(channels.labelled(lines.count))
-        if not rows.of.fitted:
-            of_line = run[lines.first]
-            codes = (self.runs.code[of_line] * 2 + self.stays[of_line]) * repeats + again[lines.first]
-            label = lines.labelled(label, numbered(codes)[0])
+        # runs that were read more often than once in like places
+        place = self.runs.place[mine]
+        label = lines.labelled(label, place[lines.first])
         if named is not None:
             numbers: dict[str | None, int] = {}
             of_name = np.array([numbers.setdefault(name, len(numbers)) for name in named])
@@ -282,7 +260,7 @@ class Sorted:
                 self._lacking(group, when, self.runs.code[run[first]])
             yield Group(
                 group,
-                Lines(rows.runs, self.runs.code[run[first]], when),
+                Lines(rows.runs, self.runs.code[run[first]], place[first[0]], when),
                 [rows.channels[c] for c in channels.code[heads[0]].tolist()],
                 [rows.masses.planes[k] for k in planes.code[columns[0]].tolist()],
                 readings,
@@ -290,7 +268,6 @@ class Sorted:
                 self.on[stand],
                 [rows.runs[k] for k in self.runs.code[self.last[group]].tolist()],
                 None if weights is None else self._positive(group, weights[heads]),
-                [] if rows.of.fitted else self._trials(run[first[0]]),
                 partial(self._exact, readings.shape, cells, source, loads, stand),
             )
 
@@ -309,14 +286,6 @@ class Sorted:
         readings[cells] = self.rows.exact()[source]
         return Exact(readings, self._exactly_on[loads], self._exactly_on[stand])
 
-    def _trials(self, run: Rows) -> list[Trial]:
-        """Return the runs of rotors that were measured alike, in order; `run` is that of each row of readings."""
-        names, code = self.rows.runs, self.runs.code
-        return [
-            Trial(names[code[k]], np.flatnonzero(run == k).tolist(), bool(self.tried[k]), bool(self.stays[k]))
-            for k in dict.fromkeys(run.tolist())
-        ]
-
     def _require_masses(self) -> None:
         """Refuse a rotor on which no mass ever was."""
         some = np.logical_or.reduceat(
@@ -325,8 +294,8 @@ class Sorted:
         if not some.all():
             of = self.rows.of.of(int(np.argmin(some)))
             raise DataError(
-                f"{self.rows.of.table.file}: {of}no mass ever changed: what a mass does to the vibration is not known; expected a "
-                "run with a mass on the rotor"
+                f"{self.rows.of.table.file}: {of}no trial run: no mass ever changed; expected a positive trial mass for every "
+                "plane, or stored coefficients by --influence"
             )
 
     def _weights(self, mine: Rows, channels: _Listed) -> Real | None:

@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import balancing
-from balancing.run_means import RunMeans
-from cli.read.runs.masses import Masses
 from dalembert.errors import DataError
 from dalembert.tables.table import Table, numbered
 from dalembert.units import UNITS, Scaled, amplitude_kind, from_si, to_si
@@ -51,38 +49,32 @@ class Channel:
         return key if self.state is not None and self.speed is None else {**key, "speed_rad_s": self.speed}
 
 
-@dataclass(frozen=True)
-class Trial:
-    """A run of an initial run with trial runs."""
-
-    run: str
-    lines: list[int]
-    """Which rows of readings are of it."""
-    tried: bool
-    """Whether a mass was put on for it."""
-    kept: bool
-
-
 class Lines:
-    """Of which run each row of readings is, for many rotors; the names are formed on request."""
+    """Which run each row of readings belongs to, for many rotors; the names are formed on request."""
 
-    def __init__(self, names: list[str], run: Rows, years: Real | None) -> None:
-        self.names, self.run, self.years = names, run, years
+    def __init__(self, names: list[str], run: Rows, place: Rows, years: Real | None) -> None:
+        self.names, self.run, self.place, self.years = names, run, place, years
         self.senses: list[str | None] = [None] * len(run)
         """For each rotor "lead" or "lag", as the runs show it; None where they cannot tell."""
 
+    @cached_property
+    def rows(self) -> list[list[int]]:
+        """The rows of each run, in the order of the file: all rotors have them in the same places."""
+        return [np.flatnonzero(self.place == k).tolist() for k in dict.fromkeys(self.place.tolist())]
+
     def of(self, i: int) -> list[str]:
-        """Return the runs of a rotor's rows."""
+        """Return the run of each row of a rotor."""
         return [self.names[r] for r in self.run[i].tolist()]
 
     def runs(self, i: int) -> list[str]:
         """Return the runs of a rotor, each once."""
-        return list(dict.fromkeys(self.of(i)))
+        return [self.names[self.run[i, rows[0]]] for rows in self.rows]
 
     def only(self, rotors: Rows, lines: Rows) -> Lines:
         """Return some lines of some of the rotors."""
         mine = np.ix_(rotors, lines)
-        return Lines(self.names, self.run[mine], None if self.years is None else self.years[mine])
+        years = None if self.years is None else self.years[mine]
+        return Lines(self.names, self.run[mine], self.place[lines], years)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,7 +97,7 @@ class Group:
     rotors: Rows
     """Their numbers, (g,)."""
     lines: Lines
-    """Of which run each row of readings is."""
+    """Which run each row of readings belongs to."""
     channels: list[Channel]
     planes: list[str]
     readings: Complex
@@ -118,14 +110,27 @@ class Group:
     """What that run is called, (g,)."""
     weights: Real | None
     """Those of the channels, (g, s)."""
-    trials: list[Trial]
-    """The runs, the initial one first; none of a log whose runs are all fitted together."""
     exact: Callable[[], Exact]
-    """Readings, masses and standing in 32 digits, as the table has them; worked out on request."""
-    fit: balancing.JointFit | None = None
-    """Where the readings tell the coefficients: not with stored ones, nor without phase."""
+    """Readings, masses and standing in 32 digits, as the table has them; computed on request."""
+    fit: balancing.JointFit = field(init=False)
+    """Initial vibration and coefficients: of all runs together, or the coefficients are stored, or of amplitudes alone."""
+    amplitude_fits: list[list[balancing.AmplitudeFit]] = field(init=False, default_factory=list)
+    """Of the four-run method, rotor by rotor, plane by plane."""
     before: Before | None = None
     """Where stored coefficients take part in the fit."""
+
+    def before_run(self, j: int) -> Rows:
+        """Return for each rotor the run that shows best what the masses of run j do, (g,); -1 where they are not new.
+
+        It is the first of the earlier runs, and those without masses, whose masses differ in one plane alone; else the first
+        without masses, where there is one.
+        """
+        apart = (self.on != self.on[:, [j]]).sum(axis=2)
+        earlier = np.arange(apart.shape[1]) < j
+        at = np.where(self.bare.any(axis=1), np.argmax(self.bare, axis=1), -1)
+        alone = (apart == 1) & (earlier | self.bare)
+        at = np.where(alone.any(axis=1), np.argmax(alone, axis=1), at)
+        return np.where(self.bare[:, j] | ((apart == 0) & earlier).any(axis=1), -1, at)
 
     def only(self, rotors: Rows, lines: Rows, channels: Rows) -> Group:
         """Return some lines and channels of some of the rotors."""
@@ -147,36 +152,31 @@ class Group:
         """The weights of one rotor's channels, (s,)."""
         return None if self.weights is None else self.weights[i]
 
-    @property
-    def fitted(self) -> balancing.JointFit:
-        """The fit of a group that has one."""
-        assert self.fit is not None
-        return self.fit
-
     @cached_property
     def chance(self) -> Real:
         """How often by chance a residual of the fit is as large as each of them, (g, r, s)."""
-        return balancing.outlier_probability(self.fitted)
+        return balancing.outlier_probability(self.fit)
 
     @cached_property
-    def repeats(self) -> RunMeans:
-        """The mean readings of an initial run and trial runs, and how far repeats scatter; of a fitted log none."""
-        return RunMeans(self.readings, [of.lines for of in self.trials])
-
-    @property
     def means(self) -> Complex:
-        """What was read in each run, (g, 1 + r, s): the mean of repeats."""
-        return self.repeats.values
-
-    @property
-    def initial(self) -> Complex:
-        """The vibration without masses, (g, s): the mean of the initial run, or as fitted."""
-        return self.means[:, 0] if self.trials or self.fit is None else self.fit.initial
+        """The mean reading of each run as vectors, (g, runs, s); NaN where a run lacks a channel."""
+        read = np.isfinite(self.readings)
+        sums, counts = (
+            np.stack([of[:, rows].sum(axis=1) for rows in self.lines.rows], axis=1)
+            for of in (np.where(read, self.readings, 0), read)
+        )
+        mean = np.full(sums.shape, complex(np.nan))
+        return np.asarray(np.divide(sums, counts, out=mean, where=counts > 0))
 
     @property
     def on(self) -> Complex:
-        """What was on the rotor in each run, (g, 1 + r, p)."""
-        return self.masses[:, [of.lines[0] for of in self.trials]]
+        """What was on the rotor in each run, (g, runs, p)."""
+        return self.masses[:, [rows[0] for rows in self.lines.rows]]
+
+    @property
+    def bare(self) -> NDArray[np.bool_]:
+        """Which runs are without masses, (g, runs)."""
+        return np.asarray(~self.on.any(axis=2))
 
 
 class Exact(NamedTuple):
@@ -196,14 +196,14 @@ class Exact(NamedTuple):
             readings[np.ix_(rotors, lines, channels)], masses[np.ix_(rotors, lines)], standing[rotors]
         )
 
-    def with_planes(self, at: list[int], count: int) -> Exact:
-        """Return the same with masses in the planes `at` of so many."""
+    def in_planes(self, own: list[int], there: list[int], count: int) -> Exact:
+        """Return the same with the masses of the planes `own` in the planes `there` of so many."""
         from dalembert.arithmetic.doubled_vectors import Vectors
 
         masses, standing = (
             Vectors.of(np.zeros((*of.shape[:-1], count))) for of in (self.masses, self.standing)
         )
-        masses[..., at], standing[..., at] = self.masses, self.standing
+        masses[..., there], standing[..., there] = self.masses[..., own], self.standing[..., own]
         return Exact(self.readings, masses, standing)
 
     def turned(self, rotors: NDArray[np.bool_]) -> Exact:
@@ -220,8 +220,10 @@ class Runs:
     rotors: list[str]
     mass_unit: str
     """Of the trials: a mass's or an unbalance's."""
+    other_masses: bool = False
+    """Whether the stored coefficients are per mass and the runs have unbalances, or the other way."""
     fitted: bool = False
-    """Whether all runs are fitted together, or are an initial one and trial runs."""
+    """Whether the fit is shown: on request, where readings are more than unknowns, or where no run is without masses."""
     groups: list[Group] = field(default_factory=list)
     max_mass: dict[str, float] = field(default_factory=dict)
     """The limits that the file states, plane -> SI."""
@@ -281,33 +283,8 @@ def apart(one: float | None, other: float) -> float:
     return abs(one - other) / max(abs(one), abs(other))
 
 
-@dataclass
-class LogRows:
-    """The rows of a table of runs, as arrays."""
-
-    of: Runs
-    """What the rows are of."""
-    rotor: Rows
-    vibration: Complex
-    masses: Masses
-    named: NDArray[np.bool_]
-    """Whether a row names a plane, or a mass where there is but one plane."""
-    run: Rows
-    runs: list[str]
-    exact: Callable[[], Vectors]
-    """`vibration` in 32 digits, as the table has it; worked out on request."""
-    years: Real | None = None
-    """When it was read; NaN where the row does not say."""
-    channels: list[Channel] = field(default_factory=list)
-    channel: Rows = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
-    """The sensor, state and speed of each row."""
-
-
-Flags = NDArray[np.bool_]
-
-
-def near_speeds(table: Table, rotor: Rows) -> tuple[list[Channel], Rows]:
-    """Return the channels, and that of each row; speeds within 5 % of the slowest of their kind are one."""
+def channels_of(table: Table, rotor: Rows) -> tuple[list[Channel], Rows]:
+    """Return the channels, and that of each row; speeds of a sensor within 5 % of the slowest are one speed, their mean."""
     sensors, sensor = table.numbered("sensor", "1")
     states, state = table.numbered("state")
     kind, first = numbered(sensor * len(states) + state)
@@ -341,72 +318,3 @@ def near_speeds(table: Table, rotor: Rows) -> tuple[list[Channel], Rows]:
         channel = Channel(one, None if none else float(mean[1]), None if none else float(mean[0]), state=of)
         code.append(out.setdefault(channel, len(out)))
     return list(out), np.array(code)[number]
-
-
-class OfInitialRun:
-    """The channels of the initial runs, which the trial runs read again."""
-
-    def __init__(self, table: Table, rotor: Rows, runs: Runs, initial: Flags) -> None:
-        self.table, self.rotor, self.runs, self.initial = table, rotor, runs, initial
-
-    def channels(self) -> tuple[list[Channel], Rows]:
-        """Return the sensors and speeds of the initial runs, and that of each row; the nearest speed is meant."""
-        table = self.table
-        sensors, sensor = table.numbered("sensor", "1")
-        speed = table.numbers.get("speed")
-        of_sensor = self.rotor * len(sensors) + sensor
-        initial = self.initial
-        if speed is None:
-            missing = ~np.isin(of_sensor, of_sensor[initial])
-            channels = [Channel(name, None) for name in sensors]
-            if missing.any():
-                raise self._not_there(int(np.argmax(missing)), sensors, sensor, initial, channels, sensor)
-            return channels, sensor
-        written, si = speed.values, np.asarray(speed.si)
-        out: dict[Channel, int] = {}
-        exact: dict[tuple[int, float | None], int] = {}
-        of: dict[int, list[int]] = {}
-        code = np.full(table.rows, -1)
-        for i in np.flatnonzero(initial).tolist():
-            value = None if written[i] != written[i] else float(written[i])
-            channel = Channel(sensors[sensor[i]], None if value is None else float(si[i]), value)
-            code[i] = out.setdefault(channel, len(out))
-            if exact.setdefault((int(of_sensor[i]), value), code[i]) == code[i]:
-                mine = of.setdefault(int(of_sensor[i]), [])
-                mine += [] if code[i] in mine else [int(code[i])]
-        channels = list(out)
-        for i in np.flatnonzero(~initial).tolist():
-            value = None if written[i] != written[i] else float(written[i])
-            match = exact.get((int(of_sensor[i]), value))
-            if match is None:
-                match = self._nearest(
-                    i, written[i], [(c, channels[c]) for c in of.get(int(of_sensor[i]), ())]
-                )
-            if match is None:
-                raise self._not_there(i, sensors, sensor, initial, channels, code)
-            code[i] = match
-        return channels, code
-
-    def _nearest(self, row: int, speed: float, same: list[tuple[int, Channel]]) -> int | None:
-        """Return the channel that is meant: the speed of a run is never quite that of another."""
-        off = [apart(channel.speed_written, speed) for _, channel in same]
-        nearest = min(range(len(same)), key=off.__getitem__, default=None)
-        if nearest is None or (off[nearest] > NEAR_SPEED and len(same) > 1):
-            return None
-        if off[nearest] > 0.01:
-            self.runs.warnings.append(
-                f"{self.runs.of(int(self.rotor[row]))}run {self.table.texts['run'][row]} ran at {speed:g}, the initial run at "
-                f"{same[nearest][1].speed_written or 0:g}: coefficients hold at one speed"
-            )
-        return same[nearest][0]
-
-    def _not_there(
-        self, row: int, sensors: list[str], sensor: Rows, initial: Flags, channels: list[Channel], code: Rows
-    ) -> DataError:
-        mine = np.flatnonzero(initial & (self.rotor == self.rotor[row]))
-        present = ", ".join(dict.fromkeys(str(channels[code[i]]) for i in mine.tolist()))
-        speed = self.table.numbers.get("speed")
-        name = sensors[sensor[row]]
-        at = np.nan if speed is None else speed.values[row]
-        what = name if at != at else f"{name} at {at:g}"
-        return self.table.error(row, "sensor", what, f"a sensor and speed of the initial run ({present})")

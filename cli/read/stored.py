@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from balancing import pooled_prior, stored_prior
-from cli.read.runs.layouts import Alpha, alpha_of
 from cli.read.runs.runs import Before, Channel, Complex, Real, Rows, Runs, apart
+from cli.read.runs.vectors import Alpha, alpha_of
 from dalembert.angles import phasor
 from dalembert.errors import DataError, quote
 from dalembert.quantities import exactly, parse_number
@@ -109,6 +109,10 @@ class Stored:
             raise DataError(f"{self.table.file}: no coefficients of rotor {quote(rotor)}")
         return mine
 
+    def key(self, rotor: str) -> str:
+        """Return what is the same for rotors with the same planes."""
+        return "" if "rotor" not in self.table.texts else ";".join(self.planes(rotor))
+
     def planes(self, rotor: str) -> list[str]:
         """Return the planes of a machine, in order."""
         plane = self._column("plane")
@@ -124,10 +128,9 @@ class Stored:
             sizes = _converted(sizes, "amplitude", self.amplitude_unit, runs.amplitude_unit)
         return vectors(sizes, phase)[self._rows_of(rotor, channels, self.planes(rotor))]
 
-    def matrix(self, rotor: str, channels: Sequence[Channel], runs: Runs) -> tuple[list[str], Complex]:
-        """Return the planes and α (s, p) of a rotor."""
-        planes = self.planes(rotor)
-        return planes, self.coefficients(rotor, channels, planes, runs).alpha
+    def matrix(self, rotor: str, channels: Sequence[Channel], runs: Runs) -> Complex:
+        """Return α (s, p) of a rotor."""
+        return self.coefficients(rotor, channels, self.planes(rotor), runs).alpha
 
     def coefficients(
         self, rotor: str, channels: Sequence[Channel], planes: list[str], runs: Runs
@@ -261,7 +264,7 @@ def read_stored(path: str) -> Stored:
 
 def stored_alpha(alpha: Alpha) -> Stored:
     """Return the coefficients `ALPHA` of a file of vectors, per kg."""
-    file, rows, _ = alpha
+    file, rows = alpha
     table = Table(file, ["ALPHA"], sum(map(len, rows)))
     places = [(s, p) for s, row in enumerate(rows) for p in range(len(row))]
     table.texts = {"sensor": [str(s + 1) for s, _ in places], "plane": [str(p + 1) for _, p in places]}
