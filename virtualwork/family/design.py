@@ -84,7 +84,7 @@ class Design:
 
     @property
     def rows(self) -> int:
-        """How many rows a table has: two of each point, x and y, one of an angle or a slide."""
+        """The number of rows of a table: two for each point, x and y, one for an angle or a slide."""
         return sum(len(key.names) for key in self.keys)
 
     @property
@@ -134,7 +134,7 @@ class Design:
         return self._alone.values(x, q)
 
     def slopes(self, numbers: ArrayLike, inputs: ArrayLike, inputs_alone: bool = False) -> Reals:
-        """The derivatives of that to the dimensions, and last to the inputs themselves, (rows, n, d + 1).
+        """Return the derivatives with respect to the dimensions, and last to the inputs themselves, (rows, n, d + 1).
 
         `inputs_alone`: to nothing but the inputs, (rows, n, 1).
         """
