@@ -42,7 +42,7 @@ class RunMeans:
 
     @cached_property
     def counts(self) -> NDArray[np.intp]:
-        """How often each sensor was read in each run, (1 + r, s)."""
+        """The number of readings of each sensor in each run, (1 + r, s)."""
         return np.array([np.isfinite(self.readings[0, of]).sum(axis=0) for of in self.rows])
 
     @cached_property
@@ -74,7 +74,7 @@ class RunMeans:
 
     @cached_property
     def contradictory(self) -> NDArray[np.bool_]:
-        """Where repeats lie as far apart as a trial mass should move the vibration, 30 % of it, (g, 1 + r, s)."""
+        """Whether repeats differ by as much as a trial mass should move the vibration, 30 % of it, (g, 1 + r, s)."""
         spread = self.scatter / self.counts
         largest = np.sqrt((np.square(np.abs(self.values)) + spread).max(axis=1, keepdims=True))
         return np.asarray(np.sqrt(spread) > 0.15 * largest)
