@@ -49,7 +49,7 @@ class History(NamedTuple):
     residual: Complex
     """(s,) each."""
     after: Spread
-    """The regions of the vibration with the corrections, of all machines."""
+    """The spread of the vibration with the corrections, of all machines."""
     planes: Sequence[str]
     corrections: Complex
     spreads: Sequence[tuple[Real, float]]

@@ -156,7 +156,7 @@ class Design:
         return rows[:, : len(q)], fine
 
     def _ready(self, q: Reals, enters: tuple[str, ...] | None) -> Repeated:
-        """What computes one design after another at some inputs; the last ones' is kept."""
+        """Return the object that computes one design after another at some inputs; that of the last inputs is kept."""
         own_signs = self._held is None
         key, same = (enters, own_signs), q.tobytes()
         kept = self._kept.get(key)
@@ -168,7 +168,7 @@ class Design:
         return kept[1]
 
     def _known(self, x: Reals) -> dict[str, Any] | None:
-        """What enters the tape of a design beside the input; None where it is better described alone."""
+        """Return the inputs of a design's tape other than the input itself; None if it is better described alone."""
         name = x.tobytes()
         if self._chosen[0] != name:
             self._chosen = name, self._enters(x)

@@ -138,13 +138,13 @@ class Family:
         return [np.full(len(self), own) if np.ndim(own) == 0 else own for own in self._of_inputs(name)]
 
     def _of_inputs(self, name: str) -> list[Number]:
-        """The same; a number where it is not varied."""
+        """Return each input's value or rate, (v,); a number if it is not varied."""
         every = (self._own[j, name] for j in range(len(self.mechanism.inputs)))
         return [number if at is None else self.values[:, at] for at, number in every]
 
     @cached_property
     def _own(self) -> dict[tuple[int | str, int | str], tuple[int | None, float]]:
-        """Of each input's value and rates the place among what is varied, or None; and the description's own number."""
+        """Return the index of each input's value and rates among the varied dimensions, or None; and the description's own number."""
         every = dimensions(self.mechanism)
         places = {d.path: i for i, d in enumerate(self.dimensions)}
         return {
