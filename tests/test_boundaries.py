@@ -101,7 +101,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("app",),
         ("grade",),
         ("exercise",),
-        ("completion", "exports", "imports"),
+        ("completion",),
         (
             "balance",
             "body",
@@ -123,6 +123,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "trial",
             "work",
         ),
+        ("formats",),
         ("cases",),
         ("show",),
         ("read",),

@@ -29,14 +29,13 @@ from virtualwork.describe.dimensions import Dimension, dimensions, value
 from virtualwork.drawing import Drawing, draw
 from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.forces import Forces
-from virtualwork.formulas.forces import Effort, Over
+from virtualwork.formulas.forces import Effort, Over, Rub, Slip
 from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.loops import Closed, Margin, Twist
 from virtualwork.formulas.pose_forces import PoseForces
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.quantity import Quantity
-from virtualwork.formulas.rubbing import Rub, Slip
 from virtualwork.page_shapes import cams, drawn_numbers, handles, profiles
 from virtualwork.picture.paper import travel_of
 from virtualwork.plan.steps import Group

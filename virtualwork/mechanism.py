@@ -132,10 +132,6 @@ class Mechanism(Description):
 
         Each of them that is not given is the description's own.
 
-        Returns
-        -------
-        Motion
-
         Examples
         --------
         >>> from virtualwork import Input, Link

@@ -13,7 +13,8 @@ import numpy as np
 
 from benchmarks.stress.pairs import Pairs
 from benchmarks.stress.random_linkages import four_bar, geared_five_bar, slider_crank, triad, turning_block
-from benchmarks.truth.mechanism import DIGITS, Exact
+from benchmarks.truth.constraints import DIGITS
+from benchmarks.truth.mechanism import Exact
 from virtualwork import Link, Mechanism, MechanismError
 from virtualwork.digits.estimates import Estimates
 from virtualwork.formulas.quantity import Quantity

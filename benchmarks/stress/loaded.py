@@ -14,7 +14,8 @@ import numpy as np
 
 from benchmarks.stress.pairs import Pairs
 from benchmarks.stress.topologies import Topology, generate, regularity
-from benchmarks.truth.mechanism import DIGITS, Exact, along, ratio
+from benchmarks.truth.constraints import DIGITS, along, ratio
+from benchmarks.truth.mechanism import Exact
 from virtualwork import GROUND, Belt, Force, Friction, Gear, Mechanism, Spring, Torque, TorsionSpring
 from virtualwork.describe import MechanismError
 from virtualwork.formulas.forces import Effort, JointForce, JointMoment, NewtonEuler, Shaking

@@ -24,28 +24,28 @@ OPTIONS = """
 Arguments:
   table TABLE  CSV of eccentric masses; - is standard input.
 What:
-  plane NAME[:Z]:RADIUS  Correction plane, such as A:0mm:20mm; one plane: static balancing.
-  planes FILE.csv  Table of correction planes: plane, z_*, radius_*, rotor.
-  mass NAME:MASS  Mass of a plane's correction, such as A:7kg; a plane with ? as its radius gets the radius for it.
+  plane NAME[:Z]:RADIUS  Correction plane, such as A:0mm:20mm; repeatable. One plane: static balancing.
+  planes FILE.csv  Table of correction planes, with the columns plane, z_*, radius_*, rotor.
+  mass NAME:MASS  Mass of a plane's correction, such as A:7kg. With --plane A:0mm:? the radius for it is found.
   gravity G  Acceleration of gravity for weights, m/s².
 How:
-  remove  Give the material to remove, not to add.
+  remove  Give the material to remove (default: to add).
   round_mass MASS  Round the corrections to this step, such as 0.1g.
   round_angle ANGLE  Round the angles to this step, such as 1deg.
-  modes FILE.csv  Modal balancing with these mode shapes: z_* and a column for each mode.
-How: the tolerance:
-  center_z Z  Axial position of the centre of mass, for couple and tolerance.
-  grade GRADE  Balance quality grade of ISO 21940-11, such as G2.5; API (4W/N) or MIL (MIL-STD-167-1).
+  modes FILE.csv  Balance a flexible rotor by its mode shapes: z_* and a column for each mode.
+Tolerance:
+  center_z Z  Axial position of the centre of mass. The couple is about it, and the tolerance is shared by it.
+  grade GRADE  Balance quality grade, such as G2.5 (ISO 21940-11), API (4W/N) or MIL (MIL-STD-167-1).
   speed SPEED  Highest service speed, such as 3000rpm.
   rotor_mass MASS  Mass of the rotor, such as 12kg.
-  permissible UNBALANCE  Permissible residual unbalance, such as 30g_mm, in place of a grade.
-  bearings Z1:Z2  Bearing planes, in which the tolerance holds; with --speed also the bearing forces.
+  permissible UNBALANCE  Permissible residual unbalance in place of a grade, such as 30g_mm.
+  bearings Z1:Z2  Bearing planes, where the tolerance holds (default: the correction planes). With --speed: show the bearing forces.
 Output:
-  page FILE.html  Write a page that computes: edit the masses, and the corrections follow.
+  page FILE.html  Write a page that computes the corrections while you edit the masses.
 Further options (docs/commands.md describes them):
-  mode_count K  Take the first K modes of --modes.
-  rigid  With --modes: balance force and couple too (N + 2 planes).
-  workers N  Processes that solve many rotors.
+  mode_count K  With --modes: use the first K modes (default: all).
+  rigid  With --modes: balance force and couple too, which takes two planes more.
+  workers N  Number of processes for many rotors.
 """
 
 
@@ -75,8 +75,8 @@ def run(
 ) -> Result:
     """Balance rotors from a table of known eccentric masses, in one, two or more planes.
 
-    TABLE has the columns mass_* and radius_* (or weight_* and radius_*, or unbalance_*), angle_*, z_* (not
-    needed with one plane), and optionally rotor and name; * is a unit: mass_kg, radius_mm, angle_deg, z_mm.
+    TABLE has the columns mass_* and radius_* (or weight_* and radius_*, or unbalance_*), angle_* and z_*, and
+    optionally rotor and name. The star is a unit: mass_kg, radius_mm, angle_deg, z_mm. One plane needs no z_*.
     Angles are counter-clockwise as seen against +z.
     """
     # numpy and all that needs it are loaded only once the command line itself is in order
@@ -128,7 +128,7 @@ def run(
         balancing = Balancing(rotors, chosen, request, executor)
 
     def figure() -> Figure:
-        from cli.balance.picture import draw
+        from cli.balance.page import draw
 
         return draw(balancing, polygons=show.steps)
 

@@ -1,31 +1,82 @@
-"""The page of a balancing: the masses as a table to edit, the formulas as tapes that compute what follows."""
+"""The picture of a balancing, masses, their resultant and the correction on a dial for each plane; its page, which computes."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.known_masses import Modal, known_masses
-from balancing.modal import shape_pieces
+from balancing import correct
+from balancing.picture import MOST, KnownMasses, known_masses
 from cli.balance.rotors import DIMENSIONS, Balancing
-from dalembert.arithmetic.engines.javascript import engine, written
+from cli.balance.tables import labels
+from cli.balance.way import polygons_below, shares
+from cli.show.picture import blank
 from dalembert.errors import DataError
-from dalembert.page import Page
-from dalembert.page import sheet as sheet_page
 from dalembert.page.typed import spelled, units
 from dalembert.units import from_si, to_si
 
-MOST = 50
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, FigureBase
+
+    from dalembert.page import Page
+
+
+def draw(balancing: Balancing, *, polygons: bool = False) -> Figure:
+    """Draw the first rotors below each other, their planes beside each other; with --steps the closed polygons too."""
+    figure = blank()
+    if polygons:
+        polygons_below(balancing, figure, lambda part: _dials(balancing, part))
+    else:
+        _dials(balancing, figure)
+    return figure
+
+
+def _dials(balancing: Balancing, figure: FigureBase) -> None:
+    unit = balancing.rotors.unbalance_unit.replace("_", "·")
+    known_masses(list(_rotors(balancing)), unit, remove=balancing.request.remove, figure=figure)
+
+
+def _rotors(balancing: Balancing) -> Iterator[KnownMasses]:
+    rotors, planes = balancing.rotors, balancing.planes
+    for r, name in enumerate(rotors.names[:MOST]):
+        mine = np.flatnonzero(rotors.rotor == r)
+        rows = balancing.rows_of(r)
+        here = balancing.plane_of_row[rows]
+        at = rotors.z[mine, None] if rotors.z is not None else np.zeros((len(mine), 1))
+        plane_z = planes.z[here] if planes.z is not None else np.zeros(len(here))
+        # each mass alone, carried to the planes as they will balance it
+        if balancing.modal:
+            carried = shares(balancing, r)
+        else:
+            carried = -correct(rotors.moment[mine, None], at, plane_z).unbalance
+        yield KnownMasses(
+            name if len(rotors.names) > 1 else "",
+            labels(balancing, mine),
+            [planes.name[p] for p in here],
+            from_si(carried, "unbalance", rotors.unbalance_unit),
+            from_si(balancing.made[rows], "unbalance", rotors.unbalance_unit),
+        )
+
+
+OF_PAGE = 50
 """Rotors of a page."""
 
 
 def sheet(b: Balancing) -> Page:
     """The page of a table of rotors."""
+    # loaded where a page is written
+    from balancing.known_masses import Modal
+    from balancing.known_masses import known_masses as tapes_of
+    from balancing.modal import shape_pieces
+    from dalembert.arithmetic.engines.javascript import engine, written
+    from dalembert.page import sheet as sheet_page
+
     rotors, request = b.rotors, b.request
-    if len(rotors.names) > MOST:
-        raise DataError(f"--page: {len(rotors.names)} rotors: expected at most {MOST}")
+    if len(rotors.names) > OF_PAGE:
+        raise DataError(f"--page: {len(rotors.names)} rotors: expected at most {OF_PAGE}")
     read = rotors.table.numbers
     columns = [name for name in DIMENSIONS if name in read]
     amount = columns[0]
@@ -42,7 +93,7 @@ def sheet(b: Balancing) -> Page:
         limit = request.tolerance
         bearings = None if limit is None or limit.bearings is None else np.array(limit.bearings)
         about = float(b.about[r]) if b.has_couple else 0.0
-        made = known_masses(
+        made = tapes_of(
             planes,
             b.planes.radius[at],
             about,
@@ -79,9 +130,6 @@ def sheet(b: Balancing) -> Page:
                 key = f"{rotor}/{name}.{column}" if several else f"{name}.{column}"
                 values[key] = float(read[column].si[i])
         rows.append(mine)
-    couple = f"{rotors.unbalance_unit}_{b.length_unit}".replace(
-        f"{b.length_unit}_{b.length_unit}", f"{b.length_unit}2"
-    )
     listed = ",\n".join(tapes)
     script = f"{engine()}\nconst tapes = [\n{listed}\n];\n"
     whole = {
@@ -117,7 +165,7 @@ def sheet(b: Balancing) -> Page:
             "mass": _shown("mass", rotors.mass_unit),
             "radius": _shown("length", rotors.radius_unit or b.planes.radius_unit),
             "unbalance": _shown("unbalance", rotors.unbalance_unit),
-            "couple": _shown("inertia", couple),
+            "couple": _shown("inertia", b.couple_unit),
         },
     }
     return sheet_page("Balancing of known masses", "balance", script, whole)

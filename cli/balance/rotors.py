@@ -81,15 +81,15 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
             f"a radius, or an unbalance {table.told}"
         )
     (amount,) = amounts
-    given = table.numbers[amount]
-    table.reject(given.values < 0, amount, f"a{'n' * (amount == 'unbalance')} {amount} that is not negative")
-    size = given.si
+    column = table.numbers[amount]
+    table.reject(column.values < 0, amount, f"a{'n' * (amount == 'unbalance')} {amount} that is not negative")
+    size = column.si
     radius = None
     if amount != "unbalance":
         radius = table.require("radius", "length")
         table.reject(radius.values < 0, "radius", "a radius that is not negative")
         table.reject(
-            (radius.values == 0) & (given.values > 0), "radius", "a positive radius, for there is a mass"
+            (radius.values == 0) & (column.values > 0), "radius", "a positive radius, for there is a mass"
         )
         size = size * radius.si
         if amount == "weight":
@@ -104,8 +104,8 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
         rotor,
         phasor(size, angle.values, angle.unit),
         None if z is None else z.si,
-        given.unit if amount == "mass" else "kg" if amount == "weight" else given.unit.split("_")[0],
-        given.unit if amount == "unbalance" else {"in": "oz_in", "m": "kg_m"}.get(radius_unit or "", "g_mm"),
+        column.unit if amount == "mass" else "kg" if amount == "weight" else column.unit.split("_")[0],
+        column.unit if amount == "unbalance" else {"in": "oz_in", "m": "kg_m"}.get(radius_unit or "", "g_mm"),
         radius_unit,
         amount == "weight",
     )
@@ -240,7 +240,7 @@ class Balancing:
         if request.angle_step is not None:
             step, step_unit = request.angle_step
             step = step if step_unit == "deg" else float(np.degrees(step))
-            angle = _to_step(angle, step) % 360.0
+            angle = _to_mark(angle, step)
         rounded = phasor(to_si(mass, "mass", unit) * radius, angle, "deg")
         return mass, angle, -rounded if request.remove else rounded
 
@@ -294,6 +294,12 @@ class Balancing:
         """The unit in which lengths are said."""
         return self.rotors.radius_unit or self.planes.z_unit or "mm"
 
+    @property
+    def couple_unit(self) -> str:
+        """The unit of a couple unbalance: that of the unbalances times that of lengths."""
+        unbalance, length = self.rotors.unbalance_unit, self.length_unit
+        return f"{unbalance}_{length}".replace(f"{length}_{length}", f"{length}2")
+
     def rows_of(self, rotor: int) -> slice:
         """Return the rows of a rotor's planes."""
         return slice(self.start[rotor], self.start[rotor] + self.count[rotor])
@@ -345,6 +351,12 @@ class Balancing:
             shapes = modes.exactly_at(there)
             result[rows] = least_norm(Vectors(shapes, shapes * 0.0), modal)
         return result
+
+
+def _to_mark(angle: Real, step: float) -> Real:
+    """Round to the nearest mark on a circle whose marks begin at 0°; where the step does not divide it, the last gap is smaller."""
+    mark = _to_step(angle, step)
+    return np.where((mark >= 360.0) | (360.0 - angle < np.abs(mark - angle)), 0.0, mark)
 
 
 def _to_step(value: Real, step: float) -> Real:

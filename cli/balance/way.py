@@ -1,4 +1,4 @@
-"""The worked solution of `dalembert balance`: components and sums, moments about a plane, forces (Riul, eqs. 6 to 21)."""
+"""The worked solution of `dalembert balance`: components and sums, moments about a plane, forces (Riul, eqs. 6 to 21); modal sums."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.balance import modal_way
-from cli.balance.equations import Scale, labels, plane_topic
+from cli.balance.rotors import Balancing
+from cli.balance.tables import Scale, labels, plane_topic
 from dalembert.angles import degrees
 from dalembert.results.columns import Column, Table, names, number
 from dalembert.results.way import Topic, figures
@@ -19,8 +19,10 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure, FigureBase
 
-    from balancing import Correction
+    from balancing import Correction, ModalCorrection
+    from balancing.polygons import Polygon
     from cli.balance.rotors import Balancing
+
 
 COMPONENTS = ("x", "y", "zx", "zy")
 
@@ -28,14 +30,12 @@ COMPONENTS = ("x", "y", "zx", "zy")
 def way(b: Balancing) -> list[Topic]:
     """The topics of every rotor, one after the other."""
     every: list[tuple[int, list[Topic]]] = []
-    if b.modal:
-        for group, rows, modal in b.modal:
-            for i, rotor in enumerate(group.tolist()):
-                every.append((rotor, modal_way.of_rotor(b, rotor, rows[i].tolist(), modal, i)))
-    else:
-        for group, rows, fix in b.solved:
-            for i, rotor in enumerate(group.tolist()):
-                every.append((rotor, _of_rotor(b, rotor, rows[i].tolist(), fix, i)))
+    topics_of: Callable[..., list[Topic]] = _modal if b.modal else _of_rotor
+    for group, rows, fix in b.modal or b.solved:
+        for i, rotor in enumerate(group.tolist()):
+            topics = topics_of(b, rotor, rows[i].tolist(), fix, i)
+            topics[-1].figure = partial(_figure, b, rotor)
+            every.append((rotor, topics))
     return [
         _headed(b, rotor, topic)
         for rotor, topics in sorted(every, key=lambda each: each[0])
@@ -73,7 +73,6 @@ def _of_rotor(b: Balancing, rotor: int, rows: list[int], fix: Correction, i: int
         topics += _two_planes(b, rows, planes, z_plane, made, masses, scale, fix, i)
     else:
         topics += _many_planes(b, rows, planes, z_plane, made, scale, fix, i)
-    topics[-1].figure = partial(_figure, b, rotor)
     return topics
 
 
@@ -87,14 +86,13 @@ def _components(b: Balancing, mine: Any, about: float | None, plane: str, scale:
     z = rotors.z[mine] if rotors.z is not None else np.full(len(mine), np.nan)
     lever = z - about if about is not None else np.full(len(mine), np.nan)
     unit, length = rotors.unbalance_unit, b.length_unit
-    moment_unit = f"{unit}_{length}".replace(f"{length}_{length}", f"{length}2")
     angle = degrees(u)
     values = {"x": u.real, "y": u.imag, "zx": lever * u.real, "zy": lever * u.imag}
 
     def component(name: str, amount: Any) -> Column:
         if len(name) == 1:
             return number(name, "unbalance", amount, unit)
-        return number(name, "inertia", amount, moment_unit)
+        return number(name, "inertia", amount, b.couple_unit)
 
     shown = [c for c in COMPONENTS if about is not None or len(c) == 1]
     columns = [
@@ -215,35 +213,176 @@ def polygons_below(b: Balancing, figure: Figure, dials: Callable[[FigureBase], N
 
 
 def polygons(b: Balancing, rotor: int, figure: FigureBase) -> None:
-    """Draw the closed polygon of forces, and with several planes that of moments about the first."""
+    """Draw the closed polygon of forces, with several planes that of moments about the first; of modes one for each condition."""
     from balancing.polygons import Polygon, closed
 
-    title = f"rotor {b.rotors.names[rotor]}: " if len(b.rotors.names) > 1 else ""
-    if b.modal:
-        closed(modal_way.polygons(b, rotor), title, figure)
-        return
     mine, rows = np.flatnonzero(b.rotors.rotor == rotor), b.rows_of(rotor)
-    here = b.plane_of_row[rows]
-    unit = b.rotors.unbalance_unit
+    here, named = b.plane_of_row[rows], labels(b, mine)
     planes = [b.planes.name[p] for p in here]
     moments, made = b.rotors.moment[mine], b.ideal[rows]
-    every = [
-        Polygon("forces", labels(b, mine), from_si(moments, "unbalance", unit), planes, from_si(made, "unbalance", unit), unit)
-    ]  # fmt: skip
-    if b.rotors.z is not None and b.planes.z is not None and len(planes) > 1:
-        z = b.planes.z[here]
-        about = z[0]
-        length = b.length_unit
-        moment = f"{unit}_{length}".replace(f"{length}_{length}", f"{length}2")
-        factor = float(from_si(1.0, "inertia", moment))
-        every.append(
-            Polygon(
-                f"moments about plane {planes[0]}",
-                labels(b, mine),
-                moments * (b.rotors.z[mine] - about) * factor,
-                planes[1:],
-                (made * (z - about))[1:] * factor,
-                moment,
-            )
+
+    def polygon(
+        title: str, first: int = 0, masses: Any = 1.0, at: Any = 1.0, moment: bool = False
+    ) -> Polygon:
+        unit, dimension = (b.couple_unit, "inertia") if moment else (b.rotors.unbalance_unit, "unbalance")
+        last = from_si((made * at)[first:], dimension, unit)
+        return Polygon(title, named, from_si(moments * masses, dimension, unit), planes[first:], last, unit)
+
+    if b.request.modes is not None:
+        fix, i = _modal_fix(b, rotor)
+        each = zip(b.request.modes.conditions, _at_masses(b, rotor), fix.at_planes[i], strict=True)
+        every = [polygon(f"{name}: U·φ", 0, masses, at) for name, masses, at in each]
+    else:
+        every = [polygon("forces")]
+        if b.rotors.z is not None and b.planes.z is not None and len(planes) > 1:
+            z = b.planes.z[here]
+            arms = b.rotors.z[mine] - z[0], z - z[0]
+            every.append(polygon(f"moments about plane {planes[0]}", 1, *arms, moment=True))
+    closed(every, f"rotor {b.rotors.names[rotor]}: " if len(b.rotors.names) > 1 else "", figure)
+
+
+SHOWN = 6
+"""So many terms of a sum are written."""
+
+
+def _modal(b: Balancing, rotor: int, rows: list[int], fix: ModalCorrection, i: int) -> list[Topic]:
+    """The topics of a rotor."""
+    scale = Scale(b)
+    shapes = b.request.modes
+    assert shapes is not None
+    mine = np.flatnonzero(b.rotors.rotor == rotor)
+    u, phi = b.rotors.moment[mine], _at_masses(b, rotor)
+    made, at_planes = b.ideal[rows], fix.at_planes[i]
+    planes = [b.planes.name[b.plane_of_row[row]] for row in rows]
+    conditions, unit = shapes.conditions, b.rotors.unbalance_unit
+    signs = [_sign(name) for name in conditions]
+    sums = fix.modal[i]
+    columns = [names("name", labels(b, mine)), number("unbalance_x", "unbalance", u.real, unit)]
+    columns.append(number("unbalance_y", "unbalance", u.imag, unit))
+    columns += [
+        number(f"phi {name}", "number", row, place=f"phi.{name}")
+        for name, row in zip(conditions, phi, strict=True)
+    ]
+    total = Table(
+        [
+            names("condition", conditions),
+            number("x", "unbalance", sums.real, unit),
+            number("y", "unbalance", sums.imag, unit),
+        ],
+        ("condition",),
+        "sums[]",
+    )
+    text = [
+        "What the unbalances do to each mode, s_k = Σ U_i·φ_k(z_i), φ by cubic splines through the stations (Bishop and Gladwell):"
+    ]
+    if shapes.rigid:
+        text.append(
+            "force: φ = 1; couple: φ = (z − middle)/length of the shaft (N + 2 planes, Kellenberger)."
         )
-    closed(every, title, figure)
+    for sign, row, s in zip(signs, phi, sums, strict=True):
+        for axis, component in (("x", u.real), ("y", u.imag)):
+            value = float(s.real if axis == "x" else s.imag)
+            text.append(
+                f"  {sign}_{axis} = {_products(scale, component, row)} = {scale.of(value)} {scale.name}"
+            )
+    topics = [
+        Topic(
+            "modal sums", [*text, Table(columns, ("name",), "rows[]"), total], "Modal sums of the unbalances"
+        )
+    ]
+    topics.append(_system(conditions, signs, planes, at_planes, sums, scale))
+    for row, name, value in zip(rows, planes, made, strict=True):
+        lines = [
+            f"  {axis} = {scale.of(part)} {scale.name}"
+            for axis, part in (("x", value.real), ("y", value.imag))
+        ]
+        topics.append(plane_topic(b, row, name, complex(value), ["From the system:", *lines], scale))
+    topics.append(_check(conditions, signs, planes, at_planes, sums, made, scale, unit))
+    return topics
+
+
+def _system(
+    conditions: list[str], signs: list[str], planes: list[str], at_planes: Any, sums: Any, scale: Scale,
+) -> Topic:  # fmt: skip
+    """The system Σ_p φ_k(z_p)·w_p = −s_k."""
+    text = ["The corrections w_p leave no mode excited: Σ_p φ_k(z_p)·w_p = −s_k for x and for y:"]
+    for sign, row, s in zip(signs, at_planes, sums, strict=True):
+        left = " + ".join(f"({figures(float(f))})·{name}" for f, name in zip(row, planes, strict=True))
+        text.append(
+            f"  {sign}: {left} = {scale.of(-float(s.real))} (x), {scale.of(-float(s.imag))} (y) {scale.name}"
+        )
+    if len(planes) > len(conditions):
+        text.append(
+            f"{len(planes)} planes for {len(conditions)} conditions: of all solutions that of least Σ|w_p|² (singular values)."
+        )
+    shown = [names("condition", conditions)]
+    shown += [
+        number(f"phi at {name}", "number", at_planes[:, p], place=f"at_planes.{p}")
+        for p, name in enumerate(planes)
+    ]
+    return Topic("system", [*text, Table(shown, ("condition",), "rows[]")], "The system")
+
+
+def _check(
+    conditions: list[str], signs: list[str], planes: list[str], at_planes: Any, sums: Any,
+    made: Any, scale: Scale, unit: str,
+) -> Topic:  # fmt: skip
+    """The modal sums with the corrections vanish."""
+    text = ["With the corrections s_k + Σ_p φ_k(z_p)·w_p, each component:"]
+    left = []
+    for sign, row, s in zip(signs, at_planes, sums, strict=True):
+        rest = complex(s + row @ made)
+        size = abs(s) + float(np.abs(row) @ np.abs(made))
+        rest = rest if abs(rest) > 1e-12 * size else 0j
+        left.append(rest)
+        for axis, of in (("x", np.real), ("y", np.imag)):
+            products = _products(scale, of(made), row)
+            text.append(
+                f"  {sign}_{axis}: {scale.of(float(of(s)))} + {products} = {scale.of(float(of(rest)))} {scale.name}"
+            )
+    table = Table(
+        [],
+        (),
+        "residual[]",
+        documented=[
+            names("condition", conditions),
+            number("x", "unbalance", [z.real for z in left], unit),
+            number("y", "unbalance", [z.imag for z in left], unit),
+        ],
+    )
+    return Topic("check", [*text, table], "Check: the modal sums with the corrections")
+
+
+def _products(scale: Scale, values: Any, row: Any) -> str:
+    terms = [
+        f"({scale.of(float(value))})·({figures(float(f))})"
+        for value, f in list(zip(values, row, strict=True))[:SHOWN]
+    ]
+    return " + ".join(terms) + (" + …" if len(values) > SHOWN else "")
+
+
+def _sign(condition: str) -> str:
+    """The letter of a condition's sum: s_1 of mode 1."""
+    return {"force": "F", "couple": "M"}.get(condition, f"s_{condition.removeprefix('mode ')}")
+
+
+def _at_masses(b: Balancing, rotor: int) -> Any:
+    """The conditions' rows at the masses, (q, m)."""
+    assert b.request.modes is not None
+    assert b.rotors.z is not None
+    return b.request.modes.at(b.rotors.z[b.rotors.rotor == rotor], "a mass")
+
+
+def _modal_fix(b: Balancing, rotor: int) -> tuple[ModalCorrection, int]:
+    """The corrections among which a rotor's stand, and its place there."""
+    group, _, fix = next(each for each in b.modal if rotor in each[0])
+    return fix, int(np.flatnonzero(group == rotor)[0])
+
+
+def shares(b: Balancing, rotor: int) -> Any:
+    """Return what each unbalance alone asks of the planes, with its sign turned, (m, p)."""
+    from balancing import modal_corrections
+
+    fix, i = _modal_fix(b, rotor)
+    moment = np.diag(b.rotors.moment[b.rotors.rotor == rotor])
+    return -modal_corrections(moment, _at_masses(b, rotor), fix.at_planes[i]).unbalance

@@ -22,25 +22,25 @@ Arguments:
   parts PARTS  CSV of parts; - is standard input.
 What:
   omega X,Y,Z  Angular velocity, rad/s, such as 0,4,12.
-  alpha X,Y,Z  Angular acceleration, rad/s²; with --frame-omega: rate of omega's components in those axes.
+  alpha X,Y,Z  Angular acceleration, rad/s². With --frame-omega: the rate of omega's components in those axes.
   frame_omega X,Y,Z  Angular velocity of axes that do not turn with the body, rad/s.
-  fixed X,Y,Z  Point about which the body turns, m; the motion of the centre of mass follows.
+  fixed X,Y,Z  Point about which the body turns, m. The motion of the centre of mass follows from it.
   velocity X,Y,Z  Velocity of the centre of mass, m/s.
   acceleration X,Y,Z  Acceleration of the centre of mass, m/s².
-  find NAME  Number to find: omega.y, speed of the shaft, or a cell of the table, such as rod.ry.
-  so_that QUANTITY=VALUE  With --find: value of a result, such as momentum.x=2 or bearing1_dynamic.size=20N.
-  only NAME,...  Show only these results: mass, inertia, principal_axes, momentum, bearing1.
-What: a robot:
-  check_inertias  Check the inertia tensors of a robot file (URDF, SDF, MJCF).
-What: a shaft:
+  find NAME  Number to find, such as omega.y, the shaft's speed or a cell of the table, rod.ry.
+  so_that QUANTITY=VALUE  With --find: wanted value of a result, such as momentum.x=2 or bearing1_dynamic.size=20N.
+  only NAME,...  Show only these results, such as mass,inertia,principal_axes,momentum,bearing1.
+Shaft:
   shaft Z1:Z2  Positions of the two bearings along the axis, such as 0mm:400mm.
   axis AXIS  Axis of the shaft through the origin: x, y, z (default), -x … or a vector, such as 1,0,1.
   speed SPEED  Speed of the shaft, such as 1200rpm.
   speed_rate RATE  Angular acceleration of the shaft, such as 10rad_s2.
   gravity X,Y,Z  Gravity on the shaft, m/s², such as 0,-9.81,0.
-  correct NAME:Z:RADIUS  Correction plane of the shaft, such as A:0mm:20mm.
+  correct NAME:Z:RADIUS  Correction plane of the shaft, such as A:0mm:20mm; repeatable.
+Robot:
+  check_inertias  Check the inertia tensors of a robot file (URDF, SDF, MJCF).
 Further options (docs/commands.md describes them):
-  about X,Y,Z  Point fixed in space, m: angular momentum about it.
+  about X,Y,Z  Point about which the angular momentum is given, m, fixed in space (default: --fixed, else the origin).
 """
 
 
@@ -65,14 +65,15 @@ def run(
     correct: list[str] | None = None,
     check_inertias: bool = False,
 ) -> Result:
-    """Compute mass, centre of mass and inertia of a body from its parts, its angular momentum, and the wrench of its
-    motion.
+    """Compute mass, centre of mass and inertia of a body from its parts, its angular momentum, and the forces and
+    moments of its motion.
 
-    PARTS has the columns body (one of several), part, shape, mass_* (a hole: negative) or density_*, x_* y_* z_* of its centre of mass,
-    axis_x axis_y axis_z (default z), rx_* ry_* rz_* (a further turn about the fixed axes in that order), and the
-    dimensions of its shape: point (radius and angle may stand for x and y); rod length; disk, ring radius; arc radius, angle; cylinder, cone radius, length;
-    tube radius, inner_radius, length; box width, height, depth; plate width, height; sphere radius, inner_radius;
-    tensor ixx iyy izz ixy ixz iyz, products as +∫xy dm; mesh file, file_unit (STL, OBJ). Thin shapes take linear_density_* or area_density_*.
+    PARTS has a row for each part: part, shape, mass_* (of a hole negative) or density_*, and x_* y_* z_* of its centre of
+    mass. The star is a unit. axis_x axis_y axis_z (default z) and rx_* ry_* rz_* (turns about the fixed axes, in this order)
+    place it. A column body tells several bodies apart. Shapes and their dimensions: point; rod length; disk, ring radius;
+    arc radius, angle; cylinder, cone radius, length; tube radius, inner_radius, length; box width, height, depth; plate
+    width, height; sphere radius, inner_radius; tensor ixx iyy izz ixy ixz iyz, products as +∫xy dm; mesh file, file_unit
+    (STL, OBJ). A point may have radius and angle for x and y. Thin shapes take linear_density_* or area_density_*.
     """
     from cli.body import tables
     from cli.body.moving import MovingBody, Request
@@ -107,7 +108,7 @@ def run(
     if sought is None:
         bodies = [MovingBody(each, request) for each in read_bodies(parts)]
     else:
-        from cli.body.find import find as search
+        from cli.body.way import find as search
 
         moving, solution = search(read_table(parts), parts, request, *sought)
         bodies = [moving]
@@ -139,7 +140,7 @@ def _inertias(file: str) -> Result:
     from pathlib import Path
 
     from cli.body.inertias import checks, table, warnings
-    from cli.read.robots import read_robot
+    from cli.formats.programs import read_robot
     from cli.show.result import Result
     from dalembert.tables.files import read_bytes
 

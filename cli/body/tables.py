@@ -346,7 +346,7 @@ def _warnings(b: MovingBody) -> list[str]:
         if np.abs(motion.tensor_rate).max() > 1e-12 * size:
             wrong = motion.rate - motion.tensor_rate
             lines.append(
-                "the inertia tensor is not constant in the axes of --frame-omega: the relative rate contains its change too; "
+                "the inertia tensor is not constant in the axes that --frame-omega turns: the relative rate contains its change too; "
                 f"eq. 44 with a constant tensor would give {', '.join(f'{x:.6g}' for x in wrong)} N·m"
             )
     if len(b.corrections) == 1:

@@ -1,18 +1,22 @@
-"""The worked solution of `dalembert body`: parts and tensor, H, its rate, principal axes, the angle of H to ω, bearings."""
+"""What else is asked of a body: the worked solution, of parts and tensor, H, its rate, principal axes, the angle of H to ω, bearings; `--find`."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.body.moving import AXES, MovingBody
-from cli.body.tables import axis_words
-from cli.read.parts import SEVERAL
+from cli.body.moving import AXES, ORIGIN, MovingBody, Request
+from cli.body.tables import axis_words, numbers_of
+from cli.read import root_search
+from cli.read.options import bad
+from cli.read.parts import SEVERAL, bodies_of
 from dalembert.results.columns import Column, Table, names, number, vector
 from dalembert.results.way import Topic, figures
+from dalembert.tables.table import Table as ReadTable
 from rigidbody3d.inertia import free_axes, own_axes
 
 if TYPE_CHECKING:
@@ -224,3 +228,77 @@ def _bearings(b: MovingBody) -> Topic:
 
 def _complex(z: complex) -> str:
     return f"{figures(z.real)} + i·({figures(z.imag)})"
+
+
+Change = Callable[[float], tuple[ReadTable, Request]]
+
+
+def find(
+    table: ReadTable, path: str, request: Request, name: str, wanted: str
+) -> tuple[MovingBody, root_search.Found]:
+    """Return the body with the number with which the quantity has the value."""
+
+    def body(change: tuple[ReadTable, Request]) -> MovingBody:
+        changed, moved = change
+        bodies = bodies_of(changed, path)
+        if len(bodies) > 1:
+            raise bad("--find", f"expected a table of one body, found {len(bodies)}")
+        return MovingBody(bodies[0], moved)
+
+    choices = {**_motions(table, request), **_cells(table, request)}
+    vectors = ", with .x, .y, .z or .size behind a vector"
+    change, solution = root_search.solve(
+        choices, name, wanted, "bearing1_dynamic.x=20N", lambda change: numbers_of(body(change)), vectors
+    )
+    return body(change), solution
+
+
+def _motions(table: ReadTable, request: Request) -> dict[str, tuple[root_search.Sought, Change]]:
+    """The numbers of the motion: of a shaft its speed and rate, else components of ω, of its rate, of Ω."""
+    choices: dict[str, tuple[root_search.Sought, Change]] = {}
+    shaft = request.shaft
+    if shaft is not None:
+        for name, unit in (("speed", "rad_s"), ("speed_rate", "rad_s2")):
+
+            def turned(x: float, name: str) -> tuple[ReadTable, Request]:
+                assert shaft is not None
+                return table, replace(request, shaft=replace(shaft, **{name: x}))  # type: ignore[arg-type]
+
+            number = root_search.Sought(f"{name}_{unit}", unit, getattr(shaft, name))
+            choices[name] = number, partial(turned, name=name)
+        return choices
+    for name, unit in (("omega", "rad_s"), ("alpha", "rad_s2"), ("frame_omega", "rad_s")):
+        vector = getattr(request, name)
+        # axes that turn with the body and axes at rest are two motions
+        if vector is None and name == "frame_omega":
+            continue
+        for i, axis in enumerate(AXES):
+
+            def moved(x: float, name: str, i: int) -> tuple[ReadTable, Request]:
+                components = list(getattr(request, name) or ORIGIN)
+                components[i] = x
+                return table, replace(request, **{name: tuple(components)})  # type: ignore[arg-type]
+
+            number = root_search.Sought(f"{name}.{axis}_{unit}", unit, (vector or ORIGIN)[i])
+            choices[f"{name}.{axis}"] = number, partial(moved, name=name, i=i)
+    return choices
+
+
+def _cells(table: ReadTable, request: Request) -> dict[str, tuple[root_search.Sought, Change]]:
+    """The numbers of the parts, in the file's units."""
+    choices: dict[str, tuple[root_search.Sought, Change]] = {}
+    for row, part in enumerate(table.texts.get("part", [str(k + 1) for k in range(table.rows)])):
+        for key, column in table.numbers.items():
+            if np.isnan(column.values[row]):
+                continue
+
+            def changed(x: float, key: str, row: int) -> tuple[ReadTable, Request]:
+                own = table.numbers[key]
+                values = own.values.copy()
+                values[row] = x
+                return replace(table, numbers={**table.numbers, key: replace(own, values=values)}), request
+
+            header = f"{part}.{key}_{column.unit}".rstrip("_")
+            number = root_search.Sought(header, column.unit, float(column.values[row]))
+            choices[f"{part}.{key}"] = number, partial(changed, key=key, row=row)
+    return choices

@@ -1,16 +1,16 @@
-"""One mechanism over its inputs: its assemblies, their motions, the quantities that are requested of them."""
+"""An analysis: one mechanism at its inputs, its assemblies and their motions, and the quantities of a request."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cli.cases.inputs import InputGrid, Inputs
-from cli.read import options
-from dalembert.dataclass import dataclass, field
+from cli.read.options import bad, whole
+from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError
 from dalembert.hints import nearest
 from dalembert.memory import memory
@@ -20,9 +20,10 @@ from virtualwork.formulas.kinematics import Angle, Point
 from virtualwork.quantities import Component
 
 if TYPE_CHECKING:
+    from types import SimpleNamespace
+
     from numpy.typing import NDArray
 
-    from cli.cases.options import Options
     from virtualwork import Mechanism
     from virtualwork.branch.assembly import Assembly
     from virtualwork.formulas.quantity import Quantity
@@ -33,7 +34,7 @@ ORDERS = ("position", "velocity", "acceleration", "jerk")
 
 
 class Request(NamedTuple):
-    """What is requested of a mechanism, whichever variant it is.
+    """Which quantities a call requests of every variant.
 
     Attributes
     ----------
@@ -54,36 +55,36 @@ class Request(NamedTuple):
     forces: bool = False
 
     @classmethod
-    def of(cls, own: Options, order: int | None = None, *, forces: bool = False) -> Request:
-        """What --only, --order and --branch ask for, as far as a command has these options."""
-        options_of = vars(own)
-        if options_of.get("order") is not None:
-            order = ORDERS.index(own.order)
-        return cls(own.file, names(options_of.get("only")), order, branch(options_of.get("branch")), forces)
+    def of(cls, options: SimpleNamespace, order: int | None = None, *, forces: bool = False) -> Request:
+        """Return what --only, --order and --branch request, as far as a command has these options."""
+        values = vars(options)
+        if values.get("order") is not None:
+            order = ORDERS.index(options.order)
+        return cls(options.file, names(values.get("only")), order, branch(values.get("branch")), forces)
 
 
 def names(
     text: str | None, flag: str = "--only", example: str = "names, such as H, coupler.omega"
 ) -> list[str] | None:
-    """Names between commas."""
+    """Split names at the commas."""
     if text is None:
         return None
     names = [name.strip() for name in text.split(",") if name.strip()]
     if not names:
-        raise options.bad(flag, f"expected {example}")
+        raise bad(flag, f"expected {example}")
     return names
 
 
 def branch(text: str | None) -> str | None:
-    """`all`, or the number of an assembly."""
-    if text is not None and text != "all" and options.whole(text) < 1:
-        raise options.bad("--branch", f"'{text}': expected all, or the number of an assembly")
+    """Check that the value of --branch is `all`, or the number of an assembly."""
+    if text is not None and text != "all" and whole(text) < 1:
+        raise bad("--branch", f"'{text}': expected all, or the number of an assembly")
     return text
 
 
 @dataclass
 class Analysis:
-    """A mechanism over its inputs; assemblies and motions are worked out when they are needed."""
+    """One mechanism at its inputs; its assemblies and motions are computed when they are first read."""
 
     request: Request
     mechanism: Mechanism
@@ -94,12 +95,12 @@ class Analysis:
 
     @property
     def file(self) -> str:
-        """What messages call the mechanism."""
+        """The name of the file, for messages."""
         return self.request.file
 
     @cached_property
-    def own_order(self) -> int:
-        """How high the rates go that the inputs have."""
+    def input_order(self) -> int:
+        """The order of the highest rate that an input has."""
         orders = self.inputs.orders
         for k, name in enumerate(("jerk", "acceleration", "speed")):
             if 3 - k in orders or any(getattr(e, name) is not None for e in self.mechanism.inputs):
@@ -108,12 +109,12 @@ class Analysis:
 
     @property
     def order(self) -> int:
-        """How often places are differentiated."""
-        return self.own_order if self.request.order is None else self.request.order
+        """The highest order of the derivatives of places."""
+        return self.input_order if self.request.order is None else self.request.order
 
     @property
     def is_long(self) -> bool:
-        """Whether the poses are more than one block."""
+        """Whether the poses fill more than one block."""
         from virtualwork.formulas.positions import BLOCK
 
         return self.inputs.n > BLOCK
@@ -128,38 +129,61 @@ class Analysis:
         """The guess's assembly, or those of --branch."""
         if self.request.branch is None:
             return (self.mechanism.assembly,)
-        every = self.mechanism.assemblies()
-        if any(g.kind == "Newton" for g in every[0].plan.groups):
+        assemblies = self.mechanism.assemblies()
+        if any(g.kind == "Newton" for g in assemblies[0].plan.groups):
             self.warnings.append(
                 "--branch: groups without a closed form were searched from many starts; an assembly may be missing"
             )
         if self.request.branch == "all":
-            return every
+            return assemblies
         number = int(self.request.branch)
-        if number > len(every):
+        if number > len(assemblies):
             raise DataError(
-                f"--branch {number}: the mechanism has {len(every)} assemblies at the guess's input"
+                f"--branch {number}: the mechanism has {len(assemblies)} assemblies at the guess's input"
             )
-        return (every[number - 1],)
+        return (assemblies[number - 1],)
 
     @cached_property
     def motions(self) -> tuple[Motion, ...]:
         """The motion of each assembly."""
-        from virtualwork.motion import Motion
+        inputs = self.inputs.whole
+        return tuple(_motion(assembly, inputs) for assembly in self.assemblies)
 
-        q = self.inputs.whole
-        result = tuple(Motion(a, q.values, q.speed, q.acceleration) for a in self.assemblies)
-        for motion in result:
-            motion.poses.input_rest = q.rest
-            motion.poses.time = q.time
-        return result
+    # --- other poses, another request ---------------------------------------------------------------------------
+    def at(self, inputs: Inputs | InputGrid) -> Analysis:
+        """Return the analysis of the same assemblies at other inputs."""
+        other = replace(self, inputs=inputs, warnings=[])
+        other.assemblies = self.assemblies
+        return other
+
+    def block(self, assembly: Assembly, low: int, high: int) -> Analysis:
+        """Return the analysis of some poses of one assembly, with the digits of the sweep solved whole."""
+        inputs = self.inputs.part(low, high)
+        block = replace(self, inputs=inputs, warnings=[], block_of=self)
+        block.assemblies = (assembly,)
+        block.motions = (_motion(assembly, inputs, self.inputs.n),)
+        return block
+
+    def requesting(self, **changes: Any) -> Analysis:
+        """Return the analysis of the same poses with another request; motions that are solved stay solved."""
+        other = replace(self, request=self.request._replace(**changes))
+        other.assemblies = self.assemblies
+        if not self.is_long or "motions" in vars(self):
+            other.motions = self.motions
+        return other
+
+    def of_assembly(self, i: int) -> Analysis:
+        """Return the analysis of one of the assemblies."""
+        other = replace(self)
+        other.assemblies, other.motions = (self.assemblies[i],), (self.motions[i],)
+        return other
 
     # --- quantities -----------------------------------------------------------------------------------------------
     @cached_property
     def places(self) -> list[Component]:
         """The places and rates that are requested."""
-        every = quantities.places(self.mechanism, 3, self.request.only or ())
-        return chosen(every, self.request.only, self.order)
+        components = quantities.places(self.mechanism, 3, self.request.only or ())
+        return chosen(components, self.request.only, self.order)
 
     @cached_property
     def forces(self) -> list[Component]:
@@ -170,7 +194,7 @@ class Analysis:
 
     @cached_property
     def pairs(self) -> list[tuple[Joint, str, str]]:
-        """Every joint force once: (joint, on, from), `on` the later in the file."""
+        """The joint forces, each once: (joint, on, from), `on` the later in the file."""
         # loaded where forces are requested
         from virtualwork.plan.joint_forces import pairs
         from virtualwork.plan.steps import joints
@@ -180,27 +204,27 @@ class Analysis:
     @property
     def shown_pairs(self) -> list[tuple[Joint, str, str]]:
         """The joint forces that are requested."""
-        shown = {each.path[1] for each in self.forces if each.path[:1] == ("reactions",)}
-        return [(j, on, of) for j, on, of in self.pairs if shown & {(j.name, on, of), (j.name, of, on)}]
+        names = {each.path[1] for each in self.forces if each.path[:1] == ("reactions",)}
+        return [(j, on, by) for j, on, by in self.pairs if names & {(j.name, on, by), (j.name, by, on)}]
 
     @cached_property
     def tabled(self) -> list[Component]:
-        """What a table has: the forces alone where they are requested without names."""
+        """The columns of a table: the forces alone where they are requested without names."""
         return self.forces if self.request.forces and self.request.only is None else self.places + self.forces
 
     @property
     def links(self) -> tuple[str, ...]:
-        """The links of which something is requested."""
+        """The links that the request names, or that it names a rate of."""
         return self._named("links", self.mechanism.links)
 
     @property
     def points(self) -> tuple[str, ...]:
-        """The points of which something is requested, in the order of the file."""
+        """The points that the request names, in the order of the file."""
         return self._named("points", self.mechanism.points)
 
-    def _named(self, kind: str, every: Iterable[str]) -> tuple[str, ...]:
-        shown = {each.path[1] for each in self.places if each.path[0] == kind}
-        return tuple(name for name in every if name in shown)
+    def _named(self, kind: str, names: Iterable[str]) -> tuple[str, ...]:
+        requested = {each.path[1] for each in self.places if each.path[0] == kind}
+        return tuple(name for name in names if name in requested)
 
     def check_names(self) -> None:
         """Refuse names that --only cannot find."""
@@ -209,19 +233,19 @@ class Analysis:
             return
         moving = quantities.places(self.mechanism, 3, only)
         forces = quantities.forces(self.mechanism, self.pairs)
-        here = [*moving, *forces] if self.request.forces else moving
-        word = unknown(here, only)
+        components = [*moving, *forces] if self.request.forces else moving
+        word = unknown(components, only)
         if word is None:
             return
         if unknown(forces, [word]) is None:
             raise DataError(f"{self.file}: --only {word}: this is a force: dalembert forces shows it")
-        names = {name for each in here for name in (*each.names, *each.owners)}
+        names = {name for each in components for name in (*each.names, *each.owners)}
         owner = word.rpartition(".")[0]
-        of_owner = [
-            name.rpartition(".")[2] for each in here if owner in each.owners for name in each.names[:1]
+        parts = [
+            name.rpartition(".")[2] for each in components if owner in each.owners for name in each.names[:1]
         ]
-        if of_owner:
-            choices = ", ".join(dict.fromkeys(of_owner))
+        if parts:
+            choices = ", ".join(dict.fromkeys(parts))
             raise DataError(f"{self.file}: --only: '{word}': expected {owner}. with one of {choices}")
         raise DataError(
             f"{self.file}: --only: no link or point is named '{owner or word}'{nearest(word, names)}"
@@ -229,7 +253,7 @@ class Analysis:
 
     # --- inputs ---------------------------------------------------------------------------------------------------
     def pose_text(self, i: int) -> str:
-        """Return the inputs of a pose as a sentence has them: 60°, 0.35 m; several with their names."""
+        """Return the inputs of a pose for a sentence: 60°, 0.35 m; several with their names."""
         values = [
             f"{figures(float(value))}{'°' if key.endswith('_deg') else ' m'}"
             for value, key in zip(self.inputs.whole.shown[i], self.input_names.values(), strict=True)
@@ -240,7 +264,7 @@ class Analysis:
 
     @cached_property
     def input_names(self) -> dict[str, str]:
-        """Each input and the name of its value: `input_deg`, or `input_m` of a slide."""
+        """The header of the value of each input: `input_deg`, or `input_m` of a slide."""
         return {e.name: "input_m" if e.is_slide else "input_deg" for e in self.mechanism.inputs}
 
     @property
@@ -250,24 +274,24 @@ class Analysis:
 
     @cached_property
     def input_columns(self) -> tuple[str, ...]:
-        """The columns of the inputs in a table."""
+        """The headers of the inputs in a table."""
         several = len(self.mechanism.inputs) > 1
         return tuple(f"{name}_{key}" if several else key for name, key in self.input_names.items())
 
     @cached_property
     def set_angles(self) -> dict[str, NDArray[np.float64]]:
-        """The angles of the links that are driven against the ground, as they were requested, degrees."""
+        """The requested angles of the links that are driven against the ground, degrees."""
         shown, inputs = self.inputs.whole.shown, self.mechanism.inputs
         return {e.link: shown[:, j] for j, e in enumerate(inputs) if e.link and e.on == "ground"}
 
     # --- sizes ----------------------------------------------------------------------------------------------------
     def bytes_each(self, *, json: bool, table: bool, states: bool) -> float:
-        """What the answer for one pose takes at most, as measured."""
+        """Return the memory that one pose takes at most, as measured."""
         numbers = len(self.places) + (5 + 6 * len(self.mechanism.points)) * bool(self.forces)
         return 300 + 110 * numbers * json + 100 * numbers * table + 1200 * len(self.mechanism.links) * states
 
     def check_size(self, *, json: bool, table: bool, states: bool = False, times: int = 1) -> None:
-        """Refuse what would take more memory than there is, before it is begun; `times` so many variants."""
+        """Refuse poses of so many variants (`times`) that would take more memory than there is, before they are solved."""
         each = self.bytes_each(json=json, table=table, states=states) * len(self.assemblies)
         poses, room = self.inputs.n * times, memory()
         if poses * each > room:
@@ -278,7 +302,7 @@ class Analysis:
 
     # --- which poses there are ------------------------------------------------------------------------------------
     def assembled(self, motion: Motion) -> NDArray[np.bool_]:
-        """Which poses are assembled, as far as the requested names go: with --only the rest is not solved."""
+        """Return which poses are assembled; with --only the rest of the mechanism is not solved, and does not count."""
         if self.whole:
             return motion.assembled
         result = np.ones(motion.n, dtype=bool)
@@ -293,36 +317,47 @@ class Analysis:
 
     @cached_property
     def named(self) -> list[Quantity]:
-        """Places of the points, links and slides that are requested, as a motion computes them."""
-        homes = self.mechanism.points
-        result: list[Quantity] = [Point(homes[name][0], 0j, name, 0) for name in self.points]
+        """The places of the points, links and slides that are requested, as a motion computes them."""
+        bodies = self.mechanism.points
+        result: list[Quantity] = [Point(bodies[name][0], 0j, name, 0) for name in self.points]
         result += [Angle(name, 0) for name in self.links]
         slides = [each.key for each in self.places if each.path[0] == "slides"]
         return [*result, *dict.fromkeys(key.of_order(0) for key in slides)]
 
 
-# --- which quantities are requested ---
-def chosen(every: Sequence[Component], words: Sequence[str] | None, order: int) -> list[Component]:
-    """The quantities of these names, up to an order where a bare name stands; all without names.
+def _motion(assembly: Assembly, inputs: Inputs, block_of: int | None = None) -> Motion:
+    """Return the motion of an assembly through some inputs, which may be a block of so many poses."""
+    from virtualwork.motion import Motion
 
-    `every` has them to the highest order.
+    motion = Motion(assembly, inputs.values, inputs.speed, inputs.acceleration, block_of=block_of)
+    motion.poses.input_rest = inputs.rest
+    motion.poses.time = inputs.time
+    return motion
+
+
+# --- which quantities are requested ---
+def chosen(components: Sequence[Component], words: Sequence[str] | None, order: int) -> list[Component]:
+    """Return the quantities of these names, up to an order where a bare name stands; all without names.
+
+    `components` has them to the highest order.
     """
     if words is None:
-        return [each for each in every if each.order <= order and not each.reverse]
-    bare, full = set(words), set(words)
+        return [each for each in components if each.order <= order and not each.reverse]
+    requested = set(words)
+    with_part = {word for word in requested if "." in word}
     return [
         each
-        for each in every
-        if not full.isdisjoint(each.names)
+        for each in components
+        if not requested.isdisjoint(each.names)
         or (
             each.order <= order
-            and not bare.isdisjoint(each.owners)
-            and (not each.reverse or bool({name for name in bare if "." in name} & set(each.owners)))
+            and not requested.isdisjoint(each.owners)
+            and (not each.reverse or not with_part.isdisjoint(each.owners))
         )
     ]
 
 
-def unknown(every: Sequence[Component], words: Sequence[str]) -> str | None:
-    """The first of some names that none of the quantities has."""
-    names = {name for each in every for name in (*each.names, *each.owners)}
+def unknown(components: Sequence[Component], words: Sequence[str]) -> str | None:
+    """Return the first of some names that no quantity has; None where all are names of quantities."""
+    names = {name for each in components for name in (*each.names, *each.owners)}
     return next((word for word in words if word not in names), None)

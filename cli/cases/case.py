@@ -1,17 +1,18 @@
-"""What a command does with every mechanism: its case, and its study; those of a single table."""
+"""A case and a study: what a command computes of one mechanism, and what it does with all of them.
+
+A command declares a `Case`, with tables, warnings and a picture of one mechanism at its inputs, and a `Study`, which
+has the command's own options and makes the cases. `cli/cases/loop.py` runs a study over all cases.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 from uuid import UUID, uuid4
 
-import numpy as np
-
-from cli.cases.analysis import Analysis
-from cli.cases.inputs import Driven, Grid, Varied, of_one, with_numbers
+from cli.cases.cases import Cases
 from cli.show.result import Result
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.results.columns import Column, Table
@@ -19,20 +20,20 @@ from dalembert.results.columns import document as result_document
 from virtualwork import MechanismError
 
 if TYPE_CHECKING:
+    import numpy as np
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from cli.cases.analysis import Request
-    from cli.cases.inputs import InputGrid, Inputs
-    from cli.cases.together import Together
+    from cli.cases.cases import Rows
     from cli.show.commands import ShowOptions
     from dalembert.results.columns import Cell, Document
     from dalembert.results.way import Topic
-    from virtualwork import Mechanism
-    from virtualwork.describe.dimensions import Dimension
     from virtualwork.family.part import Part
 
-    Rows = NDArray[np.float64]
+    Mask = NDArray[np.bool_]
+    # for some variants and their inputs as they are shown: their table or documents, (v, n) which of their poses are
+    # assembled, (v,) which of them have to be solved one by one
+    Together = Callable[[Part, Rows], tuple[Any, Mask, Mask]]
 
 # rows of a part that is solved together; variants and rows of one that is solved one by one; of a table and of
 # documents, where a row takes some kilobytes
@@ -40,247 +41,52 @@ TOGETHER, ONE_BY_ONE = (1 << 16, 1 << 12), (64, (1 << 14, 1 << 12))
 
 
 class Case:
-    """One mechanism with its inputs, and what a command tells of it."""
+    """One mechanism at its inputs, and what a command computes of it."""
 
-    def tables(self) -> Iterator[Table]:
-        """Its rows, a block of poses at a time."""
-        raise NotImplementedError
-
-    def pattern(self) -> Table:
-        """A table with the columns that the tables of all variants have."""
-        return joined(list(self.tables()))
-
-    def document(self) -> Document:
-        """What the JSON document has of it."""
-        raise NotImplementedError
-
-    def warnings(self) -> list[str]:
-        """What to warn of, once all is worked out."""
-        return []
-
-    def way(self) -> list[Topic]:
-        """The worked solution, for --steps."""
-        return []
-
-    def assembled(self, table: Table) -> list[bool] | bool:
-        """Whether the pose of each row of its table is assembled; or whether anything is."""
-        return True
-
-
-@dataclass(frozen=True)
-class Study:
-    """What a command does with every case: all that another process needs to know.
-
-    Attributes
-    ----------
-    mechanism : Mechanism
-        What the variants are variants of.
-    bare : mapping
-        The file's units of bare numbers.
-    digits : bool
-        Whether bounds of the errors are needed.
-    json : bool
-        Whether the JSON document is formed.
-    names : tuple of Driven or Varied
-        What a row of variants sets.
-    moved : Grid, optional
-        The inputs that all variants go through.
-    key : UUID
-        By which a process finds what it has prepared for it.
-    """
-
-    request: Request
-    mechanism: Mechanism
-    bare: dict[str, str]
-    digits: bool
-    json: bool
-    names: tuple[Driven | Varied, ...] = ()
-    moved: Grid | None = None
-    key: UUID = field(default_factory=uuid4)
-
-    method = ""
-    blank: ClassVar[Mapping[str, Any]] = {}
-    """What JSON has of a variant that cannot be assembled, where that is not the form of others."""
-    one_blank_row = False
-    """Whether a variant that cannot be assembled has one row; else as many as others have."""
-
-    def case(self, row: Rows | None = None) -> Case:
-        """The case of a row of variants, or of the mechanism itself.
-
-        Raises
-        ------
-        MechanismError
-        """
-        raise NotImplementedError
-
-    def cases(self, shown: Rows) -> Iterator[tuple[Case | None, list[str]]]:
-        """The cases of some variants, each with its remarks; None where one cannot be assembled."""
-        for row in shown:
-            try:
-                yield self.case(row), []
-            except MechanismError as error:
-                yield None, [str(error)]
-
-    def result(self, case: Case) -> Result:
-        """The result of a mechanism alone, in every form."""
-        raise NotImplementedError
-
-    def page(self, cases: Sequence[tuple[str, Case]], units: str | None) -> bytes:
-        """The page that moves, of every case by its name."""
-        raise NotImplementedError
+    study: Study
 
     @property
-    def frames(self) -> int:
-        """How many states of a case the page shows."""
-        return 1 if self.moved is None else self.moved.n
+    def name(self) -> str:
+        """The name of the mechanism."""
+        return self.study.cases.mechanism.name
 
-    def warnings(self) -> list[str]:
-        """What to remark on the request itself, whatever the variant."""
-        return []
-
-    def together(self, row: Rows, json: bool) -> Together | None:
-        """How variants are solved at once; None where they are not.
-
-        `row`: of one that can be assembled, which has all that is varied.
-        """
-        return None
-
-    def in_blocks(self, show: ShowOptions) -> bool:
-        """Whether the table of the mechanism itself is written a block at a time."""
-        return False
-
-    def beside_table(self) -> Mapping[Path, Callable[[], Iterable[bytes]]]:
-        """Further files of the mechanism itself."""
-        return {}
-
-    def check_size(self, show: ShowOptions, times: int) -> None:
-        """Of so many variants refuse what would take more memory than there is, before it is begun."""
-
-    def size(self, json: bool, together: bool) -> int:
-        """How many variants a part has."""
-        rows = TOGETHER[json] if together else ONE_BY_ONE[1][json]
-        most = rows if together else ONE_BY_ONE[0]
-        return max(1, min(most, rows // (1 if self.moved is None else self.moved.n)))
-
-    # --- variants -------------------------------------------------------------------------------------------------
-    @cached_property
-    def own(self) -> Analysis:
-        """The mechanism itself, over the inputs of the call."""
-        return Analysis(self.request, self.mechanism, self.inputs(self.mechanism, None))
-
-    def analysis(self, row: Rows | None = None) -> Analysis:
-        """A variant over its inputs, or the mechanism itself.
-
-        Raises
-        ------
-        MechanismError
-        """
-        if row is None:
-            return self.own
-        m = self.variant(row)
-        return Analysis(self.request, m, self.inputs(m, row))
-
-    def __getstate__(self) -> dict[str, Any]:
-        """What another process needs: all but what is worked out of it."""
-        return {name: value for name, value in vars(self).items() if name != "own"}
-
-    @property
-    def dimensions(self) -> list[Dimension]:
-        """The dimensions that vary."""
-        return [name.of for name in self.names if isinstance(name, Varied)]
-
-    def numbers(self, shown: Rows) -> Rows:
-        """Of rows of variants the dimensions alone."""
-        return shown[:, [isinstance(name, Varied) for name in self.names]]
-
-    def variant(self, row: Rows) -> Mechanism:
-        """The mechanism with a variant's numbers.
-
-        Raises
-        ------
-        MechanismError
-        """
-        return with_numbers(self.mechanism, self.dimensions, self.numbers(row[None])[0].tolist())
-
-    def in_si(self, shown: Rows) -> dict[str, list[float]]:
-        """The numbers of variants by path, SI."""
-        return {
-            d.path: [Varied(d).si(x) for x in column]
-            for d, column in zip(self.dimensions, self.numbers(shown).T.tolist(), strict=True)
-        }
-
-    def inputs(self, m: Mechanism, row: Rows | None) -> Inputs | InputGrid:
-        """The inputs of a variant."""
-        if row is None:
-            return of_one(m, self.moved)
-        its = [
-            (name, float(x), float(np.radians(x)) if name.unit == "deg" else float(x))
-            for name, x in zip(self.names, row, strict=True)
-            if isinstance(name, Driven)
-        ]
-        return of_one(m, self.moved, its)
-
-    def part(self, shown: Rows) -> tuple[Part, Rows]:
-        """Variants as a part of a family, and their inputs as they are shown, (v or 1, n, k)."""
-        from virtualwork.family.family import Family
-        from virtualwork.family.part import Part
-
-        m, v = self.mechanism, len(shown)
-        family = Family(m, self.in_si(shown))
-        own = self.inputs(m, None).whole
-        names = () if self.moved is None else self.moved.names
-        moved = {name.j for name in names if isinstance(name, Driven)}
-        si, seen = own.values[None], own.shown[None]
-        rates = family.rates(own.speed, own.acceleration)
-        # what each variant has of its own: a column of inputs, or another position in its file
-        for name, column in zip(self.names, shown.T, strict=True):
-            j = (
-                name.j
-                if isinstance(name, Driven)
-                else int(name.of.where[1])
-                if name.of.where[0] == "inputs"
-                else -1
-            )
-            if j < 0 or (j in moved and not isinstance(name, Driven)):
-                continue
-            numbers = np.radians(column) if name.unit == "deg" else np.asarray(column, dtype=float)
-            if isinstance(name, Driven) and name.order:
-                rates[name.order - 1][j] = numbers[:, None]
-            elif isinstance(name, Driven) or name.of.where[-1] == "value":
-                if len(si) == 1:
-                    si, seen = (np.repeat(x, v, axis=0) for x in (si, seen))
-                value = Driven.of(m, j)
-                si[:, :, j] = numbers[:, None]
-                as_shown = column if isinstance(name, Driven) else [value.shown(x) for x in numbers.tolist()]
-                seen[:, :, j] = np.asarray(as_shown)[:, None]
-        return Part(m, family.dimensions, family.values, si, rates), seen
-
-
-class TableCase(Case):
-    """What a study gives of one mechanism."""
-
-    name: str
-    """That of the mechanism."""
-
+    # --- its tables -----------------------------------------------------------------------------------------------
     def table(self) -> Table:
-        """The one table."""
+        """Return the table that CSV has."""
         raise NotImplementedError
 
     def tables(self) -> Iterator[Table]:
-        """The one table."""
+        """Yield that table block by block."""
         yield self.table()
 
+    def pattern(self) -> Table:
+        """Return a table with the columns that the tables of all variants have."""
+        return self.table()
+
     def further(self) -> Mapping[str, Callable[[], Table]]:
-        """Further tables of a terminal, a workbook, a report; by name."""
+        """Return the further tables of a terminal, a workbook and a report, by name."""
         return {}
 
     def documented(self) -> Iterable[Table]:
-        """The tables that JSON has, as far as they have a place there."""
+        """Return the tables of the JSON document; those without a place there are left out."""
         return [self.table(), *(table() for table in self.further().values())]
 
     def document(self) -> Document:
-        """What the JSON document has of it."""
+        """Return the JSON document, without the name of the mechanism."""
         return result_document(self.documented())
+
+    def assembled(self, rows: int = 0) -> list[bool] | bool:
+        """Return whether each of so many rows has a pose that is assembled; of other rows, whether any pose is."""
+        return True
+
+    def warnings(self) -> list[str]:
+        """Return the warnings, once all is computed."""
+        return []
+
+    # --- all forms ------------------------------------------------------------------------------------------------
+    def way(self) -> list[Topic]:
+        """Return the worked solution, for --steps."""
+        return []
 
     @property
     def is_drawn(self) -> bool:
@@ -288,40 +94,117 @@ class TableCase(Case):
         return True
 
     def figure(self) -> Figure:
-        """The picture."""
+        """Draw the picture."""
         raise NotImplementedError
 
-
-@dataclass(frozen=True)
-class TableStudy(Study):
-    """What gives one table of each mechanism."""
-
-    title = ""
-    """What the table is called in a workbook and a report."""
-    one_blank_row = True
-
-    def result(self, case: Case) -> Result:
-        """The result of one mechanism, in every form."""
-        assert isinstance(case, TableCase)
-        document: Document = case.document()
+    def result(self) -> Result:
+        """Return the result of this mechanism alone, in every form."""
+        document = cache(self.document)
+        if self.study.json:
+            # before its warnings
+            document()
         return Result(
-            document=lambda: {"name": case.name, **document},
-            tables={self.title: case.table, **case.further()},
-            notes=lambda: case.name,
-            figure=case.figure if case.is_drawn else None,
-            method=self.method,
-            warnings=case.warnings(),
+            document=lambda: {"name": self.name, **document()},
+            tables={self.study.title: self.table, **self.further()},
+            notes=lambda: self.name,
+            figure=self.figure if self.is_drawn else None,
+            method=self.study.method,
+            warnings=self.warnings(),
         )
 
 
-# --- tables of many variants: the same columns for all, one below the other ----
+@dataclass(frozen=True)
+class Study:
+    """What a command does with every case; another process gets it whole.
+
+    Attributes
+    ----------
+    cases : Cases
+    digits : bool
+        Whether the errors of the numbers are needed.
+    json : bool
+        Whether the JSON document is formed.
+    key : UUID
+        The key of what a process keeps from one part to the next.
+    """
+
+    cases: Cases
+    digits: bool
+    json: bool
+    key: UUID = field(default_factory=uuid4)
+
+    title = ""
+    """The name of the table in a workbook and a report."""
+    method = ""
+    blank: ClassVar[Mapping[str, Any]] = {}
+    """The JSON document of a variant that cannot be assembled, where it has not the form of the others."""
+    one_blank_row = True
+    """Whether a variant that cannot be assembled has one row; else as many rows as the others."""
+
+    def case(self, row: Rows | None = None) -> Case:
+        """Return the case of a row of variants, or of the mechanism itself.
+
+        Raises
+        ------
+        MechanismError
+        """
+        raise NotImplementedError
+
+    def each(self, rows: Rows) -> Iterator[tuple[Case | None, list[str]]]:
+        """Yield the cases of some variants, each with its warnings; None where one cannot be assembled."""
+        for row in rows:
+            try:
+                yield self.case(row), []
+            except MechanismError as error:
+                yield None, [str(error)]
+
+    def together(self, row: Rows, json: bool) -> Together | None:
+        """Return the function that solves many variants at once; None where they are solved one by one.
+
+        `row`: numbers of a variant that can be assembled, which has all that varies.
+        """
+        return None
+
+    def size(self, json: bool, together: bool) -> int:
+        """Return the number of variants of a part."""
+        rows = TOGETHER[json] if together else ONE_BY_ONE[1][json]
+        most = rows if together else ONE_BY_ONE[0]
+        return max(1, min(most, rows // self.cases.poses))
+
+    def warnings(self) -> list[str]:
+        """Return the warnings of the request itself, which hold for every variant."""
+        return []
+
+    def check_size(self, show: ShowOptions, times: int) -> None:
+        """Refuse so many variants (`times`) that would take more memory than there is, before they are solved."""
+
+    # --- files ----------------------------------------------------------------------------------------------------
+    def in_blocks(self, show: ShowOptions) -> bool:
+        """Whether the table of the mechanism itself is written block by block."""
+        return False
+
+    def files(self) -> Mapping[Path, Callable[[], Iterable[bytes]]]:
+        """Return the further files of the mechanism itself."""
+        return {}
+
+    @property
+    def frames(self) -> int:
+        """The number of states of a case that the page shows."""
+        return self.cases.poses
+
+    def page(self, cases: Sequence[tuple[str, Case]], units: str | None) -> bytes:
+        """Return the page on which every case, by its name, moves."""
+        raise NotImplementedError
+
+
+# --- tables of many variants: the same columns for all, one below the other -------------------------------------------
 def length(table: Table) -> int:
-    """How many rows a table has."""
+    """Return the number of rows of a table; one of a table without columns."""
     return len(table.columns[0].values) if table.columns else 1
 
 
 def like(pattern: Table, table: Table) -> Table:
-    """A table with the columns of the first."""
+    """Return a table with the columns of a pattern; what the table lacks is empty."""
     columns = {c.header: c for c in table.columns}
     empty: list[Cell] = [None] * length(table)
     return Table(
@@ -330,7 +213,7 @@ def like(pattern: Table, table: Table) -> Table:
 
 
 def emptied(pattern: Table) -> Table:
-    """The rows of a variant that cannot be assembled: what names them stays."""
+    """Return the rows of a variant that cannot be assembled: the columns that name a row stay."""
     return Table(
         [
             c if c.header in pattern.keys else Column(c.name, c.unit, [None] * len(c.values))
@@ -340,30 +223,30 @@ def emptied(pattern: Table) -> Table:
     )
 
 
-def without_bounds(table: Table) -> Table:
-    """A table without the bounds of its errors."""
+def without_errors(table: Table) -> Table:
+    """Return a table without the errors of its numbers."""
     return replace(table, columns=[replace(c, error=None) for c in table.columns])
 
 
 def joined(tables: Sequence[Table]) -> Table:
-    """Tables of the same columns, one below the other."""
+    """Put tables of the same columns one below the other."""
     if len(tables) == 1:
         return tables[0]
 
-    def bounds(parts: Sequence[Column]) -> Iterator[float]:
+    def errors(parts: Sequence[Column]) -> Iterator[float]:
         for part in parts:
-            # a variant that is not assembled has no numbers, and no bounds of them
+            # a variant that is not assembled has no numbers, and no errors of them
             yield from [0.0] * len(part.values) if part.error is None else part.error()
 
     def column(*parts: Column) -> Column:
-        error = None if all(part.error is None for part in parts) else lambda: list(bounds(parts))
+        error = None if all(part.error is None for part in parts) else lambda: list(errors(parts))
         return replace(parts[0], values=[value for part in parts for value in part.values], error=error)
 
     return replace(tables[0], columns=list(map(column, *(table.columns for table in tables))))
 
 
 def blank(part: Any, key: str = "") -> Any:
-    """Poses that are not assembled, in the form of others: what names them stays."""
+    """Return poses that are not assembled, in the form of others: what names a pose stays."""
     if isinstance(part, dict):
         return {key: blank(value, key) for key, value in part.items()}
     if isinstance(part, list):

@@ -1,32 +1,32 @@
-"""Pictures of a mechanism: drawn in its poses, the requested quantities against the input, one pose with its tables."""
+"""Pictures and pages of a mechanism: its poses, requested quantities against the input, a page that moves, a report's sheet."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cli.cases.analysis import Analysis
-from cli.cases.poses import cells_of, keys_of, solved
-from cli.show.picture import blank
+from cli.cases.poses import cells_of, column, keys_of, solved, table
+from cli.show.picture import blank, shown
 from cli.show.result import Section, Sheet
 from dalembert.angles import read_degrees
 from dalembert.results.columns import Column, Table
 from dalembert.units import UNITS, from_si, written
+from virtualwork import MechanismError, quantities
 from virtualwork.formulas.kinematics import Angle
-from virtualwork.picture.over_input import curves_of, forces
-from virtualwork.picture.paper import on_paper
-from virtualwork.picture.plot_quantities import PlotQuantity as Drawn
-from virtualwork.picture.plot_quantities import pace, unwrapped
 from virtualwork.quantities import Component, links, points
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from cli.show.result import Bars
+    from dalembert.page import Shown
     from virtualwork import Mechanism
-
+    from virtualwork.animation import JointForce, Series
+    from virtualwork.picture.plot_quantities import PlotQuantity
 
 SHOWN = {
     "m": "m", "m_s": "m/s", "m_s2": "m/s²", "m_s3": "m/s³", "deg": "deg", "rad_s": "rad/s", "rad_s2": "rad/s²",
@@ -42,7 +42,9 @@ def is_by_quantity(analysis: Analysis) -> bool:
 
 
 def drawn(analysis: Analysis) -> Figure:
-    """The mechanism to scale: the first pose in full, others as ghosts, the paths of its points."""
+    """Draw the mechanism to scale: the first pose in full, others as ghosts, the paths of its points."""
+    from virtualwork.picture.paper import on_paper
+
     figure = blank()
     only = None if analysis.request.only is None else analysis.points
     on_paper(analysis.motions[0].poses, only, figure)
@@ -50,23 +52,29 @@ def drawn(analysis: Analysis) -> Figure:
 
 
 def forces_drawn(analysis: Analysis) -> Figure:
-    """The effort and the requested joint forces against the input, and what shakes the ground."""
+    """Draw the effort, the requested joint forces and the shaking force against the input."""
+    from virtualwork.picture.over_input import forces
+
     figure = blank()
     forces(analysis.motions[0].dynamics, analysis.shown_pairs, figure)
     return figure
 
 
 def curves(analysis: Analysis) -> Figure:
-    """The requested quantities against the input, of the first assembly."""
+    """Draw the requested quantities of the first assembly against the input."""
+    from virtualwork.picture.over_input import curves_of
+
     figure, motion = blank(), analysis.motions[0]
-    every = [each for each in (*analysis.places, *analysis.forces) if each.key]
-    values = solved(motion, keys_of(every))
-    curves_of(motion.poses, [_curve(analysis, each, values[each.key]) for each in every], figure)
+    components = [each for each in (*analysis.places, *analysis.forces) if each.key]
+    values = solved(motion, keys_of(components))
+    curves_of(motion.poses, [_curve(analysis, each, values[each.key]) for each in components], figure)
     return figure
 
 
-def _curve(analysis: Analysis, each: Component, value: NDArray[np.generic]) -> Drawn:
-    """A quantity as it is drawn, with how large one of its kind is."""
+def _curve(analysis: Analysis, each: Component, value: NDArray[np.generic]) -> PlotQuantity:
+    """Return the curve of a quantity, with the usual size of its kind."""
+    from virtualwork.picture.plot_quantities import PlotQuantity, pace, unwrapped
+
     m, poses = analysis.mechanism, analysis.motions[0].poses
     numbers = unwrapped(value.real) if each.link else each.of(value)
     name = each.names[0]
@@ -76,11 +84,133 @@ def _curve(analysis: Analysis, each: Component, value: NDArray[np.generic]) -> D
         if each.header.endswith(f"_{suffix}")
     )
     if each in analysis.forces:
-        return Drawn(name, unit, numbers, float(np.abs(numbers[np.isfinite(numbers)]).max(initial=0.0)))
+        return PlotQuantity(
+            name, unit, numbers, float(np.abs(numbers[np.isfinite(numbers)]).max(initial=0.0))
+        )
     size = 1.0 if isinstance(each.key, Angle) else m.size
-    return Drawn(name, unit, numbers, 180.0 if each.link else size * pace(poses) ** each.order)
+    return PlotQuantity(name, unit, numbers, 180.0 if each.link else size * pace(poses) ** each.order)
 
 
+# --- the page that moves ----------------------------------------------------------------------------------------------
+SWEEP = 361
+"""Poses of a turn, where one pose was requested."""
+
+
+def page(analyses: Sequence[tuple[str, Analysis]], units: str | None, bare: Mapping[str, str]) -> bytes:
+    """Return the page of all points and links: it computes where the formulas can be written into it, else it replays.
+
+    Parameters
+    ----------
+    analyses : sequence of (variant, analysis)
+        The first is drawn in full, the others as ghosts.
+    units : str, optional
+        As --units has them.
+    bare : mapping of kind to unit
+        What the file's bare numbers mean.
+    """
+    from virtualwork.animation import moving_page
+
+    reason = ""
+    if analyses:
+        made = _computing(analyses, units, bare)
+        if not isinstance(made, str):
+            return made
+        reason = f"This page replays what was computed: {made}." if made else ""
+    series = [one for name, analysis in analyses for one in _series(name, analysis, units)]
+    if not series:
+        raise MechanismError("--page: no variant can be assembled, and there is nothing to draw")
+    return moving_page(series[0].mechanism.name, series, note=reason).html.encode()
+
+
+def _computing(
+    analyses: Sequence[tuple[str, Analysis]], units: str | None, bare: Mapping[str, str]
+) -> bytes | str:
+    """Return the page that computes, or the reason why there is none."""
+    from virtualwork.animation import JointForce
+    from virtualwork.computing_page import ORDERS, computing_page
+    from virtualwork.motion import Motion
+
+    variant, first = analyses[0]
+    try:
+        motion, assembly = first.motions[0], first.assemblies[0]
+    except MechanismError:
+        # the series that replay name what is wrong, or leave the variant out
+        return ""
+    others = [one for name, analysis in analyses for one in _series(name, analysis, units, computed=first)]
+    m = first.mechanism
+    start = motion.inputs[0]
+    if motion.n == 1 and len(m.inputs) == 1 and not m.inputs[0].is_slide:
+        # one pose, and the whole turn from it
+        motion = Motion(
+            assembly,
+            start[0] + np.linspace(0.0, 2 * np.pi, SWEEP),
+            first.inputs.whole.speed,
+            first.inputs.whole.acceleration,
+        )
+    pairs = first.pairs if first.request.forces else []
+    order = max(ORDERS, first.order)
+    named = quantities.places(m, order)
+    listed = [each for each in named if each.order <= first.order]
+    if first.request.forces:
+        forces = quantities.forces(m, pairs)
+        named += forces
+        listed += [each for each in forces if each.key and not each.reverse]
+    wanted: list[tuple[Component | int, str]] = list(enumerate(first.input_columns))
+    wanted += [(each, each.header) for each in listed]
+    headers = shown(Table([column(header, []) for _, header in wanted]), units)
+    arrows = [JointForce.of(*row) for row in pairs]
+    made = computing_page(
+        motion.poses,
+        {header: (what, headers[header]) for what, header in wanted},
+        named,
+        arrows,
+        bare,
+        others,
+        start,
+        order,
+        _name(variant, first, 0),
+    )
+    return made if isinstance(made, str) else made.html.encode()
+
+
+def _name(variant: str, analysis: Analysis, i: int) -> str:
+    """Return the name of a series: its variant and its branch, where there are several."""
+    names = [
+        f"variant {variant}" if variant else "",
+        f"branch {analysis.assemblies[i].number}" if analysis.several else "",
+    ]
+    return ", ".join(filter(None, names))
+
+
+def _series(
+    variant: str, analysis: Analysis, units: str | None, computed: Analysis | None = None
+) -> Iterator[Series]:
+    """Yield every assembly but the one that the page computes; none of a variant that cannot be assembled, which a warning names."""
+    from virtualwork.animation import JointForce, Series
+
+    try:
+        motions = analysis.motions
+    except MechanismError:
+        if not variant:
+            raise
+        return
+    forces = analysis.request.forces
+    for i, motion in enumerate(motions):
+        if analysis is computed and i == 0:
+            continue
+        listed: dict[str, Shown] = {}
+        arrows: list[JointForce] = []
+        # every point and link, whatever --only names: all of it is drawn
+        for with_forces in (False, True)[: 1 + forces]:
+            whole = analysis.of_assembly(i).requesting(only=None, forces=with_forces)
+            listed |= shown(table(whole), units)
+            arrows = [JointForce.of(*row) for row in (whole.pairs if with_forces else ())]
+        yield Series(
+            motion.poses, motion.drawing, listed, analysis.input_columns, arrows, _name(variant, analysis, i)
+        )
+
+
+# --- the sheet of a report --------------------------------------------------------------------------------------------
 def posed(
     title: str, m: Mechanism, inputs: tuple[float, ...], bare: Mapping[str, str], first: Section
 ) -> Sheet:
@@ -90,7 +220,7 @@ def posed(
     length = length if length in UNITS["length"] else "m"
 
     def clean(values: list[float | None], scale: float) -> list[float | None]:
-        """Without what rounding leaves of zero."""
+        """Return the values with zero in place of its rounding."""
         return [0.0 if v is not None and abs(v) < 1e-12 * scale else v for v in values]
 
     def lengths(values: list[float | None]) -> list[float | None]:
@@ -107,7 +237,7 @@ def posed(
         [values[0] for each, values in shown.items() if each.path[-1] == name]
         for name in ("x_m", "y_m", "angle_deg")
     )
-    table = Table(
+    nodes = Table(
         [
             Column("point", "", list(m.points)),
             Column(
@@ -129,20 +259,21 @@ def posed(
     )
 
     def figure() -> Figure:
-        from cli.show.picture import blank
-
         drawn = blank()
         motion.plot(figure=drawn)
         return drawn
 
-    there = bool(motion.assembled.all())
-    stands = at_inputs(m, inputs, length)
-    pose = Section("Pose", [stands, table, bodies] if there else [f"{stands}: it cannot be assembled there"])
-    return Sheet(title, [first, Section("Mechanism", [counted(m)]), pose], figure if there else None)
+    assembled = bool(motion.assembled.all())
+    place = at_inputs(m, inputs, length)
+    parts: list[str | Table | Bars] = (
+        [place, nodes, bodies] if assembled else [f"{place}: it cannot be assembled there"]
+    )
+    sections = [first, Section("Mechanism", [counted(m)]), Section("Pose", parts)]
+    return Sheet(title, sections, figure if assembled else None)
 
 
 def counted(m: Mechanism) -> str:
-    """Say what a mechanism is made of.
+    """Count the parts of a mechanism.
 
     >>> from cli.examples import EXAMPLES
     >>> from virtualwork import Mechanism
@@ -166,15 +297,15 @@ def counted(m: Mechanism) -> str:
     }
     many = {"gear mesh": "gear meshes", "place of friction": "places of friction"}
     lines = [
-        f"{len(of)} {what if len(of) == 1 else many.get(what, what + 's')}"
-        for what, of in kinds.items()
-        if of
+        f"{len(parts)} {kind if len(parts) == 1 else many.get(kind, kind + 's')}"
+        for kind, parts in kinds.items()
+        if parts
     ]
     return f"{', '.join(lines)}, driven by {' and '.join(e.name for e in m.inputs)}"
 
 
 def at_inputs(m: Mechanism, inputs: tuple[float, ...], length: str) -> str:
-    """Say where the inputs stand: `crank at 60°`."""
+    """Return the inputs for a sentence: `crank at 60°`."""
     return ", ".join(
         f"{e.name} at {from_si(v, 'length', length):.6g} {written(length)}"
         if e.is_slide

@@ -102,6 +102,12 @@ def cells_of(
     return shown
 
 
+def number_at(analysis: Analysis, component: Component) -> float | None:
+    """Return a quantity of the first pose, as it is shown; None where it has no value."""
+    computed = solved(analysis.motions[0], keys_of([component]))
+    return cells_of([component], computed, analysis.inputs.n, analysis.set_angles)[component][0]
+
+
 def exact_degrees(angle: Reals) -> Reals:
     """Degrees in [0, 360)."""
     reduced = np.mod(angle, 360.0)
@@ -280,10 +286,10 @@ def poses_of(
     tree |= {"branch": [branch] * n, "assembled": assembled.tolist()}
     if condition is not None:
         tree["condition"] = cells(condition)
-    tree |= {"marks": marks} | nested(cells_of(_moving(analysis), computed, n, driven, assembled), n)
-    if analysis.forces:
-        tree |= nested(cells_of(analysis.forces, computed, n, driven), n)
-    return in_rows(tree, n)
+    # a cam has quantities of both kinds in one object
+    numbers = cells_of(_moving(analysis), computed, n, driven, assembled)
+    numbers |= cells_of(analysis.forces, computed, n, driven)
+    return in_rows(tree | {"marks": marks} | nested(numbers, n), n)
 
 
 def pose_head(analysis: Analysis, i: int) -> Document:

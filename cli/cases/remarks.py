@@ -11,6 +11,7 @@ import numpy as np
 from cli.cases.analysis import Analysis
 from cli.cases.inputs import Driven, Varied
 from dalembert.angles import in_turn
+from dalembert.dataclass import dataclass, field
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -218,7 +219,7 @@ def without_meaning(analysis: Analysis, varied: Sequence[Driven | Varied] = ()) 
     m, request, lines = analysis.mechanism, analysis.request, []
     paths = [name.of.where for name in varied if isinstance(name, Varied)]
     moves = (
-        analysis.own_order > 0
+        analysis.input_order > 0
         or any(isinstance(name, Driven) and name.order for name in varied)
         or any(where[0] == "inputs" and where[-1] != "value" for where in paths)
     )
@@ -245,3 +246,67 @@ def listed(analysis: Analysis, what: str, places: list[float], count: int) -> st
     named = ", ".join(f"{place:g} {analysis.unit}" for place in places[:5])
     more = f" and {count - 5} further poses" if count > 5 else ""
     return f"at input {named}{more}: {what}"
+
+
+# --- the warnings of many variants ---
+# the first so many variants that have remarks keep them, whoever computes them; so many different remarks are
+# printed, each with the first so many variants that have it
+KEPT, PRINTED, VARIANTS = 50, 10, 5
+
+
+@dataclass
+class Remarks:
+    """The warnings of all variants: each once, with the variants that have it.
+
+    Attributes
+    ----------
+    kept : list of (variant, its warnings)
+        Those of the first variants that have any; the mechanism itself has an empty name.
+    further : int
+        The number of variants after these that have warnings too.
+    any_assembled : bool
+        Whether any pose of any variant is assembled.
+    """
+
+    kept: list[tuple[str, tuple[str, ...]]] = field(default_factory=list)
+    further: int = 0
+    any_assembled: bool = False
+
+    @property
+    def full(self) -> bool:
+        """Whether no further warning is kept."""
+        return len(self.kept) >= KEPT
+
+    def add(self, name: str, warnings: Iterable[str], assembled: list[bool] | bool = False) -> None:
+        """Add the warnings of a variant, which may be none, and whether its poses are assembled."""
+        lines = tuple(dict.fromkeys(warnings))
+        if lines and self.full:
+            self.further += 1
+        elif lines:
+            self.kept.append((name, lines))
+        self.any_assembled |= assembled if isinstance(assembled, bool) else any(assembled)
+
+    def join(self, other: Remarks) -> None:
+        """Add the warnings of later variants."""
+        for name, lines in other.kept:
+            self.add(name, lines)
+        self.further += other.further
+        self.any_assembled |= other.any_assembled
+
+    def lines(self) -> list[str]:
+        """Return the lines that are printed."""
+        about: dict[str, list[str]] = {}
+        for name, remarks in self.kept:
+            for remark in remarks:
+                about.setdefault(remark, []).append(name)
+        if any(names == [""] for names in about.values()):
+            return list(about)
+        lines = []
+        for remark, names in list(about.items())[:PRINTED]:
+            more = f" and {len(names) - VARIANTS} more" if len(names) > VARIANTS else ""
+            lines.append(f"variant{'s' * (len(names) > 1)} {', '.join(names[:VARIANTS])}{more}: {remark}")
+        printed = set(list(about)[:PRINTED])
+        further = self.further + sum(printed.isdisjoint(remarks) for _, remarks in self.kept)
+        if further:
+            lines.append(f"{further} further variant{'s have' if further > 1 else ' has'} remarks too")
+        return lines

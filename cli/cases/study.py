@@ -1,34 +1,42 @@
-"""Poses, with their rates or their forces: what `dalembert mechanism` and `dalembert forces` do with every case."""
+"""The study of poses, with their rates or their forces: what `dalembert mechanism` and `dalembert forces` share."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from cli.cases import poses, remarks
 from cli.cases.analysis import Analysis
 from cli.cases.case import Case, Study, like
+from cli.cases.cases import Cases, naming
 from cli.show.result import Result, Section, Sheet
 from cli.show.terminal import progress
 from dalembert.dataclass import dataclass, field, replace
+from dalembert.errors import DataError
 from dalembert.results.columns import Table
 from dalembert.results.columns import document as result_document
 from dalembert.results.text import heading
+from dalembert.units import UNITS, from_si, written
+from virtualwork import MechanismError
 from virtualwork.formulas.positions import BLOCK
-from virtualwork.motion import Motion
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from types import SimpleNamespace
+
     from numpy.typing import NDArray
 
-    from cli.cases.case import Rows
-    from cli.cases.together import Together
+    from cli.cases.case import Together
+    from cli.cases.cases import Rows
+    from cli.cases.inputs import Varied
+    from cli.read.root_search import Found
     from cli.show.commands import ShowOptions
     from dalembert.results.columns import Document
-    from dalembert.results.way import Topic
+    from virtualwork import Mechanism
+    from virtualwork.quantities import Component
 
 METHOD = (
     "Assur groups one after the other, two-link groups in closed form (Chace), larger ones by Newton-Raphson; rates by the "
@@ -38,222 +46,264 @@ METHOD = (
 )
 
 
-@dataclass(frozen=True)
-class Further:
-    """What a command shows in addition to the poses of one mechanism.
-
-    Attributes
-    ----------
-    tables : dict of name to table
-        Those with a place in JSON stand in the document and on the terminal, below the poses.
-    words : str
-        What the terminal shows below them.
-    """
-
-    tables: Mapping[str, Table] = field(default_factory=dict)
-    words: str = ""
-
-    @property
-    def document(self) -> Document:
-        """Beside `poses` in JSON."""
-        return result_document(self.tables.values())
-
-
 @dataclass
 class PoseCase(Case):
     """The poses of one mechanism.
 
     Attributes
     ----------
-    missing : list of (int, int)
-        How many poses of each assembly cannot be assembled, and the first; filled by `tables`.
+    gaps : list of (int, int)
+        For each assembly the number of poses that cannot be assembled, and the first of them; filled by `tables`.
     troubles : dict
-        What the forces cannot tell -> the first inputs where, and at how many poses.
+        Forces that have no value -> the first inputs where, and the number of poses.
+    statements : dict
+        Warnings of the forces that hold for all poses.
+    whole : list of array
+        Which poses of a variant are assembled, block by block.
     """
 
     study: PoseStudy
     analysis: Analysis
-    missing: list[tuple[int, int]] = field(default_factory=list)
+    gaps: list[tuple[int, int]] = field(default_factory=list)
     troubles: dict[str, tuple[list[float], int]] = field(default_factory=dict)
     statements: dict[str, None] = field(default_factory=dict)
-    there: list[NDArray[np.bool_]] = field(default_factory=list)
+    whole: list[NDArray[np.bool_]] = field(default_factory=list)
+
+    # --- its tables -----------------------------------------------------------------------------------------------
+    def table(self) -> Table:
+        """Return a row for each pose, one assembly after the other."""
+        return poses.table(self.analysis)
 
     def tables(self, form: Callable[[Analysis], Table] = poses.table) -> Iterator[Table]:
-        """The rows of all poses, every assembly after the other; more than a block of them block by block."""
+        """Yield those rows, block by block where the poses fill more than one block."""
         a = self.analysis
         if not a.is_long:
             yield form(a)
             return
         pattern: Table | None = None
-        for block in self._in_blocks():
+        for block in self._blocks():
             table = form(block)
             if pattern is None:
-                # of the block and of the guess's own pose the one that is assembled
-                pattern = max(table, form(self._at_guess(block)), key=lambda each: len(each.columns))
+                # the columns of the block, or of the guess's own pose: of that which is assembled
+                at_guess = block.at(replace(block.inputs.part(0, 1), values=np.array([a.mechanism.at])))
+                pattern = max(table, form(at_guess), key=lambda each: len(each.columns))
             yield like(pattern, table)
 
     def pattern(self) -> Table:
-        """The columns of all variants, from the first block of poses."""
+        """Return a table with the columns of all variants: the first block of poses."""
         return next(self.tables())
 
-    def _in_blocks(self) -> Iterator[Analysis]:
-        """An analysis for each block of poses, with the digits of the sweep solved whole."""
+    def _blocks(self) -> Iterator[Analysis]:
+        """Yield an analysis of each block of poses, and note its gaps and troubles."""
         a, q = self.analysis, self.analysis.inputs
         starts = range(0, q.n, BLOCK)
-        self.missing.clear()
-        self.there.clear()
+        self.gaps.clear()
+        self.whole.clear()
         work = ((assembly, i) for assembly in a.assemblies for i in starts)
         for assembly, i in progress(work, len(starts) * len(a.assemblies), f"blocks of {BLOCK} poses"):
             if not i:
-                self.missing.append((0, 0))
+                self.gaps.append((0, 0))
                 if len(a.mechanism.inputs) == 1:
                     assembly.track.cover(*q.span)
-            block = replace(a, inputs=q.part(i, i + BLOCK), warnings=[], block_of=a)
-            block.assemblies = (assembly,)
-            its = block.inputs.whole
-            motion = Motion(assembly, its.values, its.speed, its.acceleration, block_of=q.n)
-            motion.poses.input_rest = its.rest
-            motion.poses.time = its.time
-            block.motions = (motion,)
+            block = a.block(assembly, i, i + BLOCK)
             yield block
-            gap = ~block.assembled(motion)
-            count, at = self.missing[-1]
-            self.missing[-1] = count + int(gap.sum()), at if count else i + int(np.argmax(gap))
-            if self.study.names:
-                # the rows of a variant tell it one by one
-                self.there.append(~gap)
+            gap = ~block.assembled(block.motions[0])
+            count, first = self.gaps[-1]
+            self.gaps[-1] = count + int(gap.sum()), first if count else i + int(np.argmax(gap))
+            if self.study.cases.names:
+                # each row of a variant says whether its pose is assembled
+                self.whole.append(~gap)
             if a.forces:
                 for what, places in remarks.troubles(block):
                     listed, number = self.troubles.get(what, ([], 0))
                     self.troubles[what] = [*listed, *places[: 5 - len(listed)]], number + len(places)
                 self.statements |= dict.fromkeys(remarks.statements(block))
 
-    def _at_guess(self, block: Analysis) -> Analysis:
-        """The block's first pose, with the inputs where the guess has them: there the mechanism is assembled."""
-        first = block.inputs.part(0, 1)
-        first_pose = replace(block, inputs=replace(first, values=np.array([self.analysis.mechanism.at])))
-        first_pose.assemblies = block.assemblies
-        return first_pose
-
     @cached_property
-    def further(self) -> Further:
-        """What is shown in addition to the poses."""
-        return self.study.further(self.analysis)
+    def extra(self) -> dict[str, Table]:
+        """The tables that stand below the poses; those with a place in JSON stand in the document."""
+        return {}
+
+    def further(self) -> Mapping[str, Callable[[], Table]]:
+        """Return the tables that stand below the poses."""
+        return {name: partial(self.extra.__getitem__, name) for name in self.extra}
+
+    def afterword(self) -> str:
+        """Return what the terminal shows below the tables."""
+        return ""
 
     def document(self) -> Document:
-        """The poses, and what is shown in addition."""
-        return {"poses": poses.documents(self.analysis), **self.further.document}
+        """Return the poses, and the tables below them."""
+        return {"poses": poses.documents(self.analysis), **result_document(self.extra.values())}
 
-    def way(self) -> list[Topic]:
-        """The worked solution."""
-        return self.study.way(self.analysis)
+    def assembled(self, rows: int = 0) -> list[bool] | bool:
+        """Return whether the pose of each row is assembled; where the rows are no poses, whether any is."""
+        a = self.analysis
+        if self.gaps:
+            whole = np.concatenate(self.whole).tolist() if self.whole else []
+            return whole if rows and rows == len(whole) else any(n < a.inputs.n for n, _ in self.gaps)
+        listed = [pose for motion in a.motions for pose in a.assembled(motion).tolist()]
+        return listed if rows == len(listed) else any(listed)
 
     def warnings(self) -> list[str]:
-        """Limits, branches, forces that have no value."""
+        """Return the warnings of limits, branches, and forces that have no value."""
         a = self.analysis
-        lines = [*a.warnings, *remarks.limits(a, self.missing or None)]
-        if a.forces and self.missing:
+        lines = [*a.warnings, *remarks.limits(a, self.gaps or None)]
+        if a.forces and self.gaps:
             lines += [remarks.listed(a, what, *at) for what, at in self.troubles.items()]
             lines += self.statements
         elif a.forces:
             lines += remarks.of_forces(a)
         return lines
 
-    def assembled(self, table: Table) -> list[bool] | bool:
-        """Of each row of a table whether its pose is assembled, or whether any is."""
-        a, rows = self.analysis, len(table.columns[0].values) if table.columns else 0
-        if self.missing:
-            there = np.concatenate(self.there) if self.there else np.array([], bool)
-            return (
-                there.tolist()
-                if rows and rows == len(there)
-                else any(n < a.inputs.n for n, _ in self.missing)
-            )
-        listed = [pose for motion in a.motions for pose in a.assembled(motion).tolist()]
-        return listed if rows == len(listed) else any(listed)
+    def result(self) -> Result:
+        """Return the result of this mechanism alone, in every form."""
+        a = self.analysis
+        _ = self.extra  # before the warnings
+        result = super().result()
+        tables = result.tables
+        result.expected = (*self.further().values(), lambda: poses.by_link(a))
+        result.afterword = self.afterword
+        result.sheets = lambda: [Sheet("", _sections(tables), self.figure)]
+        result.failed = lambda: not any(a.assembled(motion).any() for motion in a.motions)
+        return result
+
+
+def _sections(tables: Mapping[str, Callable[[], Table]]) -> list[Section]:
+    """Return the sections of a report: every table; one without columns is of the JSON document alone."""
+    made = {name: table() for name, table in tables.items()}
+    return [Section(heading(name), [table]) for name, table in made.items() if table.columns]
 
 
 @dataclass(frozen=True)
 class PoseStudy(Study):
-    """What is done with the poses of every case."""
+    """Solve the poses of every case."""
 
+    kind: ClassVar[type[PoseCase]]
+    title = "poses"
     method = METHOD
+    one_blank_row = False
 
-    def further(self, analysis: Analysis) -> Further:
-        """What is shown in addition to the poses of one mechanism."""
-        return Further()
+    @property
+    def poses_alone(self) -> bool:
+        """Whether a file of tables has the poses and nothing else."""
+        return True
 
-    def way(self, analysis: Analysis) -> list[Topic]:
-        """The worked solution of one mechanism, for --steps."""
-        return []
-
-    def figure(self, analysis: Analysis) -> Figure:
-        """The picture."""
-        raise NotImplementedError
-
-    def warnings(self) -> list[str]:
-        """Rates without a speed, forces without a mass or a load."""
-        return remarks.without_meaning(self.own, self.names)
+    @property
+    def extra_in_json(self) -> bool:
+        """Whether the JSON document of each variant has more than its poses."""
+        return False
 
     def case(self, row: Rows | None = None) -> PoseCase:
-        """A variant, or the mechanism itself."""
-        return PoseCase(self, self.analysis(row))
+        """Return the poses of the variant of a row, or of the mechanism itself."""
+        return self.kind(self, self.cases.analysis(row))
+
+    def warnings(self) -> list[str]:
+        """Return the warnings of rates without a speed, and forces without a mass or a load."""
+        return remarks.without_meaning(self.cases.nominal, self.cases.names)
 
     def together(self, row: Rows, json: bool) -> Together | None:
-        """How variants are solved at once."""
-        from cli.cases.together import Together
+        """Return the function that solves many variants at once; None where the formulas do not take all."""
+        from cli.cases.together import Family
         from virtualwork.family.part import Solver
 
-        if self.request.branch is not None or self.digits or (json and self.beside_each):
+        cases = self.cases
+        if cases.request.branch is not None or self.digits or (json and self.extra_in_json):
             return None
         # a rate that only the variants have makes for more columns
-        request = self.request._replace(order=self.analysis(row).order)
-        made = Together(replace(self.own, request=request), Solver(self.part(row[None])[0]), json)
-        return made if made.pays else None
-
-    def page(self, cases: Sequence[tuple[str, Case]], units: str | None) -> bytes:
-        """The page on which every mechanism moves."""
-        from cli.cases.page import of_poses
-
-        analyses = [(name, case.analysis) for name, case in cases if isinstance(case, PoseCase)]
-        return of_poses(analyses, units, self.bare)
+        request = cases.request._replace(order=cases.analysis(row).order)
+        family = Family(replace(cases.nominal, request=request), Solver(cases.part(row[None])[0]), json)
+        return family.solved if family.is_possible else None
 
     def in_blocks(self, show: ShowOptions) -> bool:
-        """Whether the table alone is written: a block of poses at a time."""
-        return show.streams and (show.holds_one or self.own.is_long)
+        """Whether the table alone is written, block by block."""
+        return self.poses_alone and show.streams and (show.holds_one or self.cases.nominal.is_long)
 
     def check_size(self, show: ShowOptions, times: int) -> None:
         """Refuse more poses than the memory holds."""
-        self.own.check_size(json=show.as_json, table=show.needs_table, times=times)
+        self.cases.nominal.check_size(json=show.as_json, table=show.needs_table, times=times)
 
-    @property
-    def beside_each(self) -> bool:
-        """Whether each variant has more than its poses."""
-        return False
+    def page(self, cases: Sequence[tuple[str, Case]], units: str | None) -> bytes:
+        """Return the page on which every mechanism moves."""
+        from cli.cases.picture import page
 
-    def result(self, case: Case) -> Result:
-        """The poses of one mechanism, in every form."""
-        assert isinstance(case, PoseCase)
-        a, further = case.analysis, case.further
-        beside: dict[str, Callable[[], Table]] = {
-            name: partial(replace, table) for name, table in further.tables.items()
-        }
-        tables: dict[str, Callable[[], Table]] = {"poses": lambda: poses.table(a), **beside}
-        return Result(
-            document=lambda: {"name": a.mechanism.name, **case.document()},
-            tables=tables,
-            expected=(*beside.values(), lambda: poses.by_link(a)),
-            notes=lambda: a.mechanism.name,
-            afterword=lambda: further.words,
-            figure=lambda: self.figure(a),
-            method=self.method,
-            sheets=lambda: [Sheet("", self.sections(a, tables), lambda: self.figure(a))],
-            warnings=case.warnings(),
-            failed=lambda: not any(a.assembled(motion).any() for motion in a.motions),
+        analyses = [(name, case.analysis) for name, case in cases if isinstance(case, PoseCase)]
+        return page(analyses, units, self.cases.bare)
+
+
+# --- --find NAME --so-that QUANTITY=VALUE -----------------------------------------------------------------------------
+def with_root(cases: Cases, options: SimpleNamespace) -> tuple[Cases, Found | None]:
+    """Return the cases with the number that --find seeks, and that number: the nearest to the file's own.
+
+    Raises
+    ------
+    typer.BadParameter
+        A name or a value means nothing.
+    DataError
+        No number in reach gives the value.
+    """
+    if options.find is None and options.so_that is None:
+        return cases, None
+    from cli.cases.axes import dimension_named
+    from cli.cases.inputs import of_one, with_numbers
+    from cli.read import root_search
+    from cli.read.options import bad
+
+    if cases.varied is not None or cases.poses > 1:
+        raise bad("--find", "expected one pose of one mechanism, such as --at 60deg")
+    m, bare = cases.mechanism, cases.bare
+    with naming(cases.request.file):
+        pair = root_search.pair(options.find, options.so_that)
+        assert pair is not None
+        name, wanted = pair
+        dimension = dimension_named(m, name, name, "--find")
+        word, text = root_search.quantity_and_value(wanted, "B.vx=3m_s")
+        request = cases.request._replace(only=[word], order=None)
+
+        def analysis(mechanism: Mechanism) -> Analysis:
+            return Analysis(request, mechanism, of_one(mechanism, cases.moved))
+
+        nominal = analysis(m)
+        nominal.check_names()
+        components = [each for each in nominal.tabled if word in each.names]
+        if len(components) != 1:
+            names = ", ".join(dict.fromkeys(n for each in nominal.tabled for n in each.names[:1]))
+            raise bad("--so-that", f"'{word}': expected one number: {names}")
+        (component,) = components
+        target, unit = _target(component, text, bare)
+
+        def value(x: float) -> float | None:
+            try:
+                return poses.number_at(analysis(with_numbers(m, [dimension.of], [x])), component)
+            except (MechanismError, DataError):
+                return None
+
+        own = float(m.value(dimension.label).real)
+        start = 0.0 if own != own else math.degrees(own) if dimension.unit == "deg" else own
+        sought = root_search.Sought(dimension.of.header, dimension.unit, start)
+        root = root_search.search(
+            name, sought, root_search.Goal(word, unit, target, bool(component.link)), value
         )
+        solved = with_numbers(m, [dimension.of], [root])
+    text = f"{name} = {_in_unit_of_file(dimension, root, bare)} gives {word} = {root_search.amount(target, unit)}"
+    return replace(cases, mechanism=solved), root_search.Found(sought.header, root, text)
 
-    def sections(self, analysis: Analysis, tables: Mapping[str, Callable[[], Table]]) -> list[Section]:
-        """What a report shows: every table."""
-        made = {name: table() for name, table in tables.items()}
-        # a table without columns is of the JSON document alone
-        return [Section(heading(name), [table]) for name, table in made.items() if table.columns]
+
+def _in_unit_of_file(dimension: Varied, shown: float, bare: Mapping[str, str]) -> str:
+    """Return a number in the file's own unit."""
+    unit = bare.get("length", dimension.unit) if dimension.kind == "length" else dimension.unit
+    if dimension.kind == "length" and unit in UNITS["length"]:
+        return f"{float(from_si(shown, 'length', unit)):.10g} {written(unit)}"
+    if dimension.unit == "deg":
+        return f"{shown:.10g}°"
+    return f"{shown:.10g} {written(dimension.unit)}".rstrip()
+
+
+def _target(component: Component, text: str, bare: Mapping[str, str]) -> tuple[float, str]:
+    """Return the value of --so-that in the unit that the quantity is shown in, and that unit."""
+    from cli.cases.axes import place_or_angle
+    from cli.read.root_search import value_in
+
+    unit = poses.column(component.header, []).unit
+    kind = {"deg": "angle", "m": "length"}.get(unit)
+    return (value_in(unit, text) if kind is None else place_or_angle(text, kind, "--so-that", bare)), unit

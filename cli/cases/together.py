@@ -1,9 +1,12 @@
-"""The poses of many variants at once, from the formulas with the dimensions as inputs: each as if described alone."""
+"""Many variants solved together: their dimensions enter the recorded formulas as inputs.
+
+Tables and documents are those of variants that are solved one by one.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -25,7 +28,7 @@ if TYPE_CHECKING:
 
     Rows = NDArray[np.float64]
 
-# a radicand below which a pose may be a limit: such a variant is described alone, for the marks of its poses
+# a radicand below which a pose may be a limit: such a variant is solved alone, for the marks of its poses
 MARKED = 1e-4
 
 
@@ -35,10 +38,10 @@ class Solved(NamedTuple):
     Attributes
     ----------
     answer : Table or list of documents
-        One variant after the other, a row or a document for each pose; of no meaning where a variant is left alone.
+        One variant after the other, a row or a document for each pose; without meaning where a variant is left alone.
     assembled : array (v, n)
     alone : array (v,)
-        Which variants are to be described alone.
+        The variants that have to be solved one by one.
     """
 
     answer: Any
@@ -50,17 +53,17 @@ SIZE: Quantity = Size()
 
 
 @dataclass(frozen=True)
-class Together:
-    """The quantities of an analysis, of many variants at once.
+class Family:
+    """A family of variants, and the quantities that are requested of it.
 
     Attributes
     ----------
     analysis : Analysis
-        Of the mechanism that they are variants of.
+        The analysis of the mechanism itself.
     solver : Solver
-        Of some variants: its formulas are those of all.
+        The solver of some variants: its formulas are those of all.
     json : bool
-        Whether the poses' documents are formed, and no table.
+        Whether documents are formed, and no table.
     """
 
     analysis: Analysis
@@ -79,21 +82,19 @@ class Together:
 
     @cached_property
     def keys(self) -> list[Quantity]:
-        """The quantities that the table or the documents are of."""
+        """The quantities of the table or the documents."""
         a = self.analysis
-        wanted = keys_of(poses.in_json(a) if self.json else a.tabled)
+        keys = keys_of(poses.in_json(a) if self.json else a.tabled)
         if self.json:
             assert self.solver.written is not None
-            wanted += [Margin(group.name) for group in self.solver.written.closed]
-            wanted += (
-                [] if a.request.only is not None else [SIZE, *(key for row in self.loops for key in row)]
-            )
-        # whether a pose is assembled is a matter of the names alone
-        wanted += [] if a.whole else a.named
-        return list(dict.fromkeys(wanted))
+            keys += [Margin(group.name) for group in self.solver.written.closed]
+            keys += [] if a.request.only is not None else [SIZE, *(key for row in self.loops for key in row)]
+        # with --only the requested names alone decide whether a pose is assembled
+        keys += [] if a.whole else a.named
+        return list(dict.fromkeys(keys))
 
     @property
-    def pays(self) -> bool:
+    def is_possible(self) -> bool:
         """Whether the formulas take all that is requested."""
         if self.solver.written is None:
             return False
@@ -101,13 +102,13 @@ class Together:
             return False
         return self.solver.takes(self.keys)
 
-    def of(self, part: Part, shown: Rows) -> Solved:
-        """Some variants; `shown`: their inputs as they are shown, (v or 1, n, k)."""
+    def solved(self, part: Part, shown: Rows) -> Solved:
+        """Solve some variants; `shown`: their inputs as they are shown, (v or 1, n, k)."""
         solver = Solver(part, self.solver)
         v, n = part.shape
         (there, *values), alone = solver.lanes([ASSEMBLED, *self.keys])
         assembled = np.isfinite(there)
-        # a remark is due on them
+        # they have a warning
         alone |= solver.open_at_guess
         forces = bool(self.analysis.forces)
         if forces:
@@ -118,8 +119,7 @@ class Together:
             if forces:
                 alone |= (assembled & ~np.isfinite(lanes)).any(axis=1)
         flat = {key: lanes.ravel() for key, lanes in zip(self.keys, values, strict=True)}
-        analysis = replace(self.analysis, inputs=self._inputs(part, shown), warnings=[])
-        analysis.assemblies = self.analysis.assemblies
+        analysis = self.analysis.at(self._inputs(part, shown))
         whole = assembled.ravel()
         if not analysis.whole:
             whole = np.logical_and.reduce([np.isfinite(flat[key]) for key in analysis.named], initial=True)
@@ -127,14 +127,14 @@ class Together:
         if not self.json:
             return Solved(poses.table(analysis, [flat]), whole.reshape(v, n), alone)
         conditions = self._condition(flat, assembled.ravel()) if analysis.request.only is None else None
-        # no marks: variants that may have one are described alone
+        # no marks: variants that may have one are solved alone
         marks: list[list[str]] = [[]] * (v * n)
         branch = analysis.assemblies[0].number
         listed = poses.poses_of(analysis, branch, flat, whole, conditions, marks)
         return Solved(list(listed), whole.reshape(v, n), alone)
 
     def _condition(self, lanes: Mapping[Quantity, Any], assembled: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """(v n,): see `Motion.condition`."""
+        """Return the condition of each pose, (v n,); see `Motion.condition`."""
         assert self.solver.written is not None
         loops = self.solver.written.recording.loops
         if loops is None:
@@ -143,7 +143,7 @@ class Together:
         return condition(entries, len(loops.angles), lanes[SIZE], len(assembled))
 
     def _without_mass(self, part: Part) -> NDArray[np.bool_]:
-        """Which variants have a link with an inertia and no mass whose centre may move, (v,)."""
+        """Return which variants have a link with an inertia and no mass whose centre may move, (v,)."""
         m, varied = part.mechanism, {d.where: i for i, d in enumerate(part.dimensions)}
         bodies = np.zeros(part.shape[0], dtype=bool)
         for name, link in m.links.items():
@@ -162,7 +162,7 @@ class Together:
         return bodies
 
     def _inputs(self, part: Part, shown: Rows) -> Inputs:
-        """The inputs of all variants, one after the other."""
+        """Return the inputs of all variants, one after the other."""
         v, n = part.shape
-        si, seen = (np.broadcast_to(x, (v, n, x.shape[2])).reshape(v * n, -1) for x in (part.inputs, shown))
-        return Inputs(si, seen, steps=list(self.analysis.inputs.whole.steps) * v)
+        si, cells = (np.broadcast_to(x, (v, n, x.shape[2])).reshape(v * n, -1) for x in (part.inputs, shown))
+        return Inputs(si, cells, steps=list(self.analysis.inputs.whole.steps) * v)

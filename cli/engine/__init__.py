@@ -20,11 +20,11 @@ Arguments:
   cylinders CYLINDERS  CSV with a row for each cylinder; - is standard input.
 What:
   speed SPEED  Speed of the crankshaft, such as 3000rpm.
-  order K  Highest order.
-How: what balances it:
-  counterweight_share SHARE  Counterweights for the rotating masses and this share of the reciprocating ones, such as 0.5.
+  order K  Highest order: the highest multiple of the speed that is computed.
+Counterweights and balance shafts:
+  counterweight_share SHARE  Share of the reciprocating masses that counterweights balance, such as 0.5. They balance the rotating masses too.
   plane NAME:Z:RADIUS  Plane of counterweights, such as A:0mm:60mm; repeatable (default: opposite each crank pin).
-  shaft ORDER:Z:with|against  Balance shaft at ORDER times the speed, with or against the crank: 2:150mm:against; repeatable.
+  shaft ORDER:Z:with|against  Balance shaft at ORDER times the speed, with or against the crank, such as 2:150mm:against; repeatable.
 """
 
 
@@ -40,9 +40,9 @@ def run(
     """Compute the shaking forces and couples of an engine by exact orders, and the residuals after counterweights and
     balance shafts.
 
-    CYLINDERS has the columns cylinder, crank_deg, bank_deg, z_*, throw_*, rod_*, reciprocating_* and rotating_* (masses); * is a
-    unit. The crank pin stands at θ + crank_deg; bank_deg is the direction of the cylinder's axis, counter-clockwise from
-    +x (default 90). Forces are those on the frame, couples are Σ z·F about z = 0. One shaft balances a force; two of one
+    CYLINDERS has the columns cylinder, crank_deg, bank_deg, z_*, throw_*, rod_*, reciprocating_* and rotating_* (masses).
+    The star is a unit. The crank pin stands at θ + crank_deg. bank_deg is the direction of the cylinder's axis,
+    counter-clockwise from +x (default 90). Forces are those on the frame, couples are Σ z·F about z = 0. One shaft balances a force; two of one
     order and sense balance force and couple.
     """
     from cli.engine.cylinders import Engine, read_cylinders, read_shafts

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from cli.cases.options import CASES, FILE, WORKERS, Options
+from cli.cases import CASES, FILE, WORKERS
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
@@ -15,22 +16,23 @@ EXAMPLE = "desk-lamp"
 OPTIONS = f"{FILE}{CASES}{WORKERS}"
 
 
-@declared_command(OPTIONS, Options)
-def run(own: Options, show: ShowOptions) -> Result:
+@declared_command(OPTIONS, SimpleNamespace)
+def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Find the positions in which a mechanism rests under its loads without effort, and whether stably.
 
     A stable position has its period of small oscillations, without dampers and friction. --over or --cases of an
     input set the range of the search (default: a whole turn; of a slide two sizes of the mechanism either way).
     """
-    from cli.cases.call import Call
+    from cli.cases.cases import Cases
+    from cli.cases.loop import result
     from cli.equilibrium.rest import Equilibria
 
-    call = Call.of(own, show)
-    if own.at:
+    cases = Cases.of(options)
+    if options.at:
         from cli.read.options import bad
 
         raise bad(
             "--at",
             "equilibrium searches a range of the input: expected --over, such as --over 0deg:90deg:1deg",
         )
-    return call.result(Equilibria)
+    return result(Equilibria(cases, show.digits, show.as_json), options, show)

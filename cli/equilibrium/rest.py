@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.cases.analysis import Analysis
-from cli.cases.case import TableCase, TableStudy
+from cli.cases.case import Case, Study
 from cli.cases.inputs import Inputs
 from cli.cases.ledger import Entry, entries_of, ledger
 from cli.cases.poses import column
 from dalembert.angles import in_turn
-from dalembert.dataclass import dataclass, field, replace
+from dalembert.dataclass import dataclass
 from dalembert.results.columns import Column, Table, names, number
 from dalembert.results.way import Topic, figures
 
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.cases.analysis import Analysis
-    from cli.cases.case import Rows
+    from cli.cases.cases import Rows
     from dalembert.results.way import Topic
     from virtualwork.study.equilibrium import Equilibria as Found
     from virtualwork.study.equilibrium import Equilibrium
 
 
 @dataclass
-class Rest(TableCase):
-    """Where one mechanism rests.
+class Rest(Case):
+    """The positions in which one mechanism rests.
 
     Attributes
     ----------
@@ -40,12 +40,9 @@ class Rest(TableCase):
         Whether the inputs are the range that is searched.
     """
 
+    study: Equilibria
     analysis: Analysis
     ranged: bool
-    name: str = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.name = self.analysis.mechanism.name
 
     @cached_property
     def equilibria(self) -> Found:
@@ -110,13 +107,13 @@ class Rest(TableCase):
         a = self.analysis
         q = np.array([e.inputs for e in self.equilibria.found]).reshape(-1, len(a.mechanism.inputs))
         if not len(q):
-            return drawn(replace(a, inputs=a.inputs.part(0, 1)))
+            return drawn(a.at(a.inputs.part(0, 1)))
         steps = [str(i) for i in range(1, len(q) + 1)]
-        return drawn(replace(a, inputs=Inputs(q, np.degrees(q), steps=steps)))
+        return drawn(a.at(Inputs(q, np.degrees(q), steps=steps)))
 
 
 @dataclass(frozen=True)
-class Equilibria(TableStudy):
+class Equilibria(Study):
     """Find the positions of rest of every case."""
 
     title = "equilibria"
@@ -127,11 +124,10 @@ class Equilibria(TableStudy):
     )
 
     def case(self, row: Rows | None = None) -> Rest:
-        """A variant, or the mechanism itself."""
-        analysis = self.analysis(row)
+        """Return the positions of rest of the variant of a row, or of the mechanism itself."""
+        analysis, moved = self.cases.analysis(row), self.cases.moved
         _ = analysis.mechanism.assembly
-        ranged = self.moved is not None and self.moved.axes[0].option != "[input] law"
-        return Rest(analysis, ranged)
+        return Rest(self, analysis, moved is not None and moved.axes[0].option != "[input] law")
 
 
 def way(a: Analysis, positions: Sequence[Equilibrium]) -> list[Topic]:

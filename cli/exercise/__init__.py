@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,11 +22,11 @@ OPTIONS = """
 Arguments:
   file FILE.toml  The exercise.
 What:
-  students NUMBER|ROSTER.csv  Number of students, or a table with a column student; its other columns are kept.
+  students NUMBER|ROSTER.csv  Number of students, or their table with a column student.
   seed N  Random seed of the drawn values.
-  folder -o --output FOLDER  Folder of the sheets, answers.csv, key.csv, solutions.html and moodle.xml.
-  page  Put a page that computes on each sheet, for practice: it shows the answers.
-  system --for prairielearn|numbas  Write the questions for this system in addition; repeatable.
+  folder -o --output FOLDER  Folder to write: sheets, answers.csv, key.csv, solutions.html, moodle.xml.
+  page  Put a page that computes on each sheet. It is for practice: it shows the answers.
+  system --for prairielearn|numbas  Write the questions for this system too; repeatable.
 """
 SYSTEMS = ("prairielearn", "numbas")
 MOST = 2000
@@ -43,21 +42,19 @@ def _run(
 ) -> Result:
     """Make the variants of an exercise for a class: a sheet for each student, a table for the answers, key and solutions.
 
-    FILE.toml has command (what solves it), title, text with {links.crank.B.x} or {rotor.csv:W1.mass_kg} in it, a table
-    [draw] of values by steps such as "50mm:80mm:5mm" or lists, and [[ask]] with quantity (a column of the command's
-    CSV), where (its key columns), figures, points, unit. Every drawn variant can be assembled, lies away from limits
-    and is well conditioned.
+    FILE.toml has the command that solves the exercise, a title, and a text with drawn values, {links.crank.B.x} or
+    {rotor.csv:W1.mass_kg}. Its table [draw] has the values to draw from, such as "50mm:80mm:5mm" or a list. Each [[ask]] is
+    a question: quantity (a column of the command's CSV), where (its row), figures, points, unit. Every variant can be
+    assembled and lies away from limits.
     """
+    from cli.exercise import questions
     from cli.exercise.description import read_exercise
     from cli.exercise.drawings import figure, moving
-    from cli.exercise.files import put
-    from cli.exercise.mistakes import candidates
-    from cli.exercise.moodle import moodle
-    from cli.exercise.sheets import answers_csv, filled, key_csv, sheet_page, tables
-    from cli.exercise.solutions import solutions
+    from cli.exercise.recomputed import candidates
+    from cli.exercise.sheets import answers_csv, filled, key_csv, put, sheet_page, solutions, tables
     from cli.exercise.solving import workshop
     from cli.exercise.variants import variants
-    from cli.show.capture import options_of
+    from cli.show.output import options_of
     from cli.show.result import Result
 
     if folder is None:
@@ -87,11 +84,9 @@ def _run(
         files["key.csv"] = key_csv(exercise, people, drawn)
         files["solutions.html"] = solutions(exercise, people, drawn, drawings)
         slips = {id(variant): candidates(variant) for variant in dict.fromkeys(drawn)}
-        files["moodle.xml"] = moodle(exercise, people, drawn, drawings, slips)
+        files["moodle.xml"] = questions.moodle(exercise, people, drawn, drawings, slips)
         for name in system or ():
-            # cli.exercise.prairielearn, cli.exercise.numbas
-            questions = getattr(import_module(f"cli.exercise.{name}"), name)
-            files |= questions(exercise, drawn, drawings, slips)
+            files |= questions.SYSTEMS[name](exercise, drawn, drawings, slips)
         put(Path(folder), files)
         made = len({id(variant) for variant in drawn})
         result = Result(
@@ -151,12 +146,12 @@ def _students(text: str) -> list[Student]:
     return people
 
 
-def _show(result: Result, given: ShowOptions, asked: object) -> None:
+def _show(result: Result, show_options: ShowOptions, call: object) -> None:
     """Say what was written; with --json the document with the key, with --expect its check."""
     import typer
 
-    if given.json or given.expect is not None:
-        show(result, given, {})
+    if show_options.json or show_options.expect is not None:
+        show(result, show_options, {})
         return
     for line in result.warnings:
         typer.echo(f"warning: {line}", err=True)

@@ -6,19 +6,17 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
-from cli.exercise.answers import Answer, Solved
-from cli.exercise.description import Value
-from cli.exercise.load_slips import Load, loads
-from cli.exercise.slips import Pairs, Slip
+from cli.exercise.description import Answer, Solved, Value
+from cli.exercise.slips import Candidates, Load, Pairs, Slip, is_sum, joined, loads, of_loads, of_motion
+from cli.exercise.slips_of_rows import gravity, of_rotor, of_work
 from cli.exercise.solving import Problem
 from cli.exercise.variants import Variant
-from cli.exercise.work_slips import gravity
 from dalembert.errors import DataError
 from dalembert.quantities import is_number
 from dalembert.units import parted, unit_name
@@ -364,3 +362,25 @@ def _trials_left_on(problem: Problem, file: str) -> list[Edit]:
         else ("yes", "a trial mass is taken as left on")
     )
     return [Edit(text, "trial_kept", _put({(file, r, column): other for r in on or trials}))]
+
+
+PROVIDERS = {"work": of_work, "forces": of_work, "balance": of_rotor}
+
+
+def candidates(variant: Variant, again: Recomputed | None = None) -> list[Candidates]:
+    """Return the slips of every question of a variant; `again`: its runs with slips in the data."""
+    runs = again or Recomputed(variant)
+    return [_of_question(variant, k, runs) for k in range(len(variant.answers))]
+
+
+def _of_question(variant: Variant, k: int, runs: Recomputed) -> Candidates:
+    provider = PROVIDERS.get(variant.problem.exercise.command[0])
+    own = None if provider is None else provider(variant, k)
+    if own is not None:
+        return own
+    answer = variant.answers[k]
+    parts, pairs = of_motion(variant, k)
+    loaded, two_loads = of_loads(answer, k, runs.loads) if is_sum(answer) else ([], lambda: None)
+    return Candidates(
+        answer, [*parts, *loaded, *runs.slips(k)], joined([pairs, two_loads, partial(runs.pairs, k)])
+    )

@@ -1,21 +1,28 @@
-"""Sheets, key, table of answers and solutions of an exercise; the key as a table."""
+"""The pages of an exercise: a sheet for each student, solutions, answers and key; the folder is written whole or not at all."""
 
 from __future__ import annotations
 
 import csv
 import html
 import io
+import os
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 
-from cli.exercise.answers import Answer, unit_text
-from cli.exercise.description import Ask, Exercise, Value, cell_of
+from cli.exercise.description import Answer, Ask, Exercise, Value, cell_of, unit_text
 from cli.exercise.solving import Sheet, Workshop
 from cli.exercise.variants import Variant
+from cli.show.commands import ShowOptions
+from cli.show.report import html_part, report
 from dalembert.errors import DataError, quote
 from dalembert.figures import written
 from dalembert.results.columns import Table, names
+from dalembert.tables.files import is_input
+from dalembert.tables.table import read
 from dalembert.units import parted
 from dalembert.units import written as unit_written
 
@@ -248,3 +255,111 @@ def tables(
     ]
     table = Table(columns, ["student", *keys, "quantity"], "key[]")
     return {"key": lambda: table}
+
+
+SOLUTION_STYLE = """
+dl { display: grid; grid-template-columns: fit-content(40%) 1fr; gap: 0 4mm } td.n { white-space: nowrap }
+.good { color: #06632f; font-weight: 600 } .bad { color: #b00020; font-weight: 700 }
+"""
+
+
+def solutions(
+    exercise: Exercise, students: Sequence[Student], variants: Sequence[Variant], drawings: Mapping[int, str]
+) -> bytes:
+    """Return the page; students with the same numbers share a solution."""
+    parts = [f"<h1>{html.escape(exercise.title)}: solutions</h1>\n"]
+    shared: dict[int, list[str]] = {}
+    for student, variant in zip(students, variants, strict=True):
+        shared.setdefault(id(variant), []).append(student.name)
+    by_id = {id(variant): variant for variant in variants}
+    for key, who in shared.items():
+        parts += ["<section>\n", *_solution(by_id[key], who, drawings[key]), "</section>\n"]
+    return page(f"{exercise.title}: solutions", "".join(parts), SOLUTION_STYLE)
+
+
+def _solution(variant: Variant, who: Sequence[str], drawing: str) -> Iterator[str]:
+    several = f"students {', '.join(who)}" if len(who) > 1 else f"student {who[0]}"
+    yield f"<h2>{html.escape(several[0].upper() + several[1:])}</h2>\n"
+    yield problem_html(variant, drawing)
+    rows = "".join(
+        f"<tr><td>{html.escape(label(answer.ask))}</td>"
+        f'<td class="n">{written(answer.value, answer.ask.figures).replace("-", "−")}</td>'
+        f"<td>{html.escape(unit_text(answer.unit))}</td>"
+        f'<td class="n">{f"{answer.value:.8g}".replace("-", "−")}</td></tr>\n'
+        for answer in variant.answers
+    )
+    yield (
+        '<h3>Answers</h3><div class="wide"><table><thead><tr><th>quantity</th><th>answer</th><th>unit</th>'
+        f"<th>unrounded</th></tr></thead><tbody>{rows}</tbody></table></div>\n"
+    )
+    result = variant.worked.result
+    with result.within():
+        # the way, where there is one, has what the tables have
+        shown = (
+            replace(result, shows_input=True, sheets=list)
+            if result.shows_way
+            else replace(result, shows_input=True)
+        )
+        for each in report(shown, ShowOptions(), {}, None).pages:
+            for name, parts in each.sections:
+                yield f"<h3>{html.escape(name)}</h3>\n"
+                yield from map(html_part, parts)
+    if result.method:
+        yield f'<p class="small">{html.escape(result.method)}</p>\n'
+
+
+def put(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write all files of a folder, or none: a new folder appears at once, in one that is there files are replaced.
+
+    Raises
+    ------
+    DataError
+        Where the folder cannot be written, or would lose answers that were filled in, or one of the inputs.
+    """
+    _refuse(folder, files)
+    parent = folder.parent
+    if not parent.is_dir():
+        raise DataError(f"{folder}: cannot write: no folder {parent}")
+    try:
+        made = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".part", dir=parent))
+        try:
+            for name, data in files.items():
+                path = made / name
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(data)
+            if folder.is_dir():
+                for name in files:
+                    folder.joinpath(name).parent.mkdir(parents=True, exist_ok=True)
+                    os.replace(made / name, folder / name)
+            else:
+                made.chmod(0o777 & ~_mask())
+                os.replace(made, folder)
+        finally:
+            shutil.rmtree(made, ignore_errors=True)
+    except OSError as error:
+        raise DataError(f"{folder}: cannot write: {error.strerror or error}") from None
+
+
+def _mask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _refuse(folder: Path, files: Mapping[str, bytes]) -> None:
+    if folder.exists() and not folder.is_dir():
+        raise DataError(f"{folder}: cannot write: found a file, expected a folder or a new name")
+    for name in files:
+        path = folder / name
+        if is_input(path):
+            raise DataError(f"{path}: is an input: expected another folder; nothing was written")
+    answers = folder / "answers.csv"
+    if answers.is_file():
+        try:
+            filled = any(cell.strip() for cell in read(str(answers), texts=None).texts.get("answer", []))
+        except DataError:
+            filled = True
+        if filled:
+            raise DataError(
+                f"{answers}: found answers in it, expected none: they would be lost; give another folder; nothing was written"
+            )

@@ -15,9 +15,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cli.exercise.answers import Solved
-from cli.exercise.description import Exercise, Value, cell_of, value_of
-from cli.show.capture import result_of
+from cli.exercise.description import Exercise, Solved, Value, cell_of, value_of
+from cli.show.output import result_of
 from dalembert.errors import DataError, quote
 from dalembert.hints import nearest
 from dalembert.quantities import is_number
@@ -113,7 +112,7 @@ class Workshop:
     @cached_property
     def described(self) -> Any:
         """The mechanism as its file describes it."""
-        from cli.cases.call import load
+        from cli.cases.cases import load
 
         assert self.mechanism is not None
         return load(str(self.exercise.folder / self.mechanism))

@@ -10,10 +10,9 @@ from math import isfinite, prod, radians, remainder
 from random import Random
 from typing import Any
 
-from cli.exercise.answers import Answer, Solved
-from cli.exercise.description import Exercise, Value
+from cli.exercise.description import Answer, Exercise, Solved, Value
 from cli.exercise.solving import Problem, Workshop
-from cli.show.capture import options_of
+from cli.show.output import options_of
 from dalembert.errors import DataError
 from dalembert.figures import Right
 from dalembert.units import unit_name

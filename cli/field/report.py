@@ -16,9 +16,8 @@ from cli.field.rows import Rows, Tables, amplitude_unit, masses_text
 from cli.field.tables import sense
 from cli.read.runs.runs import Complex
 from cli.read.tolerance import verdict_table
-from cli.show.bars import Bar, Bars
 from cli.show.picture import blank
-from cli.show.result import Section, Sheet
+from cli.show.result import Bar, Bars, Section, Sheet
 from dalembert.angles import degrees
 from dalembert.results.columns import Column, Table
 from dalembert.results.text import with_uncertainty

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from cli.cases.options import CASES, FILE, WORKERS, Options
+from cli.cases import CASES, FILE, WORKERS
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
@@ -27,8 +28,8 @@ How:
 """
 
 
-@declared_command(OPTIONS, Options)
-def run(own: Options, show: ShowOptions) -> Result:
+@declared_command(OPTIONS, SimpleNamespace)
+def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Fit dimensions of a mechanism to a target: a path, a function of the input, a guided body, an effort.
 
     Without a column for the input, the input is free at each row of the target, and the rows keep their order. -o
@@ -36,31 +37,36 @@ def run(own: Options, show: ShowOptions) -> Result:
     file with the fitted numbers. --keep holds from the first to the last input of the target, over a whole turn where
     the input is free.
     """
-    from cli.cases.call import Call, naming
+    from cli.cases.cases import Cases, naming
+    from cli.cases.loop import result
     from cli.fit.fitting import STARTS, Fits, aims, bounds
     from cli.fit.targets import kept
     from cli.read.options import bad
 
     for flag, value, example in (
-        ("--want", own.want, "--want H"),
-        ("--free", own.free, "--free NAME=LOW:HIGH"),
+        ("--want", options.want, "--want H"),
+        ("--free", options.free, "--free NAME=LOW:HIGH"),
     ):
         if not value:
             raise bad(flag, f"missing: expected {example}")
-    call = Call.of(own, show)
-    call.refuse_inputs("the rows of the target have the inputs: expected a dimension, links.crank.B.x=...")
-    with naming(own.file):
-        targets = aims(call.mechanism, own.target, own.want, own.weight, call.remarks)
-        free = bounds(call.mechanism, own.free, call.bare)
-        keep = kept(call.mechanism, own.keep, call.bare)
-    workers = 1 if call.varied is not None else call.workers
-    return call.result(
-        Fits,
+    cases = Cases.of(options)
+    cases.refuse_inputs("the rows of the target have the inputs: expected a dimension, links.crank.B.x=...")
+    with naming(options.file):
+        targets = aims(cases.mechanism, options.target, options.want, options.weight, cases.warnings)
+        free = bounds(cases.mechanism, options.free, cases.bare)
+        keep = kept(cases.mechanism, options.keep, cases.bare)
+    # worker processes fit the variants, or the starts of one mechanism
+    workers = 1 if cases.varied is not None else options.workers or 1
+    study = Fits(
+        cases,
+        show.digits,
+        show.as_json,
         aims=targets,
         free=free,
         keep=keep,
-        starts=own.starts or STARTS,
-        seed=own.seed,
-        best=own.best or 1,
+        starts=options.starts or STARTS,
+        seed=options.seed,
+        best=options.best or 1,
         workers=workers,
     )
+    return result(study, options, show)

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.cases.axes import assigned_paths, quantity
-from cli.cases.call import beside
-from cli.cases.case import Case, TableCase, TableStudy
+from cli.cases.case import Case, Study
+from cli.cases.cases import beside
 from cli.cases.inputs import Varied
 from cli.fit.targets import targets, wanted, weights
 from cli.read import options
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from cli.cases.case import Rows
+    from cli.cases.cases import Rows
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
     from virtualwork.family.fitted import Fit
@@ -45,15 +45,11 @@ WRITTEN = 1e-12
 
 
 @dataclass
-class Fitted(TableCase):
+class Fitted(Case):
     """The fit of one mechanism."""
 
     study: Fits
     mechanism: Mechanism
-    name: str = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.name = self.mechanism.name
 
     @cached_property
     def best(self) -> Fit[Mechanism]:
@@ -109,12 +105,23 @@ class Fitted(TableCase):
         return way(self.best, self.table(), _misses_by_target([self.best], "fit"))
 
     def figure(self) -> Figure:
-        """The target, and the fitted mechanism."""
-        return _drawn(self.best)
+        """Draw the target and the fitted mechanism."""
+        figure = blank()
+        self.best.plot(figure)
+        if self.mechanism.name:
+            figure.suptitle(self.mechanism.name, fontsize=10)
+        return figure
+
+    def result(self) -> Result:
+        """Return the result of this mechanism alone: in addition the places of the target, and the fitted file."""
+        result, cases = super().result(), self.study.cases
+        result.tables = {**result.tables, **_places(self.best)}
+        result.toml = lambda: _text(cases.request.file, self.best, cases.bare).encode()
+        return result
 
 
 @dataclass(frozen=True)
-class Fits(TableStudy):
+class Fits(Study):
     """Fit every case.
 
     Attributes
@@ -137,18 +144,8 @@ class Fits(TableStudy):
     method = "Nonlinear least squares within bounds, from many starts, with exact derivatives."
 
     def case(self, row: Rows | None = None) -> Fitted:
-        """A variant, or the mechanism itself."""
-        return Fitted(self, self.mechanism if row is None else self.variant(row))
-
-    def result(self, case: Case) -> Result:
-        """With the places of the target, and the file with the fitted numbers."""
-        assert isinstance(case, Fitted)
-        result, best = super().result(case), case.best
-        return replace(
-            result,
-            tables={**result.tables, **_places(best)},
-            toml=lambda: _text(self.request.file, best, self.bare).encode(),
-        )
+        """Return the fit of the variant of a row, or of the mechanism itself."""
+        return Fitted(self, self.cases.mechanism if row is None else self.cases.variant(row))
 
 
 def aims(
@@ -181,14 +178,6 @@ def bounds(m: Mechanism, free: Sequence[str], bare: Mapping[str, str]) -> dict[s
             )
         bounds[first.path] = low, high
     return bounds
-
-
-def _drawn(fit: Fit[Mechanism]) -> Figure:
-    figure = blank()
-    fit.plot(figure)
-    if fit.mechanism.name:
-        figure.suptitle(fit.mechanism.name, fontsize=10)
-    return figure
 
 
 def _name(each: Reached) -> str:

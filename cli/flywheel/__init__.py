@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 EXAMPLE = "flywheel-engine"
 OPTIONS = """
 Arguments:
-  table TABLE  CSV of torque over the angle of the shaft, whole turns; - is standard input.
+  table TABLE  CSV of torque over whole turns of the shaft; - is standard input.
 What:
   speed SPEED  Mean speed of the shaft, such as 600rpm.
-  fluctuation COEFFICIENT  Largest minus smallest speed, over the mean speed, such as 0.02 or 2%.
+  fluctuation COEFFICIENT  Largest minus smallest speed, divided by the mean speed, such as 0.02 or 2%.
 """
 
 
@@ -42,12 +42,11 @@ def coefficient(text: str) -> float:
 def run(table: str, speed: str | None = None, fluctuation: str | None = None) -> Result:
     """Find the flywheel that keeps the speed of a shaft within a fluctuation, from a table of its torque.
 
-    TABLE has the columns angle_* and torque_*; * is a unit. The torque is linear between rows; two rows at one angle are a
+    TABLE has the columns angle_* and torque_*. The star is a unit: angle_deg, torque_N_m. The torque is linear between rows; two rows at one angle are a
     step. The rows span whole turns of the shaft, the last row included: 0 to 360 deg, or 0 to 720 deg of a four-stroke
     engine. The load is constant, the mean of the torque.
     """
-    from cli.flywheel.tables import METHOD, draw, tables, warnings, way
-    from cli.flywheel.turns import read_torque
+    from cli.flywheel.turns import METHOD, draw, read_torque, tables, warnings, way
     from cli.show.result import Result
 
     if speed is None or fluctuation is None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from cli.cases.options import BRANCH, CASES, FILE, WORKERS, Options
+from cli.cases import BRANCH, CASES, FILE, WORKERS
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
@@ -26,18 +27,28 @@ Output:
 """
 
 
-@declared_command(OPTIONS, Options)
-def run(own: Options, show: ShowOptions) -> Result:
+@declared_command(OPTIONS, SimpleNamespace)
+def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Compute the forces of a planar mechanism: effort at the inputs, joint forces, shaking force.
 
     The loads of FILE.toml act: gravity, forces, torques, springs, friction and the inertia of its masses. The table has
     a row for each pose. A whole cycle gives mean, peak, r.m.s., power and energy in addition.
     """
     from cli.cases.analysis import names
-    from cli.cases.call import Call
-    from cli.forces.cycle import Forces, checked
+    from cli.cases.cases import Cases
+    from cli.cases.loop import result
+    from cli.cases.study import with_root
+    from cli.forces.cycle import Forces
 
-    weights = names(own.counterweights, "--counterweights", "names of links, such as crank, rocker")
-    call = Call.of(own, show, forces=True)
-    checked(call, own.flywheel, weights, own.states)
-    return call.result(Forces, flywheel=own.flywheel, counterweights=weights, states=own.states)
+    weights = names(options.counterweights, "--counterweights", "names of links, such as crank, rocker")
+    cases, root = with_root(Cases.of(options, forces=True), options)
+    study = Forces(
+        cases,
+        show.digits,
+        show.as_json,
+        flywheel=options.flywheel,
+        counterweights=weights,
+        states=options.states,
+    )
+    study.check_options()
+    return result(study, options, show, root)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.cases.case import Case
-from cli.cases.study import Further, PoseCase, PoseStudy
+from cli.cases.study import PoseCase, PoseStudy
 from cli.read.options import bad
-from cli.show.result import Result
 from dalembert.angles import degrees, in_turn
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
@@ -23,125 +22,136 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.cases.analysis import Analysis
-    from cli.cases.call import Call
-    from cli.cases.inputs import Grid
-    from cli.show.commands import ShowOptions
+    from cli.show.result import Result
     from dalembert.results.way import Topic
 
 Document = dict[str, Any]
 
 
-def swept(moved: Grid | None) -> bool:
-    """Whether the inputs go through a range or a table."""
-    return moved is not None and any(axis.option in ("--over", "--cases") for axis in moved.axes)
+@dataclass
+class ForceCase(PoseCase):
+    """The forces of one mechanism, its cycle and its counterweights."""
 
+    study: Forces
 
-def checked(call: Call, flywheel: float | None, weights: list[str] | None, states: Path | None) -> None:
-    """Refuse what needs a cycle where there is none, and values that mean nothing."""
-    if flywheel is not None and not 0 < flywheel < math.inf:
-        raise bad("--flywheel", "expected a positive speed fluctuation, such as 0.02")
-    for flag, value in (("--flywheel", flywheel), ("--counterweights", weights)):
-        if value is not None and not swept(call.moved):
-            raise bad(flag, "expected a cycle too, such as --over 0deg:360deg:1deg")
-    if states is not None and call.varied is not None:
-        raise bad("--states", "expected one mechanism: --over and --cases of dimensions make several")
+    @cached_property
+    def cycle(self) -> tuple[Table, str]:
+        """The table of the cycle, and the reason why the poses are none, else empty."""
+        study = self.study
+        table, reason = cycle_of(self.analysis, study.flywheel)
+        if reason and (study.json or study.flywheel is not None):
+            self.analysis.warnings.append(f"no cycle, so no mean, peak, work or flywheel: {reason}")
+        return table, reason
+
+    @cached_property
+    def extra(self) -> dict[str, Table]:
+        """The cycle, and the counterweights."""
+        study, tables = self.study, dict[str, Table]()
+        if study.has_cycle or study.flywheel is not None:
+            tables["cycle"], _ = self.cycle
+        if study.counterweights is not None:
+            tables |= counterweights(self.analysis, study.counterweights)
+        return tables
+
+    def afterword(self) -> str:
+        """Return the reason why there is no cycle, where no warning has it."""
+        study = self.study
+        if not study.has_cycle or study.json or study.flywheel is not None:
+            return ""
+        _, reason = self.cycle
+        return f"no cycle: {reason}" if reason else ""
+
+    def way(self) -> list[Topic]:
+        """Return the ledger of every pose, and free-body diagrams."""
+        from cli.forces.way import way
+
+        return way(self.analysis)
+
+    def figure(self) -> Figure:
+        """Draw the forces or the requested quantities against the input; of one pose the mechanism."""
+        from cli.cases.picture import curves, drawn, forces_drawn, is_by_quantity
+
+        analysis = self.analysis
+        if is_by_quantity(analysis):
+            return curves(analysis)
+        several = len(analysis.inputs.whole.shown) > 2 and analysis.motions[0].assembled.any()
+        return forces_drawn(analysis) if several else drawn(analysis)
+
+    def states(self) -> PoseCase:
+        """Return the case of the same poses with all links."""
+        return PoseCase(self.study, self.analysis.requesting(only=None))
+
+    def result(self) -> Result:
+        """Return the result of this mechanism alone, in every form; the states of all links can be expected."""
+        from cli.forces.states import table
+
+        result = super().result()
+        result.expected = (*result.expected, lambda: table(self.states().analysis))
+        result.beside = self.study.files()
+        return result
 
 
 @dataclass(frozen=True)
 class Forces(PoseStudy):
-    """Effort, joint forces, shaking force.
+    """Solve the forces of every case: effort, joint forces, shaking force.
 
     Attributes
     ----------
     flywheel : float, optional
-        The speed fluctuation that a flywheel is to leave.
+        The speed fluctuation with the flywheel.
     counterweights : list of str, optional
         The links that get counterweights.
     states : Path, optional
-        Where the table of link states goes.
+        The file of the table of link states.
     """
 
     flywheel: float | None = None
     counterweights: list[str] | None = None
     states: Path | None = None
 
+    kind = ForceCase
+
+    @property
+    def is_swept(self) -> bool:
+        """Whether the inputs go through a range or a table."""
+        moved = self.cases.moved
+        return moved is not None and any(axis.option in ("--over", "--cases") for axis in moved.axes)
+
     @property
     def has_cycle(self) -> bool:
         """Whether the poses may be a cycle."""
-        return swept(self.moved) and len(self.mechanism.inputs) == 1
+        return self.is_swept and len(self.cases.mechanism.inputs) == 1
 
     @property
-    def beside_each(self) -> bool:
-        """Whether each variant has more than its poses."""
+    def poses_alone(self) -> bool:
+        """Whether a file of tables has the poses and nothing else; a workbook of a long sweep has no cycle."""
+        return self.flywheel is None and self.counterweights is None
+
+    @property
+    def extra_in_json(self) -> bool:
+        """Whether the JSON document of each variant has more than its poses."""
         return self.has_cycle or self.counterweights is not None
 
-    def in_blocks(self, show: ShowOptions) -> bool:
-        """Whether the table alone is written: a block of poses at a time."""
-        plain = self.flywheel is None and self.counterweights is None
-        # a long sweep's workbook has the poses alone
-        return plain and super().in_blocks(show)
+    def check_options(self) -> None:
+        """Refuse options that need a cycle where there is none, and values that mean nothing."""
+        if self.flywheel is not None and not 0 < self.flywheel < math.inf:
+            raise bad("--flywheel", "expected a positive speed fluctuation, such as 0.02")
+        for flag, value in (("--flywheel", self.flywheel), ("--counterweights", self.counterweights)):
+            if value is not None and not self.is_swept:
+                raise bad(flag, "expected a cycle too, such as --over 0deg:360deg:1deg")
+        if self.states is not None and self.cases.varied is not None:
+            raise bad("--states", "expected one mechanism: --over and --cases of dimensions make several")
 
-    def further(self, analysis: Analysis) -> Further:
-        """The cycle, and counterweights."""
-        tables: dict[str, Table] = {}
-        words = ""
-        if self.has_cycle or self.flywheel is not None:
-            tables["cycle"], reason = cycle_of(analysis, self.flywheel)
-            if reason and (self.json or self.flywheel is not None):
-                analysis.warnings.append(f"no cycle, so no mean, peak, work or flywheel: {reason}")
-            elif reason:
-                words = f"no cycle: {reason}"
-        if self.counterweights is not None:
-            tables |= counterweights(analysis, self.counterweights)
-        return Further(tables, words)
-
-    def way(self, analysis: Analysis) -> list[Topic]:
-        """The ledger of every pose, free-body diagrams."""
-        from cli.forces.way import way
-
-        return way(analysis)
-
-    def figure(self, analysis: Analysis) -> Figure:
-        """The forces against the input, or the requested quantities; of one pose the mechanism."""
-        from cli.cases.picture import curves, drawn, forces_drawn, is_by_quantity
-
-        if is_by_quantity(analysis):
-            return curves(analysis)
-        several = len(analysis.inputs.whole.shown) > 2 and analysis.motions[0].assembled.any()
-        return forces_drawn(analysis) if several else drawn(analysis)
-
-    def result(self, case: Case) -> Result:
-        """With the states of all links."""
-        from cli.forces.states import table
-
-        assert isinstance(case, PoseCase)
-        result = super().result(case)
-        return replace(
-            result,
-            expected=(*result.expected, lambda: table(every_link(case.analysis))),
-            beside=self.beside_table(),
-        )
-
-    def beside_table(self) -> dict[Path, Callable[[], Iterable[bytes]]]:
-        """The file of the states."""
+    def files(self) -> dict[Path, Callable[[], Iterable[bytes]]]:
+        """Return the file of the states."""
         if self.states is None:
             return {}
-        case = self.case()
-        every = PoseCase(self, every_link(case.analysis))
-        return {self.states: lambda: _csv_parts(every, self.digits)}
-
-
-def every_link(analysis: Analysis) -> Analysis:
-    """The same poses, with all links."""
-    every = replace(analysis, request=analysis.request._replace(only=None))
-    every.assemblies = analysis.assemblies
-    if not analysis.is_long:
-        every.motions = analysis.motions
-    return every
+        case = ForceCase(self, self.cases.nominal).states()
+        return {self.states: lambda: _csv_parts(case, self.digits)}
 
 
 def _csv_parts(case: PoseCase, digits: bool) -> Iterator[bytes]:
-    """The states of all links as CSV; only the digits that hold, if wanted."""
+    """Yield the states of all links as CSV; with `digits` only the digits that hold."""
     from cli.forces.states import table
     from dalembert.results.digits import digits_that_hold
     from dalembert.results.text import csv_text
@@ -152,7 +162,7 @@ def _csv_parts(case: PoseCase, digits: bool) -> Iterator[bytes]:
 
 
 def cycle_of(analysis: Analysis, coefficient: float | None) -> tuple[Table, str]:
-    """Mean, peak and r.m.s. effort over the cycle, work, energy error, flywheel; why the sweep is none, else empty."""
+    """Return mean, peak and r.m.s. effort over the cycle, work, energy error and flywheel; and why the sweep is no cycle."""
     from virtualwork.study.cycle import Cycle
 
     motion = analysis.motions[0]
@@ -160,12 +170,12 @@ def cycle_of(analysis: Analysis, coefficient: float | None) -> tuple[Table, str]
     if len(m.inputs) != 1:
         raise DataError(f"{analysis.file}: a cycle has one input, found {len(m.inputs)}")
     slide = m.inputs[0].is_slide
-    swept = Cycle(motion)
+    coarse = Cycle(motion)
     if not np.isfinite(motion.effort).all():
         reason = "the effort is not finite at every pose of the sweep"
     else:
-        reason = swept.reason or ""
-    c = swept if reason else swept.refined()
+        reason = coarse.reason or ""
+    c = coarse if reason else coarse.refined()
     if not reason and not np.isfinite(c.effort).all():
         reason = "the effort is not finite at every pose between those of the sweep"
     effort, place = ("force", "length") if slide else ("torque", "angle")
@@ -201,12 +211,12 @@ def cycle_of(analysis: Analysis, coefficient: float | None) -> tuple[Table, str]
 
 
 def _in_turns(angle: float, turns: int | None) -> float:
-    """An angle in degrees, within the whole turns of a cycle."""
+    """Return an angle in degrees, within the whole turns of a cycle."""
     return in_turn(math.degrees(angle), max(1, abs(turns or 1)))
 
 
 def counterweights(analysis: Analysis, links: list[str]) -> dict[str, Table]:
-    """Counterweights on links that leave the least r.m.s. shaking force over the sweep, a row each."""
+    """Return the counterweights on links with the least r.m.s. shaking force over the sweep, a row each."""
     from virtualwork.study.counterweights import least_squares
 
     weights, before, after = least_squares(analysis.motions[0], links)

@@ -15,24 +15,22 @@ EXAMPLE = "exercise-slider-crank"
 OPTIONS = """
 Arguments:
   file FILE.toml  The exercise.
-  answers ANSWERS  answers.csv with its column answer filled in; - is standard input.
+  answers ANSWERS  The file answers.csv with its column answer filled in; - is standard input.
 What:
-  key KEY.csv  Numbers of each student (default: key.csv in the folder of the answers).
+  key KEY.csv  Right answers of each student (default: key.csv in the folder of the answers).
 """
 
 
 def _run(file: str, answers: str, key: str | None = None) -> Result:
     """Mark the answers to an exercise: right, rounding, figures, carried, wrong or blank, with the likely mistake.
 
-    ANSWERS has the columns student, quantity, answer, the exercise's key columns and unit; further columns are kept. An
-    answer may have a decimal comma, a power of ten, its own unit: 1,23 or 1.23e0 or 18.1 kJ. An angle counts modulo a
-    turn. However wrong the answers, the status is 0.
+    ANSWERS has the columns student, quantity, answer, unit and those that name the row; further columns are kept. An
+    answer may have a decimal comma, a power of ten and its own unit: 1,23 or 1.23e0 or 18.1 kJ. An angle may differ by
+    whole turns. The status is 0 however wrong the answers are.
     """
     from cli.exercise.description import read_exercise
     from cli.exercise.solving import workshop
-    from cli.grade.answers import read_students
-    from cli.grade.marks import mark_all
-    from cli.grade.tables import METHOD, tables
+    from cli.grade.marks import METHOD, mark_all, read_students, tables
     from cli.show.result import Result
 
     exercise = read_exercise(file)

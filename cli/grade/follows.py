@@ -9,13 +9,11 @@ from itertools import product
 
 import numpy as np
 
-from cli.exercise import rotor_slips
-from cli.exercise.answers import Answer
-from cli.exercise.load_slips import WRONG, is_sum
+from cli.exercise.description import Answer
 from cli.exercise.recomputed import Recomputed
-from cli.exercise.rotor_slips import Range, polar_range
+from cli.exercise.slips import WRONG, is_sum, way_of
+from cli.exercise.slips_of_rows import Range, carried, polar_range
 from cli.exercise.variants import Variant
-from cli.exercise.work_slips import way_of
 from dalembert.units import parted, unit_name
 
 Typed = Mapping[int, tuple[float, float]]
@@ -36,9 +34,9 @@ class Follows:
         """Yield the ranges of an answer that would follow from earlier ones; `wrong`: those that are not right."""
         command = self.variant.problem.exercise.command[0]
         if command == "balance":
-            carried = rotor_slips.carried(self.variant, k, typed)
-            if carried is not None:
-                yield carried
+            after = carried(self.variant, k, typed)
+            if after is not None:
+                yield after
             return
         related = RELATIONS[command](self.variant, k, typed, wrong) if command in RELATIONS else None
         if related is not None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from cli.cases.options import CASES, FILE, WORKERS, Options
+from cli.cases import CASES, FILE, WORKERS
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
@@ -19,18 +20,19 @@ What:
 """
 
 
-@declared_command(OPTIONS, Options)
-def run(own: Options, show: ShowOptions) -> Result:
+@declared_command(OPTIONS, SimpleNamespace)
+def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Inspect a planar mechanism: mobility, groups, Grashof classes, limits, dead and change points, strokes.
 
     The results hold for the whole range of the input. --over, --cases and --set change dimensions. A terminal shows
     the order of solution in addition.
     """
-    from cli.cases.call import Call
+    from cli.cases.cases import Cases
+    from cli.cases.loop import result
     from cli.inspect.character import Inspection
 
-    call = Call.of(own, show, forces=True)
-    call.refuse_inputs(
+    cases = Cases.of(options, forces=True)
+    cases.refuse_inputs(
         "inspect speaks of the whole range of the input: expected a dimension, links.crank.B.x=..."
     )
-    return call.result(Inspection)
+    return result(Inspection(cases, show.digits, show.as_json), options, show)

@@ -8,11 +8,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cli.cases.analysis import Analysis
-from cli.cases.case import TableCase, TableStudy
+from cli.cases.case import Case, Study
 from cli.cases.poses import keys_of, listed
 from cli.cases.study import METHOD
 from dalembert.angles import in_turn
-from dalembert.dataclass import dataclass, field, replace
+from dalembert.dataclass import dataclass, replace
 from dalembert.results.columns import Table, finite, names
 from dalembert.results.way import Topic, figures
 from virtualwork.formulas.forces import Effort, JointForce
@@ -24,7 +24,7 @@ from virtualwork.study.loops import loops
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.cases.case import Rows
+    from cli.cases.cases import Rows
     from dalembert.results.columns import Cell, Document, Json
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
@@ -34,14 +34,11 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class Character(TableCase):
-    """What kind of mechanism one is."""
+class Character(Case):
+    """The character of one mechanism: mobility, groups, limits, strokes."""
 
+    study: Inspection
     analysis: Analysis
-    name: str = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.name = self.analysis.mechanism.name
 
     @cached_property
     def check(self) -> Check:
@@ -87,17 +84,17 @@ class Character(TableCase):
 
 
 @dataclass(frozen=True)
-class Inspection(TableStudy):
+class Inspection(Study):
     """Inspect every case."""
 
     title = "check"
     method = METHOD
 
     def case(self, row: Rows | None = None) -> Character:
-        """A variant, or the mechanism itself."""
-        analysis = self.analysis(row)
+        """Return the character of the variant of a row, or of the mechanism itself."""
+        analysis = self.cases.analysis(row)
         _ = analysis.mechanism.assembly
-        return Character(replace(analysis, inputs=analysis.inputs.part(0, 1)))
+        return Character(self, replace(analysis, inputs=analysis.inputs.part(0, 1)))
 
 
 class Statement(NamedTuple):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from cli.cases.options import BRANCH, CASES, FILE, WORKERS, Options
+from cli.cases import BRANCH, CASES, FILE, WORKERS
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
@@ -38,14 +39,17 @@ def print_schema(_: bool) -> None:
     typer.echo(json.dumps(schema(), indent=2, ensure_ascii=False))
 
 
-@declared_command(OPTIONS, Options, eager={"schema": print_schema})
-def run(own: Options, show: ShowOptions) -> Result:
+@declared_command(OPTIONS, SimpleNamespace, eager={"schema": print_schema})
+def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Solve the poses of a planar mechanism: positions, velocities, accelerations.
 
     FILE.toml describes ground, links, slots, sliders, gears, input and guess. The table has a row for each pose: its
-    input, every point and link, or those of --only.
+    input, every point and link, or what --only names.
     """
-    from cli.cases.call import Call
+    from cli.cases.cases import Cases
+    from cli.cases.loop import result
+    from cli.cases.study import with_root
     from cli.mechanism.newton import Poses
 
-    return Call.of(own, show).result(Poses, newton=own.newton)
+    cases, root = with_root(Cases.of(options), options)
+    return result(Poses(cases, show.digits, show.as_json, newton=options.newton), options, show, root)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.cases.study import Further, PoseStudy
+from cli.cases.study import PoseCase, PoseStudy
 from dalembert.dataclass import dataclass
 from dalembert.results.columns import Column, Table, names, number
 
@@ -15,51 +16,59 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.cases.analysis import Analysis
-    from cli.show.commands import ShowOptions
     from dalembert.results.way import Topic
 
 # radians between the solution from the guess and that of the groups: beyond it they are two assemblies
 SAME = 1e-6
 
 
+@dataclass
+class Solved(PoseCase):
+    """The poses of one mechanism, and Newton's iterates."""
+
+    study: Poses
+
+    @cached_property
+    def extra(self) -> dict[str, Table]:
+        """The iterates of --newton."""
+        return iterates(self.analysis) if self.study.newton else {}
+
+    def way(self) -> list[Topic]:
+        """Return the loops, the closed forms, Newton's iterates and the parts of the motion."""
+        from cli.mechanism.way import way
+
+        return way(self.analysis, newton=self.study.newton)
+
+    def figure(self) -> Figure:
+        """Draw the mechanism to scale, with ghosts and paths; or the curves of single quantities."""
+        from cli.cases.picture import curves, drawn, is_by_quantity
+
+        return curves(self.analysis) if is_by_quantity(self.analysis) else drawn(self.analysis)
+
+
 @dataclass(frozen=True)
 class Poses(PoseStudy):
-    """Poses and their rates.
+    """Solve the poses of every case, with their rates.
 
     Attributes
     ----------
     newton : bool
-        Whether all loops are solved at once, too.
+        Whether all loops are solved at once in addition.
     """
 
     newton: bool = False
 
+    kind = Solved
+
     @property
-    def beside_each(self) -> bool:
-        """Whether each variant has more than its poses."""
+    def poses_alone(self) -> bool:
+        """Whether a file of tables has the poses and nothing else."""
+        return not self.newton
+
+    @property
+    def extra_in_json(self) -> bool:
+        """Whether the JSON document of each variant has more than its poses."""
         return self.newton
-
-    def in_blocks(self, show: ShowOptions) -> bool:
-        """Whether the table alone is written: a block of poses at a time."""
-        return not self.newton and super().in_blocks(show)
-
-    def further(self, analysis: Analysis) -> Further:
-        """The iterates."""
-        if not self.newton:
-            return Further()
-        return Further(iterates(analysis))
-
-    def way(self, analysis: Analysis) -> list[Topic]:
-        """Loops, closed forms, Newton's iterates, parts of motion."""
-        from cli.mechanism.way import way
-
-        return way(analysis, newton=self.newton)
-
-    def figure(self, analysis: Analysis) -> Figure:
-        """The mechanism to scale: the first pose in full, others as ghosts, the paths of its points; or curves."""
-        from cli.cases.picture import curves, drawn, is_by_quantity
-
-        return curves(analysis) if is_by_quantity(analysis) else drawn(analysis)
 
 
 def iterates(analysis: Analysis) -> dict[str, Table]:

@@ -1,9 +1,9 @@
-"""Option values with a unit; a bad one is wrong usage, status 2."""
+"""Option values with a unit, a bad one is wrong usage, status 2; the head of a report."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,6 +11,7 @@ import typer
 
 from dalembert.angles import in_turn
 from dalembert.errors import DataError
+from dalembert.hints import nearest
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     import numpy as np
     from numpy.typing import NDArray
+
 
 STATES = 250_000  # what a gigabyte holds, integrated and shown
 PLACES = 10_000  # holes or blades on one rotor
@@ -34,15 +36,15 @@ def bad(flag: str, message: object) -> typer.BadParameter:
     return typer.BadParameter(str(message), param_hint=flag)
 
 
-def given(**values: object) -> list[str]:
-    """Return the flags of the options that are given, each under the name that the function has for it."""
+def flags_of(**values: object) -> list[str]:
+    """Return the flags of the options that have a value, each under the name that the function has for it."""
     there = (name for name, value in values.items() if value not in (None, False, [], ()))
     return [f"--{name.replace('_', '-')}" for name in there]
 
 
 def refuse(message: str, **values: object) -> None:
     """Refuse the first of these options that is given."""
-    for flag in given(**values):
+    for flag in flags_of(**values):
         raise bad(flag, message)
 
 
@@ -58,7 +60,7 @@ def only(text: str | None, names: Sequence[str]) -> Sequence[str]:
 
 
 def column_names(pairs: list[str] | None) -> dict[str, str]:
-    """Read the values of --column, `mass_kg=Masse`: name here -> header in the file."""
+    """Read `mass_kg=Masse`: name here -> header in the file."""
     names = {}
     for pair in pairs or ():
         name, equals, header = pair.partition("=")
@@ -154,7 +156,7 @@ def places(
         return [in_turn(start + way * (360.0 * k / blades)) for k in range(blades)]
     if numbering == "against":
         raise bad(
-            "--numbering", "speaks of --blades: --positions are numbered in the order in which they stand"
+            "--numbering", "goes with --blades: --positions are numbered in the order in which they stand"
         )
     if positions is None:
         return None
@@ -316,3 +318,27 @@ def processes(workers: int) -> Iterator[Executor | None]:
             yield pool
     except LostPart as lost:
         raise DataError(str(lost)) from None
+
+
+HEAD = ("title", "machine", "customer", "date", "author")
+
+
+def about(file: str, document: Mapping[str, object]) -> dict[str, str]:
+    """Read the table `[report]`: texts, a date may be TOML's own.
+
+    Raises
+    ------
+    DataError
+        No table, an unknown key, or a value that is no text.
+    """
+    result = document.get("report", {})
+    if not isinstance(result, dict):
+        raise DataError(f"{file}: [report]: expected a table with some of {', '.join(HEAD)}")
+    for key, value in result.items():
+        if key not in HEAD:
+            raise DataError(
+                f"{file}: [report]: unknown key '{key}': expected {', '.join(HEAD)}{nearest(key, HEAD)}"
+            )
+        if isinstance(value, (dict, list)):
+            raise DataError(f"{file}: [report] {key}: expected text")
+    return {key: str(value) for key, value in result.items()}

@@ -117,12 +117,12 @@ class _Unturned:
         for kind in dict.fromkeys(self.shapes):
             if kind in SHAPES:
                 places = np.flatnonzero(shape == kind)
-                known = SHAPES[kind]
+                form = SHAPES[kind]
                 sizes = {
-                    name: cells[name][places] for name in known.dimensions + known.optional if name in cells
+                    name: cells[name][places] for name in form.dimensions + form.optional if name in cells
                 }
-                if known.thin:
-                    density = cells.get(DENSITIES[known.thin], zero)[places]
+                if form.thin:
+                    density = cells.get(DENSITIES[form.thin], zero)[places]
                     dense: Any = measure_of(kind, **sizes)[0] * density
                     mass[places] = np.where(mass.high[places] == 0, dense, mass[places])
                 inertia[places] = inertia_of(kind, mass[places], **sizes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from cli.read.options import bad
 from dalembert.errors import DataError
@@ -69,15 +69,55 @@ def quantity_and_value(text: str, example: str) -> tuple[str, str]:
     return word.strip(), value
 
 
-def named(names: Mapping[str, Sought], name: str) -> Sought:
-    """Return the number of a name."""
-    if name not in names:
-        raise bad("--find", f"'{name}': expected one of {', '.join(names)}{nearest(name, names)}")
-    return names[name]
+T = TypeVar("T")
+
+
+def solve(
+    choices: Mapping[str, tuple[Sought, Callable[[float], T]]],
+    name: str,
+    wanted: str,
+    example: str,
+    quantities_of: Callable[[T], Mapping[str, tuple[float, str]]],
+    vectors: str = "",
+) -> tuple[T, Found]:
+    """Return what a number of these makes with which a quantity has the value `wanted`; of several numbers the nearest to the present one.
+
+    `choices` has for each name the present number, and what another one makes; `quantities_of` each quantity of that by its
+    name, with its unit. `vectors` says how names of vectors go on, where only their heads are listed.
+
+    Raises
+    ------
+    typer.BadParameter
+        A name or a value that means nothing.
+    DataError
+        No number in reach gives the value.
+    """
+    if name not in choices:
+        raise bad("--find", f"'{name}': expected one of {', '.join(choices)}{nearest(name, choices)}")
+    sought, change = choices[name]
+    word, text = quantity_and_value(wanted, example)
+    quantities = quantities_of(change(sought.start))
+    if word not in quantities:
+        each = dict.fromkeys(quantity.partition(".")[0] for quantity in quantities) if vectors else quantities
+        names = f"one of {', '.join(each)}{vectors}"
+        raise bad("--so-that", f"'{word}': expected {names}{nearest(word, quantities)}")
+    unit = quantities[word][1]
+    goal = Goal(word, unit, value_in(unit, text), unit == "deg")
+
+    def value(x: float) -> float | None:
+        try:
+            return quantities_of(change(x))[word][0]
+        except (DataError, ValueError, KeyError):
+            return None
+
+    root = search(name, sought, goal, value)
+    shown = f"{root:.10g}°" if sought.unit == "deg" else f"{root:.10g} {written(sought.unit)}".rstrip()
+    sentence = f"{name} = {shown} gives {word} = {amount(goal.value, unit)}"
+    return change(root), Found(sought.header, root, sentence)
 
 
 def value_in(unit: str, text: str) -> float:
-    """Read the value of --so-that in a unit of results."""
+    """Read the wanted value in a unit of results."""
     if is_number(text):
         return parse_number(text)
     for dimension in (each for each in LISTED if unit in UNITS[each]):
@@ -126,12 +166,6 @@ def search(name: str, sought: Sought, goal: Goal, of: Callable[[float], float | 
 def amount(value: float, unit: str) -> str:
     """Return a value with its unit, as it is read."""
     return f"{value:.6g}°" if unit == "deg" else f"{value:.6g} {written(unit)}".rstrip()
-
-
-def sentence(name: str, sought: Sought, root: float, goal: Goal) -> Found:
-    """Say which number gives the value."""
-    text = f"{root:.10g}°" if sought.unit == "deg" else f"{root:.10g} {written(sought.unit)}".rstrip()
-    return Found(sought.header, root, f"{name} = {text} gives {goal.name} = {amount(goal.value, goal.unit)}")
 
 
 def _nearest(miss: Callable[[float], float], start: float, step: float, size: float) -> float | None:

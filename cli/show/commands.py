@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
 import typer
 from typer.core import TyperCommand
 
-from cli.read.about import HEAD
-from cli.show.capture import take
+from cli.read.options import HEAD, column_names
 from dalembert.dataclass import dataclass
 
 if TYPE_CHECKING:
@@ -25,21 +24,21 @@ if TYPE_CHECKING:
 
 SHARED = """
 What:
-  column NAME=HEADER  Read the column HEADER as NAME; repeatable.
+  column NAME=HEADER  Read the column HEADER of the file as NAME, such as mass_kg=Masse; repeatable.
 Output:
-  json  Print one JSON document, SI units, full precision.
-  output -o --output FILE  Write to FILE (.csv .json .xlsx .parquet .md .tex).
+  json  Print one JSON document in SI units with full precision.
+  output -o --output FILE  Write the result to FILE (.csv .json .xlsx .parquet .md .tex).
   plot FILE  Draw a picture (.svg, .png or .pdf).
-  expect FILE.csv  Compare the result with expected values.
+  expect FILE.csv  Compare the result with the expected values in FILE.csv.
   steps  Show the worked solution: equations with their numbers.
-  digits  Print only the digits that rounding has not touched.
-  units UNIT,...  Units of the columns: mm,g,deg,N_mm,rpm.
-  report FILE  Write a report (.html or .md): data, results, method.
+  digits  Print only the right digits: computed twice, with 16 and with 32 digits.
+  units UNIT,...  Show the columns in these units, such as mm,g,deg,N_mm,rpm.
+  report FILE  Write a report (.html or .md) with data, results and method.
 Further options (docs/commands.md describes them):
-  rtol NUMBER  Relative tolerance of --expect (angles: radians).
-  about KEY=TEXT  Head of the report: title=, machine=, customer=, date=, author=.
-  text  Print the aligned table even into a pipe.
-  no_color  No colours; NO_COLOR in the environment does the same.
+  rtol NUMBER  With --expect: relative tolerance of each value, of angles in radians.
+  about KEY=TEXT  With --report: a line of its head: title=, machine=, customer=, date= or author=; repeatable.
+  text  Print the aligned table into a pipe too (default there: CSV).
+  no_color  Print without colours, as the environment variable NO_COLOR does.
   help  Show this message and exit.
 """
 """What the help says of the options that every command shares."""
@@ -172,16 +171,16 @@ def with_options(
     find: Callable[..., Result],
     options: str,
     chosen: Sequence[str] | None,
-    hand_on: Callable[[Result, ShowOptions, Mapping[str, str]], None],
-    asked: Callable[..., object] | None = None,
+    present: Callable[[Result, ShowOptions, Mapping[str, str]], None],
+    values: Callable[..., object] | None = None,
     declared: Mapping[str, Parameter] | None = None,
 ) -> Callable[..., None]:
-    """Make a command that takes these of the shared options too, None for all, and hands on what it has found.
+    """Make a command that takes these of the shared options too, None for all, and presents its result.
 
-    `options` is what its help says of its own, as `help_lines` reads it. `asked` is a class of them: then the function takes
+    `options` is what its help says of its own, as `help_lines` reads it. `values` is a class of them: then the function takes
     one of these and the shared ones. `declared`: its options, where their text is their only declaration.
     """
-    own = dict(declared) if declared is not None else _parameters(asked or find, options)
+    own = dict(declared) if declared is not None else _parameters(values or find, options)
     shared = _parameters(ShowOptions, SHARED)
     shared = {name: p for name, p in shared.items() if chosen is None or name in chosen}
     # a command may have a value of its own below --about, which is no KEY=TEXT
@@ -193,28 +192,26 @@ def with_options(
 
     @wraps(find)
     def run(**values_of: object) -> None:
-        from cli.read.options import column_names
         from dalembert.tables.headers import rename
 
         options = ShowOptions(**{name: values_of.pop(name) for name in shared})  # type: ignore[arg-type]
         if two:
-            values = options.about or []
-            options.about = [text for text in values if "=" in text]
-            values_of["about"] = next((text for text in reversed(values) if "=" not in text), None)
+            texts = options.about or []
+            options.about = [text for text in texts if "=" in text]
+            values_of["about"] = next((text for text in reversed(texts) if "=" not in text), None)
         if options.head and options.report is None:
             raise typer.BadParameter("expected --report FILE too", param_hint="--about")
         rename(column_names(options.column))
         messages = {
-            name.replace("_", " "): _said(value)
+            name.replace("_", " "): _typed(value)
             for name, value in values_of.items()
             if value != own[name].default and value is not None
         }
         if "show" in own:
             values_of["show"] = options
-        result = find(**values_of) if asked is None else find(asked(**values_of), options)
+        result = find(**values_of) if values is None else find(values(**values_of), options)
         with result.within():
-            if not take(result):
-                hand_on(result, options, messages)
+            present(result, options, messages)
 
     mine = [p for name, p in own.items() if name != "show" and not (two and name == "about")]
     parameters = [*mine, *shared.values()]
@@ -223,7 +220,7 @@ def with_options(
     return run
 
 
-def _said(value: object) -> str:
+def _typed(value: object) -> str:
     """Return an option's value as the user gave it."""
     if isinstance(value, bool):
         return "yes" if value else "no"

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
+from importlib import import_module
 from pathlib import Path
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cli.show.commands import FORMS, ShowOptions, with_options
+from cli.show.commands import FORMS, ShowOptions, parameters, with_options
 from cli.show.terminal import coloured
-from dalembert.errors import one_line
+from dalembert.errors import DataError, one_line
 
 if TYPE_CHECKING:
     from cli.show.expect import Comparison
@@ -45,8 +47,6 @@ def declared_command(
 
     The function takes its own options, as attributes of a `values`, and the shared ones.
     """
-    from cli.show.commands import parameters
-
     own = parameters(options, eager, complete)
     return lambda find: with_options(find, options, None, show, values, own)
 
@@ -55,6 +55,8 @@ def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
     """Write the requested files, print the result; status 1 if an expectation is not met, or nothing was found."""
     from dalembert.tables.headers import check_renamed
 
+    if take(result):
+        return
     form = options.form
     if form == ".toml" and result.toml is None:
         raise typer.BadParameter(
@@ -150,7 +152,7 @@ def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> 
     elif options.output is None:
         sys.stdout.write(csv_text(_first(result)().cells))
     if options.steps and not options.json and options.form != ".json":
-        from cli.show.way import way_text
+        from cli.show.result import way_text
 
         sys.stdout.write(way_text(result, options.units, sys.stdout.isatty()))
     sys.stdout.flush()
@@ -174,11 +176,11 @@ ROWS = 24  # rows of a further table that a terminal shows
 
 def _tables_text(result: Result, width: int | None) -> Iterator[str]:
     """Yield the tables as the terminal shows them: the first whole, of the others the first rows."""
-    from dalembert.results.text import as_list, heading, table_text
+    from cli.show.result import table_block
+    from dalembert.results.text import as_list, heading
 
     first, *others = result.tables.items()
-    table = (result.screen or first[1])()
-    yield _below_each_other(table.above, table_text(table.cells, table.keys, width), table.below)
+    yield table_block((result.screen or first[1])(), width)
     for name, of in others:
         table = of()
         # without columns it is of the document alone; where the document has another form, one without a place is not shown
@@ -186,15 +188,8 @@ def _tables_text(result: Result, width: int | None) -> Iterator[str]:
             continue
         if table.length == 1:
             table = as_list(table)
-        cells = {header: values[:ROWS] for header, values in table.cells.items()}
-        more = f"… and {table.length - ROWS} further rows" if table.length > ROWS else ""
         title = f"{heading(name)}: {table.above}" if table.above else f"{heading(name)}:"
-        yield _below_each_other(title, table_text(cells, table.keys, width), more, table.below)
-
-
-def _below_each_other(*parts: str) -> str:
-    """Join what is not empty, one below the other."""
-    return "".join(part.rstrip("\n") + "\n" for part in parts if part)
+        yield table_block(table, width, ROWS, title)
 
 
 def _first(result: Result) -> Callable[[], Table]:
@@ -229,7 +224,7 @@ def _hand_on(result: Result, options: ShowOptions, call: Mapping[str, str]) -> N
 def _report(
     result: Result, options: ShowOptions, call: Mapping[str, str], checked: Comparison | None = None
 ) -> dict[Path, Made]:
-    """Return the files of --report."""
+    """Return the files that --report writes."""
     if options.report is None:
         return {}
     from cli.show.report import pages
@@ -239,10 +234,10 @@ def _report(
 
 
 def _in_chosen_units(result: Result, units: str | None) -> Result:
-    """Return the result with its tables in the units of --units."""
+    """Return the result with its tables in the units that --units names."""
     if units is None:
         return result
-    from cli.show.in_units import chosen_units, in_units
+    from cli.show.result import chosen_units, in_units
 
     chosen = chosen_units(units)
 
@@ -259,11 +254,10 @@ def _in_chosen_units(result: Result, units: str | None) -> Result:
 
 def _stream(result: Result, options: ShowOptions, form: str) -> None:
     """Write a table that comes in parts."""
-    from cli.show.blocks import stream
-    from cli.show.files import refuse_inputs, write_all
+    from cli.show.files import refuse_inputs, stream, write_all
 
     if options.units is not None:
-        from cli.show.in_units import chosen_units
+        from cli.show.result import chosen_units
 
         # a bad unit is an error before anything is worked out
         chosen_units(options.units)
@@ -338,3 +332,72 @@ def _with_digits_that_hold(result: Result) -> Result:
         warnings=[*result.warnings, *_unknown(unknown)],
         screen=None if screen is None else lambda: digits_that_hold(screen())[0],
     )
+
+
+_taken: list[list[Result]] = []
+
+
+def take(result: Result) -> bool:
+    """Hand a result to whoever runs the command; False where it is run by a user."""
+    if not _taken:
+        return False
+    _taken[-1].append(result)
+    return True
+
+
+@contextmanager
+def _taking() -> Iterator[list[Result]]:
+    _taken.append([])
+    try:
+        yield _taken[-1]
+    finally:
+        _taken.pop()
+
+
+@cache
+def _runner(name: str) -> Callable[[Sequence[str]], Any]:
+    """Return what runs a command on the words behind its name."""
+    import typer
+
+    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    app.command(name)(import_module(f"cli.{name}").run)
+    built = typer.main.get_command(app)
+    return lambda words: built.main(list(words), prog_name="dalembert", standalone_mode=False)
+
+
+@cache
+def options_of(name: str) -> frozenset[str]:
+    """Return the options that a command takes."""
+    import typer
+
+    app = typer.Typer(add_completion=False)
+    app.command(name)(import_module(f"cli.{name}").run)
+    return frozenset(flag for parameter in typer.main.get_command(app).params for flag in parameter.opts)
+
+
+def result_of(words: Sequence[str]) -> Result:
+    """Return the result of a command line such as `balance rotor.csv --plane A:20mm`, with its tables and document.
+
+    Raises
+    ------
+    DataError
+        Bad data, or an option that the command does not take.
+    """
+    name, *rest = words
+    with _taking() as taken:
+        try:
+            _runner(name)([*rest, "--text", "--json"])
+        except DataError:
+            raise
+        except Exception as error:
+            # of a usage error the sentence
+            message = getattr(error, "format_message", None)
+            if message is None:
+                raise
+            raise DataError(f"{name}: {message()}") from None
+    if not taken:
+        raise DataError(f"{name}: no result: expected options that compute")
+    result = taken[0]
+    if "--steps" in rest and result.way is not None:
+        return replace(result, way=cache(result.way), shows_way=True)
+    return result

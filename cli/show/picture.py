@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.read import options
-from cli.show.in_units import chosen_units, in_units
+from cli.show.result import chosen_units, in_units
 from dalembert.errors import needs
 from dalembert.units import UNITS, to_si
 
@@ -56,7 +56,7 @@ def refuse_long(count: int) -> None:
 
 
 def shown(table: Table, units: str | None) -> dict[str, Shown]:
-    """Return the columns of numbers under their SI headers, in the units of --units."""
+    """Return the columns of numbers under their SI headers, in the units that --units names."""
     # loaded where a page is written
     from dalembert.page import Shown
 

@@ -11,13 +11,10 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.read.about import HEAD
-from cli.show import bars
-from cli.show.bars import Bars
+from cli.read.options import HEAD
 from cli.show.files import markdown
-from cli.show.in_units import finished
 from cli.show.picture import drawn
-from cli.show.result import Section, Sheet
+from cli.show.result import BARS_STYLE, Bars, Section, Sheet, finished, way_sheets, with_sentences
 from dalembert.errors import DataError
 from dalembert.quantities import is_number, parse_quantity
 from dalembert.results.columns import Column, Table
@@ -86,10 +83,8 @@ def report(
     about = {"date": date.today().isoformat(), **result.about, **options.head}
     sheets = list(result.sheets() if result.sheets is not None else [_plain_sheet(result)])
     if result.shows_way:
-        from cli.show.way import way_sheets
-
         sheets += way_sheets(result)
-    inputs = list(_given(call_options, () if result.shows_input else named()))
+    inputs = list(_inputs(call_options, () if result.shows_input else named()))
     if sheets:
         sections = list(sheets[0].sections)
         if inputs and sections[0].title != VERDICT:
@@ -127,10 +122,10 @@ def _plain_sheet(result: Result) -> Sheet:
     (name, first), *others = result.tables.items()
     sections = [
         Section(
-            heading(name), [result.notes(), *_with_sentences((result.screen or first)()), result.afterword()]
+            heading(name), [result.notes(), *with_sentences([(result.screen or first)()]), result.afterword()]
         ),
         *(
-            Section(heading(name), _with_sentences(table))
+            Section(heading(name), with_sentences([table]))
             for name, of in others
             # a table without columns is of the JSON document alone
             if (table := of()).columns
@@ -139,12 +134,7 @@ def _plain_sheet(result: Result) -> Sheet:
     return Sheet("", sections, result.figure)
 
 
-def _with_sentences(table: Table) -> list[str | Table]:
-    """A table between the sentences above and below it."""
-    return [table.above, table, table.below]
-
-
-def _given(call_options: Mapping[str, str], files: Sequence[str]) -> Iterator[str | Table]:
+def _inputs(call_options: Mapping[str, str], files: Sequence[str]) -> Iterator[str | Table]:
     """Yield the options that were given, and what the files hold."""
     if call_options:
         yield "; ".join(
@@ -165,7 +155,7 @@ def _given(call_options: Mapping[str, str], files: Sequence[str]) -> Iterator[st
         yield f"{shown}{source.of_sheet}:"
         width = len(source.header)
         cells = [[*row[:width], *[""] * (width - len(row))] for row in read]
-        yield Table([Column(said(h), "", [row[k] for row in cells]) for k, h in enumerate(source.header)])
+        yield Table([Column(spelled(h), "", [row[k] for row in cells]) for k, h in enumerate(source.header)])
         if left:
             yield f"… and {left} further rows"
 
@@ -229,7 +219,7 @@ def _grids(table: Table) -> Iterator[Part]:
             for v, t in zip(values, printed(column.header, values), strict=True)
         ]
         if column.name in ("quantity", "column"):
-            cells = [said(cell) for cell in cells]
+            cells = [spelled(cell) for cell in cells]
         texts.append(cells)
         headers.append(
             f"{_words(column.name)} [{written(column.unit)}]" if column.unit else _words(column.name)
@@ -279,11 +269,11 @@ def _words(name: str) -> str:
 _RESULTS = ("kg_m2_s", "J", "W", "rad_s3", "m_s3")
 
 
-def said(header: str) -> str:
+def spelled(header: str) -> str:
     """Return a header that stands in a cell as people write it: `inertia_x_kg_m2` is inertia x [kg·m²]."""
     of, colon, rest = header.rpartition(": ")
     if colon:
-        return f"{of}: {said(rest)}"
+        return f"{of}: {spelled(rest)}"
     if " " in header or "_" not in header:
         return header
     name, unit = parted(header, further=_RESULTS)
@@ -343,7 +333,7 @@ def _html(report: Report) -> Iterator[str]:
     title = html.escape(report.title)
     yield '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
     yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
-    yield f"<title>{title}</title><style>{_STYLE}{bars.STYLE}</style></head>\n<body>\n<h1>{title}</h1>\n"
+    yield f"<title>{title}</title><style>{_STYLE}{BARS_STYLE}</style></head>\n<body>\n<h1>{title}</h1>\n"
     if report.about:
         rows = (f"<dt>{key}</dt><dd>{html.escape(value)}</dd>" for key, value in report.about)
         yield f"<dl>{''.join(rows)}</dl>\n"

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from cli.cases.options import BRANCH, CASES, FILE, WORKERS, Options
+from cli.cases import BRANCH, CASES, FILE, WORKERS
 from cli.show.output import declared_command
 
 if TYPE_CHECKING:
@@ -26,21 +27,23 @@ Output:
 """
 
 
-@declared_command(OPTIONS, Options)
-def run(own: Options, show: ShowOptions) -> Result:
+@declared_command(OPTIONS, SimpleNamespace)
+def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Simulate a mechanism whose inputs are released: its motion in time under the loads of FILE.toml.
 
     The inputs start at the first time with the file's angle (or position) and speed; --at, --over and --cases set
     other starts. The table has a row for each time: the inputs, the energy, and what --only names.
     """
-    from cli.cases.call import Call
+    from cli.cases.cases import Cases
+    from cli.cases.loop import result
     from cli.read.options import bad
     from cli.simulate.motion import Simulation, times_and_accuracy
 
-    if own.time is None:
+    if options.time is None:
         raise bad("--time", "expected the times, such as --time 0:10:0.01")
-    if own.until is not None and own.page is not None and (own.over or own.cases):
+    if options.until is not None and options.page is not None and (options.over or options.cases):
         raise bad("--until", "expected no --page: its variants have one clock; --set shows one of them")
-    times, accuracy = times_and_accuracy(own.time, own.accuracy)
-    call = Call.of(own, show, 2, forces=own.forces).started()
-    return call.result(Simulation, times=times, accuracy=accuracy, until=own.until)
+    times, accuracy = times_and_accuracy(options.time, options.accuracy)
+    cases = Cases.of(options, 2, forces=options.forces).at_start()
+    study = Simulation(cases, show.digits, show.as_json, times=times, accuracy=accuracy, until=options.until)
+    return result(study, options, show)

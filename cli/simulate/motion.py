@@ -12,14 +12,14 @@ import numpy as np
 
 from cli.cases.analysis import Analysis
 from cli.cases.axes import input_values
-from cli.cases.case import Case, TableCase, TableStudy
+from cli.cases.case import Case, Study
 from cli.cases.poses import bounds_of, cells, column, in_rows, keys_of, nested
 from cli.read import options
 from cli.show.picture import shown as on_page
 from cli.show.terminal import progress_in_time
 from dalembert.angles import read_degrees
 from dalembert.arithmetic.engines import anew
-from dalembert.dataclass import dataclass, field, replace
+from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table, document, names, number
 from dalembert.results.way import Topic, figures
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from cli.cases.case import Rows
+    from cli.cases.cases import Rows
     from dalembert.results.columns import Document
     from virtualwork import Mechanism
     from virtualwork.animation import Series
@@ -68,17 +68,13 @@ def times_and_accuracy(time: str, accuracy: float | None) -> tuple[list[float], 
 
 
 @dataclass(eq=False)
-class Motion(TableCase):
+class Motion(Case):
     """One mechanism released."""
 
     study: Simulation
     analysis: Analysis
     # the only one, whose progress a terminal shows; of many variants it is counted how many are done
     alone: bool = False
-    name: str = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.name = self.analysis.mechanism.name
 
     @cached_property
     def run(self) -> Run:
@@ -200,7 +196,7 @@ class Motion(TableCase):
             Column(f"error of {entry.name}, estimated", "m" if entry.is_slide else "rad", [float(error)])
             for entry, error in zip(inputs, run.error_estimate.max(axis=0), strict=True)
         ]
-        if self.study.names:
+        if self.study.cases.names:
             # variants that are solved together have none
             of_run = [replace(column, place=None) for column in of_run]
         return Table([drift(run.energy_drift), *of_run, *errors], place="")
@@ -234,19 +230,18 @@ class Motion(TableCase):
         """All points and links over time for a page, whatever --only names."""
         from virtualwork.animation import JointForce
 
-        home = self.analysis
-        request = home.request._replace(only=[*home.mechanism.links, *home.mechanism.points])
-        every = replace(home, request=request)
-        every.assemblies = home.assemblies
+        a, m = self.analysis, self.analysis.mechanism
+        every = replace(a, request=a.request._replace(only=[*m.links, *m.points]))
+        every.assemblies = a.assemblies
         whole = Motion(self.study, every)
         whole.run = self.run
-        arrows = [JointForce.of(*row) for row in (every.pairs if request.forces else ())]
+        arrows = [JointForce.of(*row) for row in (every.pairs if a.request.forces else ())]
         name = f"variant {variant}" if variant else ""
-        return self.run.series(on_page(whole.table(), units), ["t_s", *home.input_columns], arrows, name)
+        return self.run.series(on_page(whole.table(), units), ["t_s", *a.input_columns], arrows, name)
 
 
 @dataclass(frozen=True)
-class Simulation(TableStudy):
+class Simulation(Study):
     """Release every case.
 
     Attributes
@@ -269,21 +264,21 @@ class Simulation(TableStudy):
     @property
     def needs_errors(self) -> bool:
         """Whether a table has the bounds of its numbers: of variants only where digits are cut by them."""
-        return self.digits or not self.names
+        return self.digits or not self.cases.names
 
     def levels(self, m: Mechanism) -> dict[str, float] | None:
         """The inputs at which it ends, SI."""
         if self.until is None:
             return None
-        shown = input_values(m, self.until, "--until", self.bare)
+        shown = input_values(m, self.until, "--until", self.cases.bare)
         return {
             m.inputs[j].name: value if m.inputs[j].is_slide else math.radians(value)
             for j, value in shown.items()
         }
 
     def case(self, row: Rows | None = None) -> Motion:
-        """A variant, or the mechanism itself."""
-        motion = Motion(self, self.analysis(row), alone=row is None)
+        """Return the motion of the variant of a row, or of the mechanism itself."""
+        motion = Motion(self, self.cases.analysis(row), alone=row is None)
         if len(motion.analysis.assemblies) > 1:
             raise options.bad("--branch", "simulate follows one assembly: expected its number")
         return motion
@@ -315,16 +310,16 @@ class Simulation(TableStudy):
     @property
     def at_once(self) -> bool:
         """Whether the inputs and the energy are all that is shown, which variants have as lanes; JSON has points and links."""
-        r = self.request
+        r = self.cases.request
         return r.only is None and r.branch is None and not (r.forces or self.digits or self.json)
 
-    def cases(self, shown: Rows) -> Iterator[tuple[Case | None, list[str]]]:
+    def each(self, rows: Rows) -> Iterator[tuple[Case | None, list[str]]]:
         """The cases of some variants, each with its remarks; None where one cannot be simulated."""
         anew()
         if self.at_once:
-            yield from _lanes(self, shown)
-            return
-        yield from super().cases(shown)
+            yield from _lanes(self, rows)
+        else:
+            yield from super().each(rows)
 
 
 @dataclass(eq=False)
@@ -344,15 +339,15 @@ class Lane(Case):
         return documents(self.t, self.values, Table([drift(self.drift)], place=""))
 
 
-def _lanes(study: Simulation, shown: Rows) -> Iterator[tuple[Case | None, list[str]]]:
+def _lanes(study: Simulation, rows: Rows) -> Iterator[tuple[Case | None, list[str]]]:
     """Variants that are simulated together."""
-    m = study.mechanism
+    m = study.cases.mechanism
     try:
-        runs = m.vary(study.in_si(shown)).simulate(
+        runs = m.vary(study.cases.in_si(rows)).simulate(
             study.times, accuracy=study.accuracy, until=study.levels(m)
         )
     except ValueError as error:
-        raise DataError(f"{study.request.file}: {error}") from None
+        raise DataError(f"{study.cases.request.file}: {error}") from None
     for i, there in enumerate(np.isfinite(runs.times)):
         remarks = list(runs.warnings.get(i, ()))
         if not there.any():

@@ -37,14 +37,14 @@ Arguments:
   body BODY.toml  The body and its state; - is standard input.
 What:
   time START:STOP:STEP  Times in seconds, such as 0:10:0.01 or 0:10/1000.
-  at T  Time, s; repeatable.
-  find NAME  Number of the file to find: omega.z, inertia.3, top.mgl, or a top's tilt.
-  so_that QUANTITY=VALUE  With --find: value of a result, such as slow=0.5rad_s or momentum.z=2.
+  at T  Time in seconds; repeatable (default: 0).
+  find NAME  Number of the file to find: omega.z, inertia.3, top.mgl, or tilt of a top.
+  so_that QUANTITY=VALUE  With --find: wanted value of a result, such as slow=0.5rad_s or momentum.z=2.
   only NAME,...  Show only these results: omega, attitude, momentum, energy, drift, period, nutation_period, cones, steady.
 How:
-  method  Closed form, or integration (default: exact wherever a closed form exists).
-  integrator  Method of integration; the splitting is for a symmetric top.
-Output: of the rotation:
+  method  Use the closed form, or integrate (default: exact where a closed form exists).
+  integrator  Method of integration; splitting is for a symmetric top.
+Output:
   page FILE.html  Write a page that replays the rotation, with curves and values.
 """
 
@@ -65,10 +65,10 @@ def run(
 ) -> Result:
     """Compute the rotation of a body in time: angular velocity, attitude, momentum and energy at any instant.
 
-    BODY.toml holds inertia = [I1, I2, I3] (or a 3 × 3 matrix, or parts = "parts.csv"), kg·m²; omega in body axes,
-    rad/s; attitude = [w, x, y, z], body to space (default [1, 0, 0, 0]); optionally a table [top] with mgl in N·m
-    (then inertia is about the fixed point, the axis is body z and gravity acts along -z of space), or torque =
-    [x, y, z] in N·m with frame = "body" or "space".
+    BODY.toml has inertia = [I1, I2, I3] in kg·m² (or a 3 × 3 matrix, or parts = "parts.csv"), omega in body axes in
+    rad/s, and attitude = [w, x, y, z], a quaternion from body to space (default [1, 0, 0, 0]). A top has a table [top]
+    with mgl in N·m, weight times distance: then inertia is about the fixed point, the axis is body z and gravity acts
+    along -z of space. A torque is torque = [x, y, z] in N·m with frame = "body" or "space".
     """
     import numpy as np
 
@@ -92,7 +92,7 @@ def run(
     rotation = Rotation(turning, np.array(times), method.value if method else None, integrator.value)
     sought, solution = pair(find, so_that), None
     if sought is not None:
-        from cli.spin.find import find as search
+        from cli.spin.tables import find as search
 
         rotation, solution = search(rotation, *sought)
         turning = rotation.body

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.read.about import about
+from cli.read.options import about
 from dalembert.errors import DataError
 from dalembert.hints import nearest
 from dalembert.results.columns import finite

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection
+from dataclasses import replace
 from functools import partial
+from math import atan2, cos, degrees, hypot, radians, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cli.read import root_search
+from cli.read.options import bad
 from cli.show.picture import blank
-from cli.spin.rotation import Rotation
+from cli.spin.rotation import Rotation, TurningBody
 from dalembert.results.columns import Column, Table, names, number, vector
 from dalembert.results.way import Topic, figures
+from rigidbody3d import check
 from rigidbody3d.attitude import rotate
 from rigidbody3d.picture.rotation import rotation as draw_rotation
 
@@ -19,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.spin.rotation import Array, Rotation
+
 
 METHOD = (
     "Free rotation and tops in closed form by Jacobi's elliptic functions (Landau and Lifshitz, Mechanics, §37; Goldstein, "
@@ -190,3 +197,65 @@ def way(r: Rotation) -> list[Topic]:
         ]
         result.append(Topic("steady precession", text, "Steady precession", dict(steady)))
     return result
+
+
+Change = Callable[[float], TurningBody]
+
+
+def find(rotation: Rotation, name: str, wanted: str) -> tuple[Rotation, root_search.Found]:
+    """Return the rotation with the number with which the quantity has the value."""
+    if len(rotation.time) > 1:
+        raise bad("--find", "expected one instant, such as --at 2")
+
+    def quantities(body: TurningBody) -> dict[str, tuple[float, str]]:
+        # a body of printed parts may miss it by its last digit
+        if name.startswith("inertia") and not check(body.inertia).valid:
+            raise ValueError
+        return _quantities(replace(rotation, body=body))
+
+    body, solution = root_search.solve(_choices(rotation.body), name, wanted, "slow=0.5rad_s", quantities)
+    return replace(rotation, body=body), solution
+
+
+def _quantities(r: Rotation) -> dict[str, tuple[float, str]]:
+    """Every number of the result by its name, such as omega.x, and its unit."""
+    kept = [column for column in constants(r).columns if not column.name.startswith("drift")]
+    columns = [*states(r).columns[1:], *kept]
+    return {re.sub(r"_([wxyz])$", r".\1", c.name): (float(c.values[0]), c.unit) for c in columns}  # type: ignore[arg-type]
+
+
+def _choices(body: TurningBody) -> dict[str, tuple[root_search.Sought, Change]]:
+    """The numbers of the file."""
+    choices: dict[str, tuple[root_search.Sought, Change]] = {}
+
+    def entry(x: float, key: str, i: int) -> TurningBody:
+        vector = np.array(getattr(body, key))
+        vector[i] = x
+        return replace(body, **{key: vector})  # type: ignore[arg-type]
+
+    vectors = [("omega", "rad_s", "xyz")]
+    if body.inertia.ndim == 1:
+        vectors.append(("inertia", "kg_m2", "123"))
+    if body.torque is not None:
+        vectors.append(("torque", "N_m", "xyz"))
+    for key, unit, letters in vectors:
+        for i, letter in enumerate(letters):
+            number = root_search.Sought(f"{key}.{letter}_{unit}", unit, float(getattr(body, key)[i]))
+            choices[f"{key}.{letter}"] = number, partial(entry, key=key, i=i)
+    if body.mgl is not None:
+        choices["top.mgl"] = (
+            root_search.Sought("top.mgl_N_m", "N_m", body.mgl),
+            lambda x: replace(body, mgl=x),
+        )
+        w, x, y, z = body.attitude.tolist()
+        if z == 0:
+            # the axis leans by a turn about a horizontal line
+            lean = degrees(2 * atan2(hypot(x, y), w))
+            across = (x / hypot(x, y), y / hypot(x, y)) if x or y else (1.0, 0.0)
+
+            def leaning(tilt: float) -> TurningBody:
+                half = radians(tilt) / 2
+                return replace(body, attitude=np.array([cos(half), *(sin(half) * a for a in across), 0.0]))
+
+            choices["tilt"] = root_search.Sought("tilt_deg", "deg", lean), leaning
+    return choices

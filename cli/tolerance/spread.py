@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.cases import poses
+from cli.cases import poses, remarks
 from cli.cases.analysis import Analysis
-from cli.cases.case import TableCase, TableStudy
+from cli.cases.case import Case, Study
 from cli.cases.poses import cells, keys_of
 from cli.cases.study import METHOD
 from cli.read.options import processes
-from dalembert.dataclass import dataclass, field
+from dalembert.dataclass import dataclass
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table, names
 from virtualwork.describe.dimensions import Dimension
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cli.cases.case import Rows
+    from cli.cases.cases import Rows
     from cli.cases.poses import Reals
     from cli.show.commands import ShowOptions
     from dalembert.results.way import Topic
@@ -38,15 +38,11 @@ NAMES = ("p0.135", "p99.865")
 
 
 @dataclass
-class Tolerances(TableCase):
-    """What the tolerances do to one mechanism."""
+class Tolerances(Case):
+    """The effect of the tolerances on one mechanism."""
 
     study: Spreads
     analysis: Analysis
-    name: str = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.name = self.analysis.mechanism.name
 
     @property
     def draws(self) -> int:
@@ -119,9 +115,7 @@ class Tolerances(TableCase):
         return joined, float(whole.mean())
 
     def warnings(self) -> list[str]:
-        """What is remarkable about the poses, and where the first order is not enough."""
-        from cli.cases import remarks
-
+        """Return the warnings of the poses, and where the first order is not enough."""
         a = self.analysis
         lines = [*a.warnings, *remarks.limits(a), *(remarks.of_forces(a) if a.forces else [])]
         return [*lines, *self.apart()]
@@ -230,11 +224,11 @@ class Tolerances(TableCase):
         columns += [names("distribution", [study.distribution]), names("assembled", [self.drawn[1]])]
         return Table(columns, place="tolerance.drawn")
 
-    def assembled(self, table: Table) -> list[bool] | bool:
-        """Of each row of a table whether its pose is assembled, or whether any is."""
+    def assembled(self, rows: int = 0) -> list[bool] | bool:
+        """Return whether the pose of each row is assembled; where the rows are no poses, whether any is."""
         (motion,) = self.analysis.motions
-        there: list[bool] = self.analysis.assembled(motion).tolist()
-        return there if table.columns and len(table.columns[0].values) == len(there) else any(there)
+        whole: list[bool] = self.analysis.assembled(motion).tolist()
+        return whole if rows == len(whole) else any(whole)
 
     @property
     def is_drawn(self) -> bool:
@@ -253,7 +247,7 @@ class Tolerances(TableCase):
 
 
 @dataclass(frozen=True)
-class Spreads(TableStudy):
+class Spreads(Study):
     """What the tolerances do to every case.
 
     Attributes
@@ -277,20 +271,18 @@ class Spreads(TableStudy):
     one_blank_row = False
 
     def warnings(self) -> list[str]:
-        """Rates without a speed, forces without a mass or a load."""
-        from cli.cases import remarks
-
-        return remarks.without_meaning(self.own, self.names)
+        """Return the warnings of rates without a speed, and forces without a mass or a load."""
+        return remarks.without_meaning(self.cases.nominal, self.cases.names)
 
     def case(self, row: Rows | None = None) -> Tolerances:
-        """A variant, or the mechanism itself."""
-        analysis = self.analysis(row)
+        """Return the effect on the variant of a row, or on the mechanism itself."""
+        analysis = self.cases.analysis(row)
         _ = analysis.motions
         return Tolerances(self, analysis)
 
     def check_size(self, show: ShowOptions, times: int) -> None:
         """Refuse more poses than the memory holds."""
-        self.own.check_size(json=show.as_json, table=show.needs_table, times=times)
+        self.cases.nominal.check_size(json=show.as_json, table=show.needs_table, times=times)
 
 
 def _sample(its: Drawn) -> dict[str, Reals]:

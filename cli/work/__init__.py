@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from cli.read import options
@@ -9,17 +10,16 @@ from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.result import Result
-    from dalembert.results.way import Topic
 
 
 EXAMPLE = "riul-slider-crank"
 OPTIONS = """
 Arguments:
-  states STATES  CSV of link states, the unknown marked ?; - is standard input.
+  states STATES  CSV of link states with the unknown marked ?; - is standard input.
 What:
   gravity GX,GY  Gravity, m/s², such as 0,-9.81 (default: none).
-Output: of the balance:
-  ledger  Show the power of every term instead of the unknowns.
+Output:
+  ledger  Show the power of every load (default: the unknowns).
 """
 
 
@@ -27,31 +27,26 @@ Output: of the balance:
 def run(states: str, gravity: str | None = None, ledger: bool = False) -> Result:
     """Find the unknown force or torque that balances a table of link states, by virtual power.
 
-    STATES has one row per link (and per step): link, mass_*, inertia_*, vx_* vy_* and ax_* ay_* of the centre of
-    mass, omega_*, alpha_*, the applied force fx_* fy_* with the velocity fvx_* fvy_* of its point, torque_*; * is
-    a unit: mass_kg, vx_m_s, omega_rad_s, torque_N_m. Empty cells are zero; an empty fv is the velocity of the centre of mass. One force or
-    torque cell holds ?; several unknowns are marked ?NAME and need as many velocity fields, distinguished by a
-    column field.
+    STATES has a row for each link, at each step (instant). Its columns are step, link, mass_*, inertia_*; vx_* vy_* and
+    ax_* ay_* of the centre of mass; omega_*, alpha_*; the applied force fx_* fy_* with the velocity fvx_* fvy_* of its
+    point; torque_*. The star is a unit: mass_kg, vx_m_s, omega_rad_s, torque_N_m. Empty cells are zero; an empty fv is
+    the velocity of the centre of mass. One cell of a force or torque holds ?. Several unknowns are marked ?NAME; they
+    need as many fields of virtual velocities, named in a column field.
     """
     g = 0j if gravity is None else options.plane_vector("--gravity", gravity, "acceleration")
     from cli.show.result import Result
     from cli.work.power import WorkBalance
     from cli.work.states import read_states
-    from cli.work.tables import METHOD, draw, tables
+    from cli.work.tables import METHOD, draw, tables, way
 
     table = read_states(states)
     balance = WorkBalance(table, g)
 
-    def way() -> list[Topic]:
-        from cli.work.way import way
-
-        return way(balance)
-
     return Result(
         tables=tables(balance, ledger_first=ledger),
-        figure=lambda: draw(balance),
+        figure=partial(draw, balance),
         method=METHOD,
-        way=way,
+        way=partial(way, balance),
         about={"title": "Balance of virtual power"},
         warnings=[*table.table.warnings, *table.warnings, *balance.warnings],
     )

@@ -88,10 +88,10 @@ class StateTable:
             name = f"fv{axis}"
             if name in self.values:
                 center = values.get(f"v{axis}", np.zeros(self.table.rows))
-                given = (
+                point = (
                     self.table.numbers[name].values if name in values else np.full(self.table.rows, np.nan)
                 )
-                values[name] = np.where(np.isnan(given), center, values.get(name, center))
+                values[name] = np.where(np.isnan(point), center, values.get(name, center))
         return values
 
     @property

@@ -11,10 +11,10 @@ from __future__ import annotations
 import cmath
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-from dalembert.arithmetic.tape import Operation, Tape, performed, reached, shortened
+from dalembert.arithmetic.tape import Operation, Tape, shortened
 
 Number = Any
 """A float, a complex, a `Real` or a `Complex`."""
@@ -43,20 +43,17 @@ class Recorder:
         """An input; the same name is the same number."""
         return Real(self, self.node("input", name))
 
-    def node(self, kind: str, *arguments: Any) -> int:
-        """The number of an operation, which is written down if it is new."""
-        return self._numbered((kind, *arguments))
-
-    def pair(self, kind: str, a: int, b: int) -> int:
-        """The same of a sum or product, whose arguments may change places."""
-        return self._numbered((kind, a, b) if a <= b else (kind, b, a))
-
-    def _numbered(self, operation: Operation) -> int:
+    def node(self, *operation: Any) -> int:
+        """The number of an operation (kind, arguments …), which is written down if it is new."""
         number = self._known.get(operation)
         if number is None:
             number = self._known[operation] = len(self.operations)
             self.operations.append(operation)
         return number
+
+    def pair(self, kind: str, a: int, b: int) -> int:
+        """The same of a sum or product, whose arguments may change places."""
+        return self.node(kind, a, b) if a <= b else self.node(kind, b, a)
 
     def difference(self, a: int, b: int) -> Real:
         """a − b; b − a, where that is known, with the other sign."""
@@ -90,37 +87,6 @@ class Recorder:
             Where an output is complex: its parts are two outputs.
         """
         return shortened(self.operations, self.numbers(outputs))
-
-    def again(self, outputs: Sequence[int], inputs: Sequence[Mapping[str, Number]]) -> list[list[Number]]:
-        """The values of operations where some inputs, each time the same, have other values; nothing else is done again.
-
-        >>> recorder = Recorder()
-        >>> x, y = recorder.input("x"), recorder.input("y")
-        >>> z = x * x + x * y
-        >>> [[at_one], [at_zero]] = recorder.again([z.number], [{"y": 1.0}, {"y": 0.0}])
-        >>> recorder.tape({"z": z, "at y = 1": at_one, "at y = 0": at_zero}).cost
-        4
-        """
-        known = [self.node("input", name) for name in inputs[0]]
-        below: dict[int, Operation] = {}
-        for number in reached(self.operations, outputs, known):
-            operation = self.operations[number]
-            if number in known or (
-                operation[0] not in ("const", "input") and not below.keys().isdisjoint(operation[1:])
-            ):
-                below[number] = operation
-        result = []
-        for enters in inputs:
-            values: dict[int, Number] = {}
-            for number, (kind, *of) in below.items():
-                if kind == "input":
-                    values[number] = enters[of[0]]
-                else:
-                    values[number] = performed(
-                        kind, [values[a] if a in values else Real(self, a) for a in of], RECORDED
-                    )
-            result.append([values[number] if number in values else Real(self, number) for number in outputs])
-        return result
 
     def numbers(self, outputs: Mapping[str, Number]) -> list[tuple[str, int]]:
         """The operations that have the values of named results; see `tape`."""
@@ -249,21 +215,17 @@ class Real:
         return -self + other
 
     def __mul__(self, other: Number) -> Number:
-        if type(other) is Real:
-            return self.times(other)
-        if isinstance(other, (Complex, complex)):
-            if isinstance(other, Constant):
-                return self * other.recorded
-            return Complex(product(self, other.real), product(self, other.imag))
-        if _plain(other):
-            if other == 0:
-                return 0.0
-            if abs(other) == 1:
-                return self if other > 0 else -self
-        return self.times(lifted(self.recorder, other))
-
-    def times(self, other: Real) -> Real:
-        """The product with a recorded number."""
+        if type(other) is not Real:
+            if isinstance(other, (Complex, complex)):
+                if isinstance(other, Constant):
+                    return self * other.recorded
+                return Complex(self * other.real, self * other.imag)
+            if _plain(other):
+                if other == 0:
+                    return 0.0
+                if abs(other) == 1:
+                    return self if other > 0 else -self
+            other = lifted(self.recorder, other)
         number = self.recorder.pair("mul", self.number, other.number)
         return Real(self.recorder, number, self.negative != other.negative)
 
@@ -304,8 +266,10 @@ class Real:
 
 def product(a: Number, b: Number) -> Number:
     """a·b, nothing where one is exactly nothing."""
-    if type(a) is Real and type(b) is Real:
-        return a.times(b)
+    if type(a) is Real:
+        return a * b
+    if type(a) is float and type(b) is Real:
+        return b * a
     return 0.0 if (_plain(a) and a == 0) or (_plain(b) and b == 0) else a * b
 
 

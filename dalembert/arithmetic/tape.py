@@ -205,12 +205,17 @@ def reached(
 ) -> list[int]:
     """The operations that some depend on, in order, they too; what is known depends on nothing."""
     wanted = set(outputs)
-    for number in range(max(wanted, default=-1), -1, -1):
-        if number in wanted and number not in inputs:
-            kind, *arguments = operations[number]
-            if kind not in ("const", "input"):
-                wanted.update(arguments)
-    return sorted(wanted)
+    last = max(wanted, default=-1)
+    marks = bytearray(last + 1)
+    for number in wanted:
+        marks[number] = 1
+    for number in range(last, -1, -1):
+        if marks[number] and number not in inputs:
+            operation = operations[number]
+            if operation[0] not in ("const", "input"):
+                for argument in operation[1:]:
+                    marks[argument] = 1
+    return [number for number, mark in enumerate(marks) if mark]
 
 
 def shortened(
@@ -223,11 +228,11 @@ def shortened(
     place: dict[int, int] = {}
     kept: list[Operation] = []
     for number in reached(operations, (number for _, number in outputs), inputs):
-        kind, *arguments = operations[number]
-        place[number] = len(kept)
+        operation = operations[number]
         if number in inputs:
-            kind, arguments = "input", [inputs[number]]
-        elif kind not in ("const", "input"):
-            arguments = [place[a] for a in arguments]
-        kept.append((kind, *arguments))
+            operation = "input", inputs[number]
+        elif operation[0] not in ("const", "input"):
+            operation = operation[0], *[place[a] for a in operation[1:]]
+        place[number] = len(kept)
+        kept.append(operation)
     return Tape(tuple(kept), tuple((name, place[number]) for name, number in outputs))

@@ -12,6 +12,13 @@ function rounded(x, [unit, step]) {
   return (inverse && Math.abs(inverse * step - 1) < 4e-16 ? even((x / unit) * inverse) / inverse : even(x / unit / step) * step) * unit;
 }
 
+// to the nearest mark on a circle whose marks begin at 0, as in the program
+function marked(x, [unit, step]) {
+  const angle = x / unit;
+  const mark = rounded(angle, [1, step]);
+  return mark >= 360 || 360 - angle < Math.abs(mark - angle) ? 0 : mark * unit;
+}
+
 // the cubics of the mode shapes where a mass stands
 function shapesAt(z) {
   const { stations, pieces } = sheet.modes;
@@ -47,7 +54,7 @@ solveSheet = () => {
       rotor.planes.forEach((_, p) => {
         for (const [name, from] of [["mass", `mass ${p}`], ["radius", `radius ${p}`], ["angle", `plane ${p} angle`]]) {
           const x = out.get(from)[0];
-          put[`${name} ${p}`] = sheet.steps[name] ? rounded(name === "angle" ? whole(x) : x, sheet.steps[name]) % (name === "angle" ? 2 * Math.PI : Infinity) : x;
+          put[`${name} ${p}`] = !sheet.steps[name] ? x : name === "angle" ? marked(whole(x), sheet.steps[name]) : rounded(x, sheet.steps[name]);
           if (sheet.steps[name]) out.set(from, [put[`${name} ${p}`], 0]);
         }
       });

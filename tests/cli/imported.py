@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cli.imports.assembled import described
-from cli.imports.drawn import settle
-from cli.imports.programs import read
+from cli.formats.description import described
+from cli.formats.programs import read
+from cli.formats.settled import settle
 from virtualwork import Mechanism
 
 FORMATS = Path(__file__).parents[1] / "data" / "formats"

@@ -9,6 +9,7 @@ import pytest
 
 from cli.cases.analysis import Request
 from cli.cases.axes import grids
+from cli.cases.cases import Cases
 from cli.cases.inputs import Grid, Varied, listed
 from cli.cases.loop import Loop
 from cli.forces.cycle import Forces
@@ -80,10 +81,11 @@ def many(text, rows, at=range(0, 360, 60), one_by_one=False, **request):
     varied = Grid((listed("--cases", [Varied(every[path]) for path in OWN[text]], np.array(rows)),))
     _, moved = grids(m, None if at is None else [f"{angle}deg" for angle in at], None, None, {}, [])
     kinds = (Forces, ForcesOneByOne) if request.get("forces") else (Poses, PosesOneByOne)
-    study = kinds[one_by_one](Request("m.toml", **request), m, {}, False, False, varied.names, moved)
+    cases = Cases(Request("m.toml", **request), m, {}, varied, moved)
+    study = kinds[one_by_one](cases, False, False)
     if not one_by_one:
         assert study.together(np.array(list(OWN[text].values())), json=True) is not None
-    return Loop(study, varied)
+    return Loop(study)
 
 
 def drawn(text, rng, count):

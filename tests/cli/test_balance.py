@@ -435,3 +435,23 @@ def test_gravity_takes_a_unit(gravity: str, dalembert: Dalembert) -> None:
     done = dalembert("work", "-", "--gravity", f"0,-{gravity}", "--json", stdin=states)
     (unknown,) = json.loads(done.stdout)["steps"][0]["unknowns"]
     assert unknown["value"] == pytest.approx(9.81, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("angle", "step", "mark"),
+    # marks of 7 deg are 0, 7, … 357: 0 is nearer to 359; of 11 deg 0, 11, … 352, and 3 is none of them
+    [
+        (359, "7deg", 0),
+        (358, "7deg", 357),
+        (359, "11deg", 0),
+        (358, "100deg", 0),
+        (354, "11deg", 352),
+        (42, "5deg", 40),
+    ],
+)
+def test_angles_are_rounded_to_marks_on_a_circle(
+    angle: float, step: str, mark: float, dalembert: Dalembert
+) -> None:
+    table = f"mass_g,radius_mm,angle_deg\n10,20,{angle - 180}\n"
+    done = dalembert("balance", "-", "--plane", "A:20mm", "--round-angle", step, stdin=table)
+    assert [float(row["angle_deg"]) for row in rows(done.stdout)] == [mark]

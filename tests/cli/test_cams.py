@@ -44,6 +44,15 @@ def test_forces_warn_where_contact_is_lost(dalembert: Dalembert, valve: str) -> 
     assert "from 20.527" in fast.stderr
 
 
+def test_json_has_the_pressure_angle_beside_the_contact_force(dalembert: Dalembert, valve: str) -> None:
+    call = ["forces", valve, "--at", "60deg", "--only", "V.pressure_angle,V.curvature_radius,V.contact_force"]
+    (row,) = csv.DictReader(dalembert(*call).stdout.splitlines())
+    (pose,) = json.loads(dalembert(*call, "--json").stdout)["poses"]
+    assert {f"V_{name}": value for name, value in pose["cams"]["V"].items()} == {
+        name: float(row[name]) for name in row if name.startswith("V_")
+    }
+
+
 def test_the_profile_as_a_table_touches_the_base_circle(
     dalembert: Dalembert, valve: str, tmp_path: Path
 ) -> None:

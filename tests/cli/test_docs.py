@@ -9,7 +9,7 @@ import pytest
 import typer
 
 from cli.app import COMMANDS, build
-from cli.read.about import HEAD
+from cli.read.options import HEAD
 from cli.spin.rotation import KEYS
 from dalembert.units import UNITS
 from virtualwork.describe.description import FILE

@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from cli.exports.file import file_bytes
-from cli.imports.assembled import described
-from cli.imports.drawn import settle
-from cli.imports.programs import read
+from cli.formats.description import described
+from cli.formats.exported import file_bytes
+from cli.formats.programs import read
+from cli.formats.settled import settle
 from tests.cli.exported import EXAMPLES, FILES, FOUR_BAR, MASSIVE, PLANETARY, exported, home, moved
 from tests.conftest import Dalembert
 from virtualwork import Mechanism

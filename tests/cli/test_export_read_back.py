@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cli.exports.skeleton import Joint, Skeleton
+from cli.formats.skeleton import Joint, Skeleton
 from dalembert.errors import DataError
 from tests.cli.exported import FILES, FOUR_BAR, MASSIVE, exported, home, moved
 from virtualwork import Mechanism
@@ -110,7 +110,7 @@ def test_mujoco_reads_the_urdf_and_stands_where_we_do() -> None:
 def coordinate(s: Skeleton, j: Joint) -> float:
     """How far a joint has turned or slid in a skeleton's pose."""
     if j.kind == "turn":
-        return s.parts[j.link].turn - s.parts[j.on].turn
+        return s.bodies[j.link].turn - s.bodies[j.on].turn
     return next(own.value for own in s.joints if own.name == j.name)
 
 
@@ -137,7 +137,7 @@ def test_yourdfpy_stands_where_we_do_in_every_pose(file: Path) -> None:
         way = {j.name: coordinate(there, j) - coordinate(start, j) for j in (b.joint for b in there.walk())}
         robot.update_cfg({name: way[name] for name in robot.actuated_joint_names})
         for b in start.walk():
-            part, end = there.parts[b.child], b.joint.ends[b.child == b.joint.link]
+            part, end = there.bodies[b.child], b.joint.ends[b.child == b.joint.link]
             found, at, turn = robot.get_transform(b.child, "ground"), part.world(end), part.turn
             assert found[:2, 3] == pytest.approx((at.real, at.imag), abs=1e-14 * m.size), b.child
             assert found[:2, 0] == pytest.approx((math.cos(turn), math.sin(turn)), abs=1e-14), b.child

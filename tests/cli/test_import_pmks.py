@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.imports.pmksweb import number
+from cli.formats.pmksweb import number
 from tests.cli.imported import FORMATS, FOUR_BAR, at, only, taken
 from tests.conftest import Dalembert
 from virtualwork import Mechanism

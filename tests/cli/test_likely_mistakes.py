@@ -12,7 +12,7 @@ import pytest
 from balancing import correct
 from cli.examples import names
 from cli.exercise.description import read_exercise
-from cli.exercise.mistakes import candidates
+from cli.exercise.recomputed import candidates
 from cli.exercise.slips import Candidates
 from cli.exercise.solving import workshop
 from cli.exercise.variants import variants

@@ -12,8 +12,9 @@ import pytest
 
 from cli.cases.analysis import Request
 from cli.cases.axes import grids
+from cli.cases.cases import Cases
 from cli.cases.inputs import Grid, Varied, listed
-from cli.cases.loop import Loop, as_it_is
+from cli.cases.loop import Loop, unchanged
 from cli.mechanism.newton import Poses
 from dalembert.errors import DataError
 from virtualwork import Mechanism
@@ -158,17 +159,17 @@ def question(v):
         (listed("--cases", [Varied(dimensions(m)["ground.D.x"])], np.linspace(0.1, 0.11, v)[:, None]),)
     )
     _, moved = grids(m, ["40deg"], None, None, {}, [])
-    study = Poses(Request("m.toml", order=0, branch="1"), m, {}, False, False, varied.names, moved)
-    return Loop(study, varied, 2)
+    cases = Cases(Request("m.toml", order=0, branch="1"), m, {}, varied, moved)
+    return Loop(Poses(cases, False, False), 2)
 
 
 def test_a_part_whose_worker_died_is_done_again(tmp_path):
     flag = tmp_path / "died"
     dies_once = f"(p := __import__('pathlib').Path({str(flag)!r})).exists() or (p.touch(), __import__('os')._exit(1)) and None"
-    form = Sent(f"(None, {dies_once}, __import__('cli.cases.loop', fromlist=['as_it_is']).as_it_is)[2]")
+    form = Sent(f"(None, {dies_once}, __import__('cli.cases.loop', fromlist=['unchanged']).unchanged)[2]")
     found = [row for part in question(130).blocks(form) for row in part.data.columns[0].values]
     assert flag.exists()
-    expected = [row for part in question(130).blocks(as_it_is) for row in part.data.columns[0].values]
+    expected = [row for part in question(130).blocks(unchanged) for row in part.data.columns[0].values]
     assert found == expected
     assert len(set(found)) == 130
 

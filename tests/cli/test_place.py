@@ -57,7 +57,7 @@ def test_blades_numbered_against_the_angles(dalembert: Dalembert) -> None:
     refused = dalembert("place", "1g@50deg", "--positions", "0deg,90deg", "--numbering", "against")
     assert refused.returncode == 2
     assert "--numbering" in refused.stderr
-    assert "speaks of --blades" in refused.stderr
+    assert "goes with --blades" in refused.stderr
 
 
 def test_limits(dalembert: Dalembert) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from tests.virtualwork.mechanisms import SWEEP, four_bar
 from virtualwork import Guess, Input, Link, Mechanism, Motor
-from virtualwork.formulas.block import Block
+from virtualwork.formulas.loaded_pose import LoadedPose
 
 
 def test_what_is_formed_for_one_joint_force_serves_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -22,10 +22,10 @@ def test_what_is_formed_for_one_joint_force_serves_the_next(monkeypatch: pytest.
     count = 0
     solve = LoopForces.form
 
-    def counted(self: LoopForces, block: Block) -> Any:
+    def counted(self: LoopForces, pose: LoadedPose) -> Any:
         nonlocal count
         count += 1
-        return solve(self, block)
+        return solve(self, pose)
 
     monkeypatch.setattr(LoopForces, "form", counted)
     sweep = np.linspace(0.0, 6.0, 20_000)  # three blocks

@@ -5,9 +5,12 @@ from __future__ import annotations
 import cmath
 import math
 
+import mpmath as mp
 import numpy as np
 import pytest
 
+from benchmarks.truth.constraints import DIGITS
+from benchmarks.truth.mechanism import Exact
 from virtualwork import DescriptionError, Friction, Guess, Guide, Input, Link, Mechanism, Torque
 from virtualwork.study.ledger import ledger
 
@@ -143,3 +146,43 @@ def test_what_does_not_slide_does_not_rub(tilt: float) -> None:
         dynamics = m.motion(q, 1.3, -0.7).dynamics
         forces.append([dynamics.joint_force(joint, "block") for joint in dynamics.reactions.joints[1:]])
     np.testing.assert_allclose(forces[1], forces[0], rtol=0, atol=1e-12)
+
+
+def pushed(*friction: Friction) -> Mechanism:
+    """A slider-crank that its slider drives; a slot along the rod holds the two parts of it in line."""
+    angle = 0.3
+    lean = -math.asin(math.sin(angle) / 2)
+    place = math.cos(angle) + 2 * math.cos(lean)
+    return Mechanism(
+        {"A": 0j},
+        {
+            "crank": Link({"A": 0j, "B": 1.0}, 1.0, 0.5),
+            "near": Link({"B": 0j, "H": 0.75}, 1.0, 0.5, 0.25),
+            "far": Link({"H": 0j, "K": 0.5, "C": 1.25}, 1.0, 0.75, 0.25),
+            "block": Link({"C": 0j}, 3.0),
+        },
+        [Guide("C", "block", turned=0.0), Guide("K", "far", "near", "H")],
+        inputs=Input(slider="C", value=place),
+        guess=Guess(place, {"crank": angle, "near": lean, "far": lean}),
+        gravity=-G * 1j,
+        friction=friction,
+    )
+
+
+@pytest.mark.parametrize("off", [1e-7, 1e-3, 1e-5, 1e-9])
+def test_a_pin_in_a_rod_of_two_parts_does_not_rub(off: float) -> None:
+    """Beside the dead point both turn fast together, and what rounds there is no slip, for the judge of the campaigns neither.
+
+    Truth: the forces without friction, in fifty digits.
+    """
+    motion = pushed(Friction("H", 0.2, 0.05)).motion(3 - off, 7e3, 0.1)
+    true, judged = Exact(pushed().motion(3 - off, 7e3, 0.1)).forces(), Exact(motion).forces()
+    dynamics, estimate = motion.dynamics, motion.dynamics.error_estimate()
+    (pin,) = (j for j in dynamics.reactions.joints if j.name == "H")
+    assert dynamics.joint_moment(pin, "far")[0] == 0
+    with mp.workdps(DIGITS):
+        parts = [true["pin:H", "far", part] for part in (0, 1)]
+        for part, x in enumerate(parts):
+            assert abs(judged["pin:H", "far", part] / x - 1) < mp.mpf(10) ** -25
+        error = abs(mp.mpc(*parts) - mp.mpc(complex(dynamics.joint_force(pin, "far")[0])))
+        assert error <= estimate.joint_force(pin, "far")[0]

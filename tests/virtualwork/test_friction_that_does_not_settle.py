@@ -10,7 +10,7 @@ import pytest
 
 from tests.virtualwork.let_go import G
 from virtualwork import Friction, Guess, Input, Link, Mechanism
-from virtualwork.formulas.locking import balanced
+from virtualwork.formulas.friction import balanced
 
 
 def rocker_driven(seed: int) -> tuple[Mechanism, float, np.random.Generator]:

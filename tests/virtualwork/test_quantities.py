@@ -11,11 +11,10 @@ from mpmath import mp
 from virtualwork import Input, Link, Mechanism, TorsionSpring
 from virtualwork.digits.exact import Gap
 from virtualwork.family.part import Assembled
-from virtualwork.formulas.forces import Effort, Force, JointForce, NewtonEuler, Over, Reaction, Shaking
+from virtualwork.formulas.forces import Effort, Force, JointForce, NewtonEuler, Over, Reaction, Rub, Shaking
 from virtualwork.formulas.kinematics import Angle, AnglePartial, Point, PointPartial, Slide, Turn
 from virtualwork.formulas.loops import Closed, Margin, Size
 from virtualwork.formulas.quantity import NOTHING, Quantity
-from virtualwork.formulas.rubbing import Rub
 
 
 def kinds(of: type[Quantity] = Quantity) -> set[type[Quantity]]:

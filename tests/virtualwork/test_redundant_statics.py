@@ -208,3 +208,24 @@ def test_what_is_determined_of_three_cranks_is_named() -> None:
         for axis in ("fx", "fy")
         for text in (*(f"{axis} on {link}" for link in links), f"{axis} from the ground at A and D and F")
     )
+
+
+def test_a_dyad_out_of_reach_at_the_guess_beside_redundant_cranks() -> None:
+    """Its branch is that of the guessed angles, as it is without the third crank."""
+    turns = np.array([0.5, 1.5])
+    reached = []
+    for third in (False, True):
+        ground = {"A": 0j, "D": 2, "Z": 1 + 3.5j} | ({"F": 1} if third else {})
+        links = {
+            "crank": Link({"A": 0j, "B": 1}),
+            "coupler": Link({"B": 0j, "E": 1, "C": 2}),
+            "rocker": Link({"D": 0j, "C": 1}),
+            "bar": Link({"E": 0j, "R": 1.4}),
+            "arm": Link({"Z": 0j, "R": 1.4}),
+        } | ({"middle": Link({"F": 0j, "E": 1})} if third else {})
+        angles = {"coupler": 0.0, "rocker": 0.1, "middle": 0.1, "bar": 1.0, "arm": -2.0}
+        guess = Guess(0.1, {name: angle for name, angle in angles.items() if name in links})
+        motion = Mechanism(ground, links, inputs=Input(link="crank"), guess=guess).motion(turns)
+        assert motion.assembled.tolist() == [False, True]
+        reached.append(motion.point("R").position[1])
+    assert reached[1] == pytest.approx(reached[0], rel=1e-12)

@@ -15,8 +15,9 @@ import pytest
 from benchmarks.stress import random_linkages
 from benchmarks.stress.campaigns import replay
 from benchmarks.stress.groups import compare
+from benchmarks.truth.constraints import along
 from benchmarks.truth.four_bar import circles, two_rates
-from benchmarks.truth.mechanism import Exact, along
+from benchmarks.truth.mechanism import Exact
 from tests.virtualwork.judged import judge
 from tests.virtualwork.mechanisms import slider_crank
 from virtualwork import (

@@ -10,6 +10,7 @@ import numpy as np
 from dalembert.arithmetic.guard import Lock, guarded, own_lock
 from dalembert.arithmetic.records import Record, record
 from dalembert.dataclass import dataclass, field
+from virtualwork.branch.sampling import depths, vanishes
 from virtualwork.describe.description import Description
 from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.group_loops import Loops
@@ -128,3 +129,21 @@ class Choice(Record):
         self.case(group).solve(st, sign, self.mechanism.size)
         for body in self.geared.intersection(group.members):
             st.angle[body] = principal(np.angle(st.turn[body]))
+
+    def singular_around(self, length: float) -> list[str]:
+        """The closed forms, by name, that are singular in all poses around the guess: with several inputs, none a tenth of a length away."""
+        at, result = self.mechanism.at, list[str]()
+        golden = np.sqrt(np.arange(2.0, 2 + len(at)))
+        off = (np.multiply.outer(np.arange(1.0, 25), golden) % 1.0 - 0.5) * 0.1 * length
+        st, size = State([a + off[:, j] for j, a in enumerate(at)]), self.mechanism.size
+        with np.errstate(all="ignore"):
+            for step in self.plan.steps:
+                if isinstance(step, Group) and step.kind == "Newton":
+                    break
+                self.run_untracked([step], st)
+                if isinstance(step, Group) and step.kind != "PRP":
+                    case = self.case(step)
+                    if vanishes(st.margin[step.name], depths(case, st, size)[1]):
+                        result.append(step.name)
+                        case.solve(st, None, size)
+        return result

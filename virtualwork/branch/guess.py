@@ -122,6 +122,9 @@ class _Chooser:
         from virtualwork.formulas.constraints import Constraints, coordinates
 
         jacobian = Constraints.at(self.m, coordinates(self.m, self.plan, st), {}).jacobian
+        if np.isnan(jacobian).any():
+            # a group cannot be assembled at the guess, as a warning says: no motion is left to be counted there
+            return
         try:
             s = np.linalg.svd(jacobian, compute_uv=False)
         except np.linalg.LinAlgError:

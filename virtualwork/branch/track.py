@@ -83,7 +83,8 @@ class Track:
         # groups that are singular in every pose
         self.folded: set[str] = set()
         if not self.active:
-            self._look_around()
+            for name in assembly.singular_around(self.length):
+                self._fold(name)
 
     # --- what poses ask ---------------------------------------------------------------------------------------
     def run(self, steps: Iterable[Step], st: State) -> None:
@@ -222,23 +223,6 @@ class Track:
         """Note a group that is singular in every pose."""
         self.folded.add(name)
         self.assembly.plain.pop(name, None)
-
-    def _look_around(self) -> None:
-        """With several inputs: which closed forms are singular at all poses around the guess."""
-        at = self.assembly.mechanism.at
-        golden = np.sqrt(np.arange(2.0, 2 + len(at)))
-        off = (np.multiply.outer(np.arange(1.0, 25), golden) % 1.0 - 0.5) * 0.1 * self.length
-        st = State([a + off[:, j] for j, a in enumerate(at)])
-        with np.errstate(all="ignore"):
-            for s in self.plan.steps:
-                if isinstance(s, Group) and s.kind == "Newton":
-                    return
-                self.assembly.run_untracked([s], st)
-                if isinstance(s, Group) and s.kind != "PRP":
-                    case, size = self.assembly.case(s), self.assembly.mechanism.size
-                    if vanishes(st.margin[s.name], depths(case, st, size)[1]):
-                        self._fold(s.name)
-                        case.solve(st, None, size)
 
     def warnings(self) -> tuple[str, ...]:
         """The assembly's warnings, and the groups that are singular in every pose in what was covered."""

@@ -27,12 +27,12 @@ from dalembert.arithmetic.recorded import Number, Recorder, bare, lifted
 from dalembert.arithmetic.varied import Precise, Varied
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, dimensions, value
+from virtualwork.formulas.branch import Branch
 from virtualwork.formulas.group_loops import gaps, unknowns
 from virtualwork.formulas.numbers import Written
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import Recording
-from virtualwork.formulas.tapes import Turning
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, turns
 
@@ -137,13 +137,13 @@ class Exact(Recording):
 
     Parameters
     ----------
-    branch : Turning
+    branch : Branch
         The assembly.
     plain : Recording
         The formulas as they are.
     """
 
-    def __init__(self, branch: Turning, plain: Recording) -> None:
+    def __init__(self, branch: Branch, plain: Recording) -> None:
         recorder = Recorder()
         numbers = Numbers(branch.mechanism, recorder)
         self.known, self.folded = numbers.known, frozenset(branch.folded)

@@ -22,13 +22,13 @@ from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.guard import guarded
 from virtualwork.describe.dimensions import dimensions
 from virtualwork.digits.exact import Balance, Exact, Gap, Unknown
+from virtualwork.formulas.forces import Rub
 from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import NAMES
-from virtualwork.formulas.rubbing import Rub
 from virtualwork.formulas.statics import NULL
 from virtualwork.formulas.tapes import taped
 from virtualwork.plan.steps import Group

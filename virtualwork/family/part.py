@@ -94,12 +94,11 @@ class Part:
         """
         one = self.some(slice(i, i + 1))
         q = one.inputs[0]
-        n = len(q)
         assembly = Assembly.from_guess(self.described(i))
         assembly.seeds.update(seeds)
         result = Lanes(assembly, q if q.shape[1] > 1 else q[:, 0], 0.0, 0.0, 0.0)
         result.rates = [
-            [float(np.ravel(r)[0]) if np.size(r) == 1 else np.broadcast_to(r, (1, n))[0] for r in order]
+            [float(np.ravel(r)[0]) if np.size(r) == 1 else np.broadcast_to(r, (1, len(q)))[0] for r in order]
             for order in one.rates
         ]
         return result

@@ -86,7 +86,7 @@ class Dynamics:
         return result
 
     def _too_fast(self, j: int) -> bool:
-        m, by = self.poses.mechanism, self.scene.forces.block.by[j]
+        m, by = self.poses.mechanism, self.scene.forces.pose.by[j]
         reach = m.size if m.inputs[j].is_slide else 1.0
         rates = (by.angle.get(body) for group in self.poses.plan.groups for body in group.angles)
         return any(rate and rate[0] is not None and not abs(rate[0]) * reach < FAST for rate in rates)

@@ -13,18 +13,18 @@ first, Q_θ = Σ T + Σ (z e^{iθ}) × F, and is −Σ Q_θ κ_j; the ledger tak
 
 from __future__ import annotations
 
-from virtualwork.formulas.block import Block
 from virtualwork.formulas.load_paths import LoadPaths
+from virtualwork.formulas.loaded_pose import LoadedPose
 from virtualwork.formulas.numbers import Number, plus, times
 
 
-def generalized_force(paths: LoadPaths, block: Block, j: int) -> Number:
+def generalized_force(paths: LoadPaths, pose: LoadedPose, j: int) -> Number:
     """What the loads do for a unit of input j ; None where nothing."""
     total: Number = None
     for body, guide, load in paths.working:
-        moved = block.by[j].slide[guide][0] if body is None else block.turning(body, j)
+        moved = pose.by[j].slide[guide][0] if body is None else pose.turning(body, j)
         # what cannot move is not evaluated
         if moved is not None:
-            value = paths.value(block, load)
+            value = paths.value(pose, load)
             total = plus(total, value if isinstance(moved, float) and moved == 1 else times(value, moved))
     return total

@@ -3,31 +3,33 @@
 But for springs and friction, a force on a link is a fixed combination of a few vectors: of 1 (a weight), of e^{iθ} (a
 force that turns with its link), of second derivatives (−m·a_G = −m Σ z (e^{iθ})″) and of other joint forces. Such
 vectors are the terms; a `Combination` holds their coefficients, which depend on the mechanism alone. Combinations
-are added and weighed as numbers, once for each mechanism. An array over the poses is formed of a term or a
-combination when its value is asked for, and never twice.
+are added and weighed as numbers, once for each mechanism. The value of a term or a combination at a pose is formed when it is
+first requested, and never twice. The contact force of a cam is a term too: it balances all that bears on its follower's
+coordinate, along the normal.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Container, Hashable, Iterable
 from typing import Any
 
 from dalembert.dataclass import dataclass
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.block import Block, Formed
-from virtualwork.formulas.numbers import Number
+from virtualwork.formulas.loaded_pose import Formed, LoadedPose
+from virtualwork.formulas.numbers import Number, cross
 from virtualwork.formulas.rates import Rates
-from virtualwork.plan.steps import Term
+from virtualwork.formulas.touches import Touch
+from virtualwork.plan.steps import Path, Term
 
 
 class ForceTerm:
     """A vector (complex) or a number (real) at each pose; two terms are the same only if they are one object."""
 
     lasts = False
-    """Whether its array is kept over a long sweep, for others that ask later."""
+    """Whether a motion keeps its values for others that ask later."""
 
-    def form(self, block: Block) -> tuple[float, Number]:
-        """A factor and an array over a block of poses; None for an array of zeros."""
+    def form(self, pose: LoadedPose) -> tuple[float, Number]:
+        """A factor and the value at a pose; None where it is zero."""
         raise NotImplementedError
 
     def reads(self) -> Iterable[ForceTerm | None]:
@@ -57,14 +59,14 @@ class Combination(dict[ForceTerm | None, Any]):
         """The combination times a factor."""
         return Combination({term: factor * c for term, c in self.items()})
 
-    def value(self, block: Block) -> Number:
-        """Its array over a block, or one number where it is the same at every pose; None where it is zero."""
+    def value(self, pose: LoadedPose) -> Number:
+        """Its value at a pose; None where it is zero."""
         total: Number = None
         for term, c in self.items():
             if term is None:
                 part = c
             else:
-                factor, v = block.formed(term)
+                factor, v = pose.formed(term)
                 if v is None:
                     continue
                 c = c * factor
@@ -83,9 +85,9 @@ class Turned(ForceTerm):
     body: str
     slide: int | None
 
-    def form(self, block: Block) -> tuple[float, Number]:
-        e = block.st.turn[self.body]
-        return 1.0, e if self.slide is None else block.st.slide[self.slide] * (e + 0j)
+    def form(self, pose: LoadedPose) -> tuple[float, Number]:
+        e = pose.st.turn[self.body]
+        return 1.0, e if self.slide is None else pose.st.slide[self.slide] * (e + 0j)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +110,8 @@ class SecondRate(ForceTerm):
             else rates.vector((None, (Term(1.0, self.name, self.slide),)), k)
         )
 
-    def form(self, block: Block) -> tuple[float, Number]:
-        return block.second(self.derivative)
+    def form(self, pose: LoadedPose) -> tuple[float, Number]:
+        return pose.second(self.derivative)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,18 +120,18 @@ class LoadTerm(ForceTerm):
 
     load: Formed
 
-    def form(self, block: Block) -> tuple[float, Number]:
-        return 1.0, block.formed(self.load)
+    def form(self, pose: LoadedPose) -> tuple[float, Number]:
+        return 1.0, pose.formed(self.load)
 
 
 @dataclass(frozen=True, eq=False)
 class Total(ForceTerm):
-    """A combination whose array more than one other reads."""
+    """A combination whose value more than one other reads."""
 
     of: Combination
 
-    def form(self, block: Block) -> tuple[float, Number]:
-        return 1.0, self.of.value(block)
+    def form(self, pose: LoadedPose) -> tuple[float, Number]:
+        return 1.0, self.of.value(pose)
 
     def reads(self) -> Iterable[ForceTerm | None]:
         return self.of
@@ -154,13 +156,13 @@ class Lever(ForceTerm):
     force: Combination
     along: bool = False
 
-    def form(self, block: Block) -> tuple[float, Number]:
-        force = self.force.value(block)
+    def form(self, pose: LoadedPose) -> tuple[float, Number]:
+        force = self.force.value(pose)
         if force is None:
             return 1.0, None
-        e = block.st.turn[self.body]
+        e = pose.st.turn[self.body]
         if self.slide is not None:
-            e = e * block.st.slide[self.slide]
+            e = e * pose.st.slide[self.slide]
         work = e.conjugate() * force
         return 1.0, work.real if self.along else work.imag
 
@@ -174,8 +176,8 @@ class Carried(ForceTerm):
 
     input: int
 
-    def form(self, block: Block) -> tuple[float, Number]:
-        return 1.0, block.drive(self.input)
+    def form(self, pose: LoadedPose) -> tuple[float, Number]:
+        return 1.0, pose.drive(self.input)
 
 
 class ForceTerms:
@@ -222,10 +224,10 @@ class ForceTerms:
         return lever
 
 
-def in_order(term: ForceTerm) -> list[ForceTerm]:
-    """The terms that one is made of, each after those it is made of itself, and that one last.
+def in_order(term: ForceTerm, formed: Container[Any]) -> list[ForceTerm]:
+    """The terms that one is made of, each after those it is made of itself, and that one last; not below what is formed.
 
-    Forming them so keeps the chain of calls short, however long the chain of links.
+    This order keeps the chain of calls short, however long the chain of links.
     """
     done: set[ForceTerm] = set()
     result: list[ForceTerm] = []
@@ -234,8 +236,59 @@ def in_order(term: ForceTerm) -> list[ForceTerm]:
         here, open_ = stack.pop()
         if open_:
             result.append(here)
-        elif here not in done:
+        elif here not in done and here not in formed:
             done.add(here)
             stack.append((here, True))
             stack += [(part, False) for part in here.reads() if part is not None and part not in done]
     return result
+
+
+@dataclass(frozen=True, eq=False)
+class Lifted(ForceTerm):
+    """What bears on the coordinate of a follower, as it bears on its cam's angle: times y′."""
+
+    touch: Touch
+    of: Combination
+
+    def form(self, pose: LoadedPose) -> tuple[float, Number]:
+        value = self.of.value(pose)
+        return 1.0, None if value is None else self.touch.rate(pose.st, 1) * value
+
+    def reads(self) -> Iterable[ForceTerm | None]:
+        return self.of
+
+
+@dataclass(frozen=True, eq=False)
+class ContactForce(ForceTerm):
+    """The contact force on the follower: what balances all that bears on its coordinate, along the normal."""
+
+    touch: Touch
+    of: Combination
+    lasts = True
+
+    def form(self, pose: LoadedPose) -> tuple[float, Number]:
+        value = self.of.value(pose)
+        return 1.0, None if value is None else value * self.touch.at(pose.st).unit()
+
+    def reads(self) -> Iterable[ForceTerm | None]:
+        return self.of
+
+
+@dataclass(frozen=True, eq=False)
+class ContactMoment(ForceTerm):
+    """The moment of the contact force on the follower about a point that moves with `path`."""
+
+    touch: Touch
+    force: ForceTerm
+    path: Path
+
+    def form(self, pose: LoadedPose) -> tuple[float, Number]:
+        factor, force = pose.formed(self.force)
+        if force is None:
+            return 1.0, None
+        return factor, cross(
+            self.touch.axis(pose.st) - pose.st.at(self.path) + self.touch.at(pose.st).place(), force
+        )
+
+    def reads(self) -> Iterable[ForceTerm | None]:
+        return (self.force,)

@@ -1,10 +1,15 @@
-"""The quantities of forces: efforts of the inputs, what joints carry, what shakes the ground, single loads."""
+"""The quantities of forces: efforts of the inputs, what joints carry and rub, what shakes the ground, single loads.
+
+Friction enters a tape (`friction 0` …, see `pose_forces`) and is exchanged for `Rub` until the two agree. A further input of such
+a tape: `slip 0`, which way the first contact slips, ±1.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from dalembert.arithmetic.recorded import RECORDED, bare
 from virtualwork.describe.description import Description
 from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.numbers import Number
@@ -206,7 +211,7 @@ class LoadTorque(Force, kind="load torque"):
     number: int
 
     def form(self, forces: PoseForces) -> Number:
-        return forces.case.loads[self.number].form(forces.block)
+        return forces.case.loads[self.number].form(forces.pose)
 
 
 class Load(LoadTorque, kind="load"):
@@ -294,3 +299,25 @@ class Over(Quantity, kind="over"):
         if load.axis == "angle" and not angle.bases:
             return recording.st.affine(angle)
         return recording.value(Angle(load.body, int(load.axis == "speed")))
+
+
+class Rub(Quantity, kind="rub"):
+    """The friction of a contact by the force that it bears."""
+
+    contact: int
+
+    def write(self, recording: Recording) -> Number:
+        joint, *_, coefficient, radius = recording.forces.case.contacts[self.contact]
+        slip = recording.recorder.input(f"slip {self.contact}") * bare(coefficient)
+        arm = slip * bare(radius) if joint.guide is None else slip
+        return -(arm * abs(recording.value(Bearing(self.contact))))
+
+
+class Slip(Quantity, kind="slip"):
+    """Which way a contact slips: ±1, or 0."""
+
+    contact: int
+
+    def write(self, recording: Recording) -> Number:
+        rate = recording.value(SlippingRate(self.contact))
+        return RECORDED.select(rate, 1.0, RECORDED.select(-rate, -1.0, 0.0))

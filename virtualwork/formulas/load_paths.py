@@ -28,10 +28,18 @@ import numpy as np
 from dalembert.dataclass import dataclass
 from virtualwork.describe.meshes import Coordinate
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.block import Block
-from virtualwork.formulas.contacts import ContactForce, ContactMoment, Lifted
-from virtualwork.formulas.force_terms import Carried, Combination, ForceTerm, Transmitted, in_order
+from virtualwork.formulas.force_terms import (
+    Carried,
+    Combination,
+    ContactForce,
+    ContactMoment,
+    ForceTerm,
+    Lifted,
+    Transmitted,
+    in_order,
+)
 from virtualwork.formulas.load_case import LoadCase
+from virtualwork.formulas.loaded_pose import LoadedPose
 from virtualwork.formulas.numbers import Number, dot
 from virtualwork.formulas.touches import Touch, Touches
 from virtualwork.plan.joint_forces import Order, Side
@@ -56,7 +64,6 @@ class LoadPaths:
         self._deep = max(len(self.plan.groups), len(self.mechanism.links)) > DEEP
         self._known: dict[Any, Combination] = {}
         self._on_group: dict[str, list[Combination]] = {}
-        self._first: dict[ForceTerm, list[ForceTerm]] = {}
         self._sides: dict[Side, Combination] = {}
         self._hung: dict[str, list[Hung]] = {}
         self._tied: dict[str, list[tuple[Coordinate, float]]] = {}
@@ -68,15 +75,14 @@ class LoadPaths:
                 self.node(step.node)
                 self.node(step.node, free=True)
 
-    def value(self, block: Block, terms: Combination) -> Number:
-        """The array of a sum over a block; what a long chain of links passes on is formed from its far end."""
+    def value(self, pose: LoadedPose, terms: Combination) -> Number:
+        """The value of a sum at a pose; what a long chain of links passes on is formed from its far end."""
         if self._deep:
             for row in terms:
-                if row is not None and row not in self._first:
-                    self._first[row] = [part for part in in_order(row) if part.lasts]
-                for part in self._first[row] if row is not None else ():
-                    block.formed(part)
-        return terms.value(block)
+                for part in in_order(row, pose.kept) if row is not None else ():
+                    if part.lasts:
+                        pose.formed(part)
+        return terms.value(pose)
 
     # --- the tree ---------------------------------------------------------------------------------------------
     def _hang(self) -> None:
@@ -362,22 +368,22 @@ class LoopForces(ForceTerm):
     def reads(self) -> Iterable[ForceTerm | None]:
         return [row for load in self.paths.on_group(self.group) for row in load]
 
-    def form(self, block: Block) -> tuple[float, Number]:
+    def form(self, pose: LoadedPose) -> tuple[float, Number]:
         group = self.group
-        block.names.add(group.name)
-        loads = [load.value(block) for load in self.paths.on_group(self.group)]
-        if group.name in block.st.folded:
+        pose.names.add(group.name)
+        loads = [load.value(pose) for load in self.paths.on_group(self.group)]
+        if group.name in pose.st.folded:
             # singular in every pose: it may be under stress without any load
-            nothing = np.full(np.shape(block.st.inputs[0]), complex(np.nan, np.nan))[()]
+            nothing = np.full(np.shape(pose.st.inputs[0]), complex(np.nan, np.nan))[()]
             return 1.0, [nothing] * len(group.closures)
         if all(load is None for load in loads):
             return 1.0, [None] * len(group.closures)
-        cols = block.by[0].columns(group)
+        cols = pose.by[0].columns(group)
         if group.kind == "Newton":
-            return 1.0, block.kind.transposed(cols, loads)
+            return 1.0, pose.kind.transposed(cols, loads)
         (c1, c2), (q1, q2) = cols[0], loads
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            inverse = block.kind.regular(block.by[0].inverse(group), c1, c2)
+            inverse = pose.kind.regular(pose.by[0].inverse(group), c1, c2)
             # λ = i (c2 q1 − c1 q2)/(c1 × c2)
             if q1 is None:
                 total = c1 * (q2 * -inverse)
@@ -394,8 +400,8 @@ class Multiplier(ForceTerm):
     solved: ForceTerm
     loop: int
 
-    def form(self, block: Block) -> tuple[float, Number]:
-        return 1.0, block.formed(self.solved)[1][self.loop]
+    def form(self, pose: LoadedPose) -> tuple[float, Number]:
+        return 1.0, pose.formed(self.solved)[1][self.loop]
 
     def reads(self) -> Iterable[ForceTerm | None]:
         return (self.solved,)
@@ -409,10 +415,10 @@ class SideForce(ForceTerm):
     side: Side
     lasts = True
 
-    def form(self, block: Block) -> tuple[float, Number]:
+    def form(self, pose: LoadedPose) -> tuple[float, Number]:
         joint, body = self.side
-        block.names.add(f"{joint} on {body}")
-        return 1.0, self.paths.balance(self.side).value(block)
+        pose.names.add(f"{joint} on {body}")
+        return 1.0, self.paths.balance(self.side).value(pose)
 
     def reads(self) -> Iterable[ForceTerm | None]:
         return self.paths.balance(self.side)
@@ -426,16 +432,16 @@ class ToothForce(ForceTerm):
     guide: int
     lasts = True
 
-    def form(self, block: Block) -> tuple[float, Number]:
+    def form(self, pose: LoadedPose) -> tuple[float, Number]:
         m, plan = self.paths.mechanism, self.paths.plan
         g = m.guides[self.guide]
         # the ground has no forces of its own: it feels the reverse of the link's
         body, sign = (g.link, 1.0) if g.link != GROUND else (g.on, -1.0)
-        force = self.paths.side((f"guide:{self.guide}", body)).value(block)
+        force = self.paths.side((f"guide:{self.guide}", body)).value(pose)
         if force is None:
             return 1.0, None
         rail = plan.directions[self.guide]
-        return sign, dot(force, rail if g.on == GROUND else rail * block.st.turn[g.on])
+        return sign, dot(force, rail if g.on == GROUND else rail * pose.st.turn[g.on])
 
     def reads(self) -> Iterable[ForceTerm | None]:
         g = self.paths.mechanism.guides[self.guide]

@@ -1,6 +1,6 @@
 """What acts on the links of a mechanism: weights, inertia, applied forces and torques, springs and dampers, friction.
 
-A load is a force at a point of a body or a torque on a body. It stands here once: its value over a block of poses, the
+A load is a force at a point of a body or a torque on a body. It stands here once: its value at a pose, the
 displacement on which it does work, its potential, and the second variation of its work. Everything else, virtual work,
 joint reactions and equilibrium, asks it for these. Loads between two bodies come as two, action and reaction; of such
 a pair one side carries the work of both.
@@ -8,14 +8,16 @@ a pair one side carries the work of both.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
 import numpy as np
 
 from dalembert.dataclass import dataclass, field
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.block import Block
 from virtualwork.formulas.force_terms import Combination, ForceTerms, LoadTerm, Turned
-from virtualwork.formulas.numbers import Complexes, Number, Reals, dot, plus, times
+from virtualwork.formulas.loaded_pose import LoadedPose
+from virtualwork.formulas.numbers import Complexes, Number, Reals, cross, dot, plus, times
 from virtualwork.formulas.rates import Rates
 from virtualwork.plan.steps import Path, path_reads
 
@@ -49,8 +51,8 @@ class Load:
         """Whether it gives back what is done against it: a weight, a spring."""
         return self.kind in ("weight", "spring", "torsion spring")
 
-    def form(self, block: Block) -> Number:
-        """Its value over a block: complex N, or N·m; None where it is zero."""
+    def form(self, pose: LoadedPose) -> Number:
+        """Its value at a pose: complex N, or N·m; None where it is zero."""
         raise NotImplementedError
 
     def combination(self, force_terms: ForceTerms) -> Combination:
@@ -68,21 +70,21 @@ class Load:
         """How the ledger calls it."""
         return f"{self.body}: {self.kind}"
 
-    def arm(self, block: Block, center: complex) -> Number:
+    def arm(self, pose: LoadedPose, center: complex) -> Number:
         """Where a force acts, from a point of its body, in ground axes; None at the point itself."""
-        return None if self.place == center else (self.place - center) * block.st.turn[self.body]
+        return None if self.place == center else (self.place - center) * pose.st.turn[self.body]
 
     # --- its work ----------------------------------------------------------------------------------------------
-    def displacement(self, block: Block, j: int) -> Number:
+    def displacement(self, pose: LoadedPose, j: int) -> Number:
         """The virtual displacement on which it does work, for a unit of input j; None where it cannot move."""
         if not self.carries:
             return None
-        return block.turning(self.body, j) if self.path is None else block.coefficient(self.path, j)
+        return pose.turning(self.body, j) if self.path is None else pose.coefficient(self.path, j)
 
-    def power(self, block: Block, j: int) -> Number:
+    def power(self, pose: LoadedPose, j: int) -> Number:
         """Its virtual work for a unit of input j, or None: it is not evaluated where nothing moves."""
-        moved = self.displacement(block, j)
-        return None if moved is None else self.work(block.formed(self), moved)
+        moved = self.displacement(pose, j)
+        return None if moved is None else self.work(pose.formed(self), moved)
 
     def work(self, value: Number, moved: Number) -> Number:
         """The work of its value on a displacement."""
@@ -90,30 +92,30 @@ class Load:
             return None
         return value * moved if self.path is None else dot(value, moved)
 
-    def elastic(self, block: Block) -> Number:
+    def elastic(self, pose: LoadedPose) -> Number:
         """The part of `power` that its potential holds; None where it stores nothing."""
         return None
 
-    def wasted(self, block: Block, j: int) -> Number:
+    def wasted(self, pose: LoadedPose, j: int) -> Number:
         """The part of `power` that no potential and no speed holds: of dampers, applied loads, drives."""
-        return None if self.stores or self.kind in OWN else self.power(block, j)
+        return None if self.stores or self.kind in OWN else self.power(pose, j)
 
-    def potential(self, block: Block) -> Number:
+    def potential(self, pose: LoadedPose) -> Number:
         """Its potential, J; NaN where it has none, None on the side that does not carry."""
         return np.nan
 
-    def second(self, block: Block, rates: Rates) -> Number:
+    def second(self, pose: LoadedPose, rates: Rates) -> Number:
         """The derivative of its virtual work along a direction in the inputs, over which the rates are taken."""
-        value = block.formed(self)
+        value = pose.formed(self)
         if value is None:
             return None
         if self.path is None:
             return times(angle_rate(rates, self.body, 2), value)
         total = times_dot(value, rates.vector(self.path, 2))
         first = rates.vector(self.path, 1)
-        return total if first is None else plus(total, times_dot(self.turned(block, rates), first))
+        return total if first is None else plus(total, times_dot(self.turned(pose, rates), first))
 
-    def turned(self, block: Block, rates: Rates) -> Number:
+    def turned(self, pose: LoadedPose, rates: Rates) -> Number:
         """The derivative of a force itself along the direction of the rates."""
         return None
 
@@ -134,18 +136,18 @@ class Constant(Load):
 
     amount: Number = 0.0
 
-    def form(self, block: Block) -> Number:
+    def form(self, pose: LoadedPose) -> Number:
         return self.amount
 
     def combination(self, force_terms: ForceTerms) -> Combination:
         return Combination({None: self.amount})
 
-    def potential(self, block: Block) -> Number:
+    def potential(self, pose: LoadedPose) -> Number:
         if self.path is not None:
-            return -dot(self.amount, block.position(self.path))
-        angle = block.setting.plan.angles[self.body]
+            return -dot(self.amount, pose.position(self.path))
+        angle = pose.setting.plan.angles[self.body]
         # of a torque on a link whose whole turns are not known there is none
-        return np.nan if not angle.by_inputs else -self.amount * block.st.affine(angle)
+        return np.nan if not angle.by_inputs else -self.amount * pose.st.affine(angle)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,15 +156,15 @@ class Follower(Load):
 
     amount: complex = 0j
 
-    def form(self, block: Block) -> Number:
-        return self.amount * block.st.turn[self.body]
+    def form(self, pose: LoadedPose) -> Number:
+        return self.amount * pose.st.turn[self.body]
 
     def combination(self, force_terms: ForceTerms) -> Combination:
         return Combination({force_terms(Turned, self.body, None): self.amount})
 
-    def turned(self, block: Block, rates: Rates) -> Number:
+    def turned(self, pose: LoadedPose, rates: Rates) -> Number:
         turning = angle_rate(rates, self.body, 1)
-        return None if turning is None else 1j * block.formed(self) * turning
+        return None if turning is None else 1j * pose.formed(self) * turning
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +191,7 @@ class Tabled(Load):
             q = at[0] + np.mod(q - at[0], at[-1] - at[0])
         return at, force, q
 
-    def place_in(self, block: Block) -> Number:
+    def place_in(self, pose: LoadedPose) -> Number:
         """What the table is over, at a pose.
 
         Raises
@@ -198,15 +200,15 @@ class Tabled(Load):
             Where it is over the time, and the poses have none.
         """
         if self.axis == "input":
-            return block.st.inputs[0]
+            return pose.st.inputs[0]
         if self.axis == "time":
-            return self.timed(block.time)
+            return self.timed(pose.time)
         if self.axis == "speed":
-            return 0.0 if block.omega(self.body) is None else block.omega(self.body)
-        angle = block.setting.plan.angles[self.body]
+            return 0.0 if pose.omega(self.body) is None else pose.omega(self.body)
+        angle = pose.setting.plan.angles[self.body]
         if angle.by_inputs:
-            return block.st.affine(angle)
-        return self.in_turn(block.st.kind.angle(block.st.turn[self.body]))
+            return pose.st.affine(angle)
+        return self.in_turn(pose.st.kind.angle(pose.st.turn[self.body]))
 
     def timed(self, time: Number) -> Number:
         """The time; refused where the poses have none."""
@@ -227,18 +229,18 @@ class Tabled(Load):
         values = np.where(outside, np.nan, np.interp(q, at, force.real) + 1j * np.interp(q, at, force.imag))
         return values if values.ndim else complex(values)
 
-    def form(self, block: Block) -> Number:
-        result = block.table(self)
+    def form(self, pose: LoadedPose) -> Number:
+        result = pose.table(self)
         if self.path is None:
             return result.real
-        return result * block.st.turn[self.body] if self.link_axes else result
+        return result * pose.st.turn[self.body] if self.link_axes else result
 
-    def second(self, block: Block, rates: Rates) -> Number:
-        total = super().second(block, rates)
+    def second(self, pose: LoadedPose, rates: Rates) -> Number:
+        total = super().second(pose, rates)
         first = angle_rate(rates, self.body, 1)
         if self.path is not None or self.axis != "angle" or first is None:
             return total
-        return plus(total, block.slope(self).real * first * first)
+        return plus(total, pose.slope(self).real * first * first)
 
     def slope(self, q: Number) -> Number:
         """The slope of the table at places of it."""
@@ -247,14 +249,14 @@ class Tabled(Load):
         values = np.diff(force)[place] / np.diff(at)[place]
         return values if values.ndim else complex(values)
 
-    def turned(self, block: Block, rates: Rates) -> Number:
+    def turned(self, pose: LoadedPose, rates: Rates) -> Number:
         """Its derivative over the input, in ground axes."""
-        steep = block.slope(self)
+        steep = pose.slope(self)
         if not self.link_axes:
             return steep
-        turning = block.by[0].angle[self.body][0]
-        along = steep * block.st.turn[self.body]
-        return along if turning is None else along + 1j * turning * block.formed(self)
+        turning = pose.by[0].angle[self.body][0]
+        along = steep * pose.st.turn[self.body]
+        return along if turning is None else along + 1j * turning * pose.formed(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,9 +267,9 @@ class InertiaForce(Load):
     acceleration: Combination = field(default_factory=Combination)
     order = 2
 
-    def form(self, block: Block) -> Number:
+    def form(self, pose: LoadedPose) -> Number:
         assert self.path is not None
-        return block.acceleration(self.path, -self.mass)
+        return pose.acceleration(self.path, -self.mass)
 
     def combination(self, force_terms: ForceTerms) -> Combination:
         return self.acceleration.times(-self.mass)
@@ -280,8 +282,8 @@ class InertiaTorque(Load):
     inertia: float = 0.0
     order = 2
 
-    def form(self, block: Block) -> Number:
-        return block.alpha(self.body, -self.inertia)
+    def form(self, pose: LoadedPose) -> Number:
+        return pose.alpha(self.body, -self.inertia)
 
     def combination(self, force_terms: ForceTerms) -> Combination:
         return Combination({force_terms.second("angle", self.body): -self.inertia})
@@ -299,18 +301,56 @@ class FrictionLoad(Load):
     sign: float = 1.0
     guide: int | None = None
 
-    def form(self, block: Block) -> Number:
-        return times(block.friction.get(self.number), self.sign)
+    def form(self, pose: LoadedPose) -> Number:
+        return times(pose.friction.get(self.number), self.sign)
 
-    def arm(self, block: Block, center: complex) -> Number:
+    def arm(self, pose: LoadedPose, center: complex) -> Number:
         if self.rail is None:
-            return super().arm(block, center)
-        along = block.setting.plan.directions[self.rail] * block.st.slide[self.rail]
-        return (self.place - center + along) * block.st.turn[self.body]
+            return super().arm(pose, center)
+        along = pose.setting.plan.directions[self.rail] * pose.st.slide[self.rail]
+        return (self.place - center + along) * pose.st.turn[self.body]
 
-    def displacement(self, block: Block, j: int) -> Number:
-        on = GROUND if self.guide is None else block.setting.mechanism.guides[self.guide].on
+    def displacement(self, pose: LoadedPose, j: int) -> Number:
+        on = GROUND if self.guide is None else pose.setting.mechanism.guides[self.guide].on
         if self.guide is None or on == GROUND or not self.carries:
-            return super().displacement(block, j)
-        along = block.setting.plan.directions[self.guide] * block.st.turn[on]
-        return times(block.by[j].slide[self.guide][0], self.sign * along)
+            return super().displacement(pose, j)
+        along = pose.setting.plan.directions[self.guide] * pose.st.turn[on]
+        return times(pose.by[j].slide[self.guide][0], self.sign * along)
+
+
+def applied_loads(loads: Iterable[Load], link: str) -> list[Load]:
+    """What acts on a link but its weight and inertia."""
+    return [load for load in loads if load.body == link and load.kind not in OWN]
+
+
+def reduced(loads: Iterable[Load], pose: LoadedPose, center: complex) -> tuple[Number, Number]:
+    """The sum of a link's loads at a pose and their moment about a point of the link; None where zero."""
+    return _summed(loads, pose, lambda load: load.arm(pose, center))
+
+
+def shaking_loads(loads: Iterable[Load]) -> list[Load]:
+    """What acts on the moving links from outside."""
+    return [load for load in loads if load.kind in EXTERNAL and load.body != GROUND]
+
+
+def resultant(loads: Iterable[Load], pose: LoadedPose) -> tuple[Number, Number]:
+    """The sum of loads at a pose and their moment about the ground's origin; None where zero."""
+    return _summed(loads, pose, lambda load: None if load.path is None else pose.position(load.path))
+
+
+def _summed(loads: Iterable[Load], pose: LoadedPose, arm: Callable[[Load], Number]) -> tuple[Number, Number]:
+    """The sum of loads, and their moment by the arm of each."""
+    force: Number = None
+    moment: Number = None
+    for load in loads:
+        value = pose.formed(load)
+        if value is None:
+            continue
+        if load.path is None:
+            moment = plus(moment, value)
+            continue
+        force = plus(force, value)
+        at = arm(load)
+        if at is not None:
+            moment = plus(moment, cross(at, value))
+    return force, moment

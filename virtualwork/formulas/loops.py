@@ -90,7 +90,7 @@ class Twist(Quantity, kind="twist"):
         if all(recording.plan.angles[body].by_inputs for body in spring.links):
             # the inputs alone fix it, whole turns included
             return 0.0
-        from virtualwork.formulas.block import Shared
+        from virtualwork.formulas.loaded_pose import Shared
 
         recording.solve([f"angle:{body}" for body in spring.links], 0)
         return Shared.within(recording.st, spring)

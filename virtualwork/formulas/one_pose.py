@@ -11,10 +11,11 @@ from typing import Any
 from numpy import array, empty
 
 from dalembert.dataclass import dataclass, field
+from virtualwork.formulas.branch import Branch
 from virtualwork.formulas.lanes import OFTEN
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.quantity import Quantity
-from virtualwork.formulas.tapes import Ready, Turning, ready
+from virtualwork.formulas.tapes import Ready, ready
 
 
 @dataclass
@@ -32,14 +33,14 @@ class OnePose:
 
     Parameters
     ----------
-    branch : Turning
+    branch : Branch
     numbers : tuple of float
         The input, its speed, acceleration and jerk.
     """
 
     __slots__ = ("_first", "branch", "known", "numbers")
 
-    def __init__(self, branch: Turning, numbers: tuple[float, float, float, float]) -> None:
+    def __init__(self, branch: Branch, numbers: tuple[float, float, float, float]) -> None:
         self.branch, self.numbers = branch, numbers
         self.known: dict[Quantity, float | complex] = {}
         self._first: Together | None = None
@@ -104,7 +105,7 @@ class OnePose:
         return True
 
 
-def one_pose(branch: Turning, angle: Any, speed: Any, acceleration: Any, jerk: Any) -> OnePose | None:
+def one_pose(branch: Branch, angle: Any, speed: Any, acceleration: Any, jerk: Any) -> OnePose | None:
     """The one pose at a float, over one input; None where it is anything else. A rate of None is the description's own."""
     entries = branch.mechanism.inputs
     if not isinstance(angle, float) or len(entries) > 1:

@@ -13,14 +13,17 @@ from functools import cached_property
 from typing import Any
 
 from dalembert.arithmetic.recorded import bare
-from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.block import Block
+from virtualwork.describe.parts import GROUND, TorsionSpring
 from virtualwork.formulas.effort import generalized_force
+from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.load_paths import LoadPaths
-from virtualwork.formulas.numbers import Number, dot, minus, plus
-from virtualwork.formulas.quantity import Quantity
+from virtualwork.formulas.loaded_pose import LoadedPose, Shared, Table
+from virtualwork.formulas.loads import applied_loads, reduced, resultant, shaking_loads
+from virtualwork.formulas.numbers import WRITTEN, Number, dot, minus, plus
+from virtualwork.formulas.positions import State
+from virtualwork.formulas.quantity import Quantity, Recording
+from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.reactions import JointForces
-from virtualwork.formulas.resultants import applied_loads, reduced, resultant, shaking_loads
 from virtualwork.formulas.statics import Column, equations, mesh_column, unknowns
 
 # a rate of a contact beside those of all links that is rounding alone, also where the pose is ill-conditioned
@@ -34,7 +37,7 @@ class PoseForces:
     ----------
     paths : LoadPaths
     joints : JointForces
-    block : Block
+    pose : LoadedPose
         The pose as the loads see it.
     formed : dict of quantity to its value
 
@@ -51,22 +54,23 @@ class PoseForces:
     def __init__(
         self,
         paths: LoadPaths,
-        block: Block,
+        pose: LoadedPose,
         solve: Callable[[Iterable[str], int], None],
         system: Callable[[list[list[Number]], list[Number]], list[Number]],
         enter: Callable[[str], Number],
     ) -> None:
         self.paths, self.case, self.mechanism = paths, paths.case, paths.mechanism
-        self.block, self.solve, self.system_of, self.enter = block, solve, system, enter
+        self.pose, self.solve, self.system_of, self.enter = pose, solve, system, enter
         self.joints = JointForces(paths)
         self.formed: dict[Quantity, Number] = {}
-        block.drive = self.effort
+        self._placed = False
+        pose.drive = self.effort
         solve(*self.case.targets())
         if self.case.contacts:
             self.solve_places()
         for n, (joint, *_) in enumerate(self.case.contacts):
             rub = enter(f"friction {n}")
-            block.friction[n] = rub if joint.guide is None else rub * self.joints.rail(block, joint.guide)
+            pose.friction[n] = rub if joint.guide is None else rub * self.joints.rail(pose, joint.guide)
 
     @property
     def redundant(self) -> bool:
@@ -74,8 +78,10 @@ class PoseForces:
         return bool(self.joints.redundant)
 
     def solve_places(self) -> None:
-        """Write down what the places of all joints depend on."""
-        self.solve(*self.case.targets(self.case.places))
+        """Solve what the places of all joints depend on, once."""
+        if not self._placed:
+            self.solve(*self.case.targets(self.case.places))
+            self._placed = True
 
     # --- the inputs and the ground ----------------------------------------------------------------------------------
     @cached_property
@@ -90,7 +96,7 @@ class PoseForces:
             link, carrier = str(m.inputs[j].link), m.carrier(j)
             self.solve([f"angle:{link}", f"angle:{carrier}"], 1)
             for i in range(k):
-                matrix[i][j] = self._apart(*(self.block.turning(body, i) for body in (link, carrier)))
+                matrix[i][j] = self._apart(*(self.pose.turning(body, i) for body in (link, carrier)))
         return self.system_of(matrix, force) if k > 1 else [force[0] / matrix[0][0]]
 
     def _apart(self, driven: Number, carried: Number) -> Number:
@@ -101,75 +107,75 @@ class PoseForces:
             return -carried
         rate = driven - carried
         least = AT_REST * (abs(driven) + abs(carried))
-        return self.block.kind.select(abs(rate) - least, rate, 0.0)
+        return self.pose.kind.select(abs(rate) - least, rate, 0.0)
 
     def effort(self, j: int) -> Number:
         return self.efforts[j]
 
     def generalized(self, j: int) -> Number:
-        value = generalized_force(self.paths, self.block, j)
+        value = generalized_force(self.paths, self.pose, j)
         return 0.0 if value is None else -bare(value)
 
     def newton_euler(self, j: int) -> Number:
         if self.redundant:
             return self._bears("force" if self.mechanism.inputs[j].is_slide else "torque", str(j))
         self.solve_places()
-        return self.joints.effort(self.block, j)
+        return self.joints.effort(self.pose, j)
 
     def shaking(self) -> tuple[Number, Number]:
-        return resultant(shaking_loads(self.case.loads), self.block)
+        return resultant(shaking_loads(self.case.loads), self.pose)
 
     # --- loads ------------------------------------------------------------------------------------------------------
     def applied(self, link: str) -> tuple[Number, Number]:
         self.solve([f"angle:{link}"], 0)
         loads = applied_loads(self.case.everything, link)
-        return reduced(loads, self.block, self.mechanism.rigid[link].center)
+        return reduced(loads, self.pose, self.mechanism.rigid[link].center)
 
     def load_place(self, number: int) -> Number:
         path = self.case.loads[number].path
         assert path is not None
         self.solve_places()
-        return self.block.position(path)
+        return self.pose.position(path)
 
     # --- joints -----------------------------------------------------------------------------------------------------
     def rail(self, guide: int) -> Number:
         self.solve_places()
-        return self.joints.rail(self.block, guide)
+        return self.joints.rail(self.pose, guide)
 
     def force(self, joint: str, body: str) -> Number:
         self.solve_places()
-        of, block = self.joints, self.block
+        of, pose = self.joints, self.pose
         at = of.by_key[joint]
         if not self.redundant:
-            return of.joint_force(block, at, body)
+            return of.joint_force(pose, at, body)
         if at.guide is not None:
             sign = 1.0 if body == self.mechanism.guides[at.guide].link else -1.0
-            across = (sign * self._bears("normal", joint)) * (1j * of.rail(block, at.guide))
-            return plus(across, of.rubbed(block, at, body))
+            across = (sign * self._bears("normal", joint)) * (1j * of.rail(pose, at.guide))
+            return plus(across, of.rubbed(pose, at, body))
         if body == GROUND:
             return -sum((self.force(joint, other) for other in at.bodies if other != GROUND), 0j)
         force = self._bears("fx", joint, body) + 1j * self._bears("fy", joint, body)
-        return plus(force, of.borne(block, at, body, self._tooth))
+        return plus(force, of.borne(pose, at, body, self._tooth))
 
     def moment(self, joint: str, body: str) -> Number:
         self.solve_places()
-        of, block = self.joints, self.block
+        of, pose = self.joints, self.pose
         guide, value = of.by_key[joint].guide, None
         if guide is not None and not self.redundant:
-            value = of.guide_moment(block, guide, body)
+            value = of.guide_moment(pose, guide, body)
         elif guide is not None and self.mechanism.guides[guide].is_slider:
-            value = plus(self._bears("moment", joint), of.beside(block, guide, self._tooth))
+            value = plus(self._bears("moment", joint), of.beside(pose, guide, self._tooth))
             value = value if body == self.mechanism.guides[guide].link else -value
         for load in self.case.friction:
             if load.path is None and load.joint == joint and load.body == body:
-                value = plus(value, load.form(block))
+                value = plus(value, load.form(pose))
         return value
 
     def contact(self, cam: int) -> Number:
         self.solve_places()
         self.solve(self.paths.touches.every[cam].targets, 0)
         push = self._bears("contact", str(cam)) if self.redundant else None
-        return self.joints.contact(self.block, cam, push)
+        return self.joints.contact(self.pose, cam, push)
 
     # --- redundant statics ------------------------------------------------------------------------------------------
     @cached_property
@@ -184,7 +190,7 @@ class PoseForces:
         for touch in self.paths.touches.every:
             self.solve(touch.targets, 0)
         entries: dict[tuple[int, int | None], Number] = {}
-        for row, column, part in equations(self.joints, self.block):
+        for row, column, part in equations(self.joints, self.pose):
             entries[row, column] = entries.get((row, column), 0.0) + bare(part)
         return entries
 
@@ -203,31 +209,78 @@ class PoseForces:
         if self.redundant:
             force = self.force(joint.key, body)
         else:
-            force = self.joints.on_side(self.block, (joint.key, body))
-            force = plus(force, self.joints.borne(self.block, joint, body))
+            force = self.joints.on_side(self.pose, (joint.key, body))
+            force = plus(force, self.joints.borne(self.pose, joint, body))
         if force is None or joint.guide is None:
             return force
-        return dot(force, 1j * self.joints.rail(self.block, joint.guide))
+        return dot(force, 1j * self.joints.rail(self.pose, joint.guide))
 
     def rubbing_rate(self, n: int) -> Number:
         self.solve_places()
         joint, body, other, *_ = self.case.contacts[n]
         if joint.guide is not None:
-            return self.block.slide_rate(joint.guide)
-        return minus(self.block.omega(body), self.block.omega(other))
+            return self.pose.slide_rate(joint.guide)
+        return minus(self.pose.omega(body), self.pose.omega(other))
 
     def slipping_rate(self, n: int) -> Number:
         """The rate of a contact, or 0 where it is nothing beside the rates of all links: the parts do not move against each other."""
         rate = self.rubbing_rate(n)
         if rate is None:
             return None
-        m, block = self.mechanism, self.block
+        m, pose = self.mechanism, self.pose
         self.solve([*(f"angle:{body}" for body in m.links), *(f"slide:{i}" for i in range(len(m.guides)))], 1)
         size = float(complex(m.size).real)
         all_: Number = 0.0
-        for turning in map(block.omega, m.links):
+        for turning in map(pose.omega, m.links):
             all_ = all_ if turning is None else all_ + abs(turning) * size
-        for sliding in map(block.slide_rate, range(len(m.guides))):
+        for sliding in map(pose.slide_rate, range(len(m.guides))):
             all_ = all_ if sliding is None else all_ + abs(sliding)
         least = all_ * (AT_REST if self.case.contacts[n][0].guide is not None else AT_REST / size)
-        return block.kind.select(abs(rate) - least, rate, 0.0)
+        return pose.kind.select(abs(rate) - least, rate, 0.0)
+
+
+class RecordedSetting(Shared):
+    """Rates and twists that enter the tape."""
+
+    def __init__(self, recording: Recording) -> None:
+        super().__init__(recording.mechanism, recording.plan)
+        self.recording = recording
+
+    @property
+    def rates(self) -> tuple[Number, Number]:
+        """q̇ and q̈ of the one input."""
+        speed, acceleration, _ = self.recording.rates
+        return speed[0], acceleration[0]
+
+    def wound(self, spring: TorsionSpring, st: State, within: Number) -> Number:
+        """The twist next to the one that enters."""
+        number = self.mechanism.torsion_springs.index(spring)
+        return self.recording.unwrapped(f"near spring {number}", WRITTEN.exp(within))
+
+
+class RecordedPose(LoadedPose):
+    """The recorded pose as the loads see it."""
+
+    def __init__(self, recording: Recording, along: Rates | None, by: list[Rates]) -> None:
+        super().__init__(RecordedSetting(recording), recording.st, along, by)
+        self.recording = recording
+
+    def table(self, load: Table) -> Number:
+        """The force of a table, as it enters."""
+        return self._entering("table", load)
+
+    def slope(self, load: Table) -> Number:
+        """How steep it is, as it enters."""
+        return self._entering("slope", load)
+
+    def _entering(self, what: str, load: Table) -> Number:
+        number = next(i for i, of in enumerate(self.recording.tables) if load.alike(of))
+        enter = self.recording.recorder.input
+        return WRITTEN.join(enter(f"{what} {number} x"), enter(f"{what} {number} y"))
+
+
+def forces_of(recording: Recording) -> PoseForces:
+    """The forces of the recorded pose; friction and redundant joint forces enter the tape."""
+    paths = LoadPaths(LoadCase(recording.mechanism, recording.plan, any(recording.moves[:2])))
+    pose = RecordedPose(recording, recording.together, recording.by)
+    return PoseForces(paths, pose, recording.solve, recording.kind.system, recording.recorder.input)

@@ -10,79 +10,20 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property, partial
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.engines import as_part
-from dalembert.arithmetic.guard import Lock, guarded
-from virtualwork.describe.description import Description
+from dalembert.arithmetic.guard import guarded
+from virtualwork.formulas.branch import Branch
 from virtualwork.formulas.kinematics import Angle, Kinematic, Partial, Point
 from virtualwork.formulas.numbers import Complexes, Number, Reals, condition, real_array
 from virtualwork.formulas.positions import BLOCK, State, columns, run
 from virtualwork.formulas.quantity import Quantity
-from virtualwork.formulas.rates import Passage, Rates, chain_rule
-from virtualwork.plan.steps import Group, Plan, Step
-
-
-class Branch(Protocol):
-    """One assembly of a mechanism, as its poses need it: what to solve, and which way every loop closes."""
-
-    @property
-    def lock(self) -> Lock:
-        """Of all that is worked out of it."""
-
-    @property
-    def mechanism(self) -> Description:
-        """What moves."""
-
-    @property
-    def plan(self) -> Plan:
-        """The order of solution."""
-
-    @property
-    def prepared(self) -> dict[bool, Any]:
-        """What acts at rest (False) and in motion (True), made once for all poses."""
-
-    @property
-    def load_paths(self) -> dict[bool, Any]:
-        """How the loads bear on joints and inputs, at rest (False) and in motion (True)."""
-
-    @property
-    def merged(self) -> tuple[Plan, Group | None]:
-        """All loops at once."""
-
-    @property
-    def passage(self) -> Passage | None:
-        """How derivatives go through change points; None with several inputs."""
-
-    @property
-    def recordings(self) -> dict[Any, Any]:
-        """What has been written down of it."""
-
-    @property
-    def together(self) -> dict[Any, Any]:
-        """What one pose that is requested again and again brings with a first request (`one_pose`)."""
-
-    @property
-    def known_steps(self) -> dict[tuple[str, ...], tuple[Step, ...]]:
-        """The steps that targets depend on, as far as requested."""
-
-    @property
-    def plain(self) -> dict[str, Callable[[State], None]]:
-        """The closed forms that keep their sign wherever the input goes, each ready to be solved."""
-
-    @property
-    def close(self) -> Callable[[Group, State], None]:
-        """Closes the loops of any other group on its branch."""
-
-    def cover(self, low: float, high: float) -> None:
-        """Look for change points and limits over the inputs from low to high."""
-
-    @property
-    def may_open(self) -> bool:
-        """Whether it cannot be assembled somewhere in what was covered, as far as is known."""
+from virtualwork.formulas.rates import Rates, chain_rule
+from virtualwork.plan.steps import Step
 
 
 def as_inputs(angle: ArrayLike, k: int) -> Reals:

@@ -41,7 +41,7 @@ class Planned(Protocol):
 
 
 class Recording(Planned, Protocol):
-    """What is written down, as quantities and the recorded block need it; see `recording.Recording`."""
+    """What is written down, as quantities and the recorded pose need it; see `recording.Recording`."""
 
     @property
     def kind(self) -> Written: ...

@@ -14,13 +14,19 @@ Inputs of a tape
 `table 0 x`, `table 0 y` the force of the first load that is given by a table
 `slope 0 x`, `slope 0 y` its derivative to what the table is over
 `time`                   where a table is over it
+
+Groups of which every derivative enters (`Entering`)
+----------------------------------------------------
+They are groups without a closed form where their Jacobian is singular, groups that are singular in every pose, and groups close
+to a change point, where two branches meet and a series gives what the Jacobian cannot. Whoever runs the tape solves for each
+derivative in turn: the columns of the Jacobian and what its loops have without it (`RightSide`) are on the tape.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dalembert.arithmetic.guard import Lock, guarded, own_lock
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare, squared
@@ -98,6 +104,8 @@ class Recording:
         # in time, with several inputs
         self.together = self.rates_of(k, given) if k > 1 else None
         self._done: set[tuple[int, int, int]] = set()
+        # what is solved, to which order
+        self._solved: dict[str, int] = {}
         self._values: dict[Quantity, Number] = {}
         # tapes of what studies make of the pose
         self.forms: dict[str, Tape] = {}
@@ -152,8 +160,9 @@ class Recording:
 
     def solve(self, targets: Iterable[str], order: int) -> None:
         """Write down what targets depend on, up to an order of derivatives."""
-        steps = self.plan.needed(targets)
-        for k in range(order + 1):
+        new = [target for target in targets if self._solved.get(target, -1) < order]
+        steps = self.plan.needed(new) if new else ()
+        for k in range(order + 1) if new else ():
             ways: list[tuple[int, Rates | None]] = [(-1, None)] if k == 0 else [*enumerate(self.by)]
             if k and self.together is not None:
                 ways.append((len(self.by), self.together))
@@ -167,6 +176,7 @@ class Recording:
                         run([step], self.st, self._close)
                     else:
                         rates.advance([step], k)
+        self._solved.update(dict.fromkeys(new, order))
 
     @property
     def along(self) -> Rates:
@@ -185,7 +195,7 @@ class Recording:
         """The loads over the recorded pose, with everything solved that they depend on."""
         if self._forces is None:
             # a dozen files: a motion without forces does not load them
-            from virtualwork.formulas.recorded_forces import forces_of
+            from virtualwork.formulas.pose_forces import forces_of
 
             self._forces = forces_of(self)
         return self._forces
@@ -231,7 +241,7 @@ class Recording:
         """What is written down that much depends on: directions, slides, and of forces what blocks keep too."""
         yield from (*self.st.turn.values(), *self.st.slide.values())
         if self._forces:
-            yield from (value[1] for of, value in self._forces.block.kept.items() if of.lasts)
+            yield from (value[1] for of, value in self._forces.pose.kept.items() if of.lasts)
 
     @cached_property
     def loops(self) -> Group | None:
@@ -243,3 +253,67 @@ class Recording:
         of = next(g for g in self.plan.groups if g.name == group)
         self.solve(self.plan.writes(of), 0)
         return of
+
+
+class Entering(Recording):
+    """The formulas of an assembly in which some groups enter.
+
+    Further inputs of the tape: `x GROUP 0` of these groups too, and `rate GROUP 0 1 0`, of the first unknown the first
+    derivative over input 0 (in time: over the count of the inputs).
+    """
+
+    def __init__(self, entering: Iterable[str], *of: Any, **more: Any) -> None:
+        self.entering = frozenset(entering)
+        # the right sides that were met on the way, by group, order and way
+        self.right: dict[tuple[str, int, int], list[Number]] = {}
+        super().__init__(*of, **more)
+
+    def rates_of(self, way: int, given: list[list[Number]]) -> Rates:
+        return _Entering(self, way, given)
+
+    def enters(self, group: Group) -> bool:
+        return group.name in self.entering
+
+
+class GroupColumn(Quantity, kind="group column"):
+    """An entry of the Jacobian of a group: of a loop, by an unknown."""
+
+    is_vector = True
+    group: str
+    loop: int
+    unknown: int
+
+    def write(self, recording: Entering) -> Number:
+        return columns(recording.solved(self.group), recording.st)[self.loop][self.unknown]
+
+
+class RightSide(Quantity, kind="right side"):
+    """A derivative of a loop without the unknowns' own of that order: over an input, or in time (`way`)."""
+
+    is_vector = True
+    group: str
+    loop: int
+    way: int
+    order: int
+
+    def write(self, recording: Entering) -> Number:
+        recording.solve(recording.plan.writes(recording.solved(self.group)), self.order)
+        return recording.right[self.group, self.order, self.way][self.loop]
+
+
+class _Entering(Rates):
+    """Derivatives of which those of some groups enter."""
+
+    def __init__(self, recording: Entering, way: int, given: list[list[Number]]) -> None:
+        super().__init__(recording.plan, recording.st, given)
+        self.recording, self.way = recording, way
+
+    def _group(self, group: Group, k: int) -> None:
+        if not self.recording.enters(group):
+            super()._group(group, k)
+            return
+        name = group.name
+        self.recording.right[name, k, self.way] = self.right_side(group, k)
+        count = len(group.angles) + len(group.slides)
+        enter = self.recording.recorder.input
+        self.write(group, k, [enter(f"rate {name} {i} {k} {self.way}") for i in range(count)])

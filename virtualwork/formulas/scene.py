@@ -10,9 +10,9 @@ import numpy as np
 
 from dalembert.arithmetic.guard import guarded
 from virtualwork.describe.parts import Rigid
-from virtualwork.formulas.block import Block, Setting
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.load_paths import LoadPaths
+from virtualwork.formulas.loaded_pose import LoadedPose, Setting
 from virtualwork.formulas.loads import FrictionLoad, Load
 from virtualwork.formulas.numbers import ONE, Number, leave_out
 from virtualwork.formulas.pose_forces import PoseForces
@@ -84,14 +84,14 @@ class Scene:
         """
         k = len(self.mechanism.inputs)
         by = [self.poses.along(j if k > 1 else -1) for j in range(k)]
-        block = Block(self.setting, by[0].st, self.poses.along() if k > 1 and self.moves else None, by)
-        return PoseForces(self.paths, block, self._solve, ONE.system, _outside)
+        pose = LoadedPose(self.setting, by[0].st, self.poses.along() if k > 1 and self.moves else None, by)
+        return PoseForces(self.paths, pose, self._solve, ONE.system, _outside)
 
     @property
-    def block(self) -> Block:
+    def pose(self) -> LoadedPose:
         """The pose as the loads see it: of floats, or written down."""
-        block: Block = (self.poses.recording.forces if self.on_tape else self.forces).block
-        return block
+        pose: LoadedPose = (self.poses.recording.forces if self.on_tape else self.forces).pose
+        return pose
 
     def along(self, targets: Iterable[str]) -> Rates | None:
         """The derivatives of one pose to the second order along its rates; None at a singular pose."""
@@ -110,7 +110,7 @@ class Scene:
 
     def over(
         self,
-        forms: Sequence[Callable[[Block], Number]],
+        forms: Sequence[Callable[[LoadedPose], Number]],
         kind: type,
         targets: Iterable[str] = (),
         order: int = 1,
@@ -127,7 +127,7 @@ class Scene:
         try:
             self.forces.solve_places()
             self._solve(wanted, order)
-            values = [form(self.forces.block) for form in forms]
+            values = [form(self.forces.pose) for form in forms]
         except (ZeroDivisionError, OverflowError):
             return self.poses.formed(forms, kind, wanted, order, name)
         result: list[Any] = [np.array([0.0 if value is None else value], kind) for value in values]

@@ -1,7 +1,7 @@
 """What tapes of poses need from outside, and the poses whose derivatives enter a tape.
 
 Unknowns of groups without a closed form, friction and redundant statics enter (`entering`). Close to a change point, where two
-branches meet, and at singular poses the groups' derivatives enter too (`formulas.entering`): a series carries them through.
+branches meet, and at singular poses the groups' derivatives enter too (`formulas.recording`): a series carries them through.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from dalembert.arithmetic.engines import Outputs, run
 from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.recorded import bare
 from dalembert.arithmetic.tape import Tape
-from virtualwork.formulas.entering import GroupColumn, RightSide
 from virtualwork.formulas.forces import Bearing, Effort, Entry
 from virtualwork.formulas.group_loops import unknowns
 from virtualwork.formulas.kinematics import AnglePartial
@@ -35,12 +34,12 @@ from virtualwork.formulas.numbers import (
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.rates import crossed, passed
-from virtualwork.formulas.recording import NAMES, NEAR, Recording
-from virtualwork.formulas.tapes import Turning, entered, recorded, taped
+from virtualwork.formulas.recording import NAMES, NEAR, GroupColumn, Recording, RightSide
+from virtualwork.formulas.tapes import entered, recorded, taped
 from virtualwork.plan.steps import Group
 
 if TYPE_CHECKING:
-    from virtualwork.formulas.block import Block
+    from virtualwork.formulas.loaded_pose import LoadedPose
     from virtualwork.formulas.loads import Tabled
     from virtualwork.formulas.statics import Statics
 
@@ -48,8 +47,6 @@ if TYPE_CHECKING:
 @guarded
 class Solving(Poses):
     """Poses of an assembly, with what their tapes need."""
-
-    branch: Turning
 
     def _begin(self) -> None:
         super()._begin()
@@ -76,7 +73,7 @@ class Solving(Poses):
 
     def formed(
         self,
-        forms: Sequence[Callable[[Block], Number]],
+        forms: Sequence[Callable[[LoadedPose], Number]],
         kind: type,
         targets: Iterable[str] = (),
         order: int = 1,
@@ -113,7 +110,7 @@ class Solving(Poses):
 
     def _written(
         self,
-        forms: Sequence[Callable[[Block], Number]],
+        forms: Sequence[Callable[[LoadedPose], Number]],
         targets: tuple[str, ...],
         order: int,
         doubts: Sequence[Quantity],
@@ -124,7 +121,7 @@ class Solving(Poses):
         recording.forces.solve_places()
         recording.solve(targets, order)
         for i, form in enumerate(forms):
-            value = form(recording.forces.block)
+            value = form(recording.forces.pose)
             value = 0.0 if value is None else bare(value)
             outputs |= {f"{i} x": value.real, f"{i} y": value.imag}
         return recording.recorder.tape(outputs)

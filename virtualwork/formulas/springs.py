@@ -6,7 +6,7 @@ from typing import Any
 
 from dalembert.dataclass import dataclass, field
 from virtualwork.describe.parts import Spring, TorsionSpring
-from virtualwork.formulas.block import Block
+from virtualwork.formulas.loaded_pose import LoadedPose
 from virtualwork.formulas.loads import Load, angle_rate, times_dot
 from virtualwork.formulas.numbers import TOGETHER, Number, dot, minus, plus, times
 from virtualwork.formulas.rates import Rates
@@ -19,31 +19,31 @@ class SpringSide(Load):
 
     spring: Spring | TorsionSpring = field(kw_only=True)
 
-    def stretch(self, block: Block) -> Number:
+    def stretch(self, pose: LoadedPose) -> Number:
         """How far the spring is from free."""
         raise NotImplementedError
 
-    def pull(self, block: Block) -> Number:
+    def pull(self, pose: LoadedPose) -> Number:
         """The spring's own part of its value."""
         raise NotImplementedError
 
-    def damped(self, block: Block) -> Number:
+    def damped(self, pose: LoadedPose) -> Number:
         """The damper's part."""
         raise NotImplementedError
 
-    def form(self, block: Block) -> Number:
-        return plus(self.pull(block), self.damped(block))
+    def form(self, pose: LoadedPose) -> Number:
+        return plus(self.pull(pose), self.damped(pose))
 
-    def elastic(self, block: Block) -> Number:
-        return self.work(self.pull(block), self.displacement(block, 0)) if self.carries else None
+    def elastic(self, pose: LoadedPose) -> Number:
+        return self.work(self.pull(pose), self.displacement(pose, 0)) if self.carries else None
 
-    def wasted(self, block: Block, j: int) -> Number:
-        return self.work(self.damped(block), self.displacement(block, j)) if self.carries else None
+    def wasted(self, pose: LoadedPose, j: int) -> Number:
+        return self.work(self.damped(pose), self.displacement(pose, j)) if self.carries else None
 
-    def potential(self, block: Block) -> Number:
+    def potential(self, pose: LoadedPose) -> Number:
         if not self.carries:
             return None
-        stretch = self.stretch(block)
+        stretch = self.stretch(pose)
         return 0.5 * self.spring.stiffness * stretch * stretch
 
 
@@ -61,48 +61,48 @@ class SpringEnd(SpringSide):
         """The vector from this end to the other, or its rate."""
         return minus(of(self.other), of(self.path))
 
-    def _inverse(self, block: Block, d: Number) -> Number:
+    def _inverse(self, pose: LoadedPose, d: Number) -> Number:
         """1/l; NaN where the spring has no length, and its pull no direction."""
-        length = block.kind.sqrt(d.real * d.real + d.imag * d.imag)
-        return block.kind.inverse(length, TOGETHER * block.setting.mechanism.size)
+        length = pose.kind.sqrt(d.real * d.real + d.imag * d.imag)
+        return pose.kind.inverse(length, TOGETHER * pose.setting.mechanism.size)
 
-    def stretch(self, block: Block) -> Number:
-        return abs(self._between(block.position)) - self.spring.free_length
+    def stretch(self, pose: LoadedPose) -> Number:
+        return abs(self._between(pose.position)) - self.spring.free_length
 
-    def pull(self, block: Block) -> Number:
+    def pull(self, pose: LoadedPose) -> Number:
         s = self.spring
         if not s.stiffness:
             return None
-        d = self._between(block.position)
+        d = self._between(pose.position)
         if not s.free_length:
             # the pull is k·d: no direction is needed, and none is asked for at zero length
             return s.stiffness * d
-        return s.stiffness * (1 - s.free_length * self._inverse(block, d)) * d
+        return s.stiffness * (1 - s.free_length * self._inverse(pose, d)) * d
 
-    def damped(self, block: Block) -> Number:
-        rate = self._between(block.velocity) if self.spring.damping else None
+    def damped(self, pose: LoadedPose) -> Number:
+        rate = self._between(pose.velocity) if self.spring.damping else None
         if rate is None:
             return None
-        d = self._between(block.position)
-        inverse = self._inverse(block, d)
+        d = self._between(pose.position)
+        inverse = self._inverse(pose, d)
         return (self.spring.damping * dot(d, rate) * (inverse * inverse)) * d
 
-    def displacement(self, block: Block, j: int) -> Number:
+    def displacement(self, pose: LoadedPose, j: int) -> Number:
         if not self.carries:
             return None
-        moved = self._between(lambda path: block.coefficient(path, j))
+        moved = self._between(lambda path: pose.coefficient(path, j))
         return None if moved is None else -moved
 
-    def second(self, block: Block, rates: Rates) -> Number:
+    def second(self, pose: LoadedPose, rates: Rates) -> Number:
         """−k[(1 − l₀/l)(d′·d′ + d·d″) + l₀(d·d′)²/l³]."""
         s, d1 = self.spring, self._between(lambda path: rates.vector(path, 1))
         if not self.carries or not s.stiffness or d1 is None:
             return None
-        d, d2 = self._between(block.position), self._between(lambda path: rates.vector(path, 2))
+        d, d2 = self._between(pose.position), self._between(lambda path: rates.vector(path, 2))
         share: Number = 1.0
         bend: Number = 0.0
         if s.free_length:
-            inverse = self._inverse(block, d)
+            inverse = self._inverse(pose, d)
             share, bend = 1 - s.free_length * inverse, s.free_length * inverse**3 * dot(d, d1) ** 2
         return -s.stiffness * (share * plus(dot(d1, d1), times_dot(d, d2)) + bend)
 
@@ -122,26 +122,26 @@ class TorsionEnd(SpringSide):
         a, b = self.spring.links
         return minus(of(b), of(a))
 
-    def stretch(self, block: Block) -> Number:
-        return block.setting.twist(block.st, self.spring)
+    def stretch(self, pose: LoadedPose) -> Number:
+        return pose.setting.twist(pose.st, self.spring)
 
-    def pull(self, block: Block) -> Number:
+    def pull(self, pose: LoadedPose) -> Number:
         stiffness = self.spring.stiffness
-        return times(stiffness * self.stretch(block), self.sign) if stiffness else None
+        return times(stiffness * self.stretch(pose), self.sign) if stiffness else None
 
-    def damped(self, block: Block) -> Number:
-        rate = self._between(block.omega) if self.spring.damping else None
+    def damped(self, pose: LoadedPose) -> Number:
+        rate = self._between(pose.omega) if self.spring.damping else None
         return times(times(rate, self.spring.damping), self.sign)
 
-    def displacement(self, block: Block, j: int) -> Number:
+    def displacement(self, pose: LoadedPose, j: int) -> Number:
         if not self.carries:
             return None
-        return times(self._between(lambda body: block.turning(body, j)), -self.sign)
+        return times(self._between(lambda body: pose.turning(body, j)), -self.sign)
 
-    def second(self, block: Block, rates: Rates) -> Number:
+    def second(self, pose: LoadedPose, rates: Rates) -> Number:
         """−k(φ′² + φ·φ″)."""
         s, first = self.spring, self._between(lambda body: angle_rate(rates, body, 1))
         if not self.carries or not s.stiffness or first is None:
             return None
         bend = self._between(lambda body: angle_rate(rates, body, 2))
-        return -s.stiffness * plus(first * first, times(self.stretch(block), bend))
+        return -s.stiffness * plus(first * first, times(self.stretch(pose), bend))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.block import Block
+from virtualwork.formulas.loaded_pose import LoadedPose
 from virtualwork.formulas.numbers import Number, Reals, cross, imaginary_part, real_part
 from virtualwork.formulas.reactions import JointForces
 from virtualwork.plan.steps import Joint
@@ -54,8 +54,8 @@ def mesh_column(m: Description, mesh: int) -> Column:
     return "gear" if m.meshes[mesh].guide is None else "tooth", str(mesh), ""
 
 
-def equations(of: JointForces, block: Block) -> Iterator[tuple[int, int | None, Number]]:
-    """What each equation holds over a block: its row, the unknown (None: what acts), and the real factor.
+def equations(of: JointForces, pose: LoadedPose) -> Iterator[tuple[int, int | None, Number]]:
+    """What each equation holds at a pose: its row, the unknown (None: what acts), and the real factor.
 
     Three for each link, ΣF and ΣM about its centre of mass, then two for each pin that is not on the ground. Moments
     and torques are divided by the size. Parts of one entry may come one after the other.
@@ -76,7 +76,7 @@ def equations(of: JointForces, block: Block) -> Iterator[tuple[int, int | None, 
             yield 3 * links.index(body) + 2, column[unknown], factor
 
     for i, body in enumerate(links):
-        force, moment = of.force(block, body, touched=False), of.moment(block, body, touched=False)
+        force, moment = of.force(pose, body, touched=False), of.moment(pose, body, touched=False)
         if force is not None:
             yield 3 * i, None, real_part(force)
             yield 3 * i + 1, None, imaginary_part(force)
@@ -86,16 +86,16 @@ def equations(of: JointForces, block: Block) -> Iterator[tuple[int, int | None, 
         if joint.guide is None:
             for body in joint.bodies:
                 if body != GROUND:
-                    arm = of.place(block, (joint.key, body)) + 0j
+                    arm = of.place(pose, (joint.key, body)) + 0j
                     yield from put(body, ("fx", joint.key, body), 1 + 0j, arm)
                     yield from put(body, ("fy", joint.key, body), 1j, arm)
             continue
         g = m.guides[joint.guide]
-        rail = of.rail(block, joint.guide) + 0j
+        rail = of.rail(pose, joint.guide) + 0j
         for body, sign in ((g.link, 1.0), (g.on, -1.0)):
             if body == GROUND:
                 continue
-            arm = of.place(block, (joint.key, body)) + 0j
+            arm = of.place(pose, (joint.key, body)) + 0j
             yield from put(body, ("normal", joint.key, ""), sign * 1j * rail, arm)
             if g.is_slider:
                 yield from turn(body, ("moment", joint.key, ""), sign)
@@ -109,19 +109,19 @@ def equations(of: JointForces, block: Block) -> Iterator[tuple[int, int | None, 
             yield from turn(body, mesh_column(m, i), factor / unit)
         if mesh.guide is not None:
             g = m.guides[mesh.guide]
-            rail = of.rail(block, mesh.guide) + 0j
+            rail = of.rail(pose, mesh.guide) + 0j
             for body, sign in ((g.link, 1.0), (g.on, -1.0)):
                 if body != GROUND:
-                    arm = of.place(block, (f"guide:{mesh.guide}", body)) + 0j
+                    arm = of.place(pose, (f"guide:{mesh.guide}", body)) + 0j
                     yield from put(body, mesh_column(m, i), sign * rail, arm)
     for touch in of.paths.touches.every:
         # along the follower's coordinate, of an arm a torque over the size
-        here = touch.at(block.st)
+        here = touch.at(pose.st)
         push = here.unit() * (1.0 if touch.drive.guide is not None else size)
         for body in links:
             for sign in (sign for other, sign in of.paths.touches.on(body) if other is touch):
-                center = block.st.at(of.paths.case.path(body, m.rigid[body].center))
-                arm = touch.axis(block.st) - center + here.place()
+                center = pose.st.at(of.paths.case.path(body, m.rigid[body].center))
+                arm = touch.axis(pose.st) - center + here.place()
                 yield from put(body, ("contact", str(touch.drive.number), ""), sign * push, arm)
     for j, entry in enumerate(m.inputs):
         if not entry.is_slide:

@@ -1,72 +1,38 @@
-"""The tapes of an assembly: each is written once, for whoever asks, and kept with it."""
+"""The tapes of an assembly: each is written once, for whoever asks, and kept with it.
+
+A motion keeps of one request, for later ones, values that much depends on and that cost more to form than to read. The operations
+of a recording are numbered, whatever the request. The tape of a later request begins at the values that earlier ones have left:
+they enter it as `kept 0`, `kept 1`, … (`Later`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, Protocol
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Callable, Container, Iterator, Sequence
 
 from dalembert.arithmetic.engines import floats
-from dalembert.arithmetic.tape import Tape
-from virtualwork.formulas.entering import Entering
-from virtualwork.formulas.kept import Later, later
-from virtualwork.formulas.numbers import Number, Reals
-from virtualwork.formulas.poses import Branch
+from dalembert.arithmetic.recorded import Complex, Real
+from dalembert.arithmetic.tape import Operation, Tape, reached, shortened
+from dalembert.dataclass import dataclass
+from virtualwork.formulas.branch import Branch
+from virtualwork.formulas.numbers import Number
 from virtualwork.formulas.quantity import Quantity
-from virtualwork.formulas.recording import NAMES, Recording
+from virtualwork.formulas.recording import NAMES, Entering, Recording
 
 # tapes of later requests that an assembly keeps
 MANY = 256
+# operations that a value must spare those who ask later: what it takes to write an array and to read it
+WORTH = 10
+COSTS = {"sin": 10, "cos": 10, "atan2": 10, "div": 3, "sqrt": 3}
+# operations that a value may cost beside what is requested, to be left for later requests
+FEW = 2
+# operations of a recording up to which it is looked through at every new request
+LONGEST = 8000
 
 # quantities of one pose, real or complex, as a function of the input, its speed, acceleration and jerk
 Ready = Callable[[float, float, float, float], tuple[complex, ...]]
 
 
-class Turning(Branch, Protocol):
-    """A branch whose closed forms may change their sign along the input."""
-
-    @property
-    def signs(self) -> Mapping[str, int]:
-        """The sign of each closed form at the guess."""
-
-    @property
-    def geared(self) -> set[str]:
-        """Bodies whose angle itself is needed."""
-
-    @property
-    def recordings(self) -> dict[Any, Any]:
-        """What has been written down of it."""
-
-    @property
-    def turning_over(self) -> frozenset[str]:
-        """The closed forms that change their sign somewhere in what was covered."""
-
-    @property
-    def settled(self) -> bool:
-        """Whether no change point lies anywhere, however far the input turns."""
-
-    @property
-    def folded(self) -> set[str]:
-        """The groups that are singular in every pose."""
-
-    def sign(self, group: str, q: Reals) -> Number:
-        """The sign of a closed form at inputs."""
-
-    @property
-    def change_points(self) -> list[tuple[float, float]]:
-        """Where two branches meet, each with how far off poses are close to it, in what was covered."""
-
-    @property
-    def phases(self) -> Mapping[int, float]:
-        """The constants of gears, by their numbers."""
-
-    def close_to_change(self, q: Reals) -> NDArray[np.bool_]:
-        """Which inputs are close to a change point."""
-
-
-def recorded(branch: Turning, moves: tuple[bool, ...]) -> Recording:
+def recorded(branch: Branch, moves: tuple[bool, ...]) -> Recording:
     """The formulas of a branch, written down once for rates that are zero or not."""
     key = moves, branch.turning_over
     with branch.lock:
@@ -78,7 +44,7 @@ def recorded(branch: Turning, moves: tuple[bool, ...]) -> Recording:
     return result
 
 
-def entered(branch: Turning, moves: tuple[bool, ...]) -> Entering:
+def entered(branch: Branch, moves: tuple[bool, ...]) -> Entering:
     """The same where groups enter that have no closed form, are singular in every pose or have a change point."""
     changes = () if branch.passage is None else branch.passage.changes
     names = frozenset(g.name for g in branch.plan.groups if g.kind == "Newton").union(branch.folded, changes)
@@ -92,7 +58,7 @@ def entered(branch: Turning, moves: tuple[bool, ...]) -> Entering:
     return result
 
 
-def taped(branch: Turning, recording: Recording, keys: tuple[Quantity, ...]) -> Tape:
+def taped(branch: Branch, recording: Recording, keys: tuple[Quantity, ...]) -> Tape:
     """The tape of quantities, pruned once."""
     key = recording, keys
     with branch.lock:
@@ -103,7 +69,7 @@ def taped(branch: Turning, recording: Recording, keys: tuple[Quantity, ...]) -> 
 
 
 def cut(
-    branch: Turning, recording: Recording, keys: tuple[Quantity, ...], known: frozenset[int] | None
+    branch: Branch, recording: Recording, keys: tuple[Quantity, ...], known: frozenset[int] | None
 ) -> Later:
     """The tape of quantities, from what is known on; None where nothing is, nor to be left."""
     if known is None:
@@ -119,7 +85,7 @@ def cut(
         return result
 
 
-def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Quantity, ...]) -> Ready | None:
+def ready(branch: Branch, moves: tuple[bool, ...], keys: tuple[Quantity, ...]) -> Ready | None:
     """Quantities of one pose as a function of floats; None where they depend on more than the input and its rates.
 
     Such a mechanism has one input that turns, no change point, no limit, and a closed form for every group.
@@ -133,7 +99,7 @@ def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Quantity, ...]) 
     return result
 
 
-def _made(branch: Turning, moves: tuple[bool, ...], keys: tuple[Quantity, ...]) -> Ready | None:
+def _made(branch: Branch, moves: tuple[bool, ...], keys: tuple[Quantity, ...]) -> Ready | None:
     if len(branch.mechanism.inputs) > 1 or not branch.settled or branch.folded or branch.may_open:
         return None
     recording = recorded(branch, moves)
@@ -144,3 +110,79 @@ def _made(branch: Turning, moves: tuple[bool, ...], keys: tuple[Quantity, ...]) 
     if not floats.takes(tape) or not set(tape.inputs) <= set(arguments):
         return None
     return floats.compiled(tape, among=arguments, vectors=tuple(key.is_vector for key in keys))
+
+
+@dataclass(frozen=True)
+class Later:
+    """The tape of a request that comes after others.
+
+    Attributes
+    ----------
+    tape : Tape
+    takes : dict of an input's name to the operation whose value it is
+    leaves : dict of an output's name to the operation whose value it is
+    """
+
+    tape: Tape
+    takes: dict[str, int]
+    leaves: dict[str, int]
+
+
+def later(recording: Recording, keys: Sequence[Quantity], formed: Container[int]) -> Later:
+    """The tape of quantities from the values of operations that are known, and what it leaves besides."""
+    recorder = recording.recorder
+    with recording.lock:
+        outputs = recorder.numbers(recording.outputs(keys))
+        operations = recorder.operations
+        below = reached(operations, (number for _, number in outputs), formed)
+        # what is known with the other sign is not worked out anew
+        turned = {number: recorder.opposite(number) for number in below if number not in formed}
+    signs = {a: b for a, b in turned.items() if b is not None and b in formed and b < a}
+    if signs:
+        operations = [("neg", signs[k]) if k in signs else of for k, of in enumerate(operations)]
+        below = reached(operations, (number for _, number in outputs), formed)
+    takes = {number: f"kept {k}" for k, number in enumerate(number for number in below if number in formed)}
+    worth = _worth_keeping(recording, operations) if len(operations) <= LONGEST else set()
+    known = set(below)
+    others = (number for number in worth - known if number not in formed)
+    near = {number for number in others if _is_near(operations, number, known)}
+    leaves = {f"left {k}": number for k, number in enumerate(sorted((near | worth & known) - takes.keys()))}
+    tape = shortened(operations, [*outputs, *leaves.items()], takes)
+    return Later(tape, {name: number for number, name in takes.items()}, leaves)
+
+
+def _worth_keeping(recording: Recording, operations: Sequence[Operation]) -> set[int]:
+    """The operations whose values are the state of a pose and cost much, with nothing but others of these known."""
+    state = {number for value in recording.state() for number in _numbers(value)}
+    result: set[int] = set()
+    costs: list[int] = []
+    for number, operation in enumerate(operations):
+        cost = 0
+        if operation[0] not in ("const", "input"):
+            cost = COSTS.get(operation[0], 1)
+            for argument in operation[1:]:
+                cost += costs[argument]
+        if number in state and cost >= WORTH:
+            result.add(number)
+            cost = 0
+        costs.append(min(cost, WORTH))
+    return result
+
+
+def _is_near(operations: Sequence[Operation], number: int, known: set[int]) -> bool:
+    """Whether a value costs few operations where others are known: the other link of a group that has been solved."""
+    needed, ahead = set[int](), [number]
+    while ahead and len(needed) <= FEW:
+        here = ahead.pop()
+        kind, *arguments = operations[here]
+        if kind not in ("const", "input") and here not in known:
+            needed.add(here)
+            ahead += arguments
+    return len(needed) <= FEW
+
+
+def _numbers(value: Number) -> Iterator[int]:
+    if isinstance(value, Real):
+        yield value.number
+    elif isinstance(value, Complex):
+        yield from (*_numbers(value.real), *_numbers(value.imag))

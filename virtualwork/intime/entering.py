@@ -11,9 +11,9 @@ import numpy as np
 from dalembert.arithmetic.engines import floats
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
-from virtualwork.formulas.block import Setting
 from virtualwork.formulas.group_loops import unknowns
 from virtualwork.formulas.lanes import Lanes
+from virtualwork.formulas.loaded_pose import Setting
 from virtualwork.formulas.positions import State, principal, unwound
 from virtualwork.formulas.winding import NODES
 from virtualwork.intime.watch import Floats, Value

@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 from dalembert.arithmetic.recorded import Number
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe import MechanismError
-from virtualwork.formulas.block import Block
 from virtualwork.formulas.forces import Bearing, RubbingRate
+from virtualwork.formulas.loaded_pose import LoadedPose
 from virtualwork.formulas.numbers import Reals, minus
 from virtualwork.intime.equations import Equations, Lost
 from virtualwork.intime.powers import motion_of
@@ -114,15 +114,15 @@ class Rubbing(Equations):
     @cached_property
     def _recorded(self) -> tuple[Tape, Tape]:
         recording = self.recording(True, True, False)
-        block, contacts = recording.forces.block, recording.forces.case.contacts
+        pose, contacts = recording.forces.pose, recording.forces.case.contacts
         rubs = [f"friction {n}" for n in range(len(self.arms))]
         result: dict[str, Number] = {}
         for n, (joint, body, other, *_) in enumerate(contacts):
             force, rate = recording.value(Bearing(n)), recording.value(RubbingRate(n))
             if joint.guide is None:
-                slip = minus(block.alpha(body), block.alpha(other))
+                slip = minus(pose.alpha(body), pose.alpha(other))
             else:
-                slip = _second(block, joint.guide)
+                slip = _second(pose, joint.guide)
             for name, value in zip(QUANTITIES, (force.real, force.imag, slip, rate), strict=True):
                 result[f"{name} {n}"] = 0.0 if value is None else value
         return motion_of(recording, self.k, rubs, result)
@@ -433,7 +433,7 @@ def _watch(
     return Watch(f"friction {name}", value, rate, [0.0], ends=True, side=1, linear=linear, noise=noise)
 
 
-def _second(block: Block, guide: int) -> Number:
+def _second(pose: LoadedPose, guide: int) -> Number:
     """The second derivative of a slide in time."""
-    factor, value = block.second(lambda rates, k: rates.slide[guide][k - 1])
+    factor, value = pose.second(lambda rates, k: rates.slide[guide][k - 1])
     return None if value is None else value * factor

@@ -41,7 +41,7 @@ def _motion_of(
     recording: Recording, k: int, frictions: Sequence[str], more: Mapping[str, Number]
 ) -> tuple[Tape, Tape]:
     again = recording.recorder
-    case, block = recording.forces.case, recording.forces.block
+    case, pose = recording.forces.case, recording.forces.pose
     efforts, accelerations = [f"effort {j}" for j in range(k)], names(k)[2][:-1]
     motion = recording.tape([Effort(j) for j in range(k)], more)
     free = [name for name in (*accelerations, *frictions) if name in motion.inputs]
@@ -75,7 +75,7 @@ def _motion_of(
         for m, other in zip(row, speeds, strict=True):
             kinetic = kinetic + 0.5 * (speed * m * other)
     loads = case.loads
-    wasted = [(load.wasted(block, j), speed) for load in loads for j, speed in enumerate(speeds)]
+    wasted = [(load.wasted(pose, j), speed) for load in loads for j, speed in enumerate(speeds)]
     power = sum((work * speed for work, speed in wasted if work is not None), 0.0)
-    potential = sum((load.potential(block) for load in loads if load.stores and load.carries), 0.0)
+    potential = sum((load.potential(pose) for load in loads if load.stores and load.carries), 0.0)
     return again.tape(out | {"power": power}), again.tape({"energy": kinetic + potential})

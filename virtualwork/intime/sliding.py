@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from virtualwork.formulas.locking import balanced
+from virtualwork.formulas.friction import balanced
 from virtualwork.formulas.numbers import Complexes
 from virtualwork.intime.watch import Floats, sign
 

@@ -13,8 +13,8 @@ import numpy as np
 from virtualwork.describe import AssemblyError, DescriptionError
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.block import Block
 from virtualwork.formulas.dynamics import Moving
+from virtualwork.formulas.loaded_pose import LoadedPose
 from virtualwork.formulas.numbers import Complexes, Number, plus
 
 
@@ -62,10 +62,10 @@ def least_squares(motion: Moving, links: Sequence[str]) -> tuple[dict[str, compl
         raise DescriptionError("counterweights: the speed is zero: expected a motion that shakes")
     inertia = [load for load in scene.loads if load.kind == "inertia force"]
 
-    def shaken(block: Block) -> Number:
+    def shaken(pose: LoadedPose) -> Number:
         total: Number = None
         for load in inertia:
-            total = plus(total, block.formed(load))
+            total = plus(total, pose.formed(load))
         return total
 
     (before,) = scene.over([shaken], complex)

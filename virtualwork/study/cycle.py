@@ -11,8 +11,8 @@ import numpy as np
 from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.branch.limits import TURNS
 from virtualwork.digits.forces import ForceErrors
-from virtualwork.formulas.block import Block
 from virtualwork.formulas.dynamics import Dynamics, Moving
+from virtualwork.formulas.loaded_pose import LoadedPose
 from virtualwork.formulas.loads import OWN
 from virtualwork.formulas.numbers import Number, Reals, minus, plus
 from virtualwork.formulas.poses import Poses
@@ -334,19 +334,19 @@ class Cycle:
         for path in centers.values():
             keys |= path_reads(path)
 
-        def kinetic(block: Block) -> Number:
+        def kinetic(pose: LoadedPose) -> Number:
             total: Number = None
             for body, r in scene.rigid.items():
-                if body in centers and (v := block.velocity(centers[body])) is not None:
+                if body in centers and (v := pose.velocity(centers[body])) is not None:
                     total = plus(total, 0.5 * r.mass * (v.real * v.real + v.imag * v.imag))
-                if r.inertia and (w := block.omega(body)) is not None:
+                if r.inertia and (w := pose.omega(body)) is not None:
                     total = plus(total, 0.5 * r.inertia * w * w)
             return total
 
-        def potential(block: Block) -> Number:
+        def potential(pose: LoadedPose) -> Number:
             total: Number = None
             for load in scene.loads:
-                total = plus(total, load.potential(block) if load.stores else None)
+                total = plus(total, load.potential(pose) if load.stores else None)
             return total
 
         moving, stored = scene.over([kinetic, potential], float, sorted(keys))
@@ -364,11 +364,11 @@ class Cycle:
             return None
         scene = self.motion.dynamics.scene
 
-        def work(block: Block) -> Number:
+        def work(pose: LoadedPose) -> Number:
             total: Number = None
             for load in scene.case.everything:
                 if load.kind not in OWN:
-                    total = plus(total, minus(load.power(block, 0), load.elastic(block)))
+                    total = plus(total, minus(load.power(pose, 0), load.elastic(pose)))
             return total
 
         total = self.effort + scene.over([work], float)[0]

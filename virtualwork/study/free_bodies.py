@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from virtualwork.describe.description import Description
-    from virtualwork.formulas.block import Block
     from virtualwork.formulas.load_case import LoadCase
+    from virtualwork.formulas.loaded_pose import LoadedPose
     from virtualwork.formulas.numbers import Complexes, Number, Reals
     from virtualwork.formulas.quantity import Quantity
     from virtualwork.plan.steps import Joint
@@ -212,15 +212,15 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
     return list(result.values())
 
 
-def _normal(block: Block, touch: Touch) -> Number:
+def _normal(pose: LoadedPose, touch: Touch) -> Number:
     """The direction in which a cam presses on its follower, a unit vector."""
-    unit = touch.at(block.st).unit()
+    unit = touch.at(pose.st).unit()
     return touch.drive.cam.sign * unit / abs(unit)
 
 
-def _touching(block: Block, touch: Touch) -> Number:
+def _touching(pose: LoadedPose, touch: Touch) -> Number:
     """Where a cam and its follower touch."""
-    return touch.axis(block.st) + touch.at(block.st).touch()
+    return touch.axis(pose.st) + touch.at(pose.st).touch()
 
 
 def _block(dynamics: Dynamics, guide: int) -> Complexes:

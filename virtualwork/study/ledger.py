@@ -20,7 +20,7 @@ from virtualwork.formulas.numbers import minus, times
 from virtualwork.plan.joint_forces import pairs
 
 if TYPE_CHECKING:
-    from virtualwork.formulas.block import Block
+    from virtualwork.formulas.loaded_pose import LoadedPose
     from virtualwork.formulas.loads import Load
     from virtualwork.formulas.numbers import Complexes, Number, Reals
     from virtualwork.formulas.scene import Scene
@@ -76,13 +76,13 @@ def items(dynamics: Dynamics, unit: int | None = None) -> list[Item]:
     return [*result, *_drives(dynamics, effort, unit), *_joints(dynamics, unit)]
 
 
-def _over(dynamics: Dynamics, kind: type, *forms: Callable[[Block], Number]) -> list[Any]:
+def _over(dynamics: Dynamics, kind: type, *forms: Callable[[LoadedPose], Number]) -> list[Any]:
     """Arrays (n,) of what forms make of a pose; zero where it is identically zero."""
     return dynamics.scene.over(forms, kind)
 
 
-def _turning(block: Block, body: str, unit: int | None) -> Number:
-    return block.omega(body) if unit is None else block.turning(body, unit)
+def _turning(pose: LoadedPose, body: str, unit: int | None) -> Number:
+    return pose.omega(body) if unit is None else pose.turning(body, unit)
 
 
 def _applied(dynamics: Dynamics, load: Load, unit: int | None) -> Item:
@@ -92,13 +92,13 @@ def _applied(dynamics: Dynamics, load: Load, unit: int | None) -> Item:
         return Item(load.body, load.kind, value, rate, turns=True)
     path = load.path
 
-    def velocity(block: Block) -> Number:
-        result = block.velocity(path) if unit is None else block.coefficient(path, unit)
+    def velocity(pose: LoadedPose) -> Number:
+        result = pose.velocity(path) if unit is None else pose.coefficient(path, unit)
         if load.rail is None:
             return result
         # on a rail the material point under the slide: without the slide's own speed along it
-        s = block.slide_rate(load.rail) if unit is None else block.by[unit].slide[load.rail][0]
-        return minus(result, times(s, dynamics.reactions.rail(block, load.rail)))
+        s = pose.slide_rate(load.rail) if unit is None else pose.by[unit].slide[load.rail][0]
+        return minus(result, times(s, dynamics.reactions.rail(pose, load.rail)))
 
     value, rate = _over(dynamics, complex, load.form, velocity)
     kind = "friction" if isinstance(load, FrictionLoad) else load.kind
@@ -129,12 +129,12 @@ def _joint_velocity(dynamics: Dynamics, bodies: Any, guide: int, body: str, unit
     g, case = dynamics.poses.mechanism.guides[guide], dynamics.scene.case
     path = case.path(g.link, bodies[g.link][g.point])
 
-    def velocity(block: Block) -> Number:
-        result = block.velocity(path) if unit is None else block.coefficient(path, unit)
+    def velocity(pose: LoadedPose) -> Number:
+        result = pose.velocity(path) if unit is None else pose.coefficient(path, unit)
         if body == g.link:
             return result
-        s = block.slide_rate(guide) if unit is None else block.by[unit].slide[guide][0]
-        return minus(result, times(s, dynamics.reactions.rail(block, guide)))
+        s = pose.slide_rate(guide) if unit is None else pose.by[unit].slide[guide][0]
+        return minus(result, times(s, dynamics.reactions.rail(pose, guide)))
 
     (rate,) = _over(dynamics, complex, velocity)
     return np.asarray(rate)
@@ -150,8 +150,8 @@ def _joints(dynamics: Dynamics, unit: int | None) -> Iterator[Item]:
         else:
             path = case.path(on, m.bodies[on][joint.name])
 
-            def velocity(block: Block, path: Any = path) -> Number:
-                return block.velocity(path) if unit is None else block.coefficient(path, unit)
+            def velocity(pose: LoadedPose, path: Any = path) -> Number:
+                return pose.velocity(path) if unit is None else pose.coefficient(path, unit)
 
             (rate,) = _over(dynamics, complex, velocity)
         workless = "pair"
@@ -199,11 +199,11 @@ def ledger(scene: Scene, j: int = 0) -> tuple[dict[str, Reals], list[str], list[
     """
     done: dict[str, Reals] = {}
     workless: list[str] = []
-    block, working = scene.block, list["Load"]()
+    pose, working = scene.pose, list["Load"]()
     for load in scene.case.everything:
-        if load.power(block, j) is not None:
+        if load.power(pose, j) is not None:
             working.append(load)
-        elif load.displacement(block, j) is None and load.name not in workless and load.carries:
+        elif load.displacement(pose, j) is None and load.name not in workless and load.carries:
             workless.append(load.name)
     each = scene.over([partial(load.power, j=j) for load in working], float)
     for load, value in zip(working, each, strict=True):

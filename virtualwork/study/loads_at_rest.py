@@ -15,8 +15,8 @@ import numpy as np
 
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.block import Block
 from virtualwork.formulas.lanes import Lanes
+from virtualwork.formulas.loaded_pose import LoadedPose
 from virtualwork.formulas.numbers import Number, Reals, plus
 from virtualwork.formulas.scene import Scene
 from virtualwork.plan.steps import path_reads
@@ -39,11 +39,11 @@ class Rest:
     def _values(self) -> list[Reals]:
         """Q and the sum of the sizes of its terms, (n, k); of many poses over one input also ∂Q/∂q and V, (n,), from one tape."""
 
-        def of(j: int, sized: bool) -> Callable[[Block], Number]:
-            def form(block: Block) -> Number:
+        def of(j: int, sized: bool) -> Callable[[LoadedPose], Number]:
+            def form(pose: LoadedPose) -> Number:
                 total: Number = None
                 for load in self.scene.loads:
-                    value = load.power(block, j)
+                    value = load.power(pose, j)
                     total = plus(total, value if value is None or not sized else abs(value))
                 return total
 
@@ -65,11 +65,11 @@ class Rest:
         """What the loads depend on."""
         return sorted(set().union(*(load.reads() for load in self.scene.loads)) - {f"angle:{GROUND}"})
 
-    def _bent(self, block: Block) -> Number:
+    def _bent(self, pose: LoadedPose) -> Number:
         """The second variation of the work, along the direction of the rates."""
-        rates, total = block.along or block.by[0], None
+        rates, total = pose.along or pose.by[0], None
         for load in self.scene.loads:
-            total = plus(total, load.second(block, rates))
+            total = plus(total, load.second(pose, rates))
         return total
 
     def along(self, direction: Reals) -> Reals:
@@ -92,7 +92,7 @@ class Rest:
         rates = scene.along(reads)
         if rates is None:
             return math.nan
-        return float(sum(load.second(scene.block, rates) or 0.0 for load in scene.loads))
+        return float(sum(load.second(scene.pose, rates) or 0.0 for load in scene.loads))
 
     def hessian(self) -> Reals:
         """V″, (n, k, k), by polarization of exact second derivatives along the inputs and their pairs."""
@@ -130,8 +130,8 @@ class Rest:
         (result,) = self.scene.over([self._stored], float, sorted(keys), name="rest, potential")
         return np.asarray(result)
 
-    def _stored(self, block: Block) -> Number:
+    def _stored(self, pose: LoadedPose) -> Number:
         total: Number = None
         for load in self.scene.loads:
-            total = plus(total, load.potential(block))
+            total = plus(total, load.potential(pose))
         return total

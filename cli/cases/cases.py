@@ -1,0 +1,314 @@
+"""The cases of a call: the mechanism of its file, its variants, and the inputs that all of them go through.
+
+A case is a variant at its inputs. `--at`, `--over`, `--cases` and `--set` fill one `Cases`, whoever asks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cli.cases.analysis import Analysis, Request
+from cli.cases.axes import assigned, grids
+from cli.cases.inputs import Driven, Grid, Varied, of_one, with_numbers
+from cli.read.options import about, bad
+from dalembert.dataclass import dataclass, field, replace
+from dalembert.errors import DataError
+from dalembert.results.text import csv_text
+from dalembert.tables.files import note, read_bytes, remember, split_sheet
+from dalembert.tables.table import Numbers, read
+from dalembert.units import UNITS, to_si
+
+if TYPE_CHECKING:
+    from types import SimpleNamespace
+
+    from numpy.typing import NDArray
+
+    from cli.cases.inputs import InputGrid, Inputs
+    from virtualwork import Mechanism
+    from virtualwork.describe.dimensions import Dimension
+    from virtualwork.family.part import Part
+
+    Rows = NDArray[np.float64]
+
+
+class Described(NamedTuple):
+    """A mechanism as its file describes it."""
+
+    mechanism: Mechanism
+    bare: dict[str, str]
+    """The units of bare lengths and angles, as far as `[units]` names them."""
+    warnings: list[str]
+    """Warnings of the tables that the file names."""
+    about: dict[str, str]
+    """The entries of the file for the head of a report."""
+
+
+def load(path: str) -> Described:
+    """Read a description; - is standard input."""
+    import tomllib
+
+    from virtualwork import Mechanism
+
+    remember(path)
+    file, data = read_bytes(path)
+    warnings: list[str] = []
+    try:
+        text = data.decode("utf-8-sig")
+        folder = Path() if path == "-" else Path(path).parent
+        mechanism = Mechanism.from_toml_text(text, file, folder, partial(beside, warnings))
+    except UnicodeDecodeError:
+        raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
+    except ValueError as error:
+        raise DataError(str(error)) from None
+    document = tomllib.loads(text)
+    units = {kind: str(unit) for kind, unit in document.get("units", {}).items()}
+    return Described(mechanism, units, warnings, about(file, document))
+
+
+@contextmanager
+def naming(file: str) -> Iterator[None]:
+    """Name the file in the errors of a mechanism."""
+    from virtualwork import MechanismError
+
+    try:
+        yield
+    except MechanismError as error:
+        raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
+
+
+_DIMENSIONS = {
+    "time": "time",
+    "t": "time",
+    "angle": "angle",
+    "position": "length",
+    "speed": "speed",
+    "fx": "force",
+    "fy": "force",
+    "torque": "torque",
+    "lift": "length",
+    "swing": "angle",
+}
+# the units that the library reads; a column in another unit is converted to the first of them
+_PLAIN = {"angle": ("rad", "deg"), "position": ("m", "mm"), "lift": ("m", "mm"), "swing": ("rad", "deg")}
+
+
+def beside(warnings: list[str], path: Path) -> bytes:
+    """Return a table as plain CSV: commas, points, units of the library; its warnings are added to `warnings`.
+
+    Raises
+    ------
+    OSError
+        There is no such file.
+    DataError
+        The table is wrong: it names row or cell, column, value and what was expected.
+    """
+    note(split_sheet(str(path))[0]).stat()
+    table = read(str(path), numbers=_DIMENSIONS, texts=("step",), blank=tuple(_DIMENSIONS))
+    warnings += table.warnings
+    columns = dict(_plain(name, column) for name, column in table.numbers.items())
+    return csv_text(columns).encode()
+
+
+def _plain(name: str, column: Numbers) -> tuple[str, list[float]]:
+    """Return header and values of a column; in a unit that the library reads they have the digits of the file."""
+    dimension = _DIMENSIONS[name]
+    first = next(iter(UNITS[dimension]))
+    if column.unit in _PLAIN.get(name, (first,)):
+        return f"{name}_{column.unit}", column.values.tolist()
+    si = _PLAIN.get(name, (first,))[0]
+    return f"{name}_{si}", to_si(column.values, dimension, column.unit).tolist()
+
+
+@dataclass(frozen=True)
+class Cases:
+    """The cases of a call.
+
+    Attributes
+    ----------
+    request : Request
+    mechanism : Mechanism
+        The mechanism whose dimensions the variants change.
+    bare : dict of kind to unit
+        The file's units of bare numbers.
+    varied : Grid, optional
+        The variants; None where there is the mechanism alone.
+    moved : Grid, optional
+        The inputs that all variants go through.
+    warnings : list of str
+        Warnings of the files.
+    about : dict
+        The entries of the file for the head of a report.
+    """
+
+    request: Request
+    mechanism: Mechanism
+    bare: dict[str, str]
+    varied: Grid | None = None
+    moved: Grid | None = None
+    warnings: list[str] = field(default_factory=list)
+    about: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, options: SimpleNamespace, order: int | None = None, *, forces: bool = False) -> Cases:
+        """Read the file, change its numbers, and lay out the cases; `order` and `forces` as in a `Request`."""
+        request = Request.of(options, order, forces=forces)
+        with naming(request.file):
+            mechanism, bare, warnings, about = load(options.file)
+            if options.set:
+                mechanism = assigned(mechanism, bare, options.set)
+            varied, moved = grids(mechanism, options.at, options.over, options.cases, bare, warnings)
+        return cls(request, mechanism, bare, varied, moved, warnings, about)
+
+    # --- the whole ------------------------------------------------------------------------------------------------
+    @property
+    def count(self) -> int:
+        """The number of mechanisms."""
+        return 1 if self.varied is None else self.varied.n
+
+    @property
+    def poses(self) -> int:
+        """The number of poses that each mechanism goes through."""
+        return 1 if self.moved is None else self.moved.n
+
+    def rows(self, low: int, high: int) -> Rows:
+        """Return the numbers of the variants from low to high, as they are shown."""
+        assert self.varied is not None
+        return self.varied.part(low, high).shown
+
+    @cached_property
+    def names(self) -> tuple[Driven | Varied, ...]:
+        """The inputs and dimensions that a row of variants sets."""
+        return () if self.varied is None else self.varied.names
+
+    @cached_property
+    def nominal(self) -> Analysis:
+        """The analysis of the mechanism itself."""
+        return Analysis(self.request, self.mechanism, of_one(self.mechanism, self.moved))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what another process needs: the rows of variants are sent to it part by part."""
+        kept = {name: value for name, value in vars(self).items() if name != "nominal"}
+        return {**kept, "varied": None, "names": self.names}
+
+    def refuse_inputs(self, message: str) -> None:
+        """Refuse options that move inputs, where these mean nothing."""
+        for grid in (self.varied, self.moved):
+            for axis in () if grid is None else grid.axes:
+                if axis.option.startswith("--") and any(isinstance(name, Driven) for name in axis.names):
+                    raise bad(axis.option, message)
+
+    def at_start(self) -> Cases:
+        """Return these cases with their inputs as numbers of the file: a motion in time starts there."""
+        from virtualwork.describe.dimensions import dimensions
+
+        by_place = {d.where: Varied(d) for d in dimensions(self.mechanism).values()}
+        grids = [grid for grid in (self.varied, self.moved) if grid is not None]
+        # a law of motion in the file gives no start
+        axes = [axis for grid in grids for axis in grid.axes if axis.option.startswith("--")]
+        kinds = ("value", "speed", "acceleration")
+        axes = [
+            replace(
+                axis,
+                names=tuple(
+                    by_place["inputs", name.j, kinds[name.order]] if isinstance(name, Driven) else name
+                    for name in axis.names
+                ),
+            )
+            for axis in axes
+        ]
+        varied = Grid(tuple(axes)) if axes else None
+        if varied is None or varied.n > 1:
+            return replace(self, varied=varied, moved=None)
+        with naming(self.request.file):
+            row = varied.part(0, 1).shown[0].tolist()
+            numbers = [name.of for name in varied.names if isinstance(name, Varied)]
+            m = with_numbers(self.mechanism, numbers, row)
+        return replace(self, mechanism=m, varied=None, moved=None)
+
+    # --- one variant, some variants -------------------------------------------------------------------------------
+    def analysis(self, row: Rows | None = None) -> Analysis:
+        """Return the analysis of the variant of a row, or of the mechanism itself.
+
+        Raises
+        ------
+        MechanismError
+        """
+        if row is None:
+            return self.nominal
+        m = self.variant(row)
+        return Analysis(self.request, m, self.inputs(m, row))
+
+    def variant(self, row: Rows) -> Mechanism:
+        """Return the mechanism with the numbers of a row.
+
+        Raises
+        ------
+        MechanismError
+        """
+        return with_numbers(self.mechanism, self.dimensions, self.numbers(row[None])[0].tolist())
+
+    def inputs(self, m: Mechanism, row: Rows) -> Inputs | InputGrid:
+        """Return the inputs of the variant of a row."""
+        values = [
+            (name, float(x), float(np.radians(x)) if name.unit == "deg" else float(x))
+            for name, x in zip(self.names, row, strict=True)
+            if isinstance(name, Driven)
+        ]
+        return of_one(m, self.moved, values)
+
+    @property
+    def dimensions(self) -> list[Dimension]:
+        """The dimensions that vary."""
+        return [name.of for name in self.names if isinstance(name, Varied)]
+
+    def numbers(self, rows: Rows) -> Rows:
+        """Return the dimensions of rows of variants, without their inputs."""
+        return rows[:, [isinstance(name, Varied) for name in self.names]]
+
+    def in_si(self, rows: Rows) -> dict[str, list[float]]:
+        """Return the numbers of variants by path, SI."""
+        return {
+            d.path: [Varied(d).si(x) for x in column]
+            for d, column in zip(self.dimensions, self.numbers(rows).T.tolist(), strict=True)
+        }
+
+    def part(self, rows: Rows) -> tuple[Part, Rows]:
+        """Return variants as a part of a family, and their inputs as they are shown, (v or 1, n, k)."""
+        from virtualwork.family.family import Family
+        from virtualwork.family.part import Part
+
+        m, v = self.mechanism, len(rows)
+        family = Family(m, self.in_si(rows))
+        nominal = of_one(m, self.moved).whole
+        names = () if self.moved is None else self.moved.names
+        moved = {name.j for name in names if isinstance(name, Driven)}
+        si, shown = nominal.values[None], nominal.shown[None]
+        rates = family.rates(nominal.speed, nominal.acceleration)
+        # a variant may set an input: by a column of inputs, or by another position in its file
+        for name, column in zip(self.names, rows.T, strict=True):
+            j = (
+                name.j
+                if isinstance(name, Driven)
+                else int(name.of.where[1])
+                if name.of.where[0] == "inputs"
+                else -1
+            )
+            if j < 0 or (j in moved and not isinstance(name, Driven)):
+                continue
+            numbers = np.radians(column) if name.unit == "deg" else np.asarray(column, dtype=float)
+            if isinstance(name, Driven) and name.order:
+                rates[name.order - 1][j] = numbers[:, None]
+            elif isinstance(name, Driven) or name.of.where[-1] == "value":
+                if len(si) == 1:
+                    si, shown = (np.repeat(x, v, axis=0) for x in (si, shown))
+                value = Driven.of(m, j)
+                si[:, :, j] = numbers[:, None]
+                cells = column if isinstance(name, Driven) else [value.shown(x) for x in numbers.tolist()]
+                shown[:, :, j] = np.asarray(cells)[:, None]
+        return Part(m, family.dimensions, family.values, si, rates), shown

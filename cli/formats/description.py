@@ -1,0 +1,351 @@
+"""Drawings and descriptions: a drawing as the TOML text of a mechanism, checked against its pose; a mechanism as bodies in a pose."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cli.formats.drawn import (
+    GROUND,
+    ORIGIN,
+    Body,
+    Drawing,
+    Drive,
+    Exact,
+    Load,
+    Slide,
+    coordinates,
+    exact,
+    unused,
+)
+from virtualwork import Mechanism
+from virtualwork.describe import MechanismError
+from virtualwork.describe.parts import Gear, Guess, Guide, Input, Link, Rack
+from virtualwork.describe.text import AsWritten, Table, document, written
+from virtualwork.motion import Motion
+
+Rows = NDArray[np.float64]
+# below this share a row of speeds follows from others: a file's decimals are fewer than ours
+FOLLOWS = 1e-6
+
+
+class _Speeds:
+    """Speeds of a drawing's bodies: (vx, vy, ω) of each, as columns; lengths as shares of its size."""
+
+    def __init__(self, d: Drawing) -> None:
+        self.d = d
+        self.size = d.size() or 1.0
+        self.columns = {name: 3 * k for k, name in enumerate(d.bodies)}
+
+    def at(self, body: str, z: complex) -> complex:
+        """Return where a place of a body stands, a share of the size."""
+        return self.d.bodies[body].world(z) / self.size
+
+    def moves(self, body: str, at: complex) -> Rows:
+        """The speed of a body's point, (2, columns)."""
+        rows = np.zeros((2, 3 * len(self.columns)))
+        k = self.columns[body]
+        rows[:, k : k + 2] = np.eye(2)
+        rows[:, k + 2] = -at.imag, at.real
+        return rows
+
+    def turns(self, body: str) -> Rows:
+        """A body's angular velocity, (columns,)."""
+        row = np.zeros(3 * len(self.columns))
+        row[self.columns[body] + 2] = 1.0
+        return row
+
+    def along(self, s: Slide, turned: float) -> Rows:
+        """The speed of a slide's point against its line, in the line's direction or across it."""
+        way = cmath.rect(1.0, self.d.bodies[s.on].turn + s.angle + turned)
+        at = self.at(s.link, self.d.bodies[s.link].points[s.point])
+        relative = self.moves(s.link, at) - self.moves(s.on, at)
+        return np.asarray(np.array([way.real, way.imag]) @ relative)
+
+    def joints(self) -> Rows:
+        """What the ground, pins, slides and gears hold at zero."""
+        d = self.d
+        rows = [np.eye(3, 3 * len(self.columns))]
+        for point, (first, *others) in d.pins().items():
+            at = self.at(first, d.bodies[first].points[point])
+            rows += [self.moves(first, at) - self.moves(other, at) for other in others]
+        for s in d.slides:
+            rows.append(self.along(s, np.pi / 2)[None])
+            if s.turned is not None:
+                rows.append((self.turns(s.link) - self.turns(s.on))[None])
+        for m in d.meshes:
+            a, b, arm = (self.turns(name) for name in (m.a, m.b, m.arm))
+            rows.append((b - arm - m.ratio * (a - arm))[None])
+        for r in d.racks:
+            turned = self.turns(r.gear) - self.turns(r.slide.on)
+            rows.append((self.along(r.slide, 0.0) - r.radius / self.size * turned)[None])
+        return np.concatenate(rows)
+
+    def driven(self, e: Drive) -> Rows:
+        """What an input drives."""
+        if e.slide is not None:
+            return self.along(e.slide, 0.0)
+        return self.turns(str(e.link)) - self.turns(e.on)
+
+
+def fit(d: Drawing) -> None:
+    """Leave out inputs that follow from those before them, and take free joints as inputs in addition."""
+    speeds = _Speeds(d)
+    _, s, vt = np.linalg.svd(speeds.joints())
+    free = vt[int(np.sum(s > FOLLOWS * s[0])) :]
+    kept: list[Drive] = []
+    spare = [e for e in d.spare if all(e.moves != other.moves for other in d.drives)]
+    # where the file drives too many, those at the ground stay
+    for e in (*sorted(d.drives, key=lambda e: GROUND not in e.pair), *spare):
+        row = free @ speeds.driven(e)
+        if np.linalg.norm(row) > FOLLOWS:
+            # what the input holds is free no more
+            kept.append(e)
+            free = np.linalg.svd(row[None])[2][1:] @ free
+    _note(
+        d, (e for e in d.drives if e not in kept), "left out as an input: its motion follows from the others'"
+    )
+    _note(d, (e for e in kept if e not in d.drives), "taken as an input in addition: it was free to move")
+    d.drives = [e for e in (*d.drives, *spare) if e in kept]
+
+
+def _note(d: Drawing, drives: Iterable[Drive], what: str) -> None:
+    d.notes += [f"{e.pair[0]} against {e.pair[1]}: {what}" for e in drives]
+
+
+def text(d: Drawing, source: str) -> str:
+    """Return the TOML text; `source` says where the mechanism is from."""
+    d = _named(d)
+    origins = {name: _origin(d, name, body) for name, body in d.bodies.items()}
+    tree = document(_parts(d, origins), AsWritten())
+    for drive, table in zip(d.drives, tree.get("input", []), strict=True):
+        # a speed keeps the unit of the other program
+        table |= {} if drive.speed is None else {"speed": drive.speed}
+    for load in d.loads:
+        tree.setdefault(load.table, []).append(_ends(d, load, origins) | load.values)
+    return written(tree | {"source": source, "units": {"length": d.length, "angle": d.angle}})
+
+
+def _parts(d: Drawing, origins: dict[str, complex]) -> dict[str, object]:
+    """Return the parts of a description, their numbers in the units of the file."""
+    links = {name: body for name, body in d.bodies.items() if name != GROUND}
+    return {
+        "name": d.name,
+        "gravity": complex(*(d.gravity or (0.0, 0.0))),
+        "ground": _places(d.bodies[GROUND].points),
+        "links": {name: _link(b, origins[name]) for name, b in links.items()},
+        "guides": [
+            Guide(s.point, s.link, s.on, complex(s.through - origins[s.on]), s.angle, s.turned)
+            for s in d.slides
+        ],
+        "gears": [Gear((m.a, m.b), m.ratio, m.arm) for m in d.meshes],
+        "racks": [Rack(r.gear, r.slide.point, r.radius) for r in d.racks],
+        "inputs": [
+            Input(e.link, e.on, value=e.at) if e.slide is None else Input(slider=e.slide.point, value=e.at)
+            for e in d.drives
+        ],
+        "guess": Guess(
+            [e.at for e in d.drives],
+            {name: b.turn for name, b in links.items()},
+            {r.slide.point: _stands(d, r.slide) for r in d.racks},
+        ),
+    }
+
+
+def _stands(d: Drawing, s: Slide) -> complex:
+    """Return where the point of a slide stands in the pose."""
+    body = d.bodies[s.link]
+    return body.world(body.points[s.point])
+
+
+def _link(b: Body, origin: complex) -> Link:
+    points = _places(b.points, origin)
+    return Link(points, b.mass, complex(b.center - origin), b.inertia) if b.mass > 0 else Link(points)
+
+
+def _origin(d: Drawing, name: str, body: Body) -> complex:
+    """Return where a link's axes begin: at the first of its joints."""
+    if d.own_axes or name == GROUND:
+        return ORIGIN
+    joints = set(d.pins()) | {s.point for s in d.slides}
+    first = next((z for p, z in body.points.items() if p in joints), None)
+    return next(iter(body.points.values()), ORIGIN) if first is None else first
+
+
+def _ends(d: Drawing, load: Load, origins: dict[str, complex]) -> Table:
+    """Name the bodies that a load holds on to; a spring's ends are points that `_named` has made."""
+    if load.table == "torsion_springs":
+        return {"links": [name for name, _ in load.ends]}
+    if load.table == "springs":
+        ends = [
+            (name, next(p for p, z in d.bodies[name].points.items() if z == at)) for name, at in load.ends
+        ]
+        return {"between": [".".join(end) for end in ends]}
+    ((name, at),) = load.ends
+    if at is None:
+        return {"link": name}
+    z = at - origins[name]
+    return {"link": name, "point": [z.real, z.imag]}
+
+
+def _named(d: Drawing) -> Drawing:
+    """Give names that a description takes: no dots, no link `ground` or `at`, no point called as a link is."""
+    _own_points(d)
+    links = {GROUND: GROUND}
+    for name in d.bodies:
+        if name != GROUND:
+            links[name] = unused(name.replace(".", "_").strip() or "link", {*links.values(), "at"})
+    points: dict[str, str] = {}
+    for load in d.loads:
+        if load.table == "springs":
+            for k, (name, at) in enumerate(load.ends):
+                held = d.bodies[name].points
+                if at is not None and at not in held.values():
+                    held[d.fresh(f"S{d.loads.index(load) + 1}{'ab'[k]}")] = at
+    for e in d.drives:
+        if e.speed is not None and float(str(e.speed).split()[0]) == 0:
+            e.speed = None
+            d.notes.append(f"the input {' against '.join(e.pair)} has the speed 0: it has no speed here")
+    for body in d.bodies.values():
+        for p in body.points:
+            if p not in points:
+                points[p] = unused(p.replace(".", "_").strip() or "P", {*points.values(), *links.values()})
+        body.points = {points[p]: z for p, z in body.points.items()}
+    d.bodies = {links[n]: b for n, b in d.bodies.items()}
+    d.rename(links.__getitem__)
+    for s in d.slides:
+        s.point = points[s.point]
+    return d
+
+
+def _own_points(d: Drawing) -> None:
+    """Give each further guide of a point a point of its own, as a guide is called as its point is.
+
+    It lies on the guide's line away from the pin. A pin in two slots has a shoe in the second.
+    """
+    guided: set[str] = set()
+    for s in d.slides:
+        if s.point in guided and not d.own_axes:
+            z, shared = d.bodies[s.link].points[s.point], s.point
+            if s.turned is None:
+                s.link, s.turned = unused(f"{shared} shoe", set(d.bodies)), -s.angle
+                d.body(s.link).points[shared] = z
+            (x, y), way, far = coordinates(z), math.radians(s.angle), d.size()
+            s.through = Exact(x + exact(far * math.cos(way)), y + exact(far * math.sin(way)))
+            s.point = d.fresh(f"{shared} on {s.on}")
+            d.bodies[s.link].points[s.point] = s.through
+        guided.add(s.point)
+
+
+def _places(points: dict[str, complex], origin: complex = ORIGIN) -> dict[str, complex]:
+    return {p: complex(z - origin) for p, z in points.items()}
+
+
+# degrees of an input that says nothing of where it begins
+TRIED = tuple(range(0, 360, 15))
+# how far from its drawn place a point may stand, of the drawing's size: rounding, magnified near change points
+NEAR = 1e-9
+# a little way of an input: rad, or of the mechanism's size
+LITTLE = 1e-3
+
+
+def described(d: Drawing, source: str) -> str:
+    """Return the TOML text of a drawing, and note on the drawing what does not hold."""
+    if d.spare:
+        fit(d)
+    if not d.posed:
+        _seek(d, source)
+    made = text(d, source)
+    try:
+        m = Mechanism.from_toml_text(made)
+        warnings = m.assembly.warnings
+        motion = _motion(m, d)
+        if not motion.assembled.all():
+            d.notes.append("it cannot be assembled as it is drawn")
+            return made
+        d.notes += warnings
+        # a little way to one side of the drawn pose at least
+        ways = [m.size * LITTLE if e.slide is not None else LITTLE for e in d.drives]
+        if not _motion(m, d, *([side * way for way in ways] for side in (-1, 1))).assembled.any():
+            d.notes.append(
+                "its input moves to neither side of the drawn pose: it stands at a limit there, or where assemblies meet"
+            )
+        if d.posed:
+            off, point = max(_gaps(d, motion), default=(0.0, ""))
+            if not off <= NEAR * m.size:
+                d.notes.append(
+                    f"{point} stands {off:.3g} m from where it is drawn: singular there, or nearly"
+                )
+    except (MechanismError, np.linalg.LinAlgError) as error:
+        d.notes.append(f"`dalembert mechanism` will refuse it: {error}")
+    return made
+
+
+def _motion(m: Mechanism, d: Drawing, *ways: Sequence[float]) -> Motion:
+    """Return the motion of poses that stand so far from the drawn one; of that itself where none is given."""
+    at = np.array([e.at for e in d.drives])
+    inputs = at + np.array(ways) if ways else at[None]
+    return m.motion(inputs if len(at) > 1 else inputs[:, 0])
+
+
+def _gaps(d: Drawing, motion: Motion) -> Iterator[tuple[float, str]]:
+    """Yield how far each point stands from its drawn place."""
+    for name, body in d.bodies.items():
+        for point, z in body.points.items() if name != GROUND else ():
+            x, y = motion.point(point).position[0]
+            yield abs(complex(x, y) - body.world(z) * d.metres), point
+
+
+def _seek(d: Drawing, source: str) -> None:
+    """Set the angles of bodies that no file places: the assembly nearest to all of them 0, at the input's own value.
+
+    Where nothing closes there, the input is tried all around.
+    """
+    why = ""
+    turns = chain(
+        [0.0], (math.radians(t) for t in TRIED[1:]) if d.drives and d.drives[0].slide is None else ()
+    )
+    start = [e.at for e in d.drives]
+    for turn in turns:
+        for e, at in zip(d.drives, start, strict=True):
+            e.at = at if turn == 0 else turn
+        for e in d.drives:
+            if e.link is not None and e.on == GROUND:
+                d.bodies[e.link].turn = e.at
+        try:
+            m = Mechanism.from_toml_text(text(d, source))
+            motion = _motion(m, d)
+            if not motion.assembled.all() or m.assembly.warnings:
+                continue
+            for name, body in d.bodies.items():
+                if name != GROUND:
+                    angle = float(motion.link(name).angle[0])
+                    body.turn = math.remainder(angle, 2 * math.pi)
+        except (MechanismError, np.linalg.LinAlgError) as error:
+            why = why or str(error)
+            continue
+        if turn:
+            d.notes.append(f"no assembly at the input's own value: it begins at {math.degrees(turn):g} deg")
+        d.notes.append(
+            "the file does not say where its bodies stand: the assembly nearest to all angles 0 is taken"
+        )
+        return
+    for e, at in zip(d.drives, start, strict=True):
+        e.at = at
+    d.notes.append(f"no assembly was found{': ' + why if why else ''}")
+
+
+# --- from a description ---------------------------------------------------------------------------------------------
+def bodies_of(m: Mechanism, motion: Motion) -> dict[str, Body]:
+    """Return the ground and the links as bodies that stand in the first pose of a motion; m, kg, rad."""
+    bodies = {GROUND: Body(dict(m.ground))}
+    for name, link in m.links.items():
+        at, turn = complex(motion.at(name, 0j).complex(0)[0]), float(motion.link(name).angle[0])
+        rigid = m.rigid[name]
+        bodies[name] = Body(dict(link.points), at, turn, rigid.mass, rigid.center, rigid.inertia)
+    return bodies

@@ -1,0 +1,398 @@
+"""A planar mechanism in one pose: bodies, joints and inputs. Importers fill it; what robots and drawings export is read from its bodies.
+
+A pin is a point that several bodies have by the same name. Coordinates that a file gives as decimals are exact
+fractions, so that the difference of two of them is rounded once.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from itertools import product
+from typing import Generic, TypeVar
+
+from dalembert.errors import DataError, quote
+from dalembert.units import to_si
+
+GROUND = "ground"
+LARGEST = 1e60
+# places nearer than this share of the drawing's size are one place
+SAME = 1e-9
+Thing = TypeVar("Thing", bound=Hashable)
+
+
+class Exact(complex):
+    """A place x + iy whose coordinates are exact fractions; the difference of two such places is exact too.
+
+    >>> a, b = place(0.3, 0), place(0.1, 0)
+    >>> (a - b).real, complex(0.3) - complex(0.1)
+    (0.2, (0.19999999999999998+0j))
+    """
+
+    x: Fraction
+    y: Fraction
+
+    def __new__(cls, x: Fraction, y: Fraction) -> Exact:
+        """Return a place from its two coordinates."""
+        z = super().__new__(cls, float(x), float(y))
+        z.x, z.y = x, y
+        return z
+
+    def __sub__(self, other: complex) -> complex:
+        """Return the way from another place."""
+        if isinstance(other, Exact):
+            return Exact(self.x - other.x, self.y - other.y)
+        return complex(self) - other
+
+    def __eq__(self, other: object) -> bool:
+        """Compare exactly, where both are exact."""
+        return (self.x, self.y) == (other.x, other.y) if isinstance(other, Exact) else complex(self) == other
+
+    # equal fractions are equal floats
+    __hash__ = complex.__hash__
+
+
+ORIGIN = Exact(Fraction(0), Fraction(0))
+
+
+def coordinates(z: complex) -> tuple[Fraction, Fraction]:
+    """Return the exact coordinates of a place; floats stand for their shortest decimals."""
+    return (z.x, z.y) if isinstance(z, Exact) else (exact(z.real), exact(z.imag))
+
+
+def together(parts: Sequence[tuple[float, complex, float]]) -> tuple[float, complex, float]:
+    """Return mass, centre and moment of inertia of several masses as one body (Huygens-Steiner)."""
+    heavy = [part for part in parts if part[0] != 0]
+    if len(heavy) <= 1:
+        return heavy[0] if heavy else parts[0]
+    mass = math.fsum(m for m, _, _ in heavy)
+    x, y = (sum(exact(m) * coordinates(c)[k] for m, c, _ in heavy) / exact(mass) for k in (0, 1))
+    center = Exact(Fraction(x), Fraction(y))
+    return mass, center, math.fsum(i + m * apart(c, center) ** 2 for m, c, i in heavy)
+
+
+def damaged(file: str, where: str, value: object, expected: str) -> DataError:
+    """Return the error of a file: where it is wrong, what stands there, what belongs there."""
+    return DataError(f"{file}: {where}: found {quote(str(value))}, expected {expected}")
+
+
+def exact(value: float) -> Fraction:
+    """Return the decimal that a number was written as; ValueError where it is no finite number.
+
+    >>> float(exact(0.3) - exact(0.1))
+    0.2
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
+        raise ValueError(f"found {value!r}, expected a finite number")
+    return Fraction(repr(value))
+
+
+def place(x: float, y: float) -> Exact:
+    """Return the place of two decimals; ValueError where one is no finite number."""
+    return Exact(exact(x), exact(y))
+
+
+def finite(file: str, where: str, word: object) -> float:
+    """Return the finite number that a word is; DataError names the place where it is none."""
+    try:
+        value = float(str(word))
+        exact(value)
+    except ValueError:
+        raise damaged(file, where, word, "a finite number") from None
+    return value
+
+
+def apart(a: complex, b: complex) -> float:
+    """Return the distance of two places."""
+    way = b - a
+    return math.hypot(way.real, way.imag)
+
+
+def direction(a: complex, b: complex) -> float:
+    """Return the direction from one place to another, degrees from the x-axis."""
+    return math.degrees(cmath.phase(b - a))
+
+
+@dataclass
+class Body:
+    """A rigid body: named points, mass, centre and moment of inertia in its own axes; where these axes stand in the pose."""
+
+    points: dict[str, complex] = field(default_factory=dict)
+    at: complex = ORIGIN
+    turn: float = 0.0
+    mass: float = 0.0
+    center: complex = ORIGIN
+    inertia: float = 0.0
+
+    def world(self, z: complex) -> complex:
+        """Return a place of its axes in those of the ground."""
+        return self.at + z * cmath.rect(1.0, self.turn)
+
+    def inside(self, z: complex) -> complex:
+        """Return a place of the ground in its axes."""
+        return (z - self.at) * cmath.rect(1.0, -self.turn)
+
+
+@dataclass
+class Slide:
+    """A point of `link` on the line of `on` through a place, at an angle; `turned` None is a slot, else a prism."""
+
+    point: str
+    link: str
+    on: str
+    through: complex
+    angle: float
+    turned: float | None = None
+
+
+@dataclass
+class Mesh:
+    """Two gears: (ω_b − ω_arm) = ratio·(ω_a − ω_arm)."""
+
+    a: str
+    b: str
+    ratio: float
+    arm: str
+
+
+@dataclass
+class Toothed:
+    """A wheel and a rack: the slide grows by radius·(θ_gear − θ_on), `on` the body that carries it."""
+
+    gear: str
+    slide: Slide
+    radius: float
+
+
+@dataclass
+class Drive:
+    """An input: the angle of `link` against `on`, or the way along a slide; `at` in the pose, `speed` as TOML has it."""
+
+    link: str | None = None
+    on: str = GROUND
+    slide: Slide | None = None
+    at: float = 0.0
+    speed: str | float | None = None
+
+    @property
+    def moves(self) -> object:
+        """What it moves, the same of inputs that move the same."""
+        return id(self.slide) if self.slide else frozenset((self.link, self.on))
+
+    @property
+    def pair(self) -> tuple[str, str]:
+        """The two bodies that it moves against each other, that which moves first."""
+        s = self.slide
+        if s is None:
+            return str(self.link), self.on
+        return (s.link, s.on) if s.link != GROUND else (s.on, s.link)
+
+
+@dataclass
+class Load:
+    """A force, torque or spring: its table, the bodies it holds on to, and its values as TOML has them.
+
+    `ends` are the places (body, place in its axes); values that are places of a body stand there and nowhere else.
+    """
+
+    table: str
+    ends: list[tuple[str, complex | None]]
+    values: dict[str, object]
+
+
+@dataclass
+class Drawing:
+    """All that a file says of one mechanism, in the file's units."""
+
+    name: str = ""
+    length: str = "m"
+    angle: str = "deg"
+    posed: bool = True
+    """It stands as it is drawn; False: at angles that are sought."""
+    own_axes: bool = False
+    """Each body's points are in axes of its own, which the file gives; False: in the ground's, as they are drawn."""
+    bodies: dict[str, Body] = field(default_factory=lambda: {GROUND: Body()})
+    slides: list[Slide] = field(default_factory=list)
+    meshes: list[Mesh] = field(default_factory=list)
+    racks: list[Toothed] = field(default_factory=list)
+    drives: list[Drive] = field(default_factory=list)
+    spare: list[Drive] = field(default_factory=list)
+    """What may drive it where its inputs leave it free; of robots, whose files may name too few or too many of them."""
+    loads: list[Load] = field(default_factory=list)
+    welds: list[tuple[str, str]] = field(default_factory=list)
+    gravity: tuple[float, float] | None = None
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def metres(self) -> float:
+        """What one of its lengths is, m."""
+        return to_si(1.0, "length", self.length)
+
+    def body(self, name: str) -> Body:
+        """Return a body, made where there is none of that name."""
+        return self.bodies.setdefault(name, Body())
+
+    def pins(self) -> dict[str, list[str]]:
+        """Return the bodies of each point that more than one body has."""
+        result: dict[str, list[str]] = {}
+        for name, body in self.bodies.items():
+            for point in body.points:
+                result.setdefault(point, []).append(name)
+        return {point: names for point, names in result.items() if len(names) > 1}
+
+    def size(self) -> float:
+        """Return the largest extent of the drawing, or of a body of it."""
+        extents = [0.0]
+        for places in [list(b.points.values()) for b in self.bodies.values()]:
+            for values in ([z.real for z in places], [z.imag for z in places]):
+                extents.append(max(values, default=0.0) - min(values, default=0.0))
+        return max(extents)
+
+    def holders(self, point: str) -> list[str]:
+        """Return the bodies that have a point."""
+        return [name for name, body in self.bodies.items() if point in body.points]
+
+    def leave(self, what: str, why: str) -> None:
+        """Note what has no meaning here.
+
+        >>> d = Drawing()
+        >>> d.leave("slide radius of C7", "arcs have no joint here")
+        >>> d.notes
+        ['slide radius of C7: left out: arcs have no joint here']
+        """
+        self.notes.append(f"{what}: left out: {why}")
+
+    def weld(self, names: Sequence[str]) -> None:
+        """Fix bodies to the first of them."""
+        self.welds += [(names[0], other) for other in names[1:]]
+
+    def rename(self, new: Callable[[str], str]) -> None:
+        """Give every body another name, wherever it is named beside its own place."""
+        for s in self.slides:
+            s.link, s.on = new(s.link), new(s.on)
+        for m in self.meshes:
+            m.a, m.b, m.arm = new(m.a), new(m.b), new(m.arm)
+        for r in self.racks:
+            r.gear = new(r.gear)
+        for e in (*self.drives, *self.spare):
+            e.link, e.on = e.link and new(e.link), new(e.on)
+        for load in self.loads:
+            load.ends = [(new(name), at) for name, at in load.ends]
+        self.welds = [(new(p), new(q)) for p, q in self.welds]
+
+    def ties(self) -> Iterator[tuple[tuple[str, ...], int]]:
+        """Yield the bodies that each joint and input ties, and for how many joints it counts: an input holds its bodies.
+
+        Shafts that share a place of the ground turn each on its own.
+        """
+        for names in self.pins().values():
+            yield from [((GROUND, n), 1) for n in names] if GROUND in names else [(tuple(names), 1)]
+        yield from (((s.link, s.on), 1) for s in self.slides)
+        yield from (((m.a, m.b, m.arm), 1) for m in self.meshes)
+        yield from (((r.gear, r.slide.link, r.slide.on), 1) for r in self.racks)
+        yield from ((e.pair, 2) for e in self.drives)
+
+    def guide(self, point: str, link: str, on: str, at: complex, angle: float, prism: bool = True) -> Slide:
+        """Add a prism or a slot between two bodies that stand at angle 0; a point that `link` has there already serves."""
+        name = self.point_at(link, at, point)
+        self.body(on)
+        self.slides.append(Slide(name, link, on, at, angle, -angle if prism else None))
+        return self.slides[-1]
+
+    def cylinder(self, names: tuple[str, str], ends: tuple[str, str], at: tuple[Exact, Exact]) -> Slide:
+        """Add a cylinder and its rod, pinned at their far ends, the one sliding in the other."""
+        barrel, rod = names
+        self.body(barrel).points[ends[0]] = at[0]
+        self.body(rod).points[ends[1]] = at[1]
+        angle = direction(*at)
+        self.slides.append(Slide(ends[1], rod, barrel, at[1], angle, -angle))
+        return self.slides[-1]
+
+    def point_at(self, body: str, at: complex, wanted: str) -> str:
+        """Return a body's point at a place, by its name; made where it has none there."""
+        held = self.body(body).points
+        name = next((p for p, z in held.items() if z == at), None) or self.fresh(wanted)
+        held[name] = at
+        return name
+
+    def moved(self, line: tuple[Exact, Exact], z: Exact, what: str, point: str) -> None:
+        """Note by how much a guide's line is moved to go through its point, where it misses it."""
+        (a, b), length = line, apart(*line)
+        off = float((b.x - a.x) * (z.y - a.y) - (b.y - a.y) * (z.x - a.x)) / length
+        if abs(off) > 1e3 * SAME * length:
+            by = f"{abs(off):.3g} {self.length}"
+            self.notes.append(f"{what}: its line is moved by {by} to go through {point}")
+
+    def fresh(self, wanted: str) -> str:
+        """Return a point's name that no body uses yet."""
+        used = {p for body in self.bodies.values() for p in body.points}
+        return unused(wanted, used)
+
+
+def centers(d: Drawing, a: str, b: str) -> Iterator[tuple[str, str, str]]:
+    """Yield what may be the centres of two gears: a pin of the one, a pin of the other, a body that turns about both."""
+    pins = d.pins()
+    for p, q in product(*(d.bodies.get(gear, Body()).points for gear in (a, b))):
+        if p != q and p in pins and q in pins:
+            first, second = (_turning_at(d, pins, point) for point in (p, q))
+            yield from ((p, q, arm) for arm in first if arm in second and arm not in (a, b))
+
+
+def _turning_at(d: Drawing, pins: dict[str, list[str]], point: str) -> list[str]:
+    """Return the bodies that turn about a pin: those of other pins in the same place of one of its bodies too."""
+    result = dict.fromkeys(pins[point])
+    for body in pins[point]:
+        held = d.bodies[body].points
+        for other, names in pins.items():
+            if other in held and held[other] == held[point]:
+                result |= dict.fromkeys(names)
+    return list(result)
+
+
+def unused(wanted: str, used: Iterable[str], between: str = "_") -> str:
+    """Return a name that is not used: the wanted one, or that with a number.
+
+    >>> unused("B", {"B", "B_2"})
+    'B_3'
+    """
+    used, name, k = set(used), wanted, 1
+    while name in used:
+        k += 1
+        name = f"{wanted}{between}{k}"
+    return name
+
+
+class Groups(Generic[Thing]):
+    """Things that are joined into groups, each of which is called as one of its things.
+
+    >>> groups = Groups("abcd")
+    >>> groups.join("b", "a", "d"), groups.join("d", "a")
+    (True, False)
+    >>> groups.of("a"), groups.all()
+    ('b', [['a', 'b', 'd'], ['c']])
+    """
+
+    def __init__(self, names: Iterable[Thing]) -> None:
+        self._above = {name: name for name in names}
+
+    def of(self, name: Thing) -> Thing:
+        """Return what the group of a thing is called."""
+        while self._above[name] != name:
+            name = self._above[name]
+        return name
+
+    def join(self, *names: Thing) -> bool:
+        """Join the groups of things under the name of the first's; return whether they were several."""
+        groups = [self.of(name) for name in names]
+        self._above |= dict.fromkeys(groups, groups[0]) if groups else {}
+        return len(set(groups)) > 1
+
+    def all(self) -> list[list[Thing]]:
+        """Return the groups, in the order in which their first things were named."""
+        result: dict[Thing, list[Thing]] = {}
+        for name in self._above:
+            result.setdefault(self.of(name), []).append(name)
+        return list(result.values())

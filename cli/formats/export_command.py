@@ -1,0 +1,91 @@
+"""`dalembert export`: a mechanism for programs that draw, and for those that simulate robots."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cli.read.options import bad
+from cli.show.output import reported
+from dalembert.errors import DataError
+
+if TYPE_CHECKING:
+    from cli.show.result import Result, Sheet
+
+FORMATS = {
+    ".dxf": "drawing (DXF), and curves over the travel of the input",
+    ".svg": "drawing (SVG), and curves over the travel of the input",
+    ".csv": "table of the input and of every moving point over its travel",
+    ".urdf": "robot (URDF) with closed loops",
+    ".sdf": "robot (SDF) with closed loops",
+    ".xml": "robot (MJCF, of MuJoCo) with closed loops",
+}
+
+METHOD = (
+    "The pose is closed by the mechanism's own solution, joint by joint, to rounding; what is written holds it with 17 "
+    "digits where the format has room for them."
+)
+
+
+OPTIONS = """
+Arguments:
+  file FILE.toml  The mechanism; - is standard input.
+Options:
+  output --output -o FILE  File to write: .dxf, .svg, .csv, .urdf, .sdf or .xml (MJCF).
+  at INPUT  Start pose, such as 60deg or crank=60deg,arm=30deg (default: the file's input).
+  profile FOLLOWER  Profile of the cam that moves this slider or arm, in the cam's axes (.dxf, .svg, .csv).
+"""
+
+
+@reported(OPTIONS)
+def run(file: str, output: Path, at: str | None = None, profile: str | None = None) -> Result:
+    """Write a mechanism for other programs: a drawing (DXF, SVG), curves (CSV), a robot (URDF, SDF, MJCF).
+
+    A drawing shows the pose of the file's own input, and the curves over the travel of the input; a robot starts in that
+    pose, closed to the last digit. Standard error names what the format cannot hold.
+    """
+    from cli.cases.axes import grids
+    from cli.cases.cases import load
+    from cli.cases.inputs import of_one
+    from cli.formats.cam_profile import SUFFIXES, of_follower
+    from cli.formats.cam_profile import file_bytes as profile_bytes
+    from cli.formats.exported import file_bytes
+    from cli.show.result import Result
+    from virtualwork import MechanismError
+
+    suffix = output.suffix.lower()
+    if suffix not in FORMATS:
+        raise bad("-o", f"'{output}': expected a name that ends in {', '.join(FORMATS)}")
+    described = load(file)
+    m, bare = described.mechanism, described.bare
+    if profile is not None and (suffix not in SUFFIXES or at is not None):
+        wrong = (
+            "it has no pose: leave --at out" if suffix in SUFFIXES else f"expected -o {', '.join(SUFFIXES)}"
+        )
+        raise bad("--profile", wrong)
+    _, moved = grids(m, None if at is None else [at], None, None, bare, [])
+    inputs = tuple(of_one(m, moved).part(0, 1).values[0].tolist())
+    name = "standard input" if file == "-" else Path(file).name
+    try:
+        if profile is not None:
+            data, notes = profile_bytes(m, of_follower(m, profile), suffix, name, bare)
+        else:
+            data, notes = file_bytes(m, inputs, suffix, name, bare)
+    except MechanismError as error:
+        raise DataError(f"{file}: {error}") from None
+
+    def sheets() -> list[Sheet]:
+        from cli.cases.picture import posed
+        from cli.show.result import Section
+
+        whole = [] if notes else ["Nothing is left out."]
+        first = Section("Written", [f"{output.name}: {FORMATS[suffix]}, {len(data)} bytes", *whole])
+        return [posed("", m, inputs, bare, first)]
+
+    return Result(
+        beside={output: lambda: data},
+        warnings=notes,
+        sheets=sheets,
+        method=METHOD,
+        about={"title": m.name or "Mechanism"} | described.about,
+    )

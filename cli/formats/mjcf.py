@@ -1,0 +1,441 @@
+"""MJCF, MuJoCo's own format, read and written: nested bodies, loops closed by equalities, gears and springs as tendons, inputs as actuators, the start as a key frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from cli.formats.markup import At, add, child, children, digits, document, include, named, spatial
+from cli.formats.mjcf_shapes import Frames, mass_of_shapes
+from cli.formats.robot import (
+    DIAGONAL_FIRST,
+    WORLD,
+    Array,
+    Inertial,
+    Kind,
+    Motor,
+    Robot,
+    RobotJoint,
+    RobotLink,
+    Spring,
+    pose,
+    printed,
+)
+from cli.formats.skeleton import LIGHT, THICK, Branching, Joint, Skeleton, Travel, strokes
+from dalembert.errors import DataError, quote
+from virtualwork.describe.parts import GROUND
+
+PLURAL = {"gear": "gears", "belt": "belt", "rack": "rack"}
+# MuJoCo takes nothing lighter
+LIGHTEST = 2e-15
+KINDS: dict[str, Kind] = {"hinge": "turn", "slide": "slide", "ball": "ball"}
+
+
+def read(file: str, root: Element, folder: Path | None) -> Robot:
+    """Read a `<mujoco>`; files that it includes are followed inside its folder alone."""
+    include(file, root, folder, [0])
+    robot = Robot(file, "MJCF", root.get("model", ""))
+    _Reader(robot, root).read()
+    return robot
+
+
+class _Reader:
+    """Walks the bodies; `classes` are the defaults, by class and tag."""
+
+    def __init__(self, robot: Robot, root: Element) -> None:
+        self.robot, self.file, self.root = robot, robot.file, root
+        self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
+        self.sites: dict[str, tuple[str, Array]] = {}
+        # how angles are written, and whether shapes give masses
+        compiler = {key: text for e in children(root, "compiler") for key, text in e.attrib.items()}
+        self.frames = Frames(
+            self.file, compiler.get("angle", "degree") != "radian", compiler.get("eulerseq", "xyz")
+        )
+        self.shapes = compiler.get("inertiafromgeom", "auto")
+        robot.gravity = np.array([0.0, 0.0, -9.81])
+        for e in children(root, "option"):
+            if e.get("gravity") is not None:
+                robot.gravity = np.array(At(self.file, "option").numbers("gravity", e.get("gravity"), 3))
+        for e in children(root, "default"):
+            self._defaults(e, "main", {})
+
+    def _defaults(self, element: Element, name: str, above: dict[str, dict[str, str]]) -> None:
+        mine = {tag: dict(values) for tag, values in above.items()}
+        for e in element:
+            if isinstance(e.tag, str) and e.tag != "default":
+                mine.setdefault(e.tag, {}).update(e.attrib)
+        self.classes[name] = mine
+        for e in children(element, "default"):
+            self._defaults(e, named(self.file, e, "class"), mine)
+
+    def whole(self, e: Element, of: str) -> dict[str, str]:
+        """Return an element's attributes with those of its class."""
+        name = e.get("class", of)
+        if name not in self.classes:
+            raise DataError(f"{self.file}: <{e.tag}>: no default class is called '{name}'")
+        return self.classes[name].get(e.tag, {}) | e.attrib
+
+    def read(self) -> None:
+        robot = self.robot
+        robot.add(RobotLink(WORLD, np.eye(4)))
+        for e in children(self.root, "worldbody"):
+            self._inside(e, WORLD, np.eye(4), "main")
+        for e in children(self.root, "equality"):
+            self._equalities(e)
+        self._tendons()
+        self._actuators()
+
+    def _inside(self, element: Element, link: str, base: Array, of: str) -> None:
+        """Read bodies, sites and frames inside a body; `base` is the pose, in the world, in which they are written."""
+        for e in element:
+            if e.tag == "frame":
+                frame = self.frames.pose(f"frame '{e.get('name', '')}'", e.attrib)
+                self._inside(e, link, base @ frame, e.get("childclass", of))
+            elif e.tag == "site":
+                values = self.whole(e, of)
+                name = e.get("name")
+                if name:
+                    at = np.linalg.inv(self.robot.links[link].pose) @ base
+                    at = at @ self.frames.pose(f"site '{name}'", values)
+                    self.sites[name] = link, at[:3, 3]
+            elif e.tag == "body":
+                self._body(e, link, base, e.get("childclass", of))
+            elif e.tag in ("replicate", "attach", "composite", "flexcomp"):
+                self.robot.notes.append(
+                    f"<{e.tag}> is left out: bodies that are made while reading are not read"
+                )
+
+    def _body(self, e: Element, parent: str, base: Array, of: str) -> None:
+        robot = self.robot
+        name = e.get("name") or f"body {len(robot.links)}"
+        where = f"body '{name}'"
+        here = base @ self.frames.pose(where, e.attrib)
+        joints = list(children(e, "joint"))
+        if child(e, "freejoint") is not None or any(self.whole(j, of).get("type") == "free" for j in joints):
+            robot.notes.append(f"{where}: its free joint is left out: it is taken as fixed")
+            joints = []
+        inertial = child(e, "inertial")
+        held = self._inertial(where, inertial)
+        if self.shapes == "true" or (self.shapes == "auto" and inertial is None):
+            geoms = (self.whole(g, of) for g in children(e, "geom"))
+            held = mass_of_shapes(self.frames, where, geoms, robot.notes)
+        robot.add(RobotLink(name, here, held))
+        above = parent
+        if not joints:
+            robot.join(
+                RobotJoint(f"{name} fixed", "fixed", parent, name, (here[:3, 3], here[:3, 3]), np.zeros(3))
+            )
+        for k, j in enumerate(joints, 1):
+            # several joints of a body follow one another, with nothing between them
+            below = name if k == len(joints) else f"{name} {k}"
+            if below != name:
+                robot.add(RobotLink(below, here))
+            self._joint(self.whole(j, of), f"{name} joint {k}", above, below, here)
+            above = below
+        self._inside(e, name, here, of)
+
+    def _joint(self, values: dict[str, str], name: str, parent: str, below: str, here: Array) -> None:
+        name = values.get("name") or name
+        at = At(self.file, f"joint '{name}'")
+        type_ = values.get("type", "hinge")
+        kind = KINDS.get(type_, "other")
+        place = here @ pose(at.numbers("pos", values.get("pos"), 3, (0.0, 0.0, 0.0)))
+        axis = at.numbers("axis", values.get("axis"), 3, (0.0, 0.0, 1.0))
+        direction = here[:3, :3] @ at.direction("axis", axis)
+        keys = ("range", "frictionloss", "armature")
+        more = tuple("limits" if k == "range" else k for k in keys if values.get(k, "0").strip("0. "))
+
+        def coordinate(value: float) -> float:
+            return self.frames.angle(value) if kind == "turn" else value
+
+        value = coordinate(at.number("ref", values.get("ref", "0")))
+        made = RobotJoint(
+            name, kind, parent, below, (place[:3, 3], place[:3, 3]), np.asarray(direction), value
+        )
+        made.type, made.more = type_, more
+        made.stiffness, made.damping, rest = _leading(at, values, "stiffness", "damping", "springref")
+        made.rest = coordinate(rest)
+        self.robot.join(made)
+
+    def _inertial(self, where: str, e: Element | None) -> Inertial | None:
+        if e is None:
+            return None
+        at = At(self.file, where)
+        place = self.frames.pose(f"{where}, inertial", e.attrib)
+        mass = at.number("mass", e.get("mass"))
+        texts = dict.fromkeys(DIAGONAL_FIRST, "0")
+        for key, names in (("diaginertia", DIAGONAL_FIRST[:3]), ("fullinertia", DIAGONAL_FIRST)):
+            if e.get(key) is not None:
+                numbers = e.get(key, "").split()
+                at.numbers(key, e.get(key))
+                if len(numbers) != len(names):
+                    raise at.error(key, f"{len(numbers)} numbers", len(names))
+                texts |= dict(zip(names, numbers, strict=True))
+        return Inertial(mass, place, *printed(texts))
+
+    # --- what closes loops ----------------------------------------------------------------------------------
+    def _equalities(self, element: Element) -> None:
+        robot = self.robot
+        for k, e in enumerate(element, 1):
+            if not isinstance(e.tag, str):
+                continue
+            values = self.whole(e, "main")
+            name = values.get("name") or f"{e.tag} {k}"
+            where = f"equality '{name}'"
+            at = At(self.file, where)
+            if values.get("active") == "false":
+                robot.notes.append(f"{where}: left out: it is not active")
+            elif e.tag in ("connect", "weld"):
+                self._connect(e.tag, name, at, values)
+            elif e.tag == "joint":
+                terms = [(named(self.file, e, "joint1"), 1.0)]
+                powers = at.numbers("polycoef", values.get("polycoef", "0 1 0 0 0"), 5)
+                if any(powers[2:]):
+                    robot.notes.append(f"{where}: left out: its polynomial is not a straight line")
+                    continue
+                if "joint2" in values:
+                    terms.append((values["joint2"], -powers[1]))
+                robot.couplings.append((name, terms))
+            elif e.tag == "tendon" and "tendon2" not in values:
+                robot.couplings.append((name, self._fixed(named(self.file, e, "tendon1"), at)))
+            else:
+                robot.notes.append(f"{where}: left out: <{e.tag}> has no like here")
+
+    def _connect(self, tag: str, name: str, at: At, values: dict[str, str]) -> None:
+        robot = self.robot
+        if "site1" in values or "site2" in values:
+            sides = []
+            for key in ("site1", "site2"):
+                if values.get(key) not in self.sites:
+                    raise DataError(f"{at.file}: {at.where}: no site is called '{values.get(key)}'")
+                link, inside = self.sites.pop(values[key])
+                sides.append((link, (robot.links[link].pose @ pose(inside))[:3, 3]))
+            (a, one), (b, other) = sides
+        else:
+            a, b = values.get("body1", ""), values.get("body2") or WORLD
+            anchor = at.numbers("anchor", values.get("anchor"), 3, (0.0, 0.0, 0.0))
+            base = robot.link(a, at.where).pose
+            robot.link(b, at.where)
+            # at the file's own configuration the place is the same on both
+            one = other = (base @ pose(anchor))[:3, 3]
+        kind: Kind = "fixed" if tag == "weld" else "ball"
+        robot.join(RobotJoint(name, kind, a, b, (one, other), np.zeros(3)))
+
+    def _fixed(self, name: str, at: At) -> list[tuple[str, float]]:
+        """Return the terms of a fixed tendon."""
+        for element in children(self.root, "tendon"):
+            for e in children(element, "fixed"):
+                if e.get("name") == name:
+                    own = At(self.file, f"tendon '{name}'")
+                    joints = children(e, "joint")
+                    return [(named(self.file, j, "joint"), own.number("", j.get("coef"))) for j in joints]
+        raise DataError(f"{self.file}: {at.where}: no fixed tendon is called '{name}'")
+
+    def _tendons(self) -> None:
+        for element in children(self.root, "tendon"):
+            for k, e in enumerate(children(element, "spatial", "fixed"), 1):
+                self._spring(e, At(self.file, f"tendon '{e.get('name') or k}'"))
+        points: dict[str, dict[str, Array]] = {}
+        for name, (link, at) in self.sites.items():
+            points.setdefault(link, {})[name] = at
+        for link, held in points.items():
+            self.robot.links[link].points = held
+
+    def _spring(self, e: Element, at: At) -> None:
+        """A tendon that pulls: between two sites, or on joints."""
+        values = self.classes[e.get("class", "main")].get("tendon", {}) | e.attrib
+        stiffness, damping = _leading(at, values, "stiffness", "damping")
+        if not (stiffness or damping):
+            return
+        text = values.get("springlength", "-1")
+        rest = at.numbers("springlength", text)
+        if not 1 <= len(rest) <= 2:
+            raise at.error("springlength", quote(text), "1 or 2 numbers")
+        ends, terms = [], []
+        if e.tag == "fixed":
+            terms = self._fixed(named(self.file, e), at)
+        else:
+            sites = [s.get("site", "") for s in e]
+            if len(sites) != 2 or not all(s in self.sites for s in sites):
+                self.robot.notes.append(f"{at.where}: left out: it does not run straight between two sites")
+                return
+            ends = [self.sites[s] for s in sites]
+        if len(rest) > 1 and rest[0] != rest[-1]:
+            self.robot.notes.append(
+                f"{at.where}: it is slack from {rest[0]:g} to {rest[-1]:g}: the first is taken"
+            )
+        open_ = "springlength" not in values or (rest[0] == -1.0 and not terms)
+        self.robot.springs.append(
+            Spring(at.where, ends, terms, stiffness, damping, None if open_ else rest[0])
+        )
+
+    def _actuators(self) -> None:
+        robot = self.robot
+        speeds = self._speeds()
+        for element in children(self.root, "actuator"):
+            for k, e in enumerate(element, 1):
+                if not isinstance(e.tag, str):
+                    continue
+                values = self.whole(e, "main")
+                name = values.get("name") or f"actuator {k}"
+                if "joint" in values:
+                    terms = [(values["joint"], 1.0)]
+                elif "tendon" in values:
+                    terms = self._fixed(values["tendon"], At(self.file, f"actuator '{name}'"))
+                else:
+                    robot.notes.append(f"actuator '{name}': left out: it drives no joint")
+                    continue
+                speed = sum(factor * speeds.get(joint, 0.0) for joint, factor in terms)
+                robot.motors.append(Motor(name, terms, speed or None))
+
+    def _speeds(self) -> dict[str, float]:
+        """The joints' speeds in the first key frame."""
+        keys = [key for e in children(self.root, "keyframe") for key in children(e, "key")]
+        own = [j.name for j in self.robot.joints.values() if j.kind in ("turn", "slide")]
+        if not keys or keys[0].get("qvel") is None:
+            return {}
+        result = At(self.file, "key").numbers("qvel", keys[0].get("qvel"))
+        if len(result) != len(own):
+            return {}
+        # a key frame at rest says of no speed
+        return {name: v for name, v in zip(own, result, strict=True) if v != 0}
+
+
+def _leading(at: At, values: Mapping[str, str], *keys: str) -> list[float]:
+    """Return for each key the first of one number or several, such as a stiffness with its polynomial's."""
+    return [(at.numbers(key, values.get(key)) or [0.0])[0] for key in keys]
+
+
+# --- writing ------------------------------------------------------------------------------------------------------
+def write(s: Skeleton, travel: Travel, comment: str) -> bytes:
+    """Return the file of a mechanism."""
+    m = s.m
+    root = Element("mujoco", model=m.name or "mechanism")
+    masses = [p.mass for p in s.bodies.values() if p.mass > 0]
+    light = max(LIGHT * max(masses, default=1.0), LIGHTEST)
+    inertias = [p.inertia for p in s.bodies.values() if p.inertia > 0]
+    least = max(min([light * m.size**2, *inertias]), LIGHTEST)
+    add(
+        root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false", boundmass=light, boundinertia=least
+    )  # fmt: skip
+    add(root, "option", gravity=spatial(m.gravity), timestep=0.0005, integrator="implicitfast")
+    default = add(root, "default")
+    # as stiff as the solver of constraints takes it
+    add(default, "equality", solref="0.001 1", solimp="0.9999 0.9999 0.001 0.5 2")
+    add(default, "geom", contype="0", conaffinity="0")
+    world = add(root, "worldbody")
+    bodies = {GROUND: world}
+    for b in s.walk():
+        bodies[b.child] = _body(s, b, bodies[b.parent])
+    for name, body in bodies.items():
+        _add_contents(s, name, body)
+    equality = Element("equality")
+    for j in s.closing:
+        _close(j, bodies, equality)
+    for link, block in s.welds:
+        add(equality, "weld", body1=link, body2=block)
+    tendon = Element("tendon")
+    count = dict.fromkeys(PLURAL, 0)
+    for mesh in m.meshes:
+        count[mesh.kind] += 1
+        name = f"{PLURAL[mesh.kind]} {count[mesh.kind]}"
+        _fixed(tendon, name, s.mesh(mesh))
+        add(equality, "tendon", tendon1=name)
+    _springs(s, tendon, bodies)
+    actuator = Element("actuator")
+    for k, e in enumerate(m.inputs):
+        joint = s.joint_of(k)
+        motor = add(actuator, "motor", name=e.name)
+        if joint is None:
+            _fixed(tendon, f"input {e.name}", s.free_input(k))
+            motor.set("tendon", f"input {e.name}")
+        else:
+            motor.set("joint", joint.name)
+        if travel.peak is not None:
+            motor.set("ctrlrange", digits(-travel.peak, travel.peak))
+    root.extend(e for e in (equality, tendon, actuator) if len(e))
+    _key(s, add(root, "keyframe"))
+    return document(root, comment)
+
+
+def _fixed(tendon: Element, name: str, terms: dict[str, float]) -> Element:
+    made = add(tendon, "fixed", name=name)
+    for joint, factor in terms.items():
+        add(made, "joint", joint=joint, coef=factor)
+    return made
+
+
+def _springs(s: Skeleton, tendon: Element, bodies: dict[str, Element]) -> None:
+    """Add springs and dampers, between two places and between two links."""
+    m = s.m
+    for k, spring in enumerate(m.springs, 1):
+        made = add(tendon, "spatial", name=f"spring {k}", stiffness=spring.stiffness, damping=spring.damping)
+        made.set("springlength", digits(spring.free_length))
+        for side, (body, point) in zip("ab", spring.between, strict=True):
+            site = f"spring {k} {side}"
+            add(bodies[body], "site", name=site, pos=spatial(m.place(body, point)))
+            add(made, "site", site=site)
+    for k, turning in enumerate(m.torsion_springs, 1):
+        on, link = turning.links
+        terms = s.terms({link: 1.0, on: -1.0})
+        made = _fixed(tendon, f"torsion spring {k}", terms)
+        made.attrib |= {"stiffness": digits(turning.stiffness), "damping": digits(turning.damping)}
+        here = sum(c * next(j.value for j in s.joints if j.name == name) for name, c in terms.items())
+        made.set("springlength", digits(here - s.twist(turning)))
+
+
+def _body(s: Skeleton, b: Branching, inside: Element) -> Element:
+    """Add a body with its joint."""
+    parent, part, j = s.bodies[b.parent], s.bodies[b.child], b.joint
+    body = add(inside, "body", name=b.child, pos=spatial(parent.inside(part.at)))
+    turned = part.turn - parent.turn
+    if turned:
+        body.set("euler", digits(0.0, 0.0, turned))
+    made = add(body, "joint", name=j.name, type="hinge" if j.kind == "turn" else "slide")
+    # of a slide the place means nothing to MuJoCo, but it is the point's
+    made.set("pos", spatial(j.ends[1] if b.child == j.link else j.ends[0]))
+    made.set("axis", digits(*j.axis(part, b.sense)))
+    if j.value:
+        made.set("ref", digits(j.value))
+    if j.limits is not None:
+        made.set("range", digits(*j.limits))
+    return body
+
+
+def _add_contents(s: Skeleton, name: str, body: Element) -> None:
+    """Add what a body has: mass, named points, a drawing."""
+    part = s.bodies[name]
+    if part.mass > 0:
+        add(
+            body,
+            "inertial",
+            pos=spatial(part.center),
+            mass=part.mass,
+            diaginertia=digits(*3 * (part.inertia,)),
+        )
+    for point, z in part.points.items():
+        # a point of several links stands on the first
+        if next(holder for holder, other in s.bodies.items() if point in other.points) == name:
+            add(body, "site", name=point, pos=spatial(z))
+    for a, b in strokes(part):
+        add(body, "geom", type="capsule", size=THICK * s.m.size, fromto=f"{spatial(a)} {spatial(b)}")
+
+
+def _close(j: Joint, bodies: dict[str, Element], equality: Element) -> None:
+    """Close a loop at a pin."""
+    sites = []
+    for name, z in zip((j.on, j.link), j.ends, strict=True):
+        sites.append(f"{j.name} on {name}")
+        add(bodies[name], "site", name=sites[-1], pos=spatial(z))
+    add(equality, "connect", name=j.name, site1=sites[0], site2=sites[1])
+
+
+def _key(s: Skeleton, keyframe: Element) -> None:
+    """The start: coordinates, speeds, efforts of the inputs."""
+    walked = [b.joint for b in s.walk()]
+    key = add(keyframe, "key", name="start")
+    key.set("qpos", digits(*(j.value for j in walked)))
+    key.set("qvel", digits(*(j.rate for j in walked)))

@@ -1,0 +1,328 @@
+"""URDF, read and written: a tree of links. Loops stand in `<gazebo>` blocks, as `<loop_joint>`, or as a second joint to one child."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from cli.formats import sdf
+from cli.formats.markup import (
+    At,
+    add,
+    child,
+    children,
+    digits,
+    document,
+    named,
+    placed,
+    plain,
+    spatial,
+    stated,
+)
+from cli.formats.robot import (
+    ROWS,
+    Array,
+    Inertial,
+    Kind,
+    Motor,
+    Robot,
+    RobotJoint,
+    RobotLink,
+    pose,
+    printed,
+    rpy,
+    sphere_around,
+)
+from cli.formats.skeleton import Branching, Skeleton, Travel, boxes
+from dalembert.errors import DataError
+from virtualwork.describe.parts import GROUND, Belt, Gear, Rack
+
+KINDS: dict[str, Kind] = {**sdf.KINDS, "spherical": "ball"}
+
+
+# a limit that is none
+LARGE = 1e9
+
+
+class _Joint(NamedTuple):
+    """A `<joint>` before its links have their places."""
+
+    element: Element
+    name: str
+    at: At
+    parent: str
+    child: str
+
+
+def read(file: str, root: Element) -> Robot:
+    """Read a `<robot>`."""
+    robot = Robot(file, "URDF", root.get("name", ""))
+    joints = list(children(root, "joint"))
+    for e in children(root, "link"):
+        name, at = placed(file, e)
+        held = _inertial(at, child(e, "inertial"))
+        robot.add(RobotLink(name, np.eye(4), held, shapes=_shapes(at, e)))
+    if not robot.links:
+        raise DataError(f"{file}: <robot>: no link: expected one or more")
+    _tree(robot, joints)
+    for e in children(root, "loop_joint"):
+        _loop(robot, e)
+    for e in children(root, "gazebo"):
+        for inner in children(e, "joint"):
+            sdf.read_joint(robot, inner)
+    for e in joints:
+        mimic = child(e, "mimic")
+        if mimic is not None:
+            _mimic(robot, named(file, e), mimic)
+    _motors(robot, root)
+    return robot
+
+
+def origin(at: At, element: Element | None) -> Array:
+    """Return the pose that an `<origin>` gives."""
+    if element is None:
+        return np.eye(4)
+    xyz, angles = (
+        at.numbers(f"origin {key}", element.get(key), 3, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy")
+    )
+    return pose(xyz, rpy(*angles))
+
+
+def _axis(at: At, element: Element, default: tuple[float, float, float]) -> list[float]:
+    """Return a joint's axis, of any length, in the joint's own axes."""
+    axis = child(element, "axis")
+    return at.numbers("axis", None if axis is None else axis.get("xyz"), 3, default)
+
+
+def _inertial(at: At, element: Element | None) -> Inertial | None:
+    if element is None:
+        return None
+    mass, inertia = child(element, "mass"), child(element, "inertia")
+    texts = {key: "0" if inertia is None else inertia.get(key, "0") for key in ROWS}
+    for key, text in texts.items():
+        at.number(f"inertia {key}", text)
+    return Inertial(
+        0.0 if mass is None else at.number("mass", mass.get("value")),
+        origin(at.inside("inertial"), child(element, "origin")),
+        *printed(texts),
+    )
+
+
+def _shapes(at: At, link: Element) -> list[tuple[Array, float]]:
+    """Return spheres around the shapes of a link; none where the size of one is not said."""
+    shapes = []
+    for e in children(link, "visual", "collision"):
+        geometry = child(e, "geometry")
+        for shape in () if geometry is None else geometry:
+            given = [
+                (key, n)
+                for key, n in (("size", 3), ("radius", 1), ("length", 1))
+                if shape.get(key) is not None
+            ]
+            size = [x for key, n in given for x in at.numbers(key, shape.get(key), n)]
+            radius = sphere_around(plain(shape), size)
+            if radius is None:
+                return []
+            shapes.append((origin(at, child(e, "origin"))[:3, 3], radius))
+    return shapes
+
+
+def _end(robot: Robot, e: Element, tag: str, at: At) -> str:
+    element = child(e, tag)
+    name = None if element is None else element.get("link")
+    if name is None:
+        raise DataError(f"{robot.file}: {at.where}: <{tag} link=…> is missing")
+    robot.link(name, at.where)
+    return name
+
+
+def _tree(robot: Robot, joints: list[Element]) -> None:
+    """Place every link; a link that has a parent already closes a loop."""
+    waiting = []
+    for e in joints:
+        name, at = placed(robot.file, e)
+        waiting.append(_Joint(e, name, at, _end(robot, e, "parent", at), _end(robot, e, "child", at)))
+    below = {joint.child for joint in waiting}
+    roots = [name for name in robot.links if name not in below]
+    if not roots:
+        raise DataError(f"{robot.file}: every link is the child of a joint: expected one that stands still")
+    robot.ground = roots[0]
+    there = set(roots)
+    closing = []
+    while waiting:
+        ready = [joint for joint in waiting if joint.parent in there]
+        if not ready:
+            raise DataError(f"{robot.file}: {waiting[0].at.where}: its links depend on each other alone")
+        waiting = [joint for joint in waiting if joint.parent not in there]
+        for joint in ready:
+            frame = robot.links[joint.parent].pose @ origin(joint.at, child(joint.element, "origin"))
+            if joint.child in there:
+                closing.append((joint, frame))
+                continue
+            there.add(joint.child)
+            robot.links[joint.child].pose = frame
+            _join(robot, joint, frame)
+    for joint, frame in closing:
+        _join(robot, joint, frame)
+
+
+def _join(robot: Robot, joint: _Joint, frame: Array) -> None:
+    e, name, at, parent, link = joint
+    type_ = e.get("type", "")
+    kind = KINDS.get(type_, "other")
+    xyz = _axis(at, e, (1.0, 0.0, 0.0))
+    direction = np.zeros(3) if kind == "fixed" else frame[:3, :3] @ at.direction("axis", xyz)
+    made = RobotJoint(
+        name, kind, parent, link, (frame[:3, 3], robot.links[link].pose[:3, 3]), direction, type=type_
+    )
+    limit, dynamics = child(e, "limit"), child(e, "dynamics")
+    made.more = stated(
+        [] if limit is None else [limit.get(end) for end in ("lower", "upper")],
+        None if dynamics is None else dynamics.get("friction"),
+    )
+    if dynamics is not None:
+        made.damping = at.number("damping", dynamics.get("damping", "0"))
+    robot.join(made)
+
+
+def _loop(robot: Robot, e: Element) -> None:
+    """`<loop_joint>`: each of its two links has the joint's place in its own axes."""
+    name, at = placed(robot.file, e)
+    kind = KINDS.get(e.get("type", "revolute"), "other")
+    sides = []
+    for tag in ("link1", "link2"):
+        side = child(e, tag)
+        if side is None:
+            raise DataError(f"{robot.file}: {at.where}: <{tag} link=… xyz=…> is missing")
+        link = robot.link(named(robot.file, side, "link"), at.where)
+        sides.append((link.name, link.pose @ origin(at.inside(tag), side)))
+    (a, frame), (b, other) = sides
+    direction = frame[:3, :3] @ at.direction("axis", _axis(at, e, (0.0, 0.0, 1.0)))
+    robot.join(RobotJoint(name, kind, a, b, (frame[:3, 3], other[:3, 3]), direction))
+
+
+def _mimic(robot: Robot, name: str, mimic: Element) -> None:
+    at = At(robot.file, f"joint '{name}'")
+    where = f"{at.where}, mimic"
+    other = named(robot.file, mimic, "joint")
+    if other not in robot.joints:
+        raise DataError(f"{robot.file}: {where}: no joint is called '{other}'")
+    factor, offset = (
+        at.number(f"mimic {key}", mimic.get(key, default))
+        for key, default in (("multiplier", "1"), ("offset", "0"))
+    )
+    robot.couplings.append((name, [(name, 1.0), (other, -factor)]))
+    if offset:
+        robot.notes.append(f"{where}: its offset {offset:g} is left out: the drawn pose is that of the file")
+
+
+def _motors(robot: Robot, root: Element) -> None:
+    """The joints that a plug-in, a transmission or a command interface drives."""
+    speeds: dict[str, float | None] = {}
+    for e in children(root, "gazebo"):
+        speeds |= sdf.driven(robot.file, e)
+    for e in children(root, "transmission"):
+        for joint in children(e, "joint"):
+            speeds.setdefault(named(robot.file, joint), None)
+    for control in children(root, "ros2_control"):
+        for joint in children(control, "joint"):
+            if child(joint, "command_interface") is not None:
+                speeds.setdefault(named(robot.file, joint), None)
+    robot.motors = [Motor(name, [(name, 1.0)], speed) for name, speed in speeds.items()]
+
+
+# --- writing ------------------------------------------------------------------------------------------------------
+def write(s: Skeleton, travel: Travel, comment: str) -> bytes:
+    """Return the file of a mechanism."""
+    root = Element("robot", name=s.m.name or "mechanism")
+    # where each link's axes begin: at the joint on which it hangs, in its own axes of the mechanism's file
+    origin = {GROUND: 0j}
+    for b in s.walk():
+        origin[b.child] = b.joint.ends[1] if b.child == b.joint.link else b.joint.ends[0]
+    for name in s.bodies:
+        _add_link(s, root, name, origin[name])
+    for b in s.walk():
+        _add_joint(s, root, b, origin, travel)
+    for name in s.bodies:
+        _add_frames(s, root, name, origin[name])
+    gazebo = Element("gazebo")
+    for j in s.closing:
+        ends = (j.ends[0] - origin[j.on], j.ends[1] - origin[j.link])
+        sdf.add_joint(gazebo, s, replace(j, ends=ends), travel, GROUND)
+    sdf.add_welds(gazebo, s)
+    _add_gears(s, root, gazebo)
+    sdf.add_plugins(gazebo, s)
+    if len(gazebo):
+        root.append(gazebo)
+    return document(root, comment)
+
+
+def _add_link(s: Skeleton, root: Element, name: str, origin: complex) -> None:
+    part, link = s.bodies[name], add(root, "link", name=name)
+    if part.mass > 0:
+        inertial = add(link, "inertial")
+        add(inertial, "origin", xyz=spatial(part.center - origin), rpy="0 0 0")
+        add(inertial, "mass", value=part.mass)
+        # in the plane only izz acts
+        add(inertial, "inertia", None, **{n: part.inertia if n[1] == n[2] else 0.0 for n in ROWS})
+    for middle, turn, sides in boxes(part, s.m.size):
+        visual = add(link, "visual")
+        add(visual, "origin", xyz=spatial(middle - origin), rpy=digits(0.0, 0.0, turn))
+        add(add(visual, "geometry"), "box", size=digits(*sides))
+
+
+def _add_joint(s: Skeleton, root: Element, b: Branching, origin: dict[str, complex], travel: Travel) -> None:
+    j, parent, part = b.joint, s.bodies[b.parent], s.bodies[b.child]
+    kind = "prismatic" if j.kind == "slide" else "continuous" if j.limits is None else "revolute"
+    made = add(root, "joint", name=j.name, type=kind)
+    at = parent.inside(part.world(origin[b.child])) - origin[b.parent]
+    add(made, "origin", xyz=spatial(at), rpy=digits(0.0, 0.0, part.turn - parent.turn))
+    add(made, "parent", link=b.parent)
+    add(made, "child", link=b.child)
+    add(made, "axis", xyz=digits(*j.axis(part, b.sense)))
+    if kind != "continuous" or j.input is not None:
+        limit = add(made, "limit")
+        low, high = (
+            j.limits
+            or (j.guide is not None and travel.way(j.guide))
+            or (j.value - s.m.size, j.value + s.m.size)
+        )
+        if kind != "continuous":
+            limit.attrib |= {"lower": digits(low - j.value), "upper": digits(high - j.value)}
+        peak = 0.0 if j.input is None else travel.peak
+        # the format wants both numbers; where nothing limits them they are large
+        limit.set("effort", digits(LARGE if peak is None else peak))
+        limit.set("velocity", digits(LARGE))
+
+
+def _add_frames(s: Skeleton, root: Element, name: str, origin: complex) -> None:
+    """Named points that no joint holds: links without mass, fixed there."""
+    for point, z in s.free_points(name).items():
+        frame = point if point not in s.bodies else f"{point} point"
+        add(root, "link", name=frame)
+        made = add(root, "joint", name=f"{frame} fixed", type="fixed")
+        add(made, "origin", xyz=spatial(z - origin), rpy="0 0 0")
+        add(made, "parent", link=name)
+        add(made, "child", link=frame)
+
+
+def _add_gears(s: Skeleton, root: Element, gazebo: Element) -> None:
+    """Gears, belts and racks of two joints of the tree are mimicked; other gears are gearboxes of the simulator."""
+    boxes: list[Gear | Belt] = []
+    parts: tuple[Gear | Belt | Rack, ...] = (*s.m.gears, *s.m.belts, *s.m.racks)
+    for g, mesh in zip(parts, s.m.meshes, strict=True):
+        terms = s.mesh(mesh)
+        driven = {j.name for j in s.joints if j.input is not None}
+        last = [name for name in terms if name not in driven]
+        joint = next((e for e in root.iter("joint") if last and e.get("name") == last[-1]), None)
+        if len(terms) == 2 and joint is not None and joint.find("mimic") is None:
+            (other,) = (name for name in terms if name != last[-1])
+            # of coordinates that may run against the pins' own sense
+            factor = -terms[other] / terms[last[-1]]
+            add(joint, "mimic", joint=other, multiplier=factor)
+        elif not isinstance(g, Rack):
+            boxes.append(g)
+    sdf.add_gearboxes(gazebo, boxes, GROUND)
