@@ -62,7 +62,7 @@ class AmplitudeFit:
 
     @property
     def condition_number(self) -> Real:
-        """By what factor relative errors of the readings can grow in the coefficient, (s,); inf where circles touch."""
+        """The factor by which relative errors of the readings can grow in the coefficient, (s,); inf where circles touch."""
         at = self._at
         # largest |∂z/∂R| over the runs
         gain = np.linalg.norm(at.gain(at.rows), axis=-2).max(axis=-1)

@@ -210,7 +210,7 @@ class Balance:
 
     @property
     def error_reason(self) -> str:
-        """Why `error_estimate` knows nothing of the corrections; empty where it does."""
+        """The reason why the corrections have no error estimate; empty if they have one."""
         return self._again[1]
 
     def second_run(self, influence: Vectors, initial: Vectors) -> tuple[Vectors | None, str]:

@@ -44,7 +44,7 @@ class ConeProblem:
     e: Complex
     offset: Complex
     rounding: float
-    """By how much the largest e may be wrong."""
+    """The possible error of the largest e."""
     h: Real
     f: Real
     square: Complex | None
@@ -179,7 +179,7 @@ class _Path:
         return _Point(self.x, self.pair, self.error)
 
     def _judge(self) -> None:
-        """What is left of the two equations, and of the gap."""
+        """Return the residuals of the two equations, and of the gap."""
         s, z = self.pair.reshape(3, 2, -1).swapaxes(0, 1).reshape(2, -1)
         self.rx = z @ self.flat
         self.rx += self.c

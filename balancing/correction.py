@@ -197,7 +197,7 @@ class Correction:
 
     @cached_property
     def residual(self) -> Unbalances:
-        """What is left when the corrections are made exactly: rounding, and in one plane the couple about it."""
+        """The residual of exact corrections: rounding, and in one plane the couple about it."""
         return self.residual_of(self.unbalance)
 
     def residual_of(self, unbalance: ArrayLike, about: ArrayLike | None = None) -> Unbalances:
@@ -286,7 +286,7 @@ class Correction:
         return ExactMasses(Vectors.of(self.moment), Doubled(self.z), Doubled(self.planes))
 
     def _hidden(self, arms: Real) -> Real:
-        """What sums in 32 digits of the unbalances times arms (..., k) may hide, (...)."""
+        """Return the possible error of sums in 32 digits of unbalances times arms (..., k), (...)."""
         from balancing.second_run import HIDDEN
 
         return np.asarray(HIDDEN * (arms * np.abs(self.moment)).sum(axis=-1))
@@ -418,6 +418,6 @@ def _complex(parts: Real) -> Complex:
 
 
 def _joined(terms: list[Real]) -> Real:
-    """Put terms (..., j, 2) behind each other along the axis to be summed."""
+    """Join terms (..., j, 2) along the axis of the sum."""
     lead = np.broadcast_shapes(*(term.shape[:-2] for term in terms))
     return np.concatenate([np.broadcast_to(term, lead + term.shape[-2:]) for term in terms], axis=-2)

@@ -124,11 +124,11 @@ class Drift(NamedTuple):
     """The rate at which the vibration changes with time, and the probability of such a rate by chance."""
 
     rate: Complex
-    """Of each channel, in readings per unit of time, (..., s); NaN if the times do not determine it."""
+    """The rate of each channel, in readings per unit of time, (..., s); NaN if the times do not determine it."""
     deviation: Real
     """Standard deviation of each component of the rate, (..., s); NaN where nothing is left over."""
     probability: Real
-    """Of all channels together, (...); NaN where untested."""
+    """The probability for all channels together, (...); NaN if untested."""
 
 
 def drift(fit: JointFit, times: ArrayLike) -> Drift:

@@ -85,13 +85,13 @@ class Forces:
     """Forces of the orders 1 to K of sources along a shaft: with·e^{ikθ} + against·e^{−ikθ}, x + iy, N."""
 
     z: Real
-    """Where each source stands, (s,), m."""
+    """The position of each source, (s,), m."""
     with_crank: Complex
     """(s, K)."""
     against: Complex
     """(s, K)."""
     again: Callable[[], Forces] | None = field(default=None, compare=False)
-    """The same forces in 32 digits, computed on request; None: the floats are exact."""
+    """These forces in 32 digits, computed on request; None: the floats are exact."""
 
     def joined(self, *others: Forces) -> Forces:
         """Return the forces of these sources and of others together."""
@@ -105,7 +105,7 @@ class Forces:
 
     @property
     def exact(self) -> Forces:
-        """The same forces in 32 digits."""
+        """These forces in 32 digits."""
         if is_doubled(self.z):
             return self
         if self.again is not None:

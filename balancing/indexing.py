@@ -27,7 +27,7 @@ class Indexed(NamedTuple):
     uncertainty: Real
     """One standard deviation of either unbalance along any direction; NaN for two readings."""
     amplification: Real
-    """How much the errors of the readings grow against positions spread evenly: 1 for 0° and 180°."""
+    """The growth of the errors of the readings relative to evenly spread positions: 1 for 0° and 180°."""
 
 
 def index_balancing(readings: ArrayLike, turned: ArrayLike = (0.0, np.pi)) -> Indexed:

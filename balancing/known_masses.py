@@ -21,7 +21,7 @@ Real = NDArray[np.float64]
 
 
 def shares(planes: Real) -> tuple[Real, Real, float]:
-    """What an unbalance of 1 at z adds in every plane, first + slope·(z − about): (first, slope, about).
+    """Return the share in every plane of an unbalance of 1 at z, first + slope·(z − about): (first, slope, about).
 
     >>> first, slope, about = shares(np.array([0.0, 0.09]))
     >>> (first + slope * (0.03 - about)).round(12)
@@ -53,7 +53,7 @@ class Modal:
         return 0 if self.shaft is None else 2
 
     def conditions(self, recorder: Recorder, z: Number) -> list[Number]:
-        """What an unbalance of 1 at z does to each condition."""
+        """Return the contribution of an unbalance of 1 at z to each condition."""
         s = z - recorder.input("station")
         rigid = [] if self.shaft is None else [1.0, (z - self.shaft[0]) * (1.0 / self.shaft[1])]
         for k in range(len(self.at_planes) - self.first):
@@ -63,12 +63,12 @@ class Modal:
 
     @property
     def solution(self) -> Real:
-        """What a condition of 1 asks of every plane, (q, p)."""
+        """The correction in every plane for a condition of 1, (q, p)."""
         q = len(self.at_planes)
         return modal_corrections(np.ones((q, 1)), np.eye(q)[:, :, None], self.at_planes).unbalance.real
 
     def left(self, sums: list[Number], made: list[Number]) -> Outputs:
-        """What corrections leave of each mode, and the size of the terms that it is the sum of."""
+        """Return the residual of each mode after the corrections, and the size of its terms."""
         outputs: Outputs = {}
         for k, row in enumerate(self.at_planes[self.first :].tolist()):
             outputs[f"left mode {k}"] = abs(sum((w * f for w, f in zip(made, row, strict=True)), sums[k]))
@@ -172,7 +172,7 @@ def known_masses(
 
 
 def _asked(planes: Real, z: Number) -> list[Number]:
-    """What an unbalance of 1 at z asks of every plane, so that force and couple vanish."""
+    """Return the correction in every plane for an unbalance of 1 at z, so that force and couple vanish."""
     first, slope, about = shares(planes)
     return [float(a) + float(b) * (z - about) for a, b in zip(first, slope, strict=True)]
 
@@ -183,6 +183,6 @@ def _modes(recorder: Recorder, modal: Modal) -> list[Number]:
 
 
 def _left(static: Number, couple: Number, made: list[Number], arms: Real) -> Outputs:
-    """What corrections leave of the unbalance and of its couple."""
+    """Return the residual unbalance and couple after the corrections."""
     levers = [w * float(arm) for w, arm in zip(made, arms, strict=True)]
     return {"left static": abs(sum(made, static)), "left couple": abs(sum(levers, couple))}

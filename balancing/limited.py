@@ -156,7 +156,7 @@ def smallest_maximum(a: Complex, b: Complex, limit: Real) -> Optimum:
 
 
 def _rounding(a: Complex, b: Complex, w: Complex) -> float:
-    """By how much b + a w can be wrong, w being rounded itself."""
+    """Return the possible error of b + a w for a rounded w."""
     return roundings(len(w)) * float((np.abs(b) + np.abs(a) @ np.abs(w)).max(initial=0.0))
 
 

@@ -28,7 +28,7 @@ class Loads(NamedTuple):
     """Which load each run has, (r, 1 + p)."""
     present: NDArray[np.bool_]
     often: Real
-    """How often each channel was read with each load, (..., 1 + p, s)."""
+    """The number of readings of each channel with each load, (..., 1 + p, s)."""
 
     def means(self, of_rows: NDArray[np.float64 | np.complex128]) -> NDArray[np.float64 | np.complex128]:
         """Return the means over the runs of each load, (..., r, s) -> (..., 1 + p, s)."""
@@ -58,7 +58,7 @@ class Loads(NamedTuple):
 
 
 def loads_of(masses: Complex, present: NDArray[np.bool_]) -> Loads | None:
-    """Tell the loads of the runs apart; None where there are more of them than unknowns, or fewer, or none is none."""
+    """Return the different loads of the runs; None if they are more or fewer than the unknowns, or if no run is without load."""
     runs, planes = masses.shape[-2:]
     if runs < 1 + planes:
         return None

@@ -70,7 +70,7 @@ class Spread(NamedTuple):
 
 
 class CoefficientSpread(NamedTuple):
-    """How well influence coefficients are known; SI."""
+    """The uncertainty of influence coefficients, in SI units."""
 
     along: Real
     """Standard deviation along each coefficient and across it, (..., s, p); NaN where it is not known."""
@@ -100,14 +100,14 @@ class LogBalance:
 
     fit: JointFit
     corrections: Complex
-    """What is to be ADDED to the rotor without masses, (..., p), by least squares."""
+    """The masses to ADD to the rotor without masses, (..., p), by least squares."""
     errors: Errors
     weights: Real | None = None
-    """Those of the channels in the least squares of the corrections, (..., s)."""
+    """The weights of the channels in the least squares of the corrections, (..., s)."""
     along: Complex | None = None
     """The directions of the corrections as given out, where they are not these ones', (..., p)."""
     ridge: float = 0.0
-    """Of the least squares of the corrections."""
+    """The ridge of the least squares of the corrections."""
 
     def __repr__(self) -> str:
         w, errors = numbers(self.corrections), numbers(self.errors.degrees_of_freedom)
@@ -169,14 +169,14 @@ class LogBalance:
         return np.swapaxes(errors.unit, -1, -2), along, across
 
     def _each(self) -> tuple[Complex, Real, Real]:
-        """The same of all readings in one row, (..., s·r) each."""
+        """Return these for all readings in one row, (..., s·r) each."""
         unit, along, across = self._by_channel()
         flat = (*unit.shape[:-2], -1)
         return unit.reshape(flat), along.reshape(flat), across.reshape(flat)
 
     @property
     def covariance(self) -> Real:
-        """Of each correction along itself (its size) and across (its angle), (..., p, 2, 2), kg²."""
+        """The covariance of each correction along itself (its size) and across (its angle), (..., p, 2, 2), kg²."""
         return self._spread.covariance
 
     @property

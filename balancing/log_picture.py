@@ -44,12 +44,12 @@ class History(NamedTuple):
     fit: JointFit
     """Without run-out."""
     chance: Real
-    """How often by chance a residual is as large as each of them, (r, s)."""
+    """The probability by chance of a residual as large as each one, (r, s)."""
     initial: Complex
     residual: Complex
     """(s,) each."""
     after: Spread
-    """Of the vibration with the corrections on, of all machines."""
+    """The spread of the vibration with the corrections, of all machines."""
     planes: Sequence[str]
     corrections: Complex
     spreads: Sequence[tuple[Real, float]]
@@ -59,7 +59,7 @@ class History(NamedTuple):
     suggested: Complex | None = None
     """The masses of the next run, (p,)."""
     places: Sequence[float] = ()
-    """Where masses can go, degrees."""
+    """The angles at which masses can be placed, degrees."""
     split: Sequence[Sequence[float]] = ()
     """The masses on these places, of each plane."""
 
@@ -116,7 +116,7 @@ def _region(axes: PolarAxes, outline: Complex, color: str) -> None:
 
 
 def _finished(axes: PolarAxes, title: str, scale: float, vectors: Sequence[complex]) -> None:
-    """Give a dial its title and its rings, with room for the largest vector."""
+    """Add title and rings to a dial, with room for the largest vector."""
     from matplotlib.ticker import MaxNLocator
 
     axes.set_title(title, pad=12, fontsize=10)

@@ -1,4 +1,4 @@
-"""What corrections are to achieve: least squares or the least maximum, within limits; and how sure they are under these."""
+"""The objective of corrections: least squares or the least maximum, within limits; and their uncertainty under limits."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ROUNDED = 1 + 64 * float(np.finfo(float).eps)
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """What the corrections of a machine are to achieve.
+    """The objective of the corrections of a machine.
 
     Examples
     --------

@@ -47,7 +47,7 @@ class _Rows:
     h: Real
     f: Real
     moved: Real
-    """By how much the values of `e` in floats may be wrong."""
+    """The possible errors of the values of `e` in floats."""
 
 
 def optimum_again(
@@ -63,7 +63,7 @@ def optimum_again(
 
 
 class _NotBounded(Exception):
-    """Why there is no bound."""
+    """There is no bound; the message has the reason."""
 
 
 def _rows(problem: Problem, minimax: bool, max_mass: Real | None, max_residual: Real | None) -> _Rows:

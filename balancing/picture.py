@@ -30,7 +30,7 @@ MOST = 4
 NAMED = 16
 """So many vectors of a dial are named."""
 RIM_ROOM = 2.3
-"""How far a dial with places reaches: with room for the marks on the rim."""
+"""The reach of a dial with places, with room for the marks on the rim."""
 SENSE = "angles counter-clockwise as seen against +z"
 WHOLE = Look("0.55", 4.0)
 TOGETHER = Look("tab:red", 1.8)
@@ -47,7 +47,7 @@ class KnownMasses(NamedTuple):
     masses: Sequence[str]
     planes: Sequence[str]
     shares: Complex
-    """Of each mass in each plane, (k, p)."""
+    """The share of each mass in each plane, (k, p)."""
     made: Complex
     """The correction in each plane, as it is given out, (p,)."""
 
@@ -63,9 +63,9 @@ class Vibration(NamedTuple):
     planes: Sequence[str]
     corrections: Complex
     standing: Complex
-    """What of the trial masses stays on, (p,)."""
+    """The trial masses that stay on the rotor, (p,)."""
     places: Sequence[float] = ()
-    """Where masses can go, rad."""
+    """The angles at which masses can be placed, rad."""
     split: Sequence[Sequence[float]] = ()
     """The masses on these places, of each plane."""
     read: Complex = NONE

@@ -30,7 +30,7 @@ class Placement:
     """Masses at given positions, computed by `place`, `place_from_stock` or `place_weights`."""
 
     target: complex
-    """What the masses together should be, complex kg."""
+    """The required sum of the masses, complex kg."""
     angles: Real
     """The positions, (n,), rad."""
     masses: Real
@@ -59,7 +59,7 @@ class Placement:
 
     @property
     def total(self) -> complex:
-        """What the masses together are, complex kg."""
+        """The sum of the masses, complex kg."""
         return complex((self.masses * np.exp(1j * self.angles)).sum())
 
     @property
@@ -69,7 +69,7 @@ class Placement:
 
     @property
     def condition_number(self) -> float:
-        """By what factor an error of the target can grow in a mass: one over the sine between the two that share it."""
+        """The factor by which an error of the target can grow in a mass: one over the sine between the two that share it."""
         if len(self.free) < 2:
             return 1.0
         one, other = self.angles[list(self.free)]
@@ -388,7 +388,7 @@ def _sums(
 
 
 def _room(loads: int, positions: int, max_pieces: int | None) -> int:
-    """Tell of how many positions all choices can be searched: half of them have at most SUMS."""
+    """Return the number of positions for which all choices can be searched: half of them have at most SUMS."""
     if max_pieces is None:
         return max(2 * int(np.log(SUMS) / np.log(loads)), 2)
     half = 1

@@ -1,4 +1,4 @@
-"""How errors of readings reach corrections that least squares found from them, to first order."""
+"""First-order propagation of errors of readings to the corrections of least squares."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ class Problem(NamedTuple):
 
     @property
     def moved(self) -> Real:
-        """By how much V + α w at these very corrections is wrong in floats, or may be, (..., s)."""
+        """Return the error of V + α w at these corrections in floats, or its bound, (..., s)."""
         alpha, v = self.floats
         change = (self.initial - Vectors.of(v)).value + np.matvec(
             (self.influence - Vectors.of(alpha)).value, self.corrections

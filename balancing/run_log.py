@@ -45,7 +45,7 @@ class Undetermined(Unseen):
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class Foreknown:
-    """What was known before the runs, in a fit with it."""
+    """The prior knowledge in a fit."""
 
     plain: JointFit
     """The runs alone: of least norm where they do not determine the unknowns."""
@@ -73,9 +73,9 @@ class JointFit:
     leverage: Real
     """h, how far a reading is its own fitted value, in [0, 1], (..., r, s)."""
     count: NDArray[np.intp] | None = None
-    """How many unknowns the runs determine, (...), where these are not all."""
+    """The number of unknowns that the runs determine, (...), if these are not all."""
     foreknown: Foreknown | None = None
-    """Where more than the runs was fitted: see `balancing.prior`."""
+    """The prior knowledge of the fit, if there is any: see `balancing.prior`."""
 
     def machine(self, i: int) -> JointFit:
         """Return the fit of one of many machines, along the leading axis."""

@@ -19,7 +19,7 @@ from dalembert.arithmetic.doubled_vectors import Vectors, part, total
 Real = NDArray[np.float64]
 
 HIDDEN = 2.0**-102
-"""What a sum in 32 digits may be off by, of the sizes of its terms."""
+"""The possible error of a sum in 32 digits, as a share of the sizes of its terms."""
 
 
 class ExactMasses(NamedTuple):
@@ -50,7 +50,7 @@ class ExactMasses(NamedTuple):
         return -((moments[..., None, :] * apart).total() / part(square, (..., None)))
 
     def residual(self, made: Vectors, about: Doubled) -> tuple[Vectors, Vectors]:
-        """What corrections as made (..., p) leave: Σ U + Σ W, and the couple about a position (...)."""
+        """Return the residual of corrections as made (..., p): Σ U + Σ W, and the couple about a position (...)."""
         lever = self.planes - part(about, (..., None))
         couple = self.about(part(about, (..., None)))[..., 0] + (made * lever).total()
         return self.static + made.total(), couple

@@ -37,7 +37,7 @@ class OncePerTurn:
     """Standard deviation of the speeds of single turns, rad/s; NaN with one turn."""
     turns: int
     phase_resolution: float = 0.0
-    """By how much the phases may be off, either way, from the samples at the edge of a mark of two levels, rad."""
+    """The possible error of the phases, either way, from the samples at the edge of a mark of two levels, rad."""
     recording: tuple[Any, ...] = field(default=(), compare=False)
     """Times, signals, mark, pulses and tacho."""
 
@@ -77,7 +77,7 @@ class Marks(NamedTuple):
     at: Any
     """(n,), s."""
     resolution: Any
-    """By how much all of them together may be earlier or later, s."""
+    """The possible common shift of all of them, s."""
 
 
 def marks(t: ArrayLike, mark: ArrayLike) -> Marks:

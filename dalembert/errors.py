@@ -1,4 +1,4 @@
-"""What a user's data can do wrong, in one line each."""
+"""Errors in a user's data, each in one line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ class DataError(Exception):
 
 
 def needs(what: str, package: str, extra: str) -> DataError:
-    """Say what is missing where a package of an extra is not installed."""
+    """Return the error of a missing package, with the extra that installs it."""
     return DataError(f"{what} needs {package}: install dalembert with its extra, dalembert[{extra}]")
 
 
@@ -31,7 +31,7 @@ def quote(value: str) -> str:
 
 
 def one_line(message: str) -> str:
-    """Put a message on one line that a terminal can show, whatever names and values of a file stand in it."""
+    """Return a message as one line that a terminal can show, for any names and values from a file."""
     line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in " ".join(message.split()))
     # what was found stands at the front, what was expected at the end
     return line if len(line) <= LONGEST else f"{line[: LONGEST * 2 // 3]} ... {line[-LONGEST // 3 :]}"

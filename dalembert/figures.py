@@ -31,7 +31,7 @@ class Typed:
 
     @property
     def digits(self) -> int:
-        """How many figures it has, zeros at the end of a whole number among them.
+        """The number of its figures, zeros at the end of a whole number included.
 
         >>> [one.digits for text in ("82350", "0.050", "1.2e3") for one in typed(text)]
         [5, 2, 2]

@@ -1,4 +1,4 @@
-"""How much memory a result may take."""
+"""Limits of the memory that a result may take."""
 
 from __future__ import annotations
 

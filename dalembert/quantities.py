@@ -30,7 +30,7 @@ _SPOKEN_DIMENSION = {
 
 
 def expected(dimension: str) -> str:
-    """Say what a value of this dimension looks like: `a length such as '120 mm'`."""
+    """Return an example of a value of this dimension: `a length such as '120 mm'`."""
     of = DIMENSIONS[dimension]
     if not of.example:
         return "a number"
@@ -107,7 +107,7 @@ def parse_number(text: str) -> float:
 
 
 def number_expected(text: str) -> str:
-    """Say what was expected in place of a text that `parse_number` refuses: a number, or a smaller one.
+    """Return the expected value in place of a text that `parse_number` refuses: a number, or a smaller one.
 
     >>> number_expected("five"), number_expected("1e300")
     ('a number', 'a number of at most 1e+60')

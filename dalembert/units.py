@@ -79,14 +79,14 @@ WORDS: dict[str, tuple[Factor, Exponents]] = {
 
 
 class Dimension(NamedTuple):
-    """What a quantity measures."""
+    """The dimension of a quantity."""
 
     exponents: Exponents
     units: str
     """Its usual units as headers spell them, blanks between; the first is SI."""
     article: str = "a"
     example: str = ""
-    """How a value of it may be written in a file, for messages."""
+    """An example of a value in a file, for messages."""
 
 
 DIMENSIONS: dict[str, Dimension] = {

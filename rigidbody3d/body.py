@@ -183,7 +183,7 @@ class Body:
 
     @cached_property
     def in_32_digits(self) -> Body:
-        """The same body in doubled numbers: computed again, from the numbers it was made of."""
+        """This body in doubled numbers, computed again from the numbers that it was made of."""
         if self.exact is not None:
             return self.exact()
         return Body(*map(in_32_digits, (self.mass, self.center, self.inertia)))

@@ -16,7 +16,7 @@ Doubled = Any
 """A `DoubledArray`, or what enters its operations."""
 
 SPREAD = 3e-5
-"""By how much of their mean the arguments may differ at the end: the series leaves out its eighth power."""
+"""The share of their mean by which the arguments may differ at the end: the series leaves out its eighth power."""
 
 
 def first(x: Doubled, y: Doubled, z: Doubled) -> Doubled:

@@ -109,7 +109,7 @@ class FreeBody:
 
     @cached_property
     def in_32_digits(self) -> FreeBody:
-        """The same body in doubled numbers."""
+        """This body in doubled numbers."""
         return FreeBody(*map(in_32_digits, (self.inertia, self.omega, self.attitude)))
 
     def error_estimate(self, of: str = "period", exact: FreeBody | None = None) -> Array:
@@ -217,5 +217,5 @@ class FreeState(AtTimes):
 
     @cached_property
     def in_32_digits(self) -> FreeState:
-        """The same state in doubled numbers."""
+        """This state in doubled numbers."""
         return self.body.in_32_digits.at(in_32_digits(self.time))

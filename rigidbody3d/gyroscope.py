@@ -48,7 +48,7 @@ class Steady(_Rates):
     """The two rates of steady precession, `.slow` and `.fast`, rad/s; NaN where the spin is too slow for any."""
 
     inputs: tuple[Array, ...]
-    """What `steady_precession` computed them from."""
+    """The arguments of `steady_precession`."""
 
     def error_estimate(self) -> tuple[Array, Array]:
         """Return estimates of the errors of both rates, (...), rad/s: computed twice, with 16 and with 32 digits.
@@ -151,7 +151,7 @@ class Cones(_Cones):
     """
 
     inputs: tuple[Array, Array, Array]
-    """What `cones` computed them from."""
+    """The arguments of `cones`."""
 
     def error_estimate(self) -> tuple[Array, ...]:
         """Return estimates of the errors of the four, (...): computed twice, with 16 and with 32 digits."""

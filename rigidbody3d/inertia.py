@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 RTOL = 1e-9
-"""By how much of the largest principal moment a tensor may miss the triangle inequality: flat bodies meet it exactly."""
+"""The share of the largest principal moment by which a tensor may miss the triangle inequality: flat bodies meet it exactly."""
 
 
 class _Axes(NamedTuple):
@@ -36,11 +36,11 @@ class Principal(_Axes):
     """Principal moments in ascending order (..., 3), and their axes as the rows of a rotation (..., 3, 3)."""
 
     tensor: Array
-    """What they are those of: the tensor (..., 3, 3), or moments (..., 3)."""
+    """Their tensor (..., 3, 3), or moments (..., 3)."""
 
     @property
     def condition(self) -> Array:
-        """By how much the axes magnify a relative error of the tensor, (..., 3): ‖I‖ over the gap to the next moment."""
+        """The factor by which the axes magnify a relative error of the tensor, (..., 3): ‖I‖ over the gap to the next moment."""
         gap = np.diff(self.moments, axis=-1)
         nearest = np.concatenate(
             [gap[..., :1], np.minimum(gap[..., :1], gap[..., 1:]), gap[..., 1:]], axis=-1
@@ -84,7 +84,7 @@ class Validity(NamedTuple):
     """Smallest of the principal moments and of I1 + I2 - I3, kg·m²; negative: no body has it."""
     moments: Array
     reason: str
-    """What is wrong with the first bad tensor; empty if none is."""
+    """The fault of the first bad tensor; empty if there is none."""
 
 
 def tensor(

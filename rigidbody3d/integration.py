@@ -52,9 +52,9 @@ class Trajectory(AtTimes):
     tensor: Array
     mgl: float
     evaluations: int
-    """How often the equations of motion were evaluated (for the splitting: stages)."""
+    """The number of evaluations of the equations of motion (for the splitting: stages)."""
     finer: Callable[[ArrayLike], Trajectory] | None = field(default=None, compare=False)
-    """The same motion of a body of this inertia with steps half as long."""
+    """The motion of a body of this inertia with steps half as long."""
 
     @cached_property
     def omega(self) -> Array:
@@ -137,7 +137,7 @@ def _apart(there: State, here: State, of: str) -> Array:
 
 
 FEW = 12 * EPS
-"""What a dozen roundings leave."""
+"""The error of a dozen roundings."""
 MOST = 10_000_000
 """So many steps take some quarter of an hour."""
 

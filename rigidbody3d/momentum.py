@@ -220,7 +220,7 @@ class Motion:
 
     @cached_property
     def in_32_digits(self) -> Motion:
-        """The same motion in doubled numbers."""
+        """This motion in doubled numbers."""
         return self.of_body(*map(in_32_digits, (self.mass, self.center, self.inertia)))
 
     def of_body(self, mass: Array, center: Array, inertia: Array) -> Motion:
@@ -301,7 +301,7 @@ ESTIMATED = [
     "momentum_about",
     "rate_about",
 ]
-"""What a motion has estimates of."""
+"""The quantities of a motion with an error estimate."""
 
 
 def _about_pivot(motion: Motion, pivot: Array) -> tuple[Array, Array]:

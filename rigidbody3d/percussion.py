@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @record
 class Blow(NamedTuple):
-    """What an impulse changes: velocity of the centre of mass, angular velocity, and the impulse of the pin."""
+    """The effect of an impulse: changes of velocity of the centre of mass and of angular velocity, and the impulse of the pin."""
 
     velocity: Array
     omega: Array

@@ -227,7 +227,7 @@ class Shaft:
 
     @cached_property
     def in_32_digits(self) -> Shaft:
-        """The same shaft in doubled numbers."""
+        """This shaft in doubled numbers."""
         entering = (self.bearings, self.speed, self.speed_rate, self.gravity)
         return Shaft(self.body.in_32_digits, *map(in_32_digits, entering))
 
@@ -275,7 +275,7 @@ class Shaft:
 
 
 ESTIMATED = ("static_unbalance", "unbalance", "dynamic", "static", "axial", "drive_torque")
-"""What a shaft has estimates of."""
+"""The quantities of a shaft with an error estimate."""
 
 
 def _complex(pairs: Array) -> Complex:

@@ -24,7 +24,7 @@ Moments = tuple[Array, Array, Array]
 
 @dataclass(frozen=True)
 class Shape:
-    """What a shape needs and what it has."""
+    """A shape: its dimensions, tensor and measure."""
 
     dimensions: tuple[str, ...]
     """The names of the dimensions it needs, m (angles: rad)."""
@@ -33,7 +33,7 @@ class Shape:
     measure: Callable[..., ArrayLike] | None = None
     """Dimensions -> volume, area or length; None for a point."""
     thin: int = 3
-    """What it is measured in: 3 volume, 2 area, 1 length."""
+    """The dimension of its measure: 3 volume, 2 area, 1 length."""
     optional: tuple[str, ...] = ()
     """Further dimensions that default to zero."""
 

@@ -1,4 +1,4 @@
-"""What bodies look like: the shapes they were made of, where these stand, and their outlines seen along an axis."""
+"""The shapes of bodies for pictures: their parts, the positions of these, and their outlines along an axis."""
 
 from __future__ import annotations
 

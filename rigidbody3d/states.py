@@ -1,4 +1,4 @@
-"""What states in time have in common: they are computed in blocks, and laid out as a table."""
+"""Common parts of states in time: computation in blocks, and the table of the states."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def in_blocks(work: Callable[[Array], Array], time: Array, lead: tuple[int, ...]
 
 
 STATE = ("attitude", "quaternion", "omega", "momentum", "energy")
-"""What a state in time has estimates of."""
+"""The quantities of a state in time with an error estimate."""
 
 
 def require(of: str, *names: str) -> None:
@@ -78,7 +78,7 @@ def _columns(state: StateInTime) -> dict[str, Array]:
 
 
 class Seen(NamedTuple):
-    """What pictures want to know of a body: its inertia, whether no torque acts on it, whether it stands on a point."""
+    """The data of a body for pictures: its inertia, whether no torque acts on it, whether it stands on a point."""
 
     inertia: ArrayLike
     free: bool

@@ -136,7 +136,7 @@ class Top:
 
     @cached_property
     def in_32_digits(self) -> Top:
-        """The same top in doubled numbers."""
+        """This top in doubled numbers."""
         return Top(*map(in_32_digits, (self.inertia, self.mgl, self.omega, self.attitude)))
 
 
@@ -194,7 +194,7 @@ class TopState(AtTimes):
 
     @cached_property
     def in_32_digits(self) -> TopState:
-        """The same state in doubled numbers."""
+        """This state in doubled numbers."""
         return self.top.in_32_digits.at(in_32_digits(self.time))
 
     @property

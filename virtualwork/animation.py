@@ -83,7 +83,7 @@ class Series:
 
     @property
     def mechanism(self) -> Description:
-        """What is drawn."""
+        """The mechanism that is drawn."""
         return self.poses.mechanism
 
     def document(self) -> dict[str, Any]:
@@ -136,7 +136,7 @@ class Series:
         }
 
     def _free(self, names: list[str]) -> dict[str, Any]:
-        """What the page draws of every link cut loose; nothing on a page that replays."""
+        """Return the free-body diagrams of the page; empty on a page that replays."""
         return {}
 
     def _add(
@@ -304,7 +304,7 @@ def _first_plots(series: Series) -> list[str]:
 
 
 def _comes_back(series: Series, link: str) -> bool:
-    """Say whether a link stands at the end as it stood at the beginning."""
+    """Return whether a link ends at its first position."""
     first = next(iter(series.mechanism.links[link].points.items()))
     z = series.poses.point(link, first[1], 0, first[0])[[0, -1]]
     turned = np.exp(1j * series.poses.angle(link)[[0, -1]])

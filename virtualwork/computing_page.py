@@ -45,7 +45,7 @@ from virtualwork.study.free_bodies import parts
 from virtualwork.toml_template import toml_template
 
 ORDERS = 2
-"""How often places are differentiated in time."""
+"""The highest derivative of positions in time."""
 # input, speed, acceleration, jerk, as an input of a description calls them
 RATES = ("value", "speed", "acceleration", "jerk")
 
@@ -113,7 +113,7 @@ class Formulas:
     poses : Poses
         Over the sweep of the page.
     order : int
-        How often places are differentiated in time.
+        The highest derivative of positions in time.
     """
 
     def __init__(self, assembly: Assembly, poses: Poses, order: int = ORDERS) -> None:
@@ -131,7 +131,7 @@ class Formulas:
         return VariedFormulas(self.assembly, fixed, moves, True, settled=False)
 
     def refused(self, keys: Sequence[Quantity]) -> str:
-        """Say why a page cannot compute these quantities; empty where it can."""
+        """Return why a page cannot compute these quantities; empty if it can."""
         m, own = self.mechanism, self.assembly
         forces = any(key.is_force for key in keys)
         _ = own.track
@@ -158,7 +158,7 @@ class Formulas:
         return self.keys[key]
 
     def column(self, each: Component, si: float = 1.0) -> dict[str, Any]:
-        """What a column or a name asks the tape of the poses for."""
+        """Return the request to the tape of the poses for a column or a name."""
         if not each.key:
             return {"zero": 1}
         found: dict[str, Any] = {"row": self.row(each.key) + each.imaginary, **self.locking(each.key)}
@@ -171,7 +171,7 @@ class Formulas:
         return found
 
     def locking(self, key: Quantity) -> dict[str, Any]:
-        """That a quantity depends on the friction of joints, and has no value where they lock."""
+        """Return whether a quantity depends on the friction of joints, and so has no value where they lock."""
         locks = self.mechanism.friction and (key.is_joint_force or isinstance(key, Effort))
         return {"locks": 1} if locks else {}
 
@@ -213,7 +213,7 @@ class Formulas:
         return found
 
     def document(self) -> dict[str, Any]:
-        """What the page knows of the mechanism beside its tapes."""
+        """Return the data of the mechanism for the page, other than its tapes."""
         m, written = self.mechanism, self.written
         iterated = {g.name for g in written.plan.groups if g.kind == "Newton"}
         closed = {g.name for g in written.closed}
@@ -250,7 +250,7 @@ class Formulas:
 
     @property
     def _rubs(self) -> int:
-        """How many contacts have friction, where forces are among the quantities."""
+        """Return the number of contacts with friction, if forces are among the quantities."""
         return len(self.written.recording.forces.case.contacts) if self._loaded else 0
 
     def _files(self) -> list[str]:
@@ -268,7 +268,7 @@ class Formulas:
 
     @staticmethod
     def _statics(of: PoseForces) -> dict[str, Any]:
-        """Where the entries of the equations of all links stand: (row, column) each, the last column that of b."""
+        """Return the places of the entries in the equations of all links: (row, column) each, the last column that of b."""
         count = len(of.unknowns)
         places = [[row, count if column is None else column] for row, column in of.system]
         return {"count": count, "rows": 1 + max(row for row, _ in places), "places": places}
@@ -292,7 +292,7 @@ class Formulas:
 
     @property
     def _pace(self) -> int:
-        """How many times finer than usual the page has to look along the input, for what gears turn fast."""
+        """Return the factor by which the page refines its steps along the input, for links that gears turn fast."""
         track = self.assembly.track
         if not track.active:
             return 1

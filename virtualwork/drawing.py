@@ -1,4 +1,4 @@
-"""What a mechanism is drawn as: lines and circles in the axes of its bodies, springs between two of them, names.
+"""The drawing of a mechanism: lines and circles in the axes of its bodies, springs between two of them, names.
 
 Every picture walks this one list, from the back to the front: on paper, in a page that moves, in a drawing for a CAD
 program. A shape's `role` says what it is, and with it which line or layer it gets; `ROLES` lists them. Where a body
@@ -56,7 +56,7 @@ SYMBOL = 0.016
 TOOTH = ((0.1, -1.0), (0.4, 1.0), (0.6, 1.0), (0.9, -1.0))
 """The outline of a tooth: along the rack, of the tooth's length, and across, of half its height."""
 UNKNOWN_TRAVEL = 0.2
-"""Where nobody says how far a guide is used: so much of the size of the mechanism either way."""
+"""The drawn length of a guide whose use is unknown, either way, in sizes of the mechanism."""
 
 
 @dataclass(frozen=True)

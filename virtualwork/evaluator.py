@@ -108,7 +108,7 @@ class Evaluator:
         return values
 
     def operations(self, *, speed: bool = True, acceleration: bool = True) -> int:
-        """How many operations a pose costs: what is not requested, and what a zero rate makes vanish, is not counted."""
+        """The number of operations of a pose, without those that no request needs or that a zero rate removes."""
         return taped(self.assembly, recorded(self.assembly, (speed, acceleration, False)), self.keys).cost
 
 

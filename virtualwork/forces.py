@@ -48,7 +48,7 @@ class Forces(Dynamics):
         return self._errors
 
     def plot(self, figure: FigureBase | None = None) -> NDArray[np.object_]:
-        """Draw effort and joint forces against the input, and what shakes the ground; return matplotlib's axes.
+        """Draw effort and joint forces against the input, and the shaking force; return matplotlib's axes.
 
         They are those of effort, joint forces and, where something moves, shaking force and moment. Without a figure
         it is a new one of pyplot's; without matplotlib (the extra `plot`) an ImportError.

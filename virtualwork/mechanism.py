@@ -1,4 +1,4 @@
-"""The door in: a mechanism as its designer describes it, and everything that it can compute."""
+"""A mechanism as its designer describes it, with everything that it can compute: the entrance of the package."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class Mechanism(Description):
         return Assembly.from_guess(self)
 
     def _repr_html_(self) -> str | None:
-        """Draw it in its own pose; None, which shows its `repr`, where it has none."""
+        """Draw the mechanism in the pose of its file; None, which shows its `repr`, if it cannot be assembled."""
         from virtualwork.notebook_picture import svg
 
         try:
@@ -121,7 +121,7 @@ class Mechanism(Description):
         acceleration: ArrayLike | None = None,
         jerk: ArrayLike | None = None,
     ) -> Motion:
-        """Motion of the assembly that the guess chooses; every quantity is solved on the first request.
+        """Return the motion of the assembly that the guess chooses; every quantity is solved on the first request.
 
         Parameters
         ----------
@@ -143,7 +143,7 @@ class Mechanism(Description):
         return Motion(self.assembly, angle, speed, acceleration, jerk)
 
     def page(self, over: ArrayLike | None = None, forces: bool = False) -> Page:
-        """Return the page that computes (`Motion.page`) over inputs (n,) or (n, k), rad or m; default: a turn from the own pose."""
+        """Return the page that computes (`Motion.page`) over inputs (n,) or (n, k), rad or m; default: a turn from the file's pose."""
         start = self.motion().inputs
         turn = np.linspace(0.0, 0.0 if len(self.inputs) > 1 or self.inputs[0].is_slide else 2 * np.pi, 361)
         return self.motion(start + turn[:, None] if over is None else over).page(forces)
@@ -197,7 +197,7 @@ class Mechanism(Description):
         return simulate(self.assembly, times, angle, speed, accuracy, until)
 
     def evaluator(self, *wanted: str) -> Evaluator:
-        """Named quantities of the assembly that the guess chooses, prepared once for many requests.
+        """Return an evaluator of named quantities of the assembly that the guess chooses, for many requests.
 
         Parameters
         ----------
@@ -231,7 +231,7 @@ class Mechanism(Description):
         return dimensions(self)
 
     def value(self, path: str) -> float | complex:
-        """The number at a path, SI; x + iy of a point. A rate of an input that is not given is 0.
+        """Return the number at a path, SI; x + iy of a point; 0 for a rate of an input that the file does not give.
 
         Raises
         ------
@@ -250,7 +250,7 @@ class Mechanism(Description):
         return value(self, path)
 
     def changed(self, numbers: Mapping[str, complex | tuple[float, float]]) -> Mechanism:
-        """This mechanism with other numbers at some paths; everything else stays.
+        """Return this mechanism with other numbers at some paths.
 
         Parameters
         ----------
@@ -274,7 +274,7 @@ class Mechanism(Description):
         return changed(self, numbers)
 
     def vary(self, numbers: Mapping[str, ArrayLike]) -> Variants:
-        """Variants of this mechanism: other numbers at the paths of some dimensions.
+        """Return a family of variants of this mechanism, with other numbers at the paths of some dimensions.
 
         Parameters
         ----------
@@ -312,7 +312,7 @@ class Mechanism(Description):
         executor: Executor | None = None,
         keep: Sequence[Bound] = (),
     ) -> Fit[Mechanism]:
-        """Find the dimensions of which points, links, slides or the effort come nearest to targets, in the sense of least squares.
+        """Find the dimensions with which points, links, slides or the effort come nearest to targets, by least squares.
 
         Parameters
         ----------
@@ -365,7 +365,7 @@ class Mechanism(Description):
         return fit(self, wanted, free or {}, starts, seed, best, executor, keep)
 
     def design(self, paths: Sequence[str], *wanted: str) -> Design:
-        """Positions as a function of some dimensions: what an optimiser of one's own evaluates, with its gradient.
+        """Return positions as a function of some dimensions, with exact derivatives, for an optimiser of your own.
 
         Parameters
         ----------
@@ -401,20 +401,20 @@ class Mechanism(Description):
 
     @cached_property
     def check(self) -> Check:
-        """What kind of mechanism this is: mobility, redundant constraints, Grashof classes, limits, dead points."""
+        """Return the character of the mechanism: mobility, redundant constraints, Grashof classes, limits, dead points."""
         from virtualwork.study.check import Check
 
         return Check(self.assembly)
 
     def equilibria(self, spans: ArrayLike | None = None, samples: int = 1440) -> Equilibria:
-        """Every position in which the mechanism rests under its loads without effort, each stable or not.
+        """Return every position in which the mechanism rests under its loads without effort, and its stability.
 
         Parameters
         ----------
         spans : array (k, 2), optional
             The range of each input, rad or m. Default: a whole turn; for a slide, two sizes of the mechanism either way.
         samples : int
-            How finely the range of one input is looked through.
+            The number of samples of one input's range.
 
         Examples
         --------
@@ -430,14 +430,14 @@ class Mechanism(Description):
             return search(self.assembly, spans, samples)
 
     def newton(self, *inputs: float, limit: int = 50) -> AllAtOnce:
-        """All loops at once by Newton-Raphson from the guess, with the table of iterates."""
+        """Solve all loops at once by Newton-Raphson from the guess, with the table of iterates."""
         from virtualwork.study.newton_table import all_at_once
 
         with self.assembly.lock:
             return all_at_once(self.assembly, inputs or self.at, limit)
 
     def assemblies(self) -> tuple[Assembly, ...]:
-        """Every assembly at the input where the guess is meant, the guess's own first."""
+        """Return every assembly at the input of the guess, the one that the guess chooses first."""
         from virtualwork.branch.solutions import all_assemblies
 
         with self.assembly.lock:

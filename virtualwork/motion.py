@@ -94,7 +94,7 @@ class Motion(MotionViews):
 
     @property
     def lock(self) -> Lock:
-        """That of the assembly."""
+        """The lock of the assembly."""
         return self.assembly.lock
 
     @cached_property
@@ -103,7 +103,7 @@ class Motion(MotionViews):
 
     @cached_property
     def poses(self) -> Lanes:
-        """What has been solved of it."""
+        """The poses, with everything solved so far."""
         # only of one pose are they not made with the motion
         assert self._one is not None
         return Lanes(self.assembly, *self._one.numbers)
@@ -112,7 +112,7 @@ class Motion(MotionViews):
     @property
     @unlocked
     def mechanism(self) -> Description:
-        """What moves."""
+        """The mechanism that moves."""
         return self.assembly.mechanism
 
     @property
@@ -122,12 +122,12 @@ class Motion(MotionViews):
 
     @property
     def n(self) -> int:
-        """How many poses."""
+        """The number of poses."""
         return self.poses.n
 
     @property
     def input_error(self) -> ArrayLike:
-        """The inputs' own errors, for the estimates of rounding errors: 0 where they are exact as given."""
+        """The errors of the inputs, for the estimates of rounding errors; 0 for exact inputs."""
         return self.poses.input_error
 
     @input_error.setter
@@ -136,12 +136,12 @@ class Motion(MotionViews):
 
     @property
     def solved(self) -> list[tuple[Step, int]]:
-        """What has been computed so far, (step, order); order 0 is position."""
+        """The solved steps and their orders, (step, order); order 0 is position."""
         return self.poses.solved
 
     @property
     def assembled(self) -> NDArray[np.bool_]:
-        """(n,) bool: which poses can be assembled."""
+        """Whether each pose can be assembled, (n,) bool."""
         return self.poses.assembled.copy()
 
     @property
@@ -152,7 +152,7 @@ class Motion(MotionViews):
     # --- what moves -----------------------------------------------------------------------------------------------
     @unlocked
     def point(self, name: str) -> PointMotion:
-        """Motion of a named point.
+        """Return the motion of a named point.
 
         Raises
         ------
@@ -166,14 +166,14 @@ class Motion(MotionViews):
 
     @unlocked
     def at(self, link: str, point: Point | str) -> PointMotion:
-        """Motion of any point of a link: a name, or coordinates in the link's own axes."""
+        """Return the motion of any point of a link: a name, or coordinates in the link's own axes."""
         if isinstance(point, str):
             return PointMotion(self, link, self.mechanism.bodies[link][point], point)
         return PointMotion(self, link, point if isinstance(point, complex) else as_point(point))
 
     @unlocked
     def link(self, name: str) -> LinkMotion:
-        """Motion of a link.
+        """Return the motion of a link.
 
         Raises
         ------
@@ -186,7 +186,7 @@ class Motion(MotionViews):
 
     @unlocked
     def slide(self, name: str) -> SlideMotion:
-        """Motion along the guide in which the named point runs."""
+        """Return the motion along the guide in which the named point runs."""
         for i, guide in enumerate(self.mechanism.guides):
             if guide.point == name:
                 return SlideMotion(self, i)
@@ -194,18 +194,18 @@ class Motion(MotionViews):
 
     @unlocked
     def values(self, keys: Sequence[Quantity]) -> list[Any]:
-        """Quantities, (n,) each."""
+        """Return several quantities by their keys, (n,) each."""
         return self._values(tuple(keys))
 
     @unlocked
     def value(self, key: Quantity) -> Any:
-        """A quantity by its key, (n,)."""
+        """Return a quantity by its key, (n,)."""
         result = None if self._one is None else self._one.value(key)
         return self._values((key,))[0] if result is None else result
 
     @unlocked
     def vector(self, key: Quantity) -> Reals:
-        """A vector by its key, (n, 2)."""
+        """Return a vector by its key, (n, 2)."""
         result = None if self._one is None else self._one.vector(key)
         return xy(self._values((key,))[0]) if result is None else result
 
@@ -289,7 +289,7 @@ class Motion(MotionViews):
 
     @unlocked
     def reaction(self, joint: str, on: str) -> Reals:
-        """The force of all others on a link at a joint, (n, 2) N (Ibrahim §2.2).
+        """Return the force of all other links on a link at a joint, (n, 2) N (Ibrahim §2.2).
 
         Parameters
         ----------
@@ -301,13 +301,13 @@ class Motion(MotionViews):
         return self.vector(Reaction(joint, on))
 
     def applied(self, link: str) -> tuple[Complexes, Reals]:
-        """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""
+        """Return the applied loads of a link without weight and inertia, at its centre of mass: (n,) complex N, (n,) N·m."""
         if not self.mechanism.applies:
             return np.zeros(self.n, complex), np.zeros(self.n)
         return self.dynamics.applied(link)
 
     def unit(self, j: int = 0) -> Motion:
-        """The motion through the same poses at a unit speed of input j alone: its velocities are virtual displacements."""
+        """Return the motion through these poses at a unit speed of input j alone; its velocities are virtual displacements."""
         if j not in self._units:
             k = self.inputs.shape[1]
             rates: list[list[Number]] = [[float(i == j) for i in range(k)], [0.0] * k, [0.0] * k]
@@ -317,13 +317,13 @@ class Motion(MotionViews):
 
     @property
     def cycle(self) -> Cycle:
-        """The sweep as a cycle of work: mean and peak effort, energy balance, flywheel."""
+        """Return the sweep as a cycle of work: mean and peak effort, energy balance, flywheel."""
         from virtualwork.study.cycle import Cycle
 
         return Cycle(self)
 
     def counterweights(self, links: Sequence[str]) -> tuple[dict[str, complex], Complexes, Complexes]:
-        """Counterweights of the least RMS shaking force: see `virtualwork.study.counterweights.least_squares`."""
+        """Return the counterweights of the least r.m.s. shaking force: see `virtualwork.study.counterweights.least_squares`."""
         from virtualwork.study.counterweights import least_squares
 
         return least_squares(self, links)
@@ -331,18 +331,18 @@ class Motion(MotionViews):
     # --- sensitivities to the dimensions -------------------------------------------------------------------------
     @cached_property
     def sensitivities(self) -> Sensitivities:
-        """Derivatives of all quantities to the numbers of the description."""
+        """The derivatives of all quantities with respect to the numbers of the description."""
         from virtualwork.family.sensitivity import Sensitivities
 
         return Sensitivities(self.assembly, self.poses)
 
     def derivative(self, key: Quantity, path: str) -> Any:
-        """The derivative (n,) of a quantity, to the number at a path."""
+        """Return the derivative (n,) of a quantity with respect to the number at a path."""
         sensitivities = self.sensitivities
         return sensitivities.of([key], [sensitivities.dimension(path)])[0][0]
 
     def sensitivity(self, what: str, path: str) -> Reals:
-        """Return the derivative of a quantity to a number of the description.
+        """Return the derivative of a quantity with respect to a number of the description.
 
         Parameters
         ----------

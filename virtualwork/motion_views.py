@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class MotionViews:
-    """What a motion looks like: its drawing, pictures on paper, pages that move and that compute."""
+    """The views of a motion: its drawing, pictures on paper, pages that replay and pages that compute."""
 
     @property
     def poses(self) -> Lanes:
@@ -35,7 +35,7 @@ class MotionViews:
 
     @cached_property
     def drawing(self) -> Drawing:
-        """What the mechanism is drawn as, its guides as long as they are used; `at(shape.body, z)` carries shapes along."""
+        """The shapes of the mechanism, its guides as long as they are used; `at(shape.body, z)` moves a shape."""
         from virtualwork.picture.paper import shapes_of
 
         return shapes_of(self.poses)
@@ -56,7 +56,7 @@ class MotionViews:
         return curves(self.poses, names, figure)
 
     def animate(self, forces: bool = False) -> Page:
-        """Return a page that moves: the mechanism over these poses with play, slider, curves and values.
+        """Return a page that replays these poses: the mechanism with play, slider, curves and values.
 
         A notebook shows it; `.save("motion.html")` writes it to a file that any browser opens.
 

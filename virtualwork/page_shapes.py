@@ -1,4 +1,4 @@
-"""What a page that computes draws and lets drag: the numbers of its shapes, and the points that are handles."""
+"""Shapes and handles of a page that computes: the numbers of its shapes, and the points to drag."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def cams(own: Drawing, m: Description) -> list[dict[str, Any]]:
 
 
 def handles(m: Description) -> list[list[Any]]:
-    """What can be dragged: the path of a point, its body, its name, and for a point in polar form the point it is counted from."""
+    """Return the handles: the path of a point, its body, its name, and for a point in polar form the point it is counted from."""
     result: list[list[Any]] = [[f"ground.{name}", "ground", name, None] for name in m.ground]
     every = dimensions(m)
     for link, part in m.links.items():

@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 
 class AnyMotion(Protocol):
-    """What has quantities: the motion of one mechanism, (n,) each, or of variants, (v, n) each."""
+    """A motion with quantities: of one mechanism, (n,) each, or of variants, (v, n) each."""
 
     def value(self, key: Quantity) -> Any:
-        """A quantity."""
+        """Return a quantity."""
 
     def vector(self, key: Quantity) -> Reals:
-        """A vector, its parts along the last axis."""
+        """Return a vector, its parts along the last axis."""
 
 
 class OneMotion(AnyMotion, Protocol):
@@ -28,22 +28,22 @@ class OneMotion(AnyMotion, Protocol):
 
     @property
     def mechanism(self) -> Description:
-        """What moves."""
+        """The mechanism that moves."""
 
     @property
     def n(self) -> int:
-        """How many poses."""
+        """The number of poses."""
 
     @property
     def rounding(self) -> Estimates:
         """Estimates of its rounding errors."""
 
     def derivative(self, key: Quantity, path: str) -> Any:
-        """The derivative of a quantity to a number of the description."""
+        """Return the derivative of a quantity with respect to a number of the description."""
 
 
 class PartOfMotion:
-    """What moves: a point, a link, or along a guide; `order` 0 is its position or angle, 1 to 3 are its rates in time.
+    """A moving point, link or slide; `order` 0 is its position or angle, 1 to 3 are its rates in time.
 
     Of one mechanism; of variants every array has a leading axis of them.
     """
@@ -70,22 +70,22 @@ class PointRates(PartOfMotion):
 
     @property
     def position(self) -> Reals:
-        """(n, 2) m; NaN where the pose cannot be assembled."""
+        """The position, (n, 2), m; NaN if the pose cannot be assembled."""
         return self.motion.vector(self.key(0))
 
     @property
     def velocity(self) -> Reals:
-        """(n, 2) m/s (Ibrahim eq. 1.4.1)."""
+        """The velocity, (n, 2), m/s (Ibrahim eq. 1.4.1)."""
         return self.motion.vector(self.key(1))
 
     @property
     def acceleration(self) -> Reals:
-        """(n, 2) m/s² (Ibrahim eq. 1.5.1)."""
+        """The acceleration, (n, 2), m/s² (Ibrahim eq. 1.5.1)."""
         return self.motion.vector(self.key(2))
 
     @property
     def jerk(self) -> Reals:
-        """(n, 2) m/s³ (Ibrahim eq. 1.5.3)."""
+        """The jerk, (n, 2), m/s³ (Ibrahim eq. 1.5.3)."""
         return self.motion.vector(self.key(3))
 
     def complex(self, order: int) -> Complexes:
@@ -105,22 +105,22 @@ class LinkRates(PartOfMotion):
 
     @property
     def angle(self) -> Reals:
-        """(n,) rad, of the link's own x-axis, in (−π, π]."""
+        """The angle of the link's x-axis, (n,), rad, in (−π, π]."""
         return self.value(0)
 
     @property
     def omega(self) -> Reals:
-        """(n,) rad/s (Ibrahim eq. 1.4.2)."""
+        """The angular velocity, (n,), rad/s (Ibrahim eq. 1.4.2)."""
         return self.value(1)
 
     @property
     def alpha(self) -> Reals:
-        """(n,) rad/s² (Ibrahim eq. 1.5.2)."""
+        """The angular acceleration, (n,), rad/s² (Ibrahim eq. 1.5.2)."""
         return self.value(2)
 
     @property
     def jerk(self) -> Reals:
-        """(n,) rad/s³ (Ibrahim eq. 1.5.3)."""
+        """The angular jerk, (n,), rad/s³ (Ibrahim eq. 1.5.3)."""
         return self.value(3)
 
     def key(self, order: int = 0) -> Quantity:
@@ -136,22 +136,22 @@ class SlideRates(PartOfMotion):
 
     @property
     def position(self) -> Reals:
-        """(n,) m."""
+        """The position along the guide, (n,), m."""
         return self.value(0)
 
     @property
     def speed(self) -> Reals:
-        """(n,) m/s."""
+        """The speed along the guide, (n,), m/s."""
         return self.value(1)
 
     @property
     def acceleration(self) -> Reals:
-        """(n,) m/s²."""
+        """The acceleration along the guide, (n,), m/s²."""
         return self.value(2)
 
     @property
     def jerk(self) -> Reals:
-        """(n,) m/s³."""
+        """The jerk along the guide, (n,), m/s³."""
         return self.value(3)
 
     def key(self, order: int = 0) -> Quantity:
@@ -184,7 +184,7 @@ class OfOneMechanism(PartOfMotion):
         return self.motion.rounding.of(self.key(order))
 
     def sensitivity(self, path: str, order: int = 0) -> Reals:
-        """Return the derivative of the position or angle (order 0), or of a rate, to a number of the description.
+        """Return the derivative of position or angle (order 0), or of a rate, with respect to a number of the description.
 
         Parameters
         ----------

@@ -46,20 +46,20 @@ class Component(NamedTuple):
     """A number that is shown of every pose."""
 
     path: tuple[Any, ...]
-    """Where it stands in JSON, a reaction below (joint, on, from); empty where tables alone have it."""
+    """Its path in JSON, a reaction below (joint, on, from); empty if only tables have it."""
     header: str
     key: Quantity = NOTHING
-    """What a motion computes for it ; nothing for what is zero throughout, or no motion has."""
+    """Its quantities of a motion; none if it is zero throughout, or if no motion has it."""
     imaginary: bool = False
     """Whether it is the y of a vector."""
     less: Quantity = NOTHING
-    """What is subtracted."""
+    """The quantity that is subtracted."""
     names: tuple[str, ...] = ()
-    """What `--only` calls it: `H.x`, `B.coupler.fx`, `B.coupler.guide.fx`."""
+    """Its name for `--only`: `H.x`, `B.coupler.fx`, `B.coupler.guide.fx`."""
     owners: tuple[str, ...] = ()
     """The bare names that it belongs to."""
     order: int = 0
-    """How often it is differentiated in time."""
+    """The order of its derivative in time."""
     polar: str = ""
     """`length` or `angle` of a vector, in place of a component (Ibrahim §1.2)."""
     reverse: bool = False
@@ -159,7 +159,7 @@ def places(m: Description, order: int, words: Iterable[str] = ()) -> list[Compon
 
 
 def cam(m: Description, number: int, of: Iterable[tuple[str, type[Quantity]]]) -> list[Component]:
-    """What a cam has beside its follower's place, under the name of the follower."""
+    """Return the quantities of a cam other than its follower's position, under the name of the follower."""
     name = str(m.cams[number].slider or m.cams[number].follower)
     return [
         Component(
@@ -262,7 +262,7 @@ def forces(m: Description, pairs: Iterable[tuple[Joint, str, str]]) -> list[Comp
 
 
 def reactions(m: Description, pairs: Iterable[tuple[Joint, str, str]]) -> list[Component]:
-    """What the joints carry, on one side and on the other, and what shakes the ground."""
+    """Return the forces of the joints, on either side, and the shaking force."""
     rub = {each.joint for each in m.friction}
     result: list[Component] = []
     for joint, on, of in pairs:

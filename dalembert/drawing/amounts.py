@@ -15,7 +15,7 @@ LADDERS = {
 }
 """Units that take prefixes, and which of them are in use."""
 NOISE = 1e-12
-"""What is as small as this beside the scale of its kind is the rounding of zero."""
+"""A value below this share of the scale of its kind is the rounding of zero."""
 
 
 def prefixed(largest: float, unit: str, at_most: float = 1e4) -> tuple[float, str]:

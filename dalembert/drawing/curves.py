@@ -98,7 +98,7 @@ def panel(axes: Axes, x: Real, curves: Sequence[Curve], what: str, unit: str, sc
 
 
 def _equal_ones(names: Sequence[str]) -> str:
-    """Say that curves are equal, as many of them by name as have room.
+    """Return the label of equal curves, with as many names as have room.
 
     >>> _equal_ones(["A", "B"]), _equal_ones(["O (pin on arm 1)", "O (pin on arm 2)", "C", "D"])
     ('A = B', 'O (pin on arm 1) = 3 others')

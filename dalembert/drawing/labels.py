@@ -17,7 +17,7 @@ Real = NDArray[np.float64]
 CELL = 2.0
 """The size of the cells in which the picture is searched, in pixels."""
 DISTANCES = (4.0, 8.0, 13.0, 20.0, 29.0, 40.0, 55.0, 75.0, 100.0)
-"""How far from its point a label may stand, points; from the fourth on a thin line leads to it."""
+"""The distances of a label from its point, points; from the fourth on a thin line leads to it."""
 TURNS = np.arange(0, 360, 15.0)
 
 

@@ -18,11 +18,11 @@ SHORT = 0.03
 
 
 ROOM = 1.3
-"""How far a dial reaches beyond its longest vector: for a name at the tip."""
+"""The reach of a dial over its longest vector, with room for a name at the tip."""
 
 
 class Look(NamedTuple):
-    """How vectors of a kind look: distinguished by colour, by dash and by width."""
+    """The look of the vectors of one kind: colour, dash and width."""
 
     color: str
     width: float

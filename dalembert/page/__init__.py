@@ -37,7 +37,7 @@ class Shown:
     values: ArrayLike
     header: str
     si: float = 1.0
-    """What one of its unit is in SI and radians."""
+    """The value of one of its unit in SI and radians."""
 
 
 def fits(count: int) -> None:
@@ -87,7 +87,7 @@ class Page:
 
     html: str
     height: int = 640
-    """How high the frame in a notebook is, pixels."""
+    """The height of the frame in a notebook, pixels."""
 
     def save(self, path: str | Path) -> None:
         """Write the page to a file; a browser opens it from the disk."""

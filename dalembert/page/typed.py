@@ -1,4 +1,4 @@
-"""What can be typed into a page: every unit of a dimension, as a ratio."""
+"""The units that a page accepts: every unit of a dimension, as a ratio."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dalembert.units import UNITS, to_si
 
 
 def units(kinds: Iterable[str]) -> dict[str, dict[str, list[float]]]:
-    """What can be typed: every unit of these dimensions, and what it is in SI and radians, as a ratio."""
+    """Return every unit of these dimensions that can be typed, with its value in SI and radians as a ratio."""
     spellings = {}
     for kind in dict.fromkeys(kinds):
         listed = UNITS.get(kind, {})

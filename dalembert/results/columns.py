@@ -48,12 +48,12 @@ class Column:
 
     name: str
     unit: str
-    """What its header ends in, such as `N_m`; empty for names and plain numbers."""
+    """The suffix of its header, such as `N_m`; empty for names and plain numbers."""
     values: Values
     error: Callable[[], Bounds] | None = None
     """The rounding errors of computed numbers, in the same unit; inf where no digit holds."""
     place: Place = None
-    """Where it stands in a row of the JSON document, with its unit: `initial.static_unbalance_kg_m`; None: not in JSON."""
+    """Its path in a row of the JSON document, with its unit: `initial.static_unbalance_kg_m`; None: not in JSON."""
     stored: Any = None
     """The numbers as JSON has them, where these are not the values shown."""
 
@@ -141,7 +141,7 @@ def number(
 def apart(
     values: NDArray[np.float64], dimension: str, unit: str, exact: Callable[[], Doubled]
 ) -> Callable[[], NDArray[np.float64]]:
-    """By what numbers in a unit differ from the same in 32 digits, which are in the unit of JSON; computed on request."""
+    """Return the differences of numbers in a unit from those in 32 digits, which are in the unit of JSON; computed on request."""
 
     def errors() -> NDArray[np.float64]:
         import numpy as np
@@ -208,7 +208,7 @@ class Table:
     keys: Sequence[str] = ()
     """The headers of the columns that name a row."""
     place: str | None = None
-    """Where its rows stand in JSON: `rotors[].corrections[]`; empty: at the top, one row; None: not in JSON."""
+    """The path of its rows in JSON: `rotors[].corrections[]`; empty: at the top, one row; None: not in JSON."""
     above: str = ""
     """A sentence above it, on the terminal and in a report."""
     below: str = ""
@@ -225,12 +225,12 @@ class Table:
 
     @property
     def length(self) -> int:
-        """How many rows."""
+        """The number of rows."""
         return next((len(column.values) for column in (*self.columns, *self.documented)), 0)
 
 
 def stacked(tables: Sequence[Table], name: str, of: Sequence[str], place: str) -> Table:
-    """Put tables with the same columns below each other; a column in front names the one that a row is of.
+    """Stack tables with the same columns; a column in front names the table of each row.
 
     Examples
     --------
@@ -279,7 +279,7 @@ class _Lists:
         return max((of for of in self.keys if place.startswith(f"{of}.")), key=len, default="")
 
     def add(self, table: Table) -> None:
-        """Put the rows of a table where they stand."""
+        """Add the rows of a table at their path."""
         assert table.place is not None
         parent = self.parent(table.place)
         way = table.place[len(parent) :].lstrip(".").split(".") if table.place else []
@@ -329,7 +329,7 @@ def _walk(home: Any, way: Iterable[str]) -> Any:
 
 
 def _put(row: Any, path: Sequence[str], value: Json) -> None:
-    """Put a value under a path; a number in it is the place in a list, which is filled in order."""
+    """Set a value at a path; a number in the path is the index of a list, which is filled in order."""
     for name, following in pairwise(path):
         empty: Any = [] if following.isdecimal() else {}
         if isinstance(row, list):

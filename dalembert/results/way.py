@@ -30,19 +30,19 @@ class Topic:
     """
 
     name: str
-    """What JSON calls it."""
+    """Its name in JSON."""
     parts: Sequence[str | Table] = ()
     """Equations and sentences as text, and tables; a table's `place` is where it stands in this topic's JSON."""
     title: str = ""
-    """What stands above it, where that is more than the name."""
+    """Its heading, if that is more than the name."""
     head: Mapping[str, Any] = field(default_factory=dict)
-    """What else JSON has of it, in front of the tables."""
+    """Its further members in JSON, before the tables."""
     figure: Callable[[], Figure] | None = None
     """Its picture, for the report."""
 
     @property
     def heading(self) -> str:
-        """What stands above it."""
+        """Its heading."""
         text = self.title or self.name
         return text[:1].upper() + text[1:]
 

@@ -24,7 +24,7 @@ class Heading:
     base: str
     """Without the unit that stands in brackets, behind a comma or in the row below."""
     unit: str = ""
-    """That unit, spelled as a suffix; empty where there is none."""
+    """Its unit as a suffix; empty if it has none."""
 
     @property
     def name(self) -> str:

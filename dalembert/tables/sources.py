@@ -41,7 +41,7 @@ class Source:
     sheet: Sheet | None = None
     headings: list[Heading] = field(default_factory=list)
     above: int = 0
-    """How many records stand above the header."""
+    """The number of records above the header."""
     units_below: bool = False
     """Whether the row below the header holds units."""
     records: list[tuple[int, list[str]]] | None = None
@@ -66,7 +66,7 @@ class Source:
         return plain and self.sheet is None and self.text.count("\n") >= LARGE
 
     def has_commas(self, columns: Iterable[Iterable[str]]) -> bool:
-        """Tell whether these cells have decimal commas: where no comma parts cells, and one stands in a cell."""
+        """Return whether these cells have decimal commas: no comma separates cells, and a cell contains one."""
         return self.delimiter != "," and any("," in cell for column in columns for cell in column)
 
     def everything(self) -> Iterator[tuple[int, list[str]]]:
@@ -144,7 +144,7 @@ class Source:
             )
 
     def told(self, unread: Sequence[Heading], missed: Mapping[str, str], texts: Sequence[str]) -> str:
-        """Say, where a column is missed, what the header is, what of it may be meant, and which other sheets there are."""
+        """Return the hint for a missing column: the header, columns of a similar meaning, and the other sheets."""
         parts = [f"the header is: {', '.join(self.header)}"]
         if offered := offers(unread, missed, texts):
             parts.append(f"did you mean {' '.join(offered)}?")

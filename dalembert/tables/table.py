@@ -298,7 +298,7 @@ def _pointed(text: str) -> str:
 
 
 def _number_expected(text: str, decimal_comma: bool) -> str:
-    """Say what was expected in place of a cell.
+    """Return the expected value in place of a cell.
 
     >>> _number_expected("3,4", False)
     'a number: decimal commas need columns separated by ; or tabs'

@@ -27,10 +27,10 @@ PERCENT = ("9", "10")  # number formats that every workbook has
 
 @dataclass(frozen=True)
 class Unseen:
-    """What a reader of the sheet sees otherwise than it is read."""
+    """Cells that a person sees in another way than they are read."""
 
     rows: frozenset[int] = frozenset()
-    """Those that are hidden, from 0."""
+    """The hidden ones, from 0."""
     columns: frozenset[int] = frozenset()
     percent: frozenset[Place] = frozenset()
     """Numbers that are shown as percentages: 50 % is 0.5."""

@@ -187,7 +187,7 @@ class CamDrive:
 
     @property
     def label(self) -> str:
-        """How messages call it."""
+        """Its name in messages."""
         return f"cam {self.cam.cam}-{self.cam.slider or self.cam.follower}"
 
 

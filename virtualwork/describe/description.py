@@ -281,7 +281,7 @@ FILE: Keys = {
     ),
     "units": Key(Free("units"), "what bare lengths and angles mean"),
 }
-"""What stands at the top of the file beside the tables of the parts."""
+"""The keys at the top of the file in addition to the tables of the parts."""
 
 
 def slide_by_guess(

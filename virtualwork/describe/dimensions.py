@@ -43,7 +43,7 @@ class Dimension:
 
     @property
     def unit(self) -> str:
-        """How a column of it ends: `m`, `deg`; empty for a plain number."""
+        """The suffix of its column: `m`, `deg`; empty for a plain number."""
         return LISTED[self.kind][0]
 
     @property

@@ -62,7 +62,7 @@ class Form:
         return ""
 
     def schema(self) -> Schema:
-        """What an editor may expect."""
+        """Return the JSON Schema of the value, for editors."""
         return TEXT
 
     def read(self, value: Any, where: str, entry: Entry) -> Any:

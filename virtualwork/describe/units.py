@@ -1,4 +1,4 @@
-"""What the bare numbers of a mechanism's file mean, and what is wrong with a value; the units themselves: `dalembert.units`."""
+"""The units of bare numbers in a mechanism's file, and messages about values; the units themselves: `dalembert.units`."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Decimals:
         return more
 
     def rest(self, dimension: str, number: float) -> float:
-        """What a number is exactly, less the float itself: 0 where it does not stand in the file."""
+        """Return the exact number less its float; 0 if the file does not have it."""
         if (dimension, number) not in self._written:
             return 0.0
         value, factor = self._written[dimension, number]
@@ -55,7 +55,7 @@ class Decimals:
 
 
 class Units:
-    """What a file's bare numbers mean: its lengths and angles in units of their own, everything else SI.
+    """The units of a file's bare numbers: lengths and angles in units of their own, everything else SI.
 
     Examples
     --------

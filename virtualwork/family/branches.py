@@ -168,7 +168,7 @@ def stays_within(
     low: Reals,
     high: Reals,
 ) -> Mask:
-    """Of which variants a quantity is no larger than a bound over their inputs from low to high, (n,) or (1,)."""
+    """Return the variants whose quantity stays within a bound over their inputs from low to high, (n,) or (1,)."""
     result = np.ones(n, dtype=bool)
     for here, some, q in _along(written, m, entering, n, low, high):
         result[here] = (np.abs(_sampled(written, key, some, q, len(result[here]))) < bound).all(axis=0)
@@ -176,7 +176,7 @@ def stays_within(
 
 
 def samples(written: VariedFormulas, m: Description, span: float) -> int:
-    """How many samples of a way are looked at, of a turn at most; the more the faster a gear turns a body."""
+    """Return the number of samples of a way, of a turn at most; more if a gear turns a body fast."""
     fast = max((abs(k) for t in turns(written.plan.steps) for _, k in t.angle.inputs), default=1.0)
     return (
         int(np.ceil(min(span / (m.size if m.inputs[0].is_slide else 1.0), 2 * np.pi) * max(fast, 1.0) / STEP))
@@ -197,7 +197,7 @@ def _levers(written: VariedFormulas) -> list[str]:
 def _along(
     written: VariedFormulas, m: Description, entering: Mapping[str, Any], n: int, low: Reals, high: Reals
 ) -> Iterator[tuple[slice, dict[str, Any], Reals]]:
-    """Some variants at a time, what is known of them, and inputs on their way, (samples, variants or 1)."""
+    """Yield some variants at a time, the decisions on them, and inputs on their way, (samples, variants or 1)."""
     count = _count(written, m, low, high)
     each = max(1, LANES // count)
     for a in range(0, n, each):
@@ -207,7 +207,7 @@ def _along(
 
 
 def _count(written: VariedFormulas, m: Description, low: Reals, high: Reals) -> int:
-    """How many samples of the longest way are looked at."""
+    """Return the number of samples of the longest way."""
     return samples(written, m, float(np.max(high - low, initial=0.0)))
 
 
@@ -238,7 +238,7 @@ def _sampled(written: VariedFormulas, key: Quantity, entering: Mapping[str, Any]
 
 
 def _meets(entering: Mapping[str, Any], q: Reals, radicand: Callable[..., Reals], n: int) -> Mask:
-    """Where a dip of the radicand, which is followed down, goes to zero."""
+    """Return where a dip of the radicand, which is followed down, goes to zero."""
     depth = radicand(entering, q, n)
     inner = depth[1:-1]
     dips = (inner <= depth[:-2]) & (inner <= depth[2:]) & (inner < DIP) & (inner > 0)

@@ -84,7 +84,7 @@ class Design:
 
     @property
     def rows(self) -> int:
-        """How many rows a table has: two of each point, x and y, one of an angle or a slide."""
+        """The number of rows of a table: two for each point, x and y, one for an angle or a slide."""
         return sum(len(key.names) for key in self.keys)
 
     @property
@@ -134,7 +134,7 @@ class Design:
         return self._alone.values(x, q)
 
     def slopes(self, numbers: ArrayLike, inputs: ArrayLike, inputs_alone: bool = False) -> Reals:
-        """The derivatives of that to the dimensions, and last to the inputs themselves, (rows, n, d + 1).
+        """Return the derivatives with respect to the dimensions, and last to the inputs themselves, (rows, n, d + 1).
 
         `inputs_alone`: to nothing but the inputs, (rows, n, 1).
         """
@@ -156,7 +156,7 @@ class Design:
         return rows[:, : len(q)], fine
 
     def _ready(self, q: Reals, enters: tuple[str, ...] | None) -> Repeated:
-        """What computes one design after another at some inputs; the last ones' is kept."""
+        """Return the object that computes one design after another at some inputs; that of the last inputs is kept."""
         own_signs = self._held is None
         key, same = (enters, own_signs), q.tobytes()
         kept = self._kept.get(key)
@@ -168,7 +168,7 @@ class Design:
         return kept[1]
 
     def _known(self, x: Reals) -> dict[str, Any] | None:
-        """What enters the tape of a design beside the input; None where it is better described alone."""
+        """Return the inputs of a design's tape other than the input itself; None if it is better described alone."""
         name = x.tobytes()
         if self._chosen[0] != name:
             self._chosen = name, self._enters(x)

@@ -110,7 +110,7 @@ class Family:
         acceleration: ArrayLike | None = None,
         executor: Executor | None = None,
     ) -> FamilyMotion:
-        """Motion of every variant over the same inputs; every quantity is solved on the first request.
+        """Return the motion of every variant over the same inputs; every quantity is solved on the first request.
 
         Parameters
         ----------
@@ -134,17 +134,17 @@ class Family:
         return FamilyMotion(Part(self.mechanism, self.dimensions, self.values, inputs, rates), executor)
 
     def own(self, name: str) -> list[Reals]:
-        """What the descriptions say of each input: its value, or a rate, (v,)."""
+        """Return each input of the descriptions: its value, or a rate, (v,)."""
         return [np.full(len(self), own) if np.ndim(own) == 0 else own for own in self._of_inputs(name)]
 
     def _of_inputs(self, name: str) -> list[Number]:
-        """The same; a number where it is not varied."""
+        """Return each input's value or rate, (v,); a number if it is not varied."""
         every = (self._own[j, name] for j in range(len(self.mechanism.inputs)))
         return [number if at is None else self.values[:, at] for at, number in every]
 
     @cached_property
     def _own(self) -> dict[tuple[int | str, int | str], tuple[int | None, float]]:
-        """Of each input's value and rates the place among what is varied, or None; and the description's own number."""
+        """Return the index of each input's value and rates among the varied dimensions, or None; and the description's own number."""
         every = dimensions(self.mechanism)
         places = {d.path: i for i, d in enumerate(self.dimensions)}
         return {
@@ -233,14 +233,14 @@ class FamilyMotion:
 
     # --- solving ------------------------------------------------------------------------------------------------
     def parts(self) -> Iterator[tuple[int, slice]]:
-        """The variants in parts: always the same ones, whoever works them out, and so are the numbers."""
+        """The variants in parts: always the same ones, whoever computes them, and so are the numbers."""
         v, n = self.part.shape
         each = max(1, LANES // max(n, 1))
         for number, i in enumerate(range(0, v, each)):
             yield number, slice(i, min(i + each, v))
 
     def values(self, keys: Sequence[Quantity]) -> list[Any]:
-        """Quantities, each (v, n), real or complex."""
+        """Return several quantities by their keys, each (v, n), real or complex."""
         new = tuple(key for key in keys if key not in self._known)
         if new:
             rows = [rows for _, rows in self.parts()]
@@ -261,25 +261,25 @@ class FamilyMotion:
         return [self._known[key] for key in keys]
 
     def value(self, key: Quantity) -> Any:
-        """A quantity by its key, (v, n)."""
+        """Return a quantity by its key, (v, n)."""
         return self.values([key])[0].copy()
 
     def vector(self, key: Quantity) -> Reals:
-        """A vector by its key, (v, n, 2)."""
+        """Return a vector by its key, (v, n, 2)."""
         return xy(self.value(key))
 
     @cached_property
     def assembled(self) -> NDArray[np.bool_]:
-        """(v, n) bool: which poses of which variants can be assembled."""
+        """Whether each pose of each variant can be assembled, (v, n) bool."""
         return np.asarray(np.isfinite(self.values([ASSEMBLED])[0]))
 
     @property
     def failed(self) -> int:
-        """How many variants cannot be assembled in some pose."""
+        """The number of variants that cannot be assembled in some pose."""
         return int((~self.assembled.all(axis=1)).sum())
 
     def reason(self, i: int) -> str | None:
-        """Why the i-th variant cannot be assembled in some pose; None where it can in all."""
+        """Return why the i-th variant cannot be assembled in some pose; None if it can in all."""
         bad = np.flatnonzero(~self.assembled[i])
         if not len(bad):
             return None
@@ -294,7 +294,7 @@ class FamilyMotion:
 
     # --- what moves -----------------------------------------------------------------------------------------------
     def point(self, name: str) -> PointOfFamily:
-        """Motion of a named point.
+        """Return the motion of a named point.
 
         Raises
         ------
@@ -307,13 +307,13 @@ class FamilyMotion:
         return PointOfFamily(self, *points[name], name)
 
     def at(self, link: str, point: Point | str) -> PointOfFamily:
-        """Motion of any point of a link: a name, or coordinates in the link's own axes."""
+        """Return the motion of any point of a link: a name, or coordinates in the link's own axes."""
         if isinstance(point, str):
             return self.point(point)
         return PointOfFamily(self, link, as_point(point), None)
 
     def link(self, name: str) -> LinkOfFamily:
-        """Motion of a link.
+        """Return the motion of a link.
 
         Raises
         ------
@@ -325,7 +325,7 @@ class FamilyMotion:
         return LinkOfFamily(self, name)
 
     def slide(self, name: str) -> SlideRates:
-        """Motion along the guide in which the named point runs."""
+        """Return the motion along the guide in which the named point runs."""
         for i, guide in enumerate(self.part.mechanism.guides):
             if guide.point == name:
                 return SlideRates(self, i)
@@ -340,7 +340,7 @@ class FamilyMotion:
         return result[0] if k == 1 else np.stack(result, axis=-1)
 
     def reaction(self, joint: str, on: str) -> Reals:
-        """The force of all others on a link at a joint, (v, n, 2) N.
+        """Return the force of all other links on a link at a joint, (v, n, 2) N.
 
         Raises
         ------

@@ -26,7 +26,7 @@ FINE = 721
 
 @dataclass(frozen=True, eq=False)
 class Fit(Generic[D]):
-    """The dimensions that come nearest to a target.
+    """The dimensions with the least distance from a target.
 
     Attributes
     ----------
@@ -67,22 +67,22 @@ class Fit(Generic[D]):
 
     @property
     def inputs(self) -> Reals:
-        """(n,) rad or m, at each row of the (first) target."""
+        """The input at each row of the (first) target, (n,), rad or m."""
         return self.reached[0].inputs
 
     @property
     def positions(self) -> Complexes:
-        """(n,) where the (first) point comes, x + iy in m."""
+        """The positions of the (first) point, (n,), x + iy, m."""
         return self.reached[0].values
 
     @property
     def target(self) -> Complexes:
-        """(n,) where it should."""
+        """The target positions, (n,)."""
         return self.reached[0].target
 
     @property
     def distances(self) -> Reals:
-        """(n,) m; rad where it is a link's angle."""
+        """The distance at each row, (n,), m; rad for the angle of a link."""
         return self.reached[0].distances
 
     @property
@@ -104,7 +104,7 @@ class Fit(Generic[D]):
         return np.concatenate(distances)
 
     def plot(self, figure: FigureBase | None = None) -> list[Axes]:
-        """Draw the targets, and what the mechanism does over their range: a panel for each point, link and slide.
+        """Draw the targets and the motion of the mechanism over their range: a panel for each point, link and slide.
 
         Parameters
         ----------

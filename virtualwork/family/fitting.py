@@ -78,7 +78,7 @@ class _Refined(NamedTuple):
 
 
 class _Problem(Generic[D]):
-    """What is looked for: shares of the way from a lower to an upper bound, and the inputs that are free."""
+    """The unknowns of a fit: shares of the way from a lower to an upper bound, and the free inputs."""
 
     def __init__(
         self,
@@ -118,13 +118,13 @@ class _Problem(Generic[D]):
         return float(every.min()), float(every.max())
 
     def judged(self, x: Reals) -> tuple[Kept, ...]:
-        """What becomes of the bounds at some shares."""
+        """Return the state of the bounds at some shares."""
         if self.bounds is None:
             return ()
         return self.bounds.judged(self.values(x), np.linspace(*self.sweep, JUDGED))
 
     def own(self) -> _Problem[D]:
-        """The same with designs of its own: what is computed on one does not meet another on another thread."""
+        """Return the problem with designs of its own, for another thread."""
         return _Problem(self.m, self.targets, self.free, self.keep)
 
     def values(self, x: Reals) -> Reals:
@@ -133,7 +133,7 @@ class _Problem(Generic[D]):
         return np.asarray(np.clip(self.low + x * (self.high - self.low), self.low, self.high))
 
     def residuals(self, x: Reals, inputs: Sequence[Reals]) -> Reals:
-        """How far every row of every target is off, weighted: of the mechanism's size, or rad."""
+        """Return the weighted distance of every row of every target: in sizes of the mechanism, or rad."""
         values = self.values(x)
         parts = zip(self.aims, self.designs, inputs, strict=True)
         off = np.concatenate([aim.apart(design(values, q)).ravel() for aim, design, q in parts])

@@ -1,4 +1,4 @@
-"""What a fit keeps over the whole sweep: quantities that stay above or below a bound, transmission angles first of all.
+"""Bounds that a fit keeps over the whole sweep, transmission angles first of all.
 
 A bound is held by multipliers (M. R. Hestenes, J. Optim. Theory Appl. 4 (1969) 303; M. J. D. Powell 1969): rows
 √ρ·max(0, λ/ρ − c) stand below the residuals of the target, c the margin of each pose to the bound; after each descent
@@ -59,7 +59,7 @@ class Bound:
 
 @dataclass(frozen=True)
 class Kept:
-    """What became of a bound: the extreme of the quantity over the sweep, and whether it is met."""
+    """The result of a bound: the extreme of the quantity over the sweep, and whether it is met."""
 
     bound: Bound
     extreme: float
@@ -98,12 +98,12 @@ class Bounds:
         self._design.hold(values)
 
     def margins(self, values: Reals, q: Reals) -> Reals:
-        """How far inside its bound each quantity is at each pose, (rows, n): relative, of the size, or rad."""
+        """Return the distance of each quantity from its bound at each pose, (rows, n): relative, in sizes, or rad."""
         result = np.concatenate(self._margins(values, q))
         return np.where(np.isfinite(result), result, -AWAY)
 
     def _margins(self, values: Reals, q: Reals) -> list[Reals]:
-        """Of each bound the margins of its rows, (its rows, n); not finite where a pose cannot be assembled."""
+        """Return the margins of the rows of each bound, (its rows, n); not finite if a pose cannot be assembled."""
         table = self._design(values, q)
         return [
             np.array([self._margin(i, key, table[row]) for key, row in rows])

@@ -1,4 +1,4 @@
-"""Some variants over given inputs, self-contained, and what they do: on the tape together, or described one by one.
+"""A self-contained part of a family: some variants over given inputs, solved on the tape together or one by one.
 
 On the tape a lane is one variant in one pose. Variants whose branch is not decided by a comparison at the guess, and
 mechanisms whose branch is more than signs (groups without a closed form, gears), are described one by one.
@@ -105,7 +105,7 @@ class Part:
 
 
 class Solver:
-    """What the variants of a part do.
+    """The motion of the variants of a part.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ class Solver:
 
     @cached_property
     def assembly(self) -> Assembly | None:
-        """That of the mechanism itself; None where its own dimensions cannot be put together."""
+        """The assembly of the mechanism itself; None if its own dimensions cannot be assembled."""
         try:
             result = assembled(self.part.mechanism)
             _ = result.track
@@ -304,7 +304,7 @@ class Solver:
         return near
 
     def _with_gaps(self, keys: Sequence[Quantity], rows: NDArray[np.intp]) -> tuple[list[Any], Mask]:
-        """Some variants on the tape of which a pose is not assembled; and which of them are better described alone."""
+        """Return the variants on the tape with a pose that is not assembled, and those of them that are better described alone."""
         assert self.written is not None
         v, n = len(rows), self.part.shape[1]
         written = self.written
@@ -377,7 +377,7 @@ class Solver:
 
     @cached_property
     def _seeds(self) -> Seeds:
-        """Where the iterations of variants described alone begin."""
+        """Return the starting points of the iterations of variants described alone."""
         low, high = self._span
         return {} if self.assembly is None else seeds_of(self.assembly, float(low.min()), float(high.max()))
 

@@ -150,7 +150,7 @@ class Descent:
         self._last: tuple[bytes, _Here] | None = None
 
     def residuals(self, x: Reals) -> Reals:
-        """How far every row of every target is off, weighted."""
+        """Return the weighted distance of every row of every target."""
         return self.at(x).residuals
 
     def jacobian(self, x: Reals) -> Reals:

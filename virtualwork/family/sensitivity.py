@@ -83,13 +83,13 @@ class Sensitivities:
         return slopes
 
     def _entering(self, dimensions: Sequence[Dimension]) -> list[str]:
-        """What dimensions are called on the tape: an input's own numbers enter as those of every input do."""
+        """Return the names of dimensions on the tape: an input's own numbers enter as those of every input do."""
         return [
             d.path if d.where[0] != "inputs" else f"{ENTERS[str(d.where[2])]}{d.where[1]}" for d in dimensions
         ]
 
     def _given(self, tape: Tape, dimensions: Sequence[Dimension]) -> dict[str, Any]:
-        """What enters a tape: the dimensions' own numbers, and those of the poses."""
+        """Return the inputs of a tape: the dimensions' own numbers, and those of the poses."""
         own = {
             d.path: float(value(self.assembly.mechanism, d.path).real)
             for d in dimensions
@@ -167,7 +167,7 @@ class Sensitivities:
 
 
 def _moved(tape: Tape, entering: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """By how much the outputs of a tape, (n,), move with the rounding of every number that enters, and of its constants."""
+    """Return the change of the outputs of a tape, (n,), by the rounding of every input and of its constants."""
     inputs = dict(entering)
     operations: list[Operation] = []
     for kind, *arguments in tape.operations:

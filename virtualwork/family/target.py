@@ -1,4 +1,4 @@
-"""What a fit aims at, and what it reached: points at places, links at angles, slides at travels, an effort."""
+"""Targets of a fit and their results: positions of points, angles of links, travels of slides, an effort."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ class Aim:
         return int(self.wanted.shape[1])
 
     def apart(self, reached: Reals) -> Reals:
-        """How far it is off, weighted, (rows, ..., n): lengths in sizes of the mechanism, angles in rad."""
+        """Return the weighted distance, (rows, ..., n): lengths in sizes of the mechanism, angles in rad."""
         return self._off(reached, self.wanted, self.scale)
 
     def from_each(self, reached: Reals) -> Reals:
@@ -164,7 +164,7 @@ class Aim:
         return np.asarray(apart * beside(scale))
 
     def reached(self, rows: Reals, inputs: Reals) -> tuple[Reached, ...]:
-        """What a design does, (rows, n)."""
+        """Return the quantities of a design, (rows, n)."""
         out, row = [], 0
         for name, key in zip(self.names, self.keys, strict=True):
             if key.is_vector:

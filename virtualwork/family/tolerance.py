@@ -1,4 +1,4 @@
-"""What tolerances of the dimensions do to what is shown: to first order, and by drawing mechanisms.
+"""The effect of tolerances of dimensions on quantities: to first order, and by drawing mechanisms.
 
 With exact slopes s_i = ∂f/∂d_i and independent dimensions of limits ± t_i, three standard deviations each,
 
@@ -32,7 +32,7 @@ QUANTILES = (0.00135, 0.99865)
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """What the tolerances do to one number, pose by pose, to first order.
+    """The effect of the tolerances on one number, pose by pose, to first order.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ def limits(m: Description, requested: Mapping[str, float]) -> dict[Dimension, fl
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """What drawn mechanisms say of one number, pose by pose, from those that are assembled.
+    """The statistics of one number over drawn mechanisms, pose by pose, from those that are assembled.
 
     Attributes
     ----------

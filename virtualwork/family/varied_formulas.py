@@ -139,7 +139,7 @@ class VariedFormulas:
         return self.recording.recorder.tape({"clear": every(depths)})
 
     def _allowed(self) -> Iterator[Number]:
-        """What is positive where a description is not refused for its numbers (`describe.description.refuse`)."""
+        """Return numbers that are positive if a description is not refused for its numbers (`describe.description.refuse`)."""
         m = self.mechanism
         least = CLOSE * bare(m.size)
         for name, earlier, later in joints_apart(m):
@@ -197,7 +197,7 @@ class VariedFormulas:
         return recorder.tape(signs | {"told": told})
 
     def _plain(self, values: Mapping[str, Number]) -> list[Number]:
-        """What is positive where a choice is certain, and the description is no other than that of all."""
+        """Return a number that is positive if a choice is certain, and the description is that of all variants."""
         plain = [values["allowed"]]
         for name in (group.name for group in self.closed):
             plus, minus = values[f"plus {name}"], values[f"minus {name}"]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
 
 DRAWN = 6
-"""So many poses of a motion are drawn, the first in full."""
+"""The number of poses of a motion that are drawn, the first in full."""
 PATH = 1441
 """Points of a path over a whole turn."""
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#a0307a", "#7a5c00", "#5b6ee1", "#b22222", "#2f7f8f")
@@ -44,7 +44,7 @@ LINES: dict[str, dict[str, Any]] = {
     "pin": {"color": "black", "lw": 1.0},
     "tip": {"color": "black", "lw": 1.0},
 }
-"""How a shape of each role is lined; without a colour in that of its body."""
+"""The line of a shape of each role; without a colour in that of its body."""
 OPAQUE = ("frame", "block", "pin", "tip", "slot")
 CIRCLE = np.exp(1j * np.linspace(0, 2 * np.pi, 73))
 
@@ -140,7 +140,7 @@ class _Paper:
         return axes
 
     def _where(self, i: int) -> str:
-        """Say at which inputs a pose stands."""
+        """Return the inputs of a pose as text."""
         shown = []
         for entry, value in zip(self.m.inputs, self.poses.inputs[i], strict=True):
             at = f"{value * self.scale:.6g} {self.unit}" if entry.is_slide else f"{np.degrees(value):.6g}°"

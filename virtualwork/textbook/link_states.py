@@ -37,7 +37,7 @@ ROUNDING = 8 * np.finfo(float).eps
 """A power below this share of load times largest velocity is rounding: the load does no work."""
 
 HIDDEN = 2.0**-97
-"""What sums in 32 digits may hide, of the sizes of their terms."""
+"""The possible error of sums in 32 digits, as a share of the sizes of their terms."""
 STEPS = 6
 """Steps of refinement: each gains the digits that the condition number leaves of sixteen."""
 
@@ -161,7 +161,7 @@ class LinkStates:
 
     @property
     def in_32_digits(self) -> LinkStates:
-        """The same states, the floats exactly, in numbers of 32 digits."""
+        """Return these states in numbers of 32 digits, the floats exactly."""
         fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
         return replace(self, **{name: in_32_digits(x) for name, x in fields.items() if x is not None})
 
@@ -244,7 +244,7 @@ class UnitLoad:
 
     @property
     def unit(self) -> str:
-        """That of the unknown: N, N·m, or neither where it is both a force and a torque."""
+        """The unit of the unknown: N, N·m, or neither if it is both a force and a torque."""
         kinds = {"N": np.any(np.asarray(self.force) != 0), "N·m": np.any(np.asarray(self.torque) != 0)}
         return " and ".join(unit for unit, there in kinds.items() if there)
 
@@ -252,7 +252,7 @@ class UnitLoad:
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class Balance:
-    """What balances the known loads; see `balance`. k is the number of unknowns and of velocity fields."""
+    """The loads that balance the known ones, computed by `balance`; k is the number of unknowns and of velocity fields."""
 
     value: Real
     """The unknowns, (..., k), N or N·m; NaN where they are not determined."""
@@ -267,7 +267,7 @@ class Balance:
     power: Real
     """(..., k): the power of the known loads in each field, W."""
     given: tuple[LinkStates, tuple[UnitLoad, ...]] | None = field(default=None, repr=False, compare=False)
-    """What was balanced."""
+    """The states and the unknowns that were balanced."""
 
     def plot(self, links: Sequence[str] = (), figure: FigureBase | None = None) -> NDArray[np.object_]:
         """Draw the power of every load as a bar; of several instants, the unknowns over them. Return the axes.

@@ -32,7 +32,7 @@ class Row(NamedTuple):
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class NewtonTable:
-    """What Newton and Raphson's method did; see `newton`.
+    """The iterates of Newton-Raphson, computed by `newton`.
 
     Attributes
     ----------
