@@ -26,7 +26,7 @@ from dalembert.arithmetic.tape import Tape
 
 Reals = NDArray[np.float64]
 LONGEST = 8000  # operations: about a second to compile; numpy runs what is longer
-FORMAT = "6"  # of the code below: another number makes old files on disk useless
+FORMAT = "7"  # of the code below: another number makes old files on disk useless
 
 _FUNCTION = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
 # kept for the life of the process: compiled code holds their addresses

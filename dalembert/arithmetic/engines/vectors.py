@@ -95,13 +95,14 @@ class Vectors:
     def sincos(self, b: ir.IRBuilder, x: ir.Value) -> tuple[ir.Value, ir.Value]:
         """(sin x, cos x)."""
         magic = self.constant(WHOLE)
-        shifted = b.fadd(b.fmul(x, self.constant(TWO_OVER_PI)), magic)
+        shifted = self.intrinsic(b, "fmuladd", x, self.constant(TWO_OVER_PI), magic)
         quadrant, k = b.bitcast(shifted, self.longs), b.fsub(shifted, magic)
         first, second, third = map(self.constant, HALF_PI)
-        a = b.fsub(x, b.fmul(k, first))
+        # exact with two roundings as with one: the product has no more than 53 bits
+        a = self.intrinsic(b, "fmuladd", b.fneg(k), first, x)
         w = b.fmul(k, second)
         r = b.fsub(a, w)
-        w = b.fsub(b.fmul(k, third), b.fsub(b.fsub(a, r), w))
+        w = self.intrinsic(b, "fmuladd", k, third, b.fsub(w, b.fsub(a, r)))
         y = b.fsub(r, w)
         rest = b.fsub(b.fsub(r, y), w)
         z = b.fmul(y, y)
@@ -109,7 +110,8 @@ class Vectors:
         high = b.fmul(z, self.polynomial(b, z, COSINE))
         half, one = b.fmul(self.constant(0.5), z), self.constant(1.0)
         w = b.fsub(one, half)
-        cosine = b.fadd(w, b.fadd(b.fsub(b.fsub(one, w), half), b.fsub(b.fmul(z, high), b.fmul(y, rest))))
+        bent = self.intrinsic(b, "fmuladd", z, high, b.fneg(b.fmul(y, rest)))
+        cosine = b.fadd(w, b.fadd(b.fsub(b.fsub(one, w), half), bent))
         odd = b.icmp_signed("!=", b.and_(quadrant, self.integer(1)), self.integer(0))
 
         def signed(value: ir.Value, quarter: ir.Value) -> ir.Value:
@@ -144,8 +146,7 @@ class Vectors:
         z = b.fmul(t, t)
         w = b.fmul(z, z)
         odd = b.fmul(z, self.polynomial(b, w, ARCTANGENT_ODD))
-        even = b.fmul(w, self.polynomial(b, w, ARCTANGENT_EVEN))
-        small = b.fmul(t, b.fadd(odd, even))
+        small = b.fmul(t, self.intrinsic(b, "fmuladd", w, self.polynomial(b, w, ARCTANGENT_EVEN), odd))
         zero = self.constant(0.0)
 
         def among(test: ir.Value, value: float, otherwise: ir.Value) -> ir.Value:
@@ -159,10 +160,9 @@ class Vectors:
         base = among(steep, 1.5707963267948966, among(back, 3.141592653589793, zero))
         base_rest = among(steep, 6.12323399573676603587e-17, among(back, 1.22464679914735317722e-16, zero))
         sense = b.fmul(among(back, -1.0, self.constant(1.0)), among(steep, -1.0, self.constant(1.0)))
-        rest = b.fadd(
-            b.fadd(base_rest, b.fmul(sense, quarter_rest)), b.fmul(sense, b.fsub(t, b.fsub(small, t_rest)))
-        )
-        angle = b.fadd(b.fadd(base, b.fmul(sense, quarter)), rest)
+        rest = self.intrinsic(b, "fmuladd", sense, quarter_rest, base_rest)
+        rest = self.intrinsic(b, "fmuladd", sense, b.fsub(t, b.fsub(small, t_rest)), rest)
+        angle = b.fadd(self.intrinsic(b, "fmuladd", sense, quarter, base), rest)
         served = b.and_(
             b.fcmp_ordered(">", most, self.constant(SMALLEST)),
             b.fcmp_ordered("<", most, self.constant(LARGEST)),
