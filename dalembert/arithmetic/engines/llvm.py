@@ -28,7 +28,7 @@ Reals = NDArray[np.float64]
 LONGEST = 8000  # operations: about a second to compile; numpy runs what is longer
 SHORT = 500  # operations up to which two vectors are worked on in turn: one waits for a result while the other goes on
 LANES = 8  # at most at a time
-FORMAT = "8"  # of the code below: another number makes old files on disk useless
+FORMAT = "9"  # of the code below: another number makes old files on disk useless
 
 _FUNCTION = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
 # kept for the life of the process: compiled code holds their addresses
