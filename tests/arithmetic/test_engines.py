@@ -68,6 +68,21 @@ def test_engines_agree_for_any_count_of_lanes(n: int, uniform: str) -> None:
             np.testing.assert_allclose(table, tables[0], rtol=1e-12, atol=1e-14)
 
 
+def test_two_vectors_in_turn_have_the_bits_of_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(5)
+    inputs = {name: rng.normal(size=1003) for name in "abc"}
+    inputs["a"][17], inputs["b"][18] = 1e300, 0.0
+    for seed in range(5):
+        tape = random_tape(seed)
+        monkeypatch.setattr(llvm, "_compiled", {})
+        in_turn = run(tape, inputs, "llvm").table
+        monkeypatch.setattr(llvm, "_compiled", {})
+        monkeypatch.setattr(llvm, "SHORT", 0)
+        monkeypatch.setattr(llvm, "FORMAT", "one vector")
+        np.testing.assert_array_equal(in_turn, run(tape, inputs, "llvm").table)
+        monkeypatch.undo()
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_parts_of_a_complex_number_lie_one_beside_the_other(engine: str) -> None:
     recorder = Recorder()

@@ -26,7 +26,9 @@ from dalembert.arithmetic.tape import Tape
 
 Reals = NDArray[np.float64]
 LONGEST = 8000  # operations: about a second to compile; numpy runs what is longer
-FORMAT = "6"  # of the code below: another number makes old files on disk useless
+SHORT = 500  # operations up to which two vectors are worked on in turn: one waits for a result while the other goes on
+LANES = 8  # at most at a time
+FORMAT = "9"  # of the code below: another number makes old files on disk useless
 
 _FUNCTION = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
 # kept for the life of the process: compiled code holds their addresses
@@ -37,7 +39,7 @@ _unusable: list[str] = []
 
 
 class Code:
-    """Compiled code of one tape, and the engine that holds it in memory."""
+    """Compiled code of one tape, and the engine that holds it in memory; `width`: how many lanes it works on at a time."""
 
     def __init__(self, width: int, keeper: Any, address: int) -> None:
         self.width, self._keeper = width, keeper
@@ -174,10 +176,13 @@ def _kind(x: Reals, rows: int, columns: int) -> str:
 def _code(tape: Tape, inputs: str, outputs: str) -> Code | None:
     from dalembert.arithmetic.engines.lowered import lowered
 
+    def lanes(width: int) -> int:
+        return min(2 * width, LANES) if len(tape.operations) <= SHORT else width
+
     code = loaded(
-        f"{tape.key}|{inputs}|{outputs}", "tape", lambda width: lowered(tape, inputs, outputs, width)
+        f"{tape.key}|{inputs}|{outputs}", "tape", lambda width: lowered(tape, inputs, outputs, lanes(width))
     )
-    return None if code is None else Code(*code)
+    return None if code is None else Code(lanes(code[0]), *code[1:])
 
 
 def loaded(name: str, symbol: str, written: Callable[[int], Any]) -> tuple[int, Any, int] | None:

@@ -4,6 +4,7 @@
 (`r`), of each column (`c`), of each lane of the grid (`b`), row by row. An output is a number of each lane (`l`), two in turn with
 the next one's (`p`), or of each row a byte (`h`): whether it is positive in every column. What depends on no column is worked
 out once for each row. There is at least a vector of columns; the last one ends with the last column. Lanes alone are one row.
+A vector may be twice as long as the processor's: LLVM makes two of it, whose operations take turns.
 """
 
 from __future__ import annotations

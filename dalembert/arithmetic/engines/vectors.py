@@ -1,9 +1,9 @@
 """Sine, cosine and arctangent as LLVM code on vectors of lanes: at most two units in the last place off.
 
-The polynomials and the reduction stand in `polynomials`. A vector with a lane that this does not serve (an
-argument beyond 2²⁰·π/2, or so near to a multiple of π/2 that the reduction cancels; for the arctangent infinities,
-zeros, or sizes near the ends of the range) goes, whole, through the system's own functions; and where even those
-cancel (large arguments next to a multiple of π/2: some lose eight units there) through `circular`, on whole numbers.
+The polynomials and the reduction stand in `polynomials`. A lane that this does not serve (an argument beyond 2²⁰·π/2, or so
+near to a multiple of π/2 that the reduction cancels; for the arctangent infinities, zeros, or sizes near the ends of the range)
+goes through the system's own functions; and where even those cancel (large arguments next to a multiple of π/2: some lose eight
+units there) through `circular`, on whole numbers. No lane's digits depend on its neighbours'.
 """
 
 from __future__ import annotations
@@ -98,7 +98,8 @@ class Vectors:
         shifted = b.fadd(b.fmul(x, self.constant(TWO_OVER_PI)), magic)
         quadrant, k = b.bitcast(shifted, self.longs), b.fsub(shifted, magic)
         first, second, third = map(self.constant, HALF_PI)
-        a = b.fsub(x, b.fmul(k, first))
+        # exact with two roundings as with one: the product has no more than 53 bits
+        a = self.intrinsic(b, "fmuladd", b.fneg(k), first, x)
         w = b.fmul(k, second)
         r = b.fsub(a, w)
         w = b.fsub(b.fmul(k, third), b.fsub(b.fsub(a, r), w))
@@ -159,10 +160,10 @@ class Vectors:
         base = among(steep, 1.5707963267948966, among(back, 3.141592653589793, zero))
         base_rest = among(steep, 6.12323399573676603587e-17, among(back, 1.22464679914735317722e-16, zero))
         sense = b.fmul(among(back, -1.0, self.constant(1.0)), among(steep, -1.0, self.constant(1.0)))
-        rest = b.fadd(
-            b.fadd(base_rest, b.fmul(sense, quarter_rest)), b.fmul(sense, b.fsub(t, b.fsub(small, t_rest)))
-        )
-        angle = b.fadd(b.fadd(base, b.fmul(sense, quarter)), rest)
+        # exact with two roundings as with one: the sense is a sign
+        rest = self.intrinsic(b, "fmuladd", sense, quarter_rest, base_rest)
+        rest = self.intrinsic(b, "fmuladd", sense, b.fsub(t, b.fsub(small, t_rest)), rest)
+        angle = b.fadd(self.intrinsic(b, "fmuladd", sense, quarter, base), rest)
         served = b.and_(
             b.fcmp_ordered(">", most, self.constant(SMALLEST)),
             b.fcmp_ordered("<", most, self.constant(LARGEST)),
@@ -181,12 +182,12 @@ class Vectors:
         arguments: list[ir.Value],
         functions: list[str],
     ) -> list[ir.Value]:
-        """The fast values where they serve all lanes, else those of the system's functions, lane by lane."""
+        """The fast values; in lanes that they do not serve, those of the system's functions."""
         good = self._all(b, served)
         before = b.block
         with b.if_then(b.not_(good), likely=False):
             slow = b.call(self._slow(name, len(arguments), functions), arguments)
-            slowly = [b.extract_value(slow, i) for i in range(len(functions))]
+            slowly = [b.select(served, value, b.extract_value(slow, i)) for i, value in enumerate(fast)]
             there = b.block
         results = []
         for value, other in zip(fast, slowly, strict=True):
