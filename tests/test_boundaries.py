@@ -416,6 +416,18 @@ def test_a_small_table_needs_numpy_only(tmp_path: Path) -> None:
     assert not loaded & (HEAVY - {"numpy"})
 
 
+def test_a_check_of_inertias_loads_no_mechanism(tmp_path: Path) -> None:
+    """Files that read a robot also write one of a mechanism; a reader alone does without."""
+    robot = tmp_path / "robot.urdf"
+    robot.write_text(
+        '<robot name="r"><link name="a"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+        "</link></robot>"
+    )
+    loaded = modules_after("body", str(robot), "--check-inertias")
+    assert "rigidbody3d" in loaded
+    assert "virtualwork" not in loaded
+
+
 ROLES = (("command",), ("columns", "picture", "remarks", "report", "words"), ("solve",), ("read",))
 
 

@@ -1,4 +1,4 @@
-"""The inertias of a robot file: can a body have them, which is the nearest that it can, what has likely slipped."""
+"""The inertias of a robot file: whether a body can have them, the nearest that it can have, the likely mistake."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ROOM = 3.0
 
 
 class Guess(NamedTuple):
-    """What may have slipped, and how far apart the moments would then be."""
+    """A likely mistake, and the ratio of the moments once it is corrected."""
 
     what: str
     entry: str
@@ -38,7 +38,7 @@ class Guess(NamedTuple):
 
 @dataclass(frozen=True)
 class Check:
-    """A link's inertia, looked at."""
+    """The check of a link's inertia."""
 
     link: RobotLink
     held: Inertial
@@ -78,7 +78,7 @@ class Check:
 
     @cached_property
     def likely(self) -> str | None:
-        """What has likely slipped; None where nothing is to be seen."""
+        """The likely mistake; None where none is seen."""
         if self.held.mass < 0:
             return "a stray minus sign in the mass"
         if self.missing == 0:
@@ -95,7 +95,7 @@ class Check:
         return self._whole()
 
     def _carried(self) -> Array:
-        """What the parallel axis theorem adds at the link's origin, in the tensor's axes."""
+        """Return what the parallel axis theorem adds at the link's origin, in the tensor's axes."""
         inside = self.held.pose[:3, :3].T @ self.held.pose[:3, 3]
         return inertia.shift(self.held.mass, inside)
 
@@ -115,7 +115,7 @@ class Check:
         return signs
 
     def _decimals(self) -> list[Guess]:
-        """One entry off by a power of ten, the smallest that mends it."""
+        """Return entries that are off by the smallest power of ten that makes the tensor possible."""
         for power, what in SLIPS.items():
             decimals = []
             for entry, factor in product(PLACES, (10.0**-power, 10.0**power)):
@@ -128,12 +128,12 @@ class Check:
         return []
 
     def _reordered(self) -> Array:
-        """The same numbers, typed in the other order."""
+        """Return the tensor with its numbers typed in the other order."""
         pairs = zip(ROWS, DIAGONAL_FIRST, strict=True)
         return symmetric({meant: float(self.held.tensor[PLACES[typed]]) for typed, meant in pairs})
 
     def _whole(self) -> str | None:
-        """A body that reaches no farther than r from its centre has no moment above m·r², one that spans r hardly 0."""
+        """Return a mistake of the whole tensor: no moment exceeds m·r² where the body reaches to r, nor is one far below that."""
         held, largest = self.held, float(self.moments[2])
         if held.mass <= 0 or largest <= 0:
             return None

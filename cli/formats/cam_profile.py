@@ -20,7 +20,7 @@ SUFFIXES = (".csv", ".dxf", ".svg")
 
 
 def of_follower(m: Description, name: str) -> CamDrive:
-    """The cam that moves a follower, called by its sliding point or its arm.
+    """Return the cam that moves a follower, which is named by its sliding point or its arm.
 
     Raises
     ------
@@ -28,12 +28,12 @@ def of_follower(m: Description, name: str) -> CamDrive:
     """
     names = {str(cam.slider or cam.follower): number for number, cam in enumerate(m.cams)}
     if name not in names:
-        known = (
+        expected = (
             f"one of the followers {', '.join(names)}{nearest(name, names)}"
             if names
             else "a mechanism with [[cams]]"
         )
-        raise bad("--profile", f"'{name}': expected {known}")
+        raise bad("--profile", f"'{name}': expected {expected}")
     return m.cam_drives[names[name]]
 
 
@@ -49,16 +49,16 @@ def file_bytes(
     notes = check_cam(m, drive.number).warnings
     if suffix == ".csv":
         return _table(points, drive, length, metres, bare.get("angle", "rad")), notes
-    said = " ".join(f"{m.name}: profile of {drive.label}, from {file}".split())
+    comment = " ".join(f"{m.name}: profile of {drive.label}, from {file}".split())
     center = m.bodies[drive.cam.cam][drive.pin] / metres
     drawing = _drawing(points, length, metres, center, drive.cam.base_radius / metres)
-    return (svg(drawing, said, metres * 1000) if suffix == ".svg" else dxf(drawing, said)), notes
+    return (svg(drawing, comment, metres * 1000) if suffix == ".svg" else dxf(drawing, comment)), notes
 
 
 def _drawing(
     points: list[ProfilePoint], length: str, metres: float, center: complex, radius: float
 ) -> Strokes:
-    """The profile, the pitch curve and a cross at the axis."""
+    """Return the profile, the pitch curve and a cross at the axis."""
     from virtualwork.shapes import Line
 
     shapes = [
@@ -74,7 +74,7 @@ def _drawing(
 
 
 def _table(points: list[ProfilePoint], drive: CamDrive, length: str, metres: float, angle: str) -> bytes:
-    """A row for each point: the cam's angle, the lift, the profile, the pitch curve, pressure angle and radius."""
+    """Return a row for each point: the cam's angle, the lift, the profile, the pitch curve, pressure angle and radius."""
     turned: Callable[[float], float] = float if angle == "rad" else math.degrees
     unit = "rad" if angle == "rad" else "deg"
     slides = drive.guide is not None

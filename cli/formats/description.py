@@ -35,7 +35,7 @@ FOLLOWS = 1e-6
 
 
 class _Speeds:
-    """Speeds of a drawing's bodies: (vx, vy, ω) of each, as columns; lengths as shares of its size."""
+    """The linear equations of the bodies' speeds: three columns (vx, vy, ω) for each body; lengths are shares of the drawing's size."""
 
     def __init__(self, d: Drawing) -> None:
         self.d = d
@@ -47,7 +47,7 @@ class _Speeds:
         return self.d.bodies[body].world(z) / self.size
 
     def moves(self, body: str, at: complex) -> Rows:
-        """The speed of a body's point, (2, columns)."""
+        """Return the velocity of a point of a body, (2, columns)."""
         rows = np.zeros((2, 3 * len(self.columns)))
         k = self.columns[body]
         rows[:, k : k + 2] = np.eye(2)
@@ -55,20 +55,20 @@ class _Speeds:
         return rows
 
     def turns(self, body: str) -> Rows:
-        """A body's angular velocity, (columns,)."""
+        """Return the angular velocity of a body, (columns,)."""
         row = np.zeros(3 * len(self.columns))
         row[self.columns[body] + 2] = 1.0
         return row
 
     def along(self, s: Slide, turned: float) -> Rows:
-        """The speed of a slide's point against its line, in the line's direction or across it."""
+        """Return the velocity of a slide's point against its guide, along the line turned by `turned`."""
         way = cmath.rect(1.0, self.d.bodies[s.on].turn + s.angle + turned)
         at = self.at(s.link, self.d.bodies[s.link].points[s.point])
         relative = self.moves(s.link, at) - self.moves(s.on, at)
         return np.asarray(np.array([way.real, way.imag]) @ relative)
 
     def joints(self) -> Rows:
-        """What the ground, pins, slides and gears hold at zero."""
+        """Return the sums that the ground, pins, slides, gears and racks keep at zero."""
         d = self.d
         rows = [np.eye(3, 3 * len(self.columns))]
         for point, (first, *others) in d.pins().items():
@@ -87,14 +87,14 @@ class _Speeds:
         return np.concatenate(rows)
 
     def driven(self, e: Drive) -> Rows:
-        """What an input drives."""
+        """Return the speed that an input drives."""
         if e.slide is not None:
             return self.along(e.slide, 0.0)
         return self.turns(str(e.link)) - self.turns(e.on)
 
 
 def fit(d: Drawing) -> None:
-    """Leave out inputs that follow from those before them, and take free joints as inputs in addition."""
+    """Remove inputs that depend on those before them, and add free joints as inputs until all is driven."""
     speeds = _Speeds(d)
     _, s, vt = np.linalg.svd(speeds.joints())
     free = vt[int(np.sum(s > FOLLOWS * s[0])) :]
@@ -291,7 +291,7 @@ def described(d: Drawing, source: str) -> str:
 
 
 def _motion(m: Mechanism, d: Drawing, *ways: Sequence[float]) -> Motion:
-    """Return the motion of poses that stand so far from the drawn one; of that itself where none is given."""
+    """Return the motion of poses that stand so far from the drawn one; of the drawn one itself where there is none."""
     at = np.array([e.at for e in d.drives])
     inputs = at + np.array(ways) if ways else at[None]
     return m.motion(inputs if len(at) > 1 else inputs[:, 0])

@@ -1,4 +1,4 @@
-"""What a mechanism is drawn as, on layers and in the unit of its file, as SVG and as DXF: shapes, curves, names."""
+"""Drawings of a mechanism in SVG and DXF: shapes, curves and names, on layers and in the unit of its file."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Text:
 
     @property
     def reach(self) -> tuple[complex, ...]:
-        """Where it begins."""
+        """The place where it begins."""
         return (self.at,)
 
 

@@ -181,7 +181,7 @@ class Drive:
 
     @property
     def moves(self) -> object:
-        """What it moves, the same of inputs that move the same."""
+        """The pair or the slide that it moves: equal for inputs that move the same."""
         return id(self.slide) if self.slide else frozenset((self.link, self.on))
 
     @property
@@ -195,7 +195,7 @@ class Drive:
 
 @dataclass
 class Load:
-    """A force, torque or spring: its table, the bodies it holds on to, and its values as TOML has them.
+    """A force, torque or spring: its table, the bodies on which it acts, and its values as in TOML.
 
     `ends` are the places (body, place in its axes); values that are places of a body stand there and nowhere else.
     """
@@ -207,7 +207,7 @@ class Load:
 
 @dataclass
 class Drawing:
-    """All that a file says of one mechanism, in the file's units."""
+    """One mechanism of a file, in the file's units."""
 
     name: str = ""
     length: str = "m"
@@ -222,7 +222,7 @@ class Drawing:
     racks: list[Toothed] = field(default_factory=list)
     drives: list[Drive] = field(default_factory=list)
     spare: list[Drive] = field(default_factory=list)
-    """What may drive it where its inputs leave it free; of robots, whose files may name too few or too many of them."""
+    """Further inputs, taken where `drives` leave the mechanism free: robot files may name too few or too many."""
     loads: list[Load] = field(default_factory=list)
     welds: list[tuple[str, str]] = field(default_factory=list)
     gravity: tuple[float, float] | None = None
@@ -230,7 +230,7 @@ class Drawing:
 
     @property
     def metres(self) -> float:
-        """What one of its lengths is, m."""
+        """The length that the number 1 means, m."""
         return to_si(1.0, "length", self.length)
 
     def body(self, name: str) -> Body:
@@ -258,7 +258,7 @@ class Drawing:
         return [name for name, body in self.bodies.items() if point in body.points]
 
     def leave(self, what: str, why: str) -> None:
-        """Note what has no meaning here.
+        """Note what is left out, and why.
 
         >>> d = Drawing()
         >>> d.leave("slide radius of C7", "arcs have no joint here")
@@ -272,7 +272,7 @@ class Drawing:
         self.welds += [(names[0], other) for other in names[1:]]
 
     def rename(self, new: Callable[[str], str]) -> None:
-        """Give every body another name, wherever it is named beside its own place."""
+        """Give bodies other names, wherever joints, inputs and loads name them."""
         for s in self.slides:
             s.link, s.on = new(s.link), new(s.on)
         for m in self.meshes:
@@ -368,7 +368,7 @@ def unused(wanted: str, used: Iterable[str], between: str = "_") -> str:
 
 
 class Groups(Generic[Thing]):
-    """Things that are joined into groups, each of which is called as one of its things.
+    """Things joined into groups; each group has the name of one of its things.
 
     >>> groups = Groups("abcd")
     >>> groups.join("b", "a", "d"), groups.join("d", "a")

@@ -1,4 +1,4 @@
-"""A mechanism as the bytes of a file of another program, and what that file cannot hold."""
+"""The bytes of a file for another program, and what that file cannot hold."""
 
 from __future__ import annotations
 
@@ -43,10 +43,13 @@ def file_bytes(
         if suffix == ".svg":
             return svg(drawing, comment, metres * 1000), notes
         return dxf(drawing, comment), notes
-    from cli.formats import mjcf, sdf, urdf
-
-    robot = {".xml": mjcf, ".sdf": sdf, ".urdf": urdf}[suffix]
-    return robot.write(s, travel, comment), _left_out(s, suffix)
+    if suffix == ".xml":
+        from cli.formats.mjcf import write
+    elif suffix == ".sdf":
+        from cli.formats.sdf import write
+    else:
+        from cli.formats.urdf import write
+    return write(s, travel, comment), _left_out(s, suffix)
 
 
 def _comment(m: Mechanism, inputs: tuple[float, ...], file: str) -> str:

@@ -1,8 +1,8 @@
 """FreeCAD sketches (`.FCStd`: a zip with Document.xml): a sketch of lines as a linkage drawn in one pose.
 
 A line is a link, points made coincident are a pin. Fixed are points on the origin, points whose two distances from it
-are given, and blocked lines. Lines of a triangle, and lines that meet at a given angle, are one link. A point on a line
-is a slot; a point of which one distance from the axes is given slides. A sketch names no input: the first link that is
+have values, and blocked lines. Lines of a triangle, and lines that meet at a fixed angle, are one link. A point on a line
+is a slot; a point with one fixed distance from the axes slides. A sketch names no input: the first link that is
 pinned to the ground drives.
 """
 
@@ -49,7 +49,7 @@ class Sketch:
     """What is no line."""
 
     def at(self, vertex: Vertex) -> Exact:
-        """Where a point of a line stands."""
+        """Return where a point of a line stands."""
         return self.lines[vertex[0]][vertex[1] - 1]
 
 
@@ -65,7 +65,7 @@ def is_document(data: bytes) -> bool:
 
 
 def read(file: str, data: bytes) -> list[Drawing]:
-    """A drawing of every sketch with lines."""
+    """Read a drawing of every sketch with lines."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             entry = archive.getinfo("Document.xml")
@@ -171,7 +171,7 @@ class _Linkage:
                 self.links.join(a, b)
 
     def _ground(self) -> None:
-        """Which coordinates of which points are held."""
+        """Collect the points whose x, and whose y, is fixed."""
         x, y = self.fixed
         for coordinate in self.fixed:
             coordinate.add(ORIGIN)
@@ -217,7 +217,7 @@ class _Linkage:
         self.names, self.vertices = names, vertices
 
     def _slots(self) -> None:
-        """Points that one coordinate holds, and points on lines."""
+        """Add slots: points with one fixed coordinate, and points on lines."""
         d = self.d
         for v, point in self.vertices.items():
             of_x, of_y = (v in held for held in self.fixed)

@@ -41,7 +41,7 @@ class Element:
 
     @property
     def id(self) -> str:
-        """What it is called; empty where it is not."""
+        """The id; empty where there is none."""
         return self.attributes.get("id", "")
 
     def all(self, *tags: str) -> Iterator[Element]:
@@ -101,12 +101,12 @@ def read(file: str, text: str) -> list[Drawing]:
 
 
 def yes(e: Element, key: str) -> bool:
-    """Return whether an attribute says so."""
+    """Return whether an attribute is set."""
     return e.attributes.get(key, "").lower() in ("true", "1", "yes")
 
 
 class _Reader:
-    """Makes bodies of links; complaints name the line."""
+    """Reads one document: a body for each link; errors name the line."""
 
     def __init__(self, file: str, root: Element) -> None:
         self.file, self.root = file, root

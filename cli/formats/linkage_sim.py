@@ -42,7 +42,7 @@ def read(file: str, data: Any) -> list[Drawing]:
 
 
 class _Reader:
-    """Makes bodies of bodies; complaints name the place."""
+    """Reads one mechanism; errors name the place."""
 
     def __init__(self, file: str, data: Any) -> None:
         self.file = file
@@ -60,14 +60,14 @@ class _Reader:
         return entry[key]
 
     def named(self, entry: dict[str, Any], key: str, where: str = "") -> dict[str, Any]:
-        """Return an object by names; empty where it is not there."""
+        """Return an object of named entries; empty where there is none."""
         value = entry.get(key) or {}
         if not isinstance(value, dict):
             raise damaged(self.file, f"{where}{key}", value, "an object by names")
         return value
 
     def listed(self, entry: dict[str, Any], key: str, where: str = "") -> list[dict[str, Any]]:
-        """Return a list of objects; empty where it is not there."""
+        """Return a list of objects; empty where there is none."""
         value = entry.get(key) or []
         if not isinstance(value, list) or not all(isinstance(e, dict) for e in value):
             raise damaged(self.file, f"{where}{key}", value, "a list of objects")
@@ -173,7 +173,7 @@ class _Reader:
         return body, turn, shift
 
     def named_body(self, where: str, e: dict[str, Any], key: str) -> tuple[str, float, complex]:
-        """Return the same of the body that an entry names; it must be there."""
+        """Return the body that an entry names, the turn of its axes and their origin; the body must be there."""
         result = self.whole(str(self.get(where, e, key)))
         if result[0] not in self.d.bodies:
             raise damaged(self.file, where, result[0], "one of the bodies")
@@ -267,7 +267,7 @@ class _Reader:
             self._linear(e)
 
     def _linear(self, e: dict[str, Any]) -> None:
-        """A driven distance of two points: a cylinder."""
+        """Add the driven distance of two points as a cylinder."""
         d = self.d
         where = f"linear driver {e.get('id', '')}".strip()
         ends = []
@@ -288,7 +288,7 @@ class _Reader:
         d.drives.append(Drive(slide=d.slides[-1], at=at, speed=speed))
 
     def _traced(self) -> None:
-        """Points to be looked at: coupler and mount points, and attachment points that no joint uses."""
+        """Keep the points of interest: coupler and mount points, and attachment points that no joint uses."""
         for name, e in self.data["bodies"].items():
             body, turn, shift = self.whole(name)
             for key in ("attachment_points", "coupler_points", "mount_points"):

@@ -106,13 +106,13 @@ def text(element: Element | None, *path: str) -> str | None:
 
 
 def stated(limits: Iterable[str | None], friction: str | None) -> tuple[str, ...]:
-    """Name the data of a joint beyond its place: what is there and not zero."""
+    """Name the further data of a joint: limits and friction that are present and not zero."""
     result = {"limits": list(limits), "friction": [friction]}
     return tuple(what for what, words in result.items() if any((word or "").strip("0. ") for word in words))
 
 
 class At(NamedTuple):
-    """A place in a file, as messages name it; `of` is the element there."""
+    """A place in a file, as messages name it; `of` names the element there."""
 
     file: str
     where: str
@@ -122,7 +122,7 @@ class At(NamedTuple):
         return At(self.file, f"{self.where}, {of}" if of else self.where)
 
     def error(self, of: str, value: object, expected: object) -> DataError:
-        """Say what was found there, and what was expected."""
+        """Return the error: what stands there, and what is expected."""
         return DataError(f"{self.file}: {self.inside(of).where}: found {value}, expected {expected}")
 
     def number(self, of: str, text: str | None) -> float:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from cli.formats.drawn import GROUND
 from cli.formats.markup import At, add, child, children, digits, document, include, named, spatial
 from cli.formats.mjcf_shapes import Frames, mass_of_shapes
 from cli.formats.robot import (
     DIAGONAL_FIRST,
+    LIGHT,
+    THICK,
     WORLD,
     Array,
     Inertial,
@@ -23,10 +27,12 @@ from cli.formats.robot import (
     Spring,
     pose,
     printed,
+    strokes,
 )
-from cli.formats.skeleton import LIGHT, THICK, Branching, Joint, Skeleton, Travel, strokes
 from dalembert.errors import DataError, quote
-from virtualwork.describe.parts import GROUND
+
+if TYPE_CHECKING:
+    from cli.formats.skeleton import Branching, Joint, Skeleton, Travel
 
 PLURAL = {"gear": "gears", "belt": "belt", "rack": "rack"}
 # MuJoCo takes nothing lighter
@@ -43,7 +49,7 @@ def read(file: str, root: Element, folder: Path | None) -> Robot:
 
 
 class _Reader:
-    """Walks the bodies; `classes` are the defaults, by class and tag."""
+    """Reads the bodies; `classes` are the defaults, by class and tag."""
 
     def __init__(self, robot: Robot, root: Element) -> None:
         self.robot, self.file, self.root = robot, robot.file, root
@@ -245,7 +251,7 @@ class _Reader:
             self.robot.links[link].points = held
 
     def _spring(self, e: Element, at: At) -> None:
-        """A tendon that pulls: between two sites, or on joints."""
+        """Read a tendon that pulls: between two sites, or on joints."""
         values = self.classes[e.get("class", "main")].get("tendon", {}) | e.attrib
         stiffness, damping = _leading(at, values, "stiffness", "damping")
         if not (stiffness or damping):
@@ -292,7 +298,7 @@ class _Reader:
                 robot.motors.append(Motor(name, terms, speed or None))
 
     def _speeds(self) -> dict[str, float]:
-        """The joints' speeds in the first key frame."""
+        """Return the joints' speeds in the first key frame."""
         keys = [key for e in children(self.root, "keyframe") for key in children(e, "key")]
         own = [j.name for j in self.robot.joints.values() if j.kind in ("turn", "slide")]
         if not keys or keys[0].get("qvel") is None:

@@ -1,4 +1,4 @@
-"""What MJCF says of places and shapes: orientations in five forms, masses and moments of shapes of one density."""
+"""Orientations of MJCF in its five forms, and masses and moments of its shapes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 
 from cli.formats.markup import At
 from cli.formats.robot import Array, Inertial, about, pose, quaternion
-from rigidbody3d import inertia
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ def _onto(z: Array) -> Array:
     return quaternion(np.cos(half), *(np.sin(half) * axis / s))
 
 
-# of a shape that says of neither mass nor density, kg/m³
+# of a shape with neither mass nor density, kg/m³
 DENSITY = 1000.0
 # how many of a shape's sizes are used, those along its own axes being halves
 SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
@@ -97,6 +96,8 @@ def unit_mass(shape: str, size: list[float]) -> tuple[float, Array]:
 
 def together(parts: list[tuple[float, Array, Array]]) -> Inertial | None:
     """Return the inertia of several masses: each its mass, pose and moments in its own axes."""
+    from rigidbody3d import inertia
+
     mass = sum(m for m, _, _ in parts)
     if mass <= 0:
         return None

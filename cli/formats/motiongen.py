@@ -8,7 +8,7 @@ from cli.formats.drawn import GROUND, Drawing, Drive, Exact, Slide, damaged, dir
 from dalembert.errors import DataError
 
 LENGTHS = ("mm", "cm", "m", "in", "ft")
-# what is read of a document, and what only tells about it
+# what is read of a document, and what only describes it
 KEYS = {"mechanism", "units", "joints", "links", "slots", "cylinders", "actuators", "notes", "source", "meta"}
 
 
@@ -27,7 +27,7 @@ def listed(entry: dict[str, Any], *keys: str) -> list[Any]:
 
 
 class _Reader:
-    """Makes bodies of links; complaints name the place."""
+    """Reads one mechanism: a body for each link; errors name the place."""
 
     def __init__(self, file: str, data: Any) -> None:
         if isinstance(data, dict) and isinstance(data.get("mechanism"), dict):
@@ -50,8 +50,8 @@ class _Reader:
             raise damaged(self.file, key, type(value).__name__, "a list of objects")
         return value
 
-    def known(self, where: str, ids: list[Any]) -> list[str]:
-        """Return ids of joints, each of them known."""
+    def joint_ids(self, where: str, ids: list[Any]) -> list[str]:
+        """Return ids of joints, each of which must be in the file."""
         for id_ in ids:
             if str(id_) not in self.at:
                 raise damaged(self.file, where, id_, f"a joint: one of {', '.join(self.at)[:200]}")
@@ -72,7 +72,7 @@ class _Reader:
         self.slot_of: dict[str, str] = {}
         moving = 0
         for k, e in enumerate(self.entries("links"), 1):
-            ids = self.known(f"link {k}", listed(e, "joints", "jointIds"))
+            ids = self.joint_ids(f"link {k}", listed(e, "joints", "jointIds"))
             if e.get("isGround"):
                 name = GROUND
             else:
@@ -91,7 +91,7 @@ class _Reader:
             self._limits(f"slot {k}", e)
         self.pistons: dict[frozenset[str], Slide] = {}
         for k, e in enumerate(self.entries("cylinders"), 1):
-            self._cylinder(f"cylinder {k}", self.known(f"cylinder {k}", listed(e, "joints", "jointIds")))
+            self._cylinder(f"cylinder {k}", self.joint_ids(f"cylinder {k}", listed(e, "joints", "jointIds")))
             self._limits(f"cylinder {k}", e)
         for k, e in enumerate(self.entries("actuators"), 1):
             self._actuator(k, e)
@@ -102,7 +102,7 @@ class _Reader:
 
     def _slot(self, k: int, e: dict[str, Any]) -> None:
         d, where = self.d, f"slot {k}"
-        ends = self.known(where, listed(e, "ends", "endIds", "joints", "jointIds"))
+        ends = self.joint_ids(where, listed(e, "ends", "endIds", "joints", "jointIds"))
         if len(ends) != 2 or self.at[ends[0]] == self.at[ends[1]]:
             raise damaged(self.file, where, ends, "two ends at different places")
         on = self.slot_of.get(str(e.get("id")))
@@ -111,7 +111,7 @@ class _Reader:
             return
         a, b = (self.at[id_] for id_ in ends)
         angle = direction(a, b)
-        for rider in self.known(where, listed(e, "riders", "riderIds")):
+        for rider in self.joint_ids(where, listed(e, "riders", "riderIds")):
             held = [n for n in d.holders(rider) if n != on]
             if not held:
                 d.leave(f"rider {rider} of {where}", "no other link has it")
@@ -151,7 +151,7 @@ class _Reader:
     def _actuator(self, k: int, e: dict[str, Any]) -> None:
         d, where = self.d, f"actuator {k}"
         self._limits(where, e)
-        at, start = self.known(where, [e.get("at"), e.get("from")])
+        at, start = self.joint_ids(where, [e.get("at"), e.get("from")])
         velocity = e.get("velocity")
         try:
             speed = None if velocity is None else float(exact(velocity))
@@ -168,7 +168,7 @@ class _Reader:
                 Drive(slide=slide, speed=None if speed is None else f"{sense * speed!r} {d.length}/s")
             )
             return
-        (to,) = self.known(where, [e["to"]])
+        (to,) = self.joint_ids(where, [e["to"]])
         turning = d.holders(at)
         links = [n for n in turning if to in d.bodies[n].points]
         frames = [n for n in turning if start in d.bodies[n].points and n not in links[:1]]

@@ -24,8 +24,7 @@ from cli.formats.drawn import (
     together,
     unused,
 )
-from cli.formats.robot import Motor, Robot, RobotJoint, RobotLink, Spring, plane_of
-from cli.formats.skeleton import BLOCK
+from cli.formats.robot import BLOCK, Motor, Robot, RobotJoint, RobotLink, Spring, plane_of
 from dalembert.errors import DataError
 
 # two ends of a joint nearer than this share of the robot's size are one place
@@ -181,7 +180,7 @@ class _Layer:
         self.d.slides.append(self.slides[j.name])
 
     def _slots(self) -> None:
-        """A body that `dalembert export` made the block of a slot, with one slide and one pin, is that again."""
+        """Make slots again of the blocks that `dalembert export` made of them, each with one slide and one pin."""
         d = self.d
         for name, s in self.slides.items():
             for block, carrier in ((s.link, s.on), (s.on, s.link)):
@@ -221,7 +220,7 @@ class _Layer:
         s.through, s.angle = self._place(frame.inside(start)), _turn(line - frame.turn)
 
     def _named_points(self) -> None:
-        """Named places of the file, and origins of links that are fixed to others and have no mass."""
+        """Add the named places of the file, and the origins of links without mass that are fixed to others."""
         robot, d = self.robot, self.d
         for name, link in robot.links.items():
             body = self.name(name)
@@ -312,7 +311,7 @@ class _Layer:
         return True
 
     def _springs(self, moving: list[RobotJoint]) -> None:
-        """Springs and dampers of joints and tendons; on a slide alone they have no like."""
+        """Add springs and dampers of joints and tendons; one on a slide alone has no equivalent."""
         robot, d = self.robot, self.d
         springs = [
             Spring(f"spring of joint {j.name}", [], [(j.name, 1.0)], j.stiffness, j.damping, j.rest)

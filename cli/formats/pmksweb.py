@@ -24,7 +24,7 @@ LISTED = re.compile(r"(^|[?&/])j=.*&l=", re.DOTALL)
 
 
 class _List:
-    """Takes one link apart; complaints name the row."""
+    """Reads one link of before 2022; errors name the row."""
 
     def __init__(self, file: str, text: str) -> None:
         self.file, self.d = file, Drawing()
@@ -153,7 +153,7 @@ FORCES = ("lbf", "N")
 
 @dataclass
 class Joint:
-    """One joint as the string has it."""
+    """A joint of the string."""
 
     name: str
     at: Exact
@@ -204,7 +204,7 @@ def flags(digits: str, count: int) -> list[bool]:
 
 
 class _String:
-    """Takes one string apart; complaints name the part."""
+    """Reads one string; errors name the part."""
 
     def __init__(self, file: str, text: str) -> None:
         self.file = file

@@ -6,7 +6,6 @@ import json
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import unquote
 
 from dalembert.errors import DataError
 
@@ -31,13 +30,13 @@ ROOTS = {"robot": "urdf", "sdf": "sdf", "mujoco": "mjcf"}
 
 
 def unknown(file: str) -> DataError:
-    """Refuse a file of no known kind."""
+    """Return the error of a file whose kind is not recognized."""
     programs = "; ".join(f"{name} ({what})" for name, what in KINDS.items())
     return DataError(f"{file}: of no known kind: expected {programs}; --from names one")
 
 
 def decoded(file: str, data: bytes) -> str:
-    """Return a file's text; too large or binary is refused."""
+    """Return a file's text; DataError where the file is too large or binary."""
     from cli.formats.markup import LARGEST_FILE
 
     if len(data) > LARGEST_FILE:
@@ -97,6 +96,8 @@ def kind_of(file: str, text: str) -> str:
             if {"mechanism", "mechanisms"} & first.keys() or {"joints", "links"} <= first.keys():
                 return "motiongen"
         raise unknown(file)
+    from urllib.parse import unquote
+
     from cli.formats import pmksweb
 
     line = next((unquote(row).strip() for row in text.splitlines() if row.strip()), "")

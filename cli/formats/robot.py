@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cli.formats.drawn import Body
 from dalembert.errors import DataError
 
 Array = NDArray[np.float64]
 Kind = Literal["turn", "slide", "ball", "fixed", "other"]
 WORLD = "world"
+# of the heaviest link: the mass of a link without mass, where a format requires one
+LIGHT = 1e-6
+# how the massless bodies are called that slots become
+BLOCK = "block "
+# how thick a link is drawn, of the mechanism's size
+THICK = 0.008
 PLACES = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
 # the orders in which formats and tables print a tensor: URDF, SDF; MJCF
 ROWS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -25,7 +33,7 @@ DIAGONAL_FIRST = tuple(PLACES)
 class Inertial:
     """Mass and inertia tensor of a link; `pose` are the tensor's axes at the centre of mass, in the link's axes.
 
-    `half` is half a unit of each entry's last printed digit; `entries` are the names the file gives them.
+    `half` is half a unit of each entry's last printed digit; `entries` are their names in the file.
     """
 
     mass: float
@@ -50,10 +58,10 @@ class RobotLink:
 
 @dataclass
 class RobotJoint:
-    """A joint; `ends` are where it stands as each of its two links has it, `axis` its axis, all in the world.
+    """A joint; `ends` are its places on its two links, `axis` its axis, all in the world.
 
-    `value` is its coordinate in the file's own configuration, `rest` that where its spring is at rest. A `ball` is pinned in every plane; `type` is what the file
-    calls it, `more` what else it says of it: limits, damping.
+    `value` is its coordinate in the file's own configuration, `rest` that where its spring is at rest. A `ball` is pinned in every plane; `type` is its type in
+    the file, `more` names its further data: limits, friction.
     """
 
     name: str
@@ -72,7 +80,7 @@ class RobotJoint:
 
 @dataclass
 class Motor:
-    """What drives: a sum of joint coordinates, Σ factor·coordinate, at a speed."""
+    """A motor on a sum of joint coordinates, Σ factor·coordinate, at a speed."""
 
     name: str
     terms: list[tuple[str, float]]
@@ -96,7 +104,7 @@ class Spring:
 
 @dataclass
 class Robot:
-    """All that a file says; `gears` are (a, b, ratio, arm), `couplings` sums of joint coordinates that stay as they are."""
+    """A robot of a file; `gears` are (a, b, ratio, arm), `couplings` sums of joint coordinates that stay as they are."""
 
     file: str
     format: str
@@ -216,6 +224,20 @@ def sphere_around(shape: str, size: list[float]) -> float | None:
         radius, length = size
         return float(np.hypot(radius, length / 2)) if shape == "cylinder" else radius + length / 2
     return max(size) if shape in ("sphere", "ellipsoid") and size else None
+
+
+def strokes(body: Body) -> list[tuple[complex, complex]]:
+    """Return what a body looks like: the sides of the hull of its points, in its axes."""
+    from virtualwork.drawing import hull
+
+    ends = hull(body.points.values())
+    return list(zip(ends, ends[1:] + (ends[:1] if len(ends) > 2 else ()), strict=False))
+
+
+def boxes(body: Body, size: float) -> Iterator[tuple[complex, float, tuple[float, float, float]]]:
+    """Yield the strokes as boxes for a mechanism of this size: the middle, the direction and the sides of each."""
+    for a, b in strokes(body):
+        yield (a + b) / 2, cmath.phase(b - a), (abs(b - a), 2 * THICK * size, 2 * THICK * size)
 
 
 # rad: what angles such as 1.57 for a right angle are off by

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
+from cli.formats.drawn import GROUND
 from cli.formats.markup import At, add, child, children, digits, document, named, placed, plain, stated, text
 from cli.formats.robot import (
+    LIGHT,
     ROWS,
     WORLD,
     Array,
@@ -18,13 +21,16 @@ from cli.formats.robot import (
     Robot,
     RobotJoint,
     RobotLink,
+    boxes,
     pose,
     printed,
     rpy,
 )
-from cli.formats.skeleton import LIGHT, Joint, Skeleton, Travel, boxes
 from dalembert.errors import DataError
-from virtualwork.describe.parts import GROUND, Belt, Gear
+
+if TYPE_CHECKING:
+    from cli.formats.skeleton import Joint, Skeleton, Travel
+    from virtualwork.describe.parts import Belt, Gear
 
 KINDS: dict[str, Kind] = {
     "revolute": "turn",
@@ -65,7 +71,7 @@ def _named_text(at: At, element: Element, tag: str) -> str:
 
 
 def read_pose(at: At, element: Element | None) -> Array:
-    """Return what a `<pose>` says, whatever it is relative to."""
+    """Return the pose of a `<pose>` element, in the frame to which it is relative."""
     if element is None or not (element.text or "").strip():
         return np.eye(4)
     at = at.inside("pose")
@@ -78,7 +84,7 @@ def read_pose(at: At, element: Element | None) -> Array:
 
 
 class _Model:
-    """The frames of a model, each worked out on the first request."""
+    """The frames of a model; each is computed on the first request."""
 
     def __init__(self, robot: Robot, element: Element, version: str) -> None:
         self.robot, self.element, self.file = robot, element, robot.file
@@ -87,7 +93,7 @@ class _Model:
         except ValueError:
             self.old = False
         self.at: dict[str, Array] = {WORLD: np.eye(4)}
-        self.asked: set[str] = set()
+        self.entered: set[str] = set()
         self.frames = {
             named(self.file, e): e for e in children(element, "link", "joint", "frame") if e.get("name")
         }
@@ -121,9 +127,9 @@ class _Model:
             return self.at[name]
         if name not in self.frames:
             raise DataError(f"{self.file}: {at.where}: no frame is called '{name}'")
-        if name in self.asked:
+        if name in self.entered:
             raise DataError(f"{self.file}: {at.where}: the pose of '{name}' is relative to itself")
-        self.asked.add(name)
+        self.entered.add(name)
         e = self.frames[name]
         pose = child(e, "pose")
         base = "" if pose is None else pose.get("relative_to", "")
@@ -137,7 +143,7 @@ class _Model:
         return self.at[name]
 
     def _motors(self) -> None:
-        """The joints that plug-ins drive; else those whose greatest effort is not zero where others' is."""
+        """Set the motors: the joints that plug-ins drive; without plug-ins those with an effort limit, where others have the limit 0."""
         robot, file = self.robot, self.file
         speeds = driven(file, self.element)
         if not speeds:
@@ -153,7 +159,7 @@ class _Model:
 
 
 def _inertial(at: At, element: Element | None) -> Inertial | None:
-    """Read an `<inertial>`; without one the format means 1 kg, which nobody has said."""
+    """Read an `<inertial>`; without one the format means 1 kg, which no author wrote."""
     if element is None:
         return None
     texts = {key: text(element, "inertia", key) or str(int(key[1] == key[2])) for key in ROWS}
@@ -178,12 +184,12 @@ def read_joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
     """Add a `<joint>`, of a model or of a `<gazebo>` block of URDF, where its pose is relative to its child."""
     name, at = placed(robot.file, e)
 
-    def known(link: str) -> str:
+    def resolved(link: str) -> str:
         link = robot.ground if link == WORLD and model is None else link
         return robot.link(link, at.where).name
 
     parent, below = (_named_text(at, e, tag) for tag in ("parent", "child"))
-    parent = known(parent)
+    parent = resolved(parent)
     robot.link(below, at.where)
     if model is not None:
         frame = model.frame(name, at)
@@ -192,7 +198,7 @@ def read_joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
     axis = child(e, "axis")
     type_ = e.get("type", "")
     if type_ == "gearbox":
-        reference = known(text(e, "gearbox_reference_body") or text(e, "reference_body") or WORLD)
+        reference = resolved(text(e, "gearbox_reference_body") or text(e, "reference_body") or WORLD)
         ratio = at.number("gearbox_ratio", text(e, "gearbox_ratio") or "1")
         sense = float(np.sign(_axis(at, axis, frame, None) @ _axis(at, child(e, "axis2"), frame, None)))
         robot.gears.append((parent, below, -ratio * (sense or 1.0), reference))

@@ -30,7 +30,7 @@ def _rename_point(d: Drawing, old: str, new: str) -> None:
 
 
 def _one_pin_at_a_place(d: Drawing) -> bool:
-    """Two joints of one body at the same place are one pin."""
+    """Join two joints of one body at the same place into one pin; return whether there were two."""
     near = SAME * d.size()
     joints = set(d.pins()) | {s.point for s in d.slides}
     for body in d.bodies.values():

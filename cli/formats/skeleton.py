@@ -16,10 +16,11 @@ import numpy as np
 
 from cli.formats.description import bodies_of
 from cli.formats.drawn import Body, Groups, unused
+from cli.formats.robot import BLOCK
 from dalembert.errors import DataError
 from virtualwork.describe.meshes import Mesh
 from virtualwork.describe.parts import GROUND, TorsionSpring
-from virtualwork.drawing import hull, tracers
+from virtualwork.drawing import tracers
 from virtualwork.parts_of_motion import SlideMotion
 
 if TYPE_CHECKING:
@@ -35,24 +36,6 @@ if TYPE_CHECKING:
 FOLLOWED = 181
 # a rate of nothing, for an input's of one
 STILL = 1e-9
-# of the heaviest link: what a link without mass is given where a format takes none
-LIGHT = 1e-6
-# how the massless bodies are called that slots become
-BLOCK = "block "
-# how thick a link is drawn, of the mechanism's size
-THICK = 0.008
-
-
-def strokes(body: Body) -> list[tuple[complex, complex]]:
-    """Return what a body looks like: the sides of the hull of its points, in its axes."""
-    ends = hull(body.points.values())
-    return list(zip(ends, ends[1:] + (ends[:1] if len(ends) > 2 else ()), strict=False))
-
-
-def boxes(body: Body, size: float) -> Iterator[tuple[complex, float, tuple[float, float, float]]]:
-    """Yield the strokes as boxes for a mechanism of this size: the middle, the direction and the sides of each."""
-    for a, b in strokes(body):
-        yield (a + b) / 2, cmath.phase(b - a), (abs(b - a), 2 * THICK * size, 2 * THICK * size)
 
 
 @dataclass
@@ -99,7 +82,7 @@ class Branching:
 
 
 class Skeleton:
-    """The bodies, the joints, the tree and the loops of a mechanism at given inputs."""
+    """The bodies, the joints, the tree and the loops of a mechanism at some inputs."""
 
     def __init__(
         self, m: Mechanism, inputs: tuple[float, ...], limits: tuple[float, float] | None = None

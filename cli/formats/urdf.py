@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from cli.formats import sdf
+from cli.formats.drawn import GROUND
 from cli.formats.markup import (
     At,
     add,
@@ -31,14 +32,17 @@ from cli.formats.robot import (
     Robot,
     RobotJoint,
     RobotLink,
+    boxes,
     pose,
     printed,
     rpy,
     sphere_around,
 )
-from cli.formats.skeleton import Branching, Skeleton, Travel, boxes
 from dalembert.errors import DataError
-from virtualwork.describe.parts import GROUND, Belt, Gear, Rack
+
+if TYPE_CHECKING:
+    from cli.formats.skeleton import Branching, Skeleton, Travel
+    from virtualwork.describe.parts import Belt, Gear
 
 KINDS: dict[str, Kind] = {**sdf.KINDS, "spherical": "ball"}
 
@@ -112,17 +116,17 @@ def _inertial(at: At, element: Element | None) -> Inertial | None:
 
 
 def _shapes(at: At, link: Element) -> list[tuple[Array, float]]:
-    """Return spheres around the shapes of a link; none where the size of one is not said."""
+    """Return spheres around the shapes of a link; none where one has no size."""
     shapes = []
     for e in children(link, "visual", "collision"):
         geometry = child(e, "geometry")
         for shape in () if geometry is None else geometry:
-            given = [
+            sizes = [
                 (key, n)
                 for key, n in (("size", 3), ("radius", 1), ("length", 1))
                 if shape.get(key) is not None
             ]
-            size = [x for key, n in given for x in at.numbers(key, shape.get(key), n)]
+            size = [x for key, n in sizes for x in at.numbers(key, shape.get(key), n)]
             radius = sphere_around(plain(shape), size)
             if radius is None:
                 return []
@@ -189,7 +193,7 @@ def _join(robot: Robot, joint: _Joint, frame: Array) -> None:
 
 
 def _loop(robot: Robot, e: Element) -> None:
-    """`<loop_joint>`: each of its two links has the joint's place in its own axes."""
+    """Read a `<loop_joint>`: each of its two links has the joint's place in its own axes."""
     name, at = placed(robot.file, e)
     kind = KINDS.get(e.get("type", "revolute"), "other")
     sides = []
@@ -220,7 +224,7 @@ def _mimic(robot: Robot, name: str, mimic: Element) -> None:
 
 
 def _motors(robot: Robot, root: Element) -> None:
-    """The joints that a plug-in, a transmission or a command interface drives."""
+    """Set the motors: the joints that a plug-in, a transmission or a command interface drives."""
     speeds: dict[str, float | None] = {}
     for e in children(root, "gazebo"):
         speeds |= sdf.driven(robot.file, e)
@@ -299,7 +303,7 @@ def _add_joint(s: Skeleton, root: Element, b: Branching, origin: dict[str, compl
 
 
 def _add_frames(s: Skeleton, root: Element, name: str, origin: complex) -> None:
-    """Named points that no joint holds: links without mass, fixed there."""
+    """Add named points that no joint holds as links without mass, fixed there."""
     for point, z in s.free_points(name).items():
         frame = point if point not in s.bodies else f"{point} point"
         add(root, "link", name=frame)
@@ -310,8 +314,10 @@ def _add_frames(s: Skeleton, root: Element, name: str, origin: complex) -> None:
 
 
 def _add_gears(s: Skeleton, root: Element, gazebo: Element) -> None:
-    """Gears, belts and racks of two joints of the tree are mimicked; other gears are gearboxes of the simulator."""
-    boxes: list[Gear | Belt] = []
+    """Write gears, belts and racks of two joints of the tree as `<mimic>`, other gears as gearboxes of the simulator."""
+    from virtualwork.describe.parts import Rack
+
+    gearboxes: list[Gear | Belt] = []
     parts: tuple[Gear | Belt | Rack, ...] = (*s.m.gears, *s.m.belts, *s.m.racks)
     for g, mesh in zip(parts, s.m.meshes, strict=True):
         terms = s.mesh(mesh)
@@ -324,5 +330,5 @@ def _add_gears(s: Skeleton, root: Element, gazebo: Element) -> None:
             factor = -terms[other] / terms[last[-1]]
             add(joint, "mimic", joint=other, multiplier=factor)
         elif not isinstance(g, Rack):
-            boxes.append(g)
-    sdf.add_gearboxes(gazebo, boxes, GROUND)
+            gearboxes.append(g)
+    sdf.add_gearboxes(gazebo, gearboxes, GROUND)
