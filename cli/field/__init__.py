@@ -202,9 +202,9 @@ def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -
 
     beside: dict[Path, Callable[[], bytes]] = {} if save_influence is None else {save_influence: stored}
     if page is not None:
-        from cli.field.page import sheet
+        from cli.field.report import machine_page
 
-        html = sheet(b).html.encode()
+        html = machine_page(b).html.encode()
         beside[page] = lambda: html
     return Result(
         tables=made,

@@ -21,8 +21,7 @@ from balancing import (
 from balancing.doubt import LEVEL
 from balancing.log_balance import CoefficientSpread
 from cli.field.field_balancing import FieldBalancing, Solved
-from cli.field.rotor import Rotor, each
-from cli.field.rows import READINGS, Rows, Tables, amplitude, masses, masses_text, vibration
+from cli.field.rotor import READINGS, Rotor, Rows, Tables, amplitude, each, masses, masses_text, vibration
 from cli.read.options import bad
 from cli.read.runs.runs import Before, Complex, Group, Real
 from dalembert.angles import degrees

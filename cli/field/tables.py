@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cli.field.field_balancing import FieldBalancing, Solved
-from cli.field.rotor import Rotor, Trim, each
-from cli.field.rows import READINGS, Rows, Tables, amplitude, masses, uncertainties
+from cli.field.rotor import READINGS, Rotor, Rows, Tables, Trim, amplitude, each, masses, uncertainties
 from cli.read.runs.runs import Complex, Real
 from dalembert.angles import degrees
 from dalembert.results.columns import ABSENT, Column, Table, names, number

@@ -337,3 +337,24 @@ def test_the_split_onto_places(dalembert: Dalembert) -> None:
     assert len(parts) == 2
     assert abs(sum(parts) - fix["mass_kg"] * np.exp(1j * np.radians(fix["angle_deg"]))) < 1e-17
     assert dalembert("field", "-", "--blades", "3", "--positions", "0deg", stdin=FAN).returncode == 2
+
+
+def test_a_mass_of_zero_is_none(dalembert: Dalembert) -> None:
+    """Also where the initial run states it, with or without a plane; a plane without any mass is not determined."""
+    for bare in (",0,0", "A,0,0", ",,"):
+        done = dalembert("field", "-", "--json", stdin=table(f"0,1,3,0,{bare}", "1,1,5,0,A,2,0"))
+        assert abs(corrections(done)[0] * 1e3 + 3) < 1e-12
+    done = dalembert("field", "-", stdin=table("0,1,3,0,,,", "1,1,5,0,A,0,0", "2,1,4,0,B,2,0"))
+    assert done.returncode == 1
+    assert "2 planes (A, B) and 1 trial run" in done.stderr
+
+
+def test_runs_without_an_initial_one_are_fitted_with_stored_coefficients(
+    dalembert: Dalembert, tmp_path: Path
+) -> None:
+    text = runs("A,1,0,", "B,1,90,", on=[[1, 0], [0, 1j]])
+    dalembert("field", "-", "--save-influence", "ic.csv", stdin=text)
+    head, *rows = text.splitlines()
+    done = dalembert("field", "-", "--json", "--influence", "ic.csv", stdin=table(*rows[3:], head=head))
+    assert np.abs(corrections(done) * 1e3 - W).max() < 1e-12
+    assert document(done)["rotors"][0]["fit"]["runs"] == 2
