@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Callable
 from importlib import import_module
+from io import TextIOWrapper
 
 import typer
 from typer.core import TyperGroup
@@ -168,6 +169,9 @@ def main(front: Callable[[str | None], Callable[..., object]] = build) -> None:
         from dalembert.tables.files import forget
 
         forget()
+    # what the encoding of a pipe or a console lacks is shown as its code, as on standard error
+    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         wanted()  # an unknown engine is refused before any work
         try:
@@ -185,6 +189,10 @@ def main(front: Callable[[str | None], Callable[..., object]] = build) -> None:
         sys.exit(130)
     except MemoryError:
         sys.exit(_fail("not enough memory for this input"))
+    except UnicodeEncodeError as error:
+        part = error.object[max(error.start - 20, 0) : error.end + 20]
+        text = next((word for word in sys.argv if error.object[error.start] in word), part)
+        sys.exit(_fail(f"{text!a}: a character that UTF-8 does not have: expected text in UTF-8"))
     except Exception as error:
         if isinstance(error, OSError) and error.errno in FULL and error.filename is None:
             _silence()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 import subprocess
 from pathlib import Path
 
@@ -15,7 +16,7 @@ import pytest
 from dalembert.quantities import parse_number, parse_quantity
 from tests.cli.logs import log
 from tests.cli.measured import FAN, HEAD, document, table
-from tests.conftest import Dalembert
+from tests.conftest import COMMAND, Dalembert
 
 FULL = Path("/dev/full")
 LOG = log([(0, 0), (10, -90), (30, -60)])
@@ -281,3 +282,29 @@ def test_rows_of_a_run_that_contradict_each_other(dalembert: Dalembert) -> None:
     done = field("weight", "1", "3", "2", "3")
     assert (done.returncode, "found '2', expected 1 as elsewhere for this sensor" in done.stderr) == (1, True)
     assert field("weight", "1", "3", "1", "3").stdout == field("weight", "", "", "1", "3").stdout
+
+
+def test_a_pipe_whose_encoding_lacks_a_character(dalembert: Dalembert, tmp_path: Path) -> None:
+    """Windows pipes are cp1252, which has neither the minus sign nor the root of a worked solution."""
+    dalembert("examples", "riul-rotor")
+    planes = ["--plane", "A:0mm:20mm", "--plane", "B:90mm:20mm"]
+    done = subprocess.run(
+        [str(COMMAND), "balance", "rotor.csv", *planes, "--steps"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONIOENCODING": "cp1252"},
+        capture_output=True,
+        check=False,
+        timeout=300,
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert "d2 = \\u2212(563.718" in done.stdout.decode("cp1252")
+
+
+@pytest.mark.parametrize("options", [["--about", "title=\udcff", "--report", "r.html"], ["-o", "x.csv"]])
+def test_an_option_that_is_no_text_in_utf_8(options: list[str], dalembert: Dalembert, tmp_path: Path) -> None:
+    dalembert("examples", "riul-rotor")
+    plane = "A:20mm" if "--about" in options else "\udcff:20mm"
+    done = dalembert("balance", "rotor.csv", "--plane", plane, *options)
+    assert done.returncode == 1
+    assert "expected text in UTF-8" in done.stderr
+    assert not [path for path in tmp_path.iterdir() if path.name[0] in ".rx" and path.name != "rotor.csv"]
