@@ -136,12 +136,16 @@ def bound(motion: Motion, key: Quantity, driven: Mapping[str, Reals]) -> Reals:
         return np.asarray(np.degrees(motion.rounding.of(key)))
     if key.body in driven:
         return TURNED * np.abs(driven[key.body])
+    value = motion.value(key)
+    return np.degrees(motion.rounding.of(key)) + degrees_off(value, degrees(np.exp(1j * value)))
+
+
+def degrees_off(angle: Reals, shown: Reals) -> Reals:
+    """What the degrees as they are shown round besides, whole turns apart."""
     from dalembert.arithmetic.doubled import PI, Doubled
 
-    # what the degrees as they are shown round besides
-    value = motion.value(key)
-    off = (Doubled(value) * (180.0 / PI) - degrees(np.exp(1j * value))).value
-    return np.asarray(np.degrees(motion.rounding.of(key)) + np.abs(off - 360.0 * np.rint(off / 360.0)))
+    off = (Doubled(angle) * (180.0 / PI) - shown).value
+    return np.asarray(np.abs(off - 360.0 * np.rint(off / 360.0)))
 
 
 def bounds_of(bounds: Reals) -> list[float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +12,7 @@ from cli.cases.analysis import Analysis
 from cli.cases.case import Case, Study
 from cli.cases.inputs import Inputs
 from cli.cases.ledger import Entry, entries_of, ledger
-from cli.cases.poses import column
+from cli.cases.poses import bounds_of, column, degrees_off
 from dalembert.angles import in_turn
 from dalembert.dataclass import dataclass
 from dalembert.results.columns import Column, Table, names, number
@@ -64,7 +64,7 @@ class Rest(Case):
                 e.inputs[j] if entry.is_slide else in_turn(math.degrees(e.inputs[j])) for e in positions
             ]
             place = self.analysis.input_names[entry.name]
-            columns.append(column(header, values))
+            columns.append(column(header, values, partial(self._errors, j, values)))
             columns[-1].place = place if one else f"inputs.{entry.name}.{place}"
         columns.append(names("stable", [e.stable for e in positions]))
         columns.append(number("potential", "energy", np.array([e.potential for e in positions], dtype=float)))
@@ -73,6 +73,14 @@ class Rest(Case):
             name = "period" if i == 0 else f"period_{i + 1}"
             columns.append(number(name, "time", np.array(periods, dtype=float)))
         return Table(columns, place="equilibria[]")
+
+    def _errors(self, j: int, shown: list[float]) -> list[float]:
+        """How far an input lies from where it rests, as it is shown."""
+        positions, entry = self.equilibria.found, self.analysis.mechanism.inputs[j]
+        off = np.array([e.error_estimate()[j] for e in positions])
+        if not entry.is_slide:
+            off = np.degrees(off) + degrees_off(np.array([e.inputs[j] for e in positions]), np.array(shown))
+        return bounds_of(off)
 
     def warnings(self) -> list[str]:
         """Return the warnings: what the table does not show."""

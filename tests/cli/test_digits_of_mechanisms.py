@@ -235,3 +235,18 @@ def test_an_input_of_a_whole_turn_is_shown_as_it_was_asked(dalembert: Dalembert,
     (tmp_path / "m.toml").write_text(FOUR_BAR)
     done = dalembert("mechanism", "m.toml", "--at", "0deg", "--at", "360deg", "--digits", "--only", "C")
     assert [row["input_deg"] for row in csv.DictReader(io.StringIO(done.stdout))] == ["0.0", "360.0"]
+
+
+def test_positions_of_rest(dalembert: Dalembert, tmp_path: Path) -> None:
+    """A bar with a torque of 3 N m: m g r cos q = 3, stable below."""
+    file = tmp_path / "bar.toml"
+    file.write_text(
+        "gravity = [0, -9.81]\nground.O = [0, 0]\n"
+        "links.bar = { points = { O = [0, 0] }, mass = 2, center = [0.5, 0] }\n"
+        'input.link = "bar"\ntorques = [{ link = "bar", torque = 3 }]\n'
+    )
+    above, below = table(dalembert("equilibrium", str(file), "--digits"))
+    with mp.workdps(30):
+        true = mp.degrees(mp.acos(3 / mp.mpf("9.81")))
+        assert holds(above["input_deg"], true) >= 13
+        assert holds(below["input_deg"], 360 - true) >= 13

@@ -144,6 +144,11 @@ def test_expected_poses_beside_another_table(dalembert: Dalembert, tmp_path: Pat
 
 
 def test_digits_beside_another_table(dalembert: Dalembert) -> None:
-    done = dalembert("equilibrium", "m.toml", "--digits")
-    assert done.stdout == dalembert("equilibrium", "m.toml").stdout
+    some, whole = (
+        rows(dalembert("equilibrium", "m.toml", *options).stdout) for options in (["--digits"], [])
+    )
+    for one, full in zip(some, whole, strict=True):
+        assert len(one.pop("input_deg")) < len(full.pop("input_deg"))
+        # of the others no error is known
+        assert one == full
     assert dalembert("equilibrium", "m.toml", "--digits", "--text").returncode == 0
