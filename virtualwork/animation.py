@@ -98,7 +98,7 @@ class Series:
             if shown.si != 1:
                 self._packed[k]["si"] = shown.si
         names = list(m.points)
-        timed = any(np.any(rate) for rate in self.poses.rates[0]) and all(
+        timed = self.poses.moves[0] and all(
             f"{name}_vx_m_s" in self._index for name in names if name not in m.ground
         )
         unit = not timed and len(m.inputs) == 1

@@ -418,7 +418,7 @@ def page_of(poses: Poses, drawing: Drawing, forces: Forces | None = None, over: 
     """
     m = poses.mechanism
     named = places(m, ORDERS)
-    moves = any(np.any(rate) for rates in poses.rates for rate in rates)
+    moves = any(poses.moves)
     listed = [each for each in named if not each.order or moves]
     arrows: list[JointForce] = []
     if forces is not None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from virtualwork.describe.description import Description
 from virtualwork.formulas.kinematics import Angle, Point
 from virtualwork.formulas.poses import Poses
@@ -17,7 +15,7 @@ LINK = ("angle_rad", "omega_rad_s", "alpha_rad_s2")
 def columns(poses: Poses) -> dict[str, Any]:
     """Return the columns by their headers; rates where the inputs have any."""
     m = poses.mechanism
-    orders = 3 if any(np.any(rate) for of in poses.rates for rate in of) else 1
+    orders = 3 if any(poses.moves) else 1
     table: dict[str, Any] = {
         f"{e.name}_{'m' if e.is_slide else 'rad'}": poses.inputs[:, j] for j, e in enumerate(m.inputs)
     }

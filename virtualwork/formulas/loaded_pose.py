@@ -73,7 +73,7 @@ class Setting(Shared):
     @cached_property
     def moves(self) -> bool:
         """Whether anything moves at all: a speed or an acceleration that is not zero."""
-        return not self.at_rest and any(np.any(rate) for rates in self.poses.rates[:2] for rate in rates)
+        return not self.at_rest and any(self.poses.moves[:2])
 
     @property
     def rates(self) -> tuple[Number, Number]:

@@ -184,6 +184,15 @@ class Poses:
                 whole[rows][np.isfinite(whole[rows])] = np.inf
         return whole
 
+    @property
+    def moves(self) -> tuple[bool, ...]:
+        """Whether the inputs have a speed, an acceleration, a jerk that is not zero everywhere."""
+
+        def any_of(rate: Number) -> bool:
+            return bool(rate.any()) if isinstance(rate, np.ndarray) else bool(rate)
+
+        return tuple(any(map(any_of, rates)) for rates in self.rates)
+
     # --- solving ----------------------------------------------------------------------------------------------
     @property
     def solved(self) -> list[tuple[Step, int]]:

@@ -61,8 +61,7 @@ class Solving(Poses):
     @cached_property
     def recording(self) -> Recording:
         """The formulas of the branch, for rates that are zero where these are."""
-        moves = tuple(any(np.any(rate) for rate in rates) for rates in self.rates)
-        return entered(self.branch, moves) if self.enters else recorded(self.branch, moves)
+        return entered(self.branch, self.moves) if self.enters else recorded(self.branch, self.moves)
 
     @cached_property
     def enters(self) -> bool:
