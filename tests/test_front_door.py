@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 import subprocess
 import sys
@@ -55,6 +56,20 @@ def test_a_short_name_stays_in_its_package_and_is_longer_here(short: str, long: 
     assert getattr(dalembert, long) is getattr(import_module(package), name)
     with pytest.raises(AttributeError, match=f"'{name}': it is `dalembert.{long}` or `{short}`"):
         getattr(dalembert, name)
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_every_public_function_has_an_example_and_names_its_parameters(room: str) -> None:
+    package = import_module(room)
+    for name in package.__all__:
+        value = getattr(package, name)
+        if not callable(value):
+            continue
+        text = inspect.getdoc(value) or ""
+        assert text.split("\n\n")[0].endswith("."), name
+        if inspect.isfunction(value):
+            assert ">>>" in text, name
+            assert [p for p in inspect.signature(value).parameters if p not in text] == [], name
 
 
 def test_the_page_of_public_names_is_up_to_date() -> None:
