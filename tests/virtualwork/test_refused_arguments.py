@@ -112,3 +112,13 @@ def test_a_guide_through_a_pair_of_numbers_is_that_through_a_complex_one():
     )
     assert (places[0] == places[1]).all()
     assert (places[0] == places[2]).all()
+
+
+@pytest.mark.parametrize("times", ["a", ["a"], [0, 1j], {"a": 1}, [0, [1, 2]]])
+def test_times_that_are_no_numbers(times):
+    m = four_bar()
+    for of in (m, m.vary({"links.crank.B.x": [0.03, 0.04]})):
+        with pytest.raises(ValueError, match="times: expected real numbers, found"):
+            of.simulate(times)
+    with pytest.raises(ValueError, match="speed: expected real numbers, found 'fast'"):
+        m.simulate([0, 1], speed="fast")

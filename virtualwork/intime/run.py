@@ -15,7 +15,7 @@ from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
 from virtualwork.describe.parts import Input
-from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.formulas.numbers import EPS, Reals, real_array
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.intime.coordinates import Coordinates
 from virtualwork.intime.equations import Equations
@@ -377,7 +377,7 @@ def rising(times: ArrayLike) -> Reals:
     ------
     ValueError
     """
-    t = np.array(times, dtype=float).reshape(-1)
+    t = real_array("times", times).reshape(-1)
     if not len(t) or not np.isfinite(t).all() or (np.diff(t) <= 0).any():
         raise ValueError("times: expected rising finite times, s")
     return t
@@ -388,7 +388,7 @@ def _state(
 ) -> Floats:
     if requested is None:
         return [float(at if value is None else value) for value, at in zip(own, home, strict=True)]
-    value = np.asarray(requested, dtype=float)
+    value = real_array(name, requested)
     if value.ndim > 1 or (value.ndim == 1 and len(value) != k) or not np.isfinite(value).all():
         raise ValueError(f"{name}: expected {k} finite number{'s' if k > 1 else ''}, found {requested!r}")
     return np.broadcast_to(value, (k,)).tolist()  # type: ignore[no-any-return]

@@ -23,7 +23,7 @@ from virtualwork.describe import MechanismError
 from virtualwork.family.family import Family, FamilyMotion
 from virtualwork.family.part import Part, Solver
 from virtualwork.family.varied_formulas import VariedFormulas
-from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.numbers import Reals, real_array
 from virtualwork.intime.control import first_steps
 from virtualwork.intime.coordinates import FOLDING
 from virtualwork.intime.ends import events, passed, sides
@@ -190,7 +190,7 @@ class Variants(Family):
 
 
 def _starts(name: str, start: ArrayLike, v: int, k: int) -> Reals:
-    value = np.asarray(start, dtype=float)
+    value = real_array(name, start)
     if not np.isfinite(value).all() or value.shape not in ((), (k,), (v, k)):
         raise ValueError(
             f"{name}: expected a number, or shape ({k},) or ({v}, {k}), all finite; found {value.shape}"
