@@ -306,12 +306,14 @@ def find_unit(dimension: str, suffix: str) -> str | None:
     same = next((unit for unit in units if unit.lower() == suffix.lower()), None)
     if same is not None or not suffix:
         return same
-    name = unit_name(suffix)
-    try:
-        units[name]
-    except KeyError:
-        return None
-    return name
+    # of units that are made of words the case counts (`kN_mm`), unless all are small
+    for name in (unit_name(suffix), unit_name(suffix.lower())):
+        try:
+            units[name]
+        except KeyError:
+            continue
+        return name
+    return None
 
 
 @cache

@@ -89,3 +89,13 @@ def test_what_is_looked_up_does_not_change_the_table() -> None:
     assert find_unit("length", "km") == "km"
     assert find_unit("length", "furlong") is None
     assert before == {dimension: list(units) for dimension, units in UNITS.items()}
+
+
+@pytest.mark.parametrize(
+    "suffix", ["T", "FT", "REV", "LBF_FT", "KN_MM", "N_MM", "kn_m", "MM", "SLUG", "N/MM2"]
+)
+def test_the_case_of_a_header_does_not_matter_where_small_letters_are_a_unit(suffix: str) -> None:
+    """Headers in capitals, as old machines print them; a prefix that only a capital can mean stays unknown."""
+    small = {d for d in UNITS if find_unit(d, suffix.lower())}
+    assert {d for d in UNITS if find_unit(d, suffix)} == small
+    assert (small == set()) == (suffix in ("KN_MM", "N/MM2"))

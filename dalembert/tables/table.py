@@ -140,6 +140,8 @@ class Table:
             return
         for name, column in columns.items():
             for i, cell in enumerate(column):
+                if any(map(str.isalpha, cell)) and not is_number(cell.replace(",", ".")):
+                    continue  # a word among numbers keeps its commas
                 try:
                     column[i] = _pointed(cell)
                 except ValueError:

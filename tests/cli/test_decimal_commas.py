@@ -111,3 +111,11 @@ def test_factors_of_an_unknown(mark: str, dalembert: Dalembert) -> None:
     assert done.returncode == 0, done.stderr
     last = done.stdout.splitlines()[-1].split(",")
     assert last[1:] == with_points.stdout.splitlines()[-1].split(",")[1:]
+
+
+def test_words_among_expected_numbers_keep_their_commas(dalembert: Dalembert, tmp_path: Path) -> None:
+    assert dalembert("examples", "watt-six-bar").returncode == 0
+    text = "quantity;of;value\nmost_m;B.x;-2,3987737135926186\ngroup;BCD + CFG;RRR, closed form\n"
+    (tmp_path / "e.csv").write_text(text)
+    done = dalembert("inspect", "watt.toml", "--expect", "e.csv")
+    assert done.returncode == 0, done.stdout + done.stderr
