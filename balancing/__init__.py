@@ -28,12 +28,13 @@ if TYPE_CHECKING:
     from balancing.log_balance import LogBalance, region_factor, spread
     from balancing.modal import ModalCorrection, UnreachedMode, modal_corrections, shapes_at
     from balancing.next_run import NextRun, suggest_run
-    from balancing.placement import Placement, drill_depth, place, place_from_stock, transfer
+    from balancing.placement import Placement, drill_depth, place, transfer
     from balancing.prior import Prior, fit_with_prior, pooled_prior, stored_prior
     from balancing.rotor import by_size
     from balancing.rounding import influence_error
     from balancing.run_log import JointFit, Undetermined, determined, initial_alone, joint_fit
     from balancing.severity import ZONE_BOUNDARIES, severity_zone
+    from balancing.stock import place_from_stock
     from balancing.synchronous import OncePerTurn, once_per_turn
     from balancing.tolerance import (
         GRADES,
@@ -72,7 +73,8 @@ _HOMES = {
     "balancing.next_run": "NextRun suggest_run",
     "balancing.synchronous": "OncePerTurn once_per_turn",
     "balancing.prior": "Prior fit_with_prior pooled_prior stored_prior",
-    "balancing.placement": "Placement drill_depth place place_from_stock transfer",
+    "balancing.placement": "Placement drill_depth place transfer",
+    "balancing.stock": "place_from_stock",
     "balancing.rotor": "by_size",
     "balancing.rounding": "influence_error",
     "balancing.tolerance": "GRADES allocate api_unbalance grade_value journal_loads mil_unbalance permissible_unbalance",

@@ -33,7 +33,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
         ("log_picture",),
-        ("doubt", "fixed_weights", "next_run", "objective", "polygons"),
+        ("doubt", "fixed_weights", "next_run", "objective", "polygons", "stock"),
         (
             "amplitudes",
             "engine",
@@ -41,7 +41,6 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "log_balance",
             "placement",
             "prior",
-            "run_means",
             "tolerance",
             "trial",
             "unbalance",
