@@ -67,11 +67,13 @@ class Rest(Case):
             columns.append(column(header, values, partial(self._errors, j, values)))
             columns[-1].place = place if one else f"inputs.{entry.name}.{place}"
         columns.append(names("stable", [e.stable for e in positions]))
-        columns.append(number("potential", "energy", np.array([e.potential for e in positions], dtype=float)))
+        energy = np.array([e.potential for e in positions], dtype=float)
+        columns.append(number("potential", "energy", energy, error=partial(self._estimates, "potential", 0)))
         for i in range(len(m.inputs)):
             periods = [e.periods[i] if i < len(e.periods) else None for e in positions]
             name = "period" if i == 0 else f"period_{i + 1}"
-            columns.append(number(name, "time", np.array(periods, dtype=float)))
+            error = partial(self._estimates, "periods", i)
+            columns.append(number(name, "time", np.array(periods, dtype=float), error=error))
         return Table(columns, place="equilibria[]")
 
     def _errors(self, j: int, shown: list[float]) -> list[float]:
@@ -81,6 +83,11 @@ class Rest(Case):
         if not entry.is_slide:
             off = np.degrees(off) + degrees_off(np.array([e.inputs[j] for e in positions]), np.array(shown))
         return bounds_of(off)
+
+    def _estimates(self, of: str, i: int) -> list[float]:
+        """The estimates of the errors of a quantity of every position, by its number; NaN where a position has none."""
+        estimates = [e.error_estimate(of) for e in self.equilibria.found]
+        return [each[i] if i < len(each) else math.nan for each in estimates]
 
     def warnings(self) -> list[str]:
         """Return the warnings: what the table does not show."""

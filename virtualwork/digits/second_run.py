@@ -193,6 +193,9 @@ class SecondRun:
             elif kind == "table":
                 number, part = of.split()
                 found[name] = self._table(int(number))[part == "y"]
+            elif kind == "slope":
+                number, part = of.split()
+                found[name] = self._slope(int(number))[part == "y"]
             elif not of and name[0] == "q":
                 found[name] = self._input(int(name[1:]))
             elif not of:
@@ -311,6 +314,19 @@ class SecondRun:
 
     def _table(self, number: int) -> tuple[Doubled, Doubled]:
         """What a table gives, linear between its rows."""
+        along, (step, first), (change, before) = self._row(number)
+        share = (along - first) / step
+        x, y = (share * rise + of for rise, of in zip(change, before, strict=True))
+        return x, y
+
+    def _slope(self, number: int) -> tuple[Doubled, Doubled]:
+        """How steep a table is between its rows."""
+        _, (step, _), (change, _) = self._row(number)
+        x, y = (rise / step for rise in change)
+        return x, y
+
+    def _row(self, number: int) -> tuple[Doubled, tuple[Doubled, Any], tuple[list[Doubled], list[Any]]]:
+        """The place in a table, and of the row before it: the step to the next and where it begins; the same of the force's parts."""
         table = self.exact.tables[number]
         at, force = (np.array(column) for column in zip(*table.table, strict=True))
         place = self._place(table)
@@ -321,9 +337,9 @@ class SecondRun:
             period = TURN * float(round(turns)) if whole else Doubled(at[-1]) - at[0]
             place = place - period * cycles
         i = np.clip(np.searchsorted(at, place.high, "right") - 1, 0, len(at) - 2)
-        share = (place - at[i]) / (Doubled(at[i + 1]) - at[i])
-        x, y = (share * (Doubled(part[i + 1]) - part[i]) + part[i] for part in (force.real, force.imag))
-        return x, y
+        parts = force.real, force.imag
+        step, change = Doubled(at[i + 1]) - at[i], [Doubled(part[i + 1]) - part[i] for part in parts]
+        return place, (step, at[i]), (change, [part[i] for part in parts])
 
     def _place(self, table: Tabled) -> Doubled:
         """What a table is over."""

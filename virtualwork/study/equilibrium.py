@@ -19,9 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.engines.doubled import LAST, OWN
 from virtualwork.branch.assembly import Assembly
-from virtualwork.digits.balance import off_balance
+from virtualwork.digits.balance import Balance
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.study.loads_at_rest import Rest
 
@@ -61,30 +60,57 @@ class Equilibrium:
         >>> [e.periods for e in equilibria(rod.assembly).found] == [(), (2 * np.pi * np.sqrt(2 / 3 / 9.81),)]
         True
         """
-        if not self.stable:
-            return ()
-        assert self.assembly is not None
-        rest = Rest(self.assembly, np.array([self.inputs]))
-        mass, stiffness = rest.mass()[0], rest.hessian()[0]
-        if len(mass) == 1:
-            values = mass[0] / stiffness[0]
-        else:
-            from scipy.linalg import eigh
-
-            values = eigh(mass, stiffness, eigvals_only=True)[::-1]
+        values, _ = self._oscillations
         # what has no mass, to rounding, has no period
-        swings = values > len(mass) * EPS * np.abs(values).max()
+        swings = values > len(values) * EPS * np.abs(values).max(initial=0.0)
         return tuple((2 * np.pi * np.sqrt(values[swings])).tolist())
+
+    @cached_property
+    def _oscillations(self) -> tuple[Reals, Reals]:
+        """The μ of V″ a μ = M a, the largest first, and the a in columns."""
+        if not self.stable:
+            return np.empty(0), np.empty((len(self.inputs), 0))
+        mass, stiffness = self._rest.mass()[0], self._stiffness
+        if len(mass) == 1:
+            return mass[0] / stiffness[0], np.ones((1, 1))
+        from scipy.linalg import eigh
+
+        values, vectors = eigh(mass, stiffness)
+        return values[::-1], vectors[:, ::-1]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled: without the poses, which have a lock."""
+        return {name: value for name, value in vars(self).items() if name not in ("_rest", "_balance")}
+
+    @cached_property
+    def _rest(self) -> Rest:
+        assert self.assembly is not None
+        return Rest(self.assembly, np.array([self.inputs]))
+
+    @cached_property
+    def _stiffness(self) -> Reals:
+        """V″, (k, k)."""
+        return np.asarray(self._rest.hessian()[0])
 
     @property
     def period(self) -> float | None:
         """The period of small oscillations about it, s, with several inputs the longest; None where there is none."""
         return self.periods[0] if self.periods else None
 
-    def error_estimate(self) -> tuple[float, ...]:
-        """Return an estimate of the rounding error of each input, rad or m: how far it lies from the position of rest in 32 digits.
+    @cached_property
+    def _balance(self) -> Balance:
+        """The position of rest in 32 digits."""
+        return Balance(self._rest.poses, self._stiffness)
+
+    def error_estimate(self, of: str = "inputs") -> tuple[float, ...]:
+        """Return an estimate of the rounding error of a quantity: how far it lies from that of the position of rest in 32 digits.
 
         Infinite where the second variation vanishes. A file's decimals are exact in the second run, numbers given as floats as given.
+
+        Parameters
+        ----------
+        of
+            "inputs", rad or m; "periods", s; "potential", J, or "stiffness": one number, none where there is no potential.
 
         Examples
         --------
@@ -94,11 +120,19 @@ class Equilibrium:
         >>> down = equilibria(pendulum.assembly).found[1]
         >>> abs(down.inputs[0] - 1.5 * np.pi) < down.error_estimate()[0] < 1e-14
         True
+        >>> abs(down.period - 2 * np.pi * np.sqrt(0.5 / 9.81)) < 2 * down.error_estimate("periods")[0] < 1e-14
+        True
         """
-        assert self.assembly is not None
-        rest = Rest(self.assembly, np.array([self.inputs]))
-        off = off_balance(rest.poses, rest.hessian()[0])
-        return tuple((OWN * off + LAST * np.abs(self.inputs)).tolist())
+        if of == "inputs":
+            return tuple(self._balance.input_errors.tolist())
+        if of == "potential":
+            return () if self.potential is None else (self._balance.potential_error(self.potential),)
+        if of == "stiffness":
+            return (self._balance.stiffness_error(self.stiffness, self._stiffness),)
+        if of == "periods":
+            errors = self._balance.period_errors(np.array(self.periods), self._oscillations[1])
+            return tuple(errors.tolist())
+        raise ValueError(f"{of}: expected inputs, potential, stiffness or periods")
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cached_property
-from itertools import combinations, product
+from functools import cached_property, partial
+from itertools import combinations, combinations_with_replacement
 
 import numpy as np
 
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.at_rest import mass, mass_reads, potential, second_variation
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.loaded_pose import LoadedPose
 from virtualwork.formulas.numbers import Number, Reals, plus
@@ -67,10 +68,7 @@ class Rest:
 
     def _bent(self, pose: LoadedPose) -> Number:
         """The second variation of the work, along the direction of the rates."""
-        rates, total = pose.along or pose.by[0], None
-        for load in self.scene.loads:
-            total = plus(total, load.second(pose, rates))
-        return total
+        return second_variation(self.scene.loads, pose, pose.along or pose.by[0])
 
     def along(self, direction: Reals) -> Reals:
         """∂Q/∂q along a direction in the inputs, times the direction: d²(work), (n,)."""
@@ -92,7 +90,7 @@ class Rest:
         rates = scene.along(reads)
         if rates is None:
             return math.nan
-        return float(sum(load.second(scene.pose, rates) or 0.0 for load in scene.loads))
+        return float(second_variation(scene.loads, scene.pose, rates) or 0.0)
 
     def hessian(self) -> Reals:
         """V″, (n, k, k), by polarization of exact second derivatives along the inputs and their pairs."""
@@ -107,19 +105,13 @@ class Rest:
         return out
 
     def mass(self) -> Reals:
-        """The generalized mass Σ m K_j·K_k + Σ I κ_j κ_k, (n, k, k)."""
-        k, rigid = self.k, self.assembly.mechanism.rigid
-        still: list[Number] = [0.0] * k
-        ways = [self.poses.again(self.inputs, [unit, still, still]) for unit in np.eye(k).tolist()]
-        out = np.zeros((len(self.inputs), k, k))
-        for body, of in rigid.items():
-            moved = [way.point(body, of.center, 1) for way in ways] if of.mass else None
-            turned = [way.angle(body, 1) for way in ways] if of.inertia else None
-            for i, j in product(range(k), repeat=2):
-                if moved is not None:
-                    out[:, i, j] += of.mass * (np.conj(moved[i]) * moved[j]).real
-                if turned is not None:
-                    out[:, i, j] += of.inertia * turned[i] * turned[j]
+        """The generalized mass, (n, k, k)."""
+        pairs = list(combinations_with_replacement(range(self.k), 2))
+        case, out = self.scene.case, np.zeros((len(self.inputs), self.k, self.k))
+        forms = [partial(mass, case, i=i, j=j) for i, j in pairs]
+        values = self.scene.over(forms, float, mass_reads(case), name="rest, mass")
+        for (i, j), value in zip(pairs, values, strict=True):
+            out[:, i, j] = out[:, j, i] = value
         return out
 
     def potential(self) -> Reals:
@@ -131,7 +123,4 @@ class Rest:
         return np.asarray(result)
 
     def _stored(self, pose: LoadedPose) -> Number:
-        total: Number = None
-        for load in self.scene.loads:
-            total = plus(total, load.potential(pose))
-        return total
+        return potential(self.scene.loads, pose)
