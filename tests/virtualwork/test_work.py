@@ -96,7 +96,7 @@ def test_only_what_is_asked_for_is_formed() -> None:
     _ = motion.effort
     assert motion.dynamics.__dict__.get("reactions") is None  # the effort forms no reaction
     motion.reaction("C", on="rocker")
-    formed = motion.dynamics.scene.forces.block.names
+    formed = motion.dynamics.scene.forces.pose.names
     assert not any("A on" in name or "D on" in name for name in formed)
     motion.reaction("A", on="crank")
     assert "pin:A on crank" in formed
@@ -131,7 +131,7 @@ def test_loads_that_do_no_work_are_never_evaluated() -> None:
     assert (motion.effort == 0).all()
     scene = motion.dynamics.scene
     # no load was evaluated, each acts where nothing moves or its rate is zero; nor anything made of loads
-    kept = scene.block.kept.values()
+    kept = scene.pose.kept.values()
     assert all(value is None or value[1] is None for value in kept)
     works, workless, _ = ledger(scene)
     assert "crank: weight" in workless
