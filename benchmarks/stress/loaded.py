@@ -149,7 +149,7 @@ def _true(exact: Exact, forces: dict[Any, Any], key: Quantity) -> Any:
     return None
 
 
-def _constants(motion: Motion) -> list[list[Any]]:
+def constants_of(motion: Motion) -> list[list[Any]]:
     """The constants of gears, belts and racks at every pose, as the second run has them at the first one.
 
     What the guess fixes by way of loops is no number of the description: its last digits are the program's own. Between poses
@@ -220,7 +220,7 @@ def answers(seed: int, poses: int = POSES) -> Iterator[Answer]:
         if engine is not None:
             os.environ["DALEMBERT_ENGINE"] = engine
     with mp.workdps(DIGITS):
-        constants = _constants(motion)
+        constants = constants_of(motion)
     for i, own in zip(here, constants, strict=True):
         try:
             exact = Exact(motion, int(i), constants=own)

@@ -73,7 +73,7 @@ def along(m: Mechanism, inputs: list[Any], way: list[float], constants: Any = No
         store(s.stiffness, length - mp.mpf(s.free_length), first, second)
     for ts in m.torsion_springs:
         angle, first, second = (e.angle(ts.links[1], k) - e.angle(ts.links[0], k) for k in range(3))
-        twist = angle - mp.mpf(ts.free_angle) - 2 * mp.pi * e._turns(ts, angle)
+        twist = angle - mp.mpf(ts.free_angle) - 2 * mp.pi * e.whole_turns(ts, angle)
         store(ts.stiffness, twist, first, second)
     return Along(potential, slope, bend, moved)
 

@@ -51,12 +51,12 @@ class Exact(Constraints):
             found += [(a, za, pull, mp.mpf(0)), (b, zb, -pull, mp.mpf(0))]
         for ts in m.torsion_springs:
             angle, rate = (self.angle(ts.links[1], k) - self.angle(ts.links[0], k) for k in (0, 1))
-            twist = angle - mp.mpf(ts.free_angle) - 2 * mp.pi * self._turns(ts, angle)
+            twist = angle - mp.mpf(ts.free_angle) - 2 * mp.pi * self.whole_turns(ts, angle)
             torque = mp.mpf(ts.stiffness) * twist + mp.mpf(ts.damping) * rate
             found += [(ts.links[0], 0j, mp.mpc(0), torque), (ts.links[1], 0j, mp.mpc(0), -torque)]
         return [load for load in found if load[0] != GROUND]
 
-    def _turns(self, spring: TorsionSpring, angle: Any) -> Any:
+    def whole_turns(self, spring: TorsionSpring, angle: Any) -> Any:
         """The whole turns that a spring's angle counts too many: on the straight way of the inputs from the guess it is followed."""
         guess = [0.0 if link == GROUND else self.m.guess.angles.get(link) for link in spring.links]
         if None in guess:

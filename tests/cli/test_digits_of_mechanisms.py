@@ -250,3 +250,21 @@ def test_positions_of_rest(dalembert: Dalembert, tmp_path: Path) -> None:
         true = mp.degrees(mp.acos(3 / mp.mpf("9.81")))
         assert holds(above["input_deg"], true) >= 13
         assert holds(below["input_deg"], 360 - true) >= 13
+
+
+def test_potential_and_period_of_a_pendulum(dalembert: Dalembert, tmp_path: Path) -> None:
+    """The decimals of the file are the data: m g l and 2π √(I / (m g l)); 49.05, where 16 digits have 49.050000000000004."""
+    file = tmp_path / "bar.toml"
+    file.write_text(
+        "gravity = [0, -9.81]\nground.O = [0, 0]\n"
+        "links.bar = { points = { O = [0, 0] }, mass = 10, center = [0.5, 0], inertia = 0.7 }\n"
+        'input.link = "bar"\n'
+    )
+    above, below = table(dalembert("equilibrium", file, "--digits"))
+    with mp.workdps(30):
+        assert (above["potential_J"], below["potential_J"]) == ("49.05", "-49.05")
+        assert above["period_s"] == ""
+        period = 2 * mp.pi * mp.sqrt(mp.mpf("3.2") / mp.mpf("49.05"))
+        assert holds(below["period_s"], period) >= 14
+    call = ("equilibrium", file, "--json")
+    assert dalembert(*call).stdout == dalembert(*call, "--digits").stdout

@@ -170,6 +170,8 @@ class Exact(Recording):
             recorder=recorder,
             kind=Unrounded(recorder),
         )
+        if any(spring.turns for spring in self.mechanism.torsion_springs):
+            self.turn = 2.0 * bare(numbers.enter("pi", math.pi, PI))
 
     @cached_property
     def closed(self) -> list[Group]:

@@ -25,6 +25,9 @@ from virtualwork.plan.steps import Path, Plan
 class Shared:
     """What a pose does not say of itself: rates of the inputs, the time, how far torsion springs are wound."""
 
+    turn: Number = 2 * np.pi
+    """A whole turn."""
+
     def __init__(self, mechanism: Description, plan: Plan) -> None:
         self.mechanism, self.plan = mechanism, plan
 
@@ -52,7 +55,7 @@ class Shared:
         angles = [self.plan.angles[body] for body in (a, b)]
         if all(angle.by_inputs for angle in angles):
             twist = (st.affine(angles[1]) - spring.free_angle) - st.affine(angles[0])
-            return twist + 2 * np.pi * spring.turns if spring.turns else twist
+            return twist + self.turn * spring.turns if spring.turns else twist
         return self.wound(spring, st, self.within(st, spring))
 
     @staticmethod

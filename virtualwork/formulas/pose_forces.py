@@ -244,7 +244,7 @@ class RecordedSetting(Shared):
 
     def __init__(self, recording: Recording) -> None:
         super().__init__(recording.mechanism, recording.plan)
-        self.recording = recording
+        self.recording, self.turn = recording, recording.turn
 
     @property
     def rates(self) -> tuple[Number, Number]:

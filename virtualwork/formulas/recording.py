@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
+from math import pi
 from typing import TYPE_CHECKING, Any
 
 from dalembert.arithmetic.guard import Lock, guarded, own_lock
@@ -93,6 +94,8 @@ class Recording:
         self.settled = settled
         k = len(mechanism.inputs)
         self.kind = kind
+        # a whole turn of a spring that is wound
+        self.turn: Number = 2 * pi
         self.st = State([self.recorder.input(f"q{j}") for j in range(k)], kind=kind)
         self.rates = [
             [self.recorder.input(f"{name}{j}") if there else None for j in range(k)]
