@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from virtualwork import Mechanism
+from virtualwork import Mechanism, Torque
 from virtualwork.describe import DescriptionError
 
 CRANK = """
@@ -67,3 +67,8 @@ def test_what_is_wrong_with_a_table_is_one_sentence(table: bytes, words: str, tm
         crank(tmp_path, table)
     assert words in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_a_torque_over_what_it_cannot_be_over_is_refused() -> None:
+    with pytest.raises(DescriptionError, match="found 'input', expected time, angle or speed"):
+        Torque("crank", history=((0.0, 1.0), (1.0, 2.0)), over="input")  # type: ignore[arg-type]

@@ -331,6 +331,12 @@ class Torque(Part):
     over: Literal["time", "angle", "speed"] = "time"
     periodic: bool = False
 
+    def __post_init__(self) -> None:
+        if self.over not in ("time", "angle", "speed"):
+            raise DescriptionError(
+                f"torque on {self.link} over: found '{self.over}', expected time, angle or speed"
+            )
+
 
 @dataclass(frozen=True)
 class Spring(Part):
