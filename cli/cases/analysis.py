@@ -76,7 +76,7 @@ def names(
 
 
 def branch(text: str | None) -> str | None:
-    """Check that the value of --branch is `all`, or the number of an assembly."""
+    """Check that --branch names `all`, or the number of an assembly."""
     if text is not None and text != "all" and whole(text) < 1:
         raise bad("--branch", f"'{text}': expected all, or the number of an assembly")
     return text
@@ -126,7 +126,7 @@ class Analysis:
 
     @cached_property
     def assemblies(self) -> tuple[Assembly, ...]:
-        """The guess's assembly, or those of --branch."""
+        """The guess's assembly, or those that --branch names."""
         if self.request.branch is None:
             return (self.mechanism.assembly,)
         assemblies = self.mechanism.assemblies()

@@ -311,7 +311,7 @@ def _in_unit_of_file(dimension: Varied, shown: float, bare: Mapping[str, str]) -
 
 
 def _target(component: Component, text: str, bare: Mapping[str, str]) -> tuple[float, str]:
-    """Return the value of --so-that in the unit that the quantity is shown in, and that unit."""
+    """Return the value that --so-that names, in the unit that the quantity is shown in, and that unit."""
     from cli.cases.axes import place_or_angle
     from cli.read.root_search import value_in
 

@@ -131,7 +131,7 @@ class _Group:
         )
 
     def _thirty(self) -> Iterator[str]:
-        """The 30/30 rule, where no reading is left over to show how well the coefficients are known."""
+        """The 30/30 rule, where no spare reading shows how exact the coefficients are."""
         group, means, rotors = self.group, self.group.means, np.arange(len(self.group.rotors))
         bare = (group.fit.degrees_of_freedom == 0) & (group.before is None)
         for j in range(means.shape[1]):

@@ -45,7 +45,7 @@ def measured_groups(
     )
     runs, stored = measured.rows.rows.of, measured.stored
     runs.groups = list(_Groups(measured, request).fitted())
-    # the one fact that shows a fit: it is asked for, or something is left over to judge it by, or no run is without masses
+    # the one fact that shows a fit: it is requested, or there are readings to spare, or no run is without masses
     runs.fitted = not request.four_run and (measured.fit or any(_spares(group) for group in runs.groups))
     runs.warnings = [*runs.table.warnings, *runs.warnings, *measured.warnings]
     lags = request.against or runs.lags

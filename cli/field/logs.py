@@ -198,7 +198,7 @@ def drift_rates(b: FieldBalancing) -> Table:
 
 
 def predicted_run(b: FieldBalancing) -> Table:
-    """What the run with the masses of --predict should read: a row for each rotor and sensor."""
+    """Return the predicted readings of a run with the masses that --predict names: a row for each rotor and sensor."""
     rows = Rows.sensors(b)
     value, deviation = rows.several(lambda solved: predicted(b, solved))
     columns = [*vibration(b, value), amplitude(b, "amplitude_uncertainty", deviation)]

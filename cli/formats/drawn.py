@@ -77,7 +77,7 @@ def together(parts: Sequence[tuple[float, complex, float]]) -> tuple[float, comp
 
 
 def damaged(file: str, where: str, value: object, expected: str) -> DataError:
-    """Return the error of a file: where it is wrong, what stands there, what belongs there."""
+    """Return the error of a file: the place, the value there, the expected value."""
     return DataError(f"{file}: {where}: found {quote(str(value))}, expected {expected}")
 
 

@@ -122,7 +122,7 @@ class At(NamedTuple):
         return At(self.file, f"{self.where}, {of}" if of else self.where)
 
     def error(self, of: str, value: object, expected: object) -> DataError:
-        """Return the error: what stands there, and what is expected."""
+        """Return the error: the value there, and the expected value."""
         return DataError(f"{self.file}: {self.inside(of).where}: found {value}, expected {expected}")
 
     def number(self, of: str, text: str | None) -> float:

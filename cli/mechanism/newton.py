@@ -30,7 +30,7 @@ class Solved(PoseCase):
 
     @cached_property
     def extra(self) -> dict[str, Table]:
-        """The iterates of --newton."""
+        """Newton-Raphson iterates, which --newton shows."""
         return iterates(self.analysis) if self.study.newton else {}
 
     def way(self) -> list[Topic]:

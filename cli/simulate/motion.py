@@ -107,7 +107,7 @@ class Motion(Case):
         a = self.analysis
         if not a.request.forces:
             return []
-        # --forces asks for joint forces: those of the names of --only, of all joints where these have none
+        # --forces requests joint forces: those that --only names, of all joints where it names none
         joints = [each for each in a.forces if each.path[:1] == ("reactions",)]
         every = quantities.forces(a.mechanism, a.pairs)
         joints = joints or [each for each in every if each.path[:1] == ("reactions",) and not each.reverse]

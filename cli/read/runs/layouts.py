@@ -64,7 +64,7 @@ def runs_layout(path: str) -> Layout:
 
 
 def is_log(header: list[str]) -> bool:
-    """Whether a header is a log's, whose runs may be told apart by their masses alone."""
+    """Whether a header is a log's, whose masses alone may distinguish its runs."""
     columns = {name.strip().lower() for name in header}
     own = any(name.startswith(("mass_", "unbalance_")) for name in columns)
     own = own and not any(name.startswith(("trial_mass", "trial_unbalance")) for name in columns)

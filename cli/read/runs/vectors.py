@@ -33,7 +33,7 @@ class Layout:
 
     table: Table
     is_log: bool = True
-    """Whether its runs may be told apart by their masses alone."""
+    """Whether its masses alone may distinguish its runs."""
     max_mass: dict[str, float] = field(default_factory=dict)
     """Limits of the corrections, plane -> kg."""
     runout: dict[str, complex] = field(default_factory=dict)
