@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from balancing.rounding import influence_error
     from balancing.run_log import JointFit, Undetermined, determined, initial_alone, joint_fit
     from balancing.severity import ZONE_BOUNDARIES, severity_zone
-    from balancing.stock import place_from_stock
+    from balancing.stock import FewestWeights, fewest_from_stock, place_from_stock
     from balancing.synchronous import OncePerTurn, once_per_turn
     from balancing.tolerance import (
         GRADES,
@@ -74,7 +74,7 @@ _HOMES = {
     "balancing.synchronous": "OncePerTurn once_per_turn",
     "balancing.prior": "Prior fit_with_prior pooled_prior stored_prior",
     "balancing.placement": "Placement drill_depth place transfer",
-    "balancing.stock": "place_from_stock",
+    "balancing.stock": "FewestWeights fewest_from_stock place_from_stock",
     "balancing.rotor": "by_size",
     "balancing.rounding": "influence_error",
     "balancing.tolerance": "GRADES allocate api_unbalance grade_value journal_loads mil_unbalance permissible_unbalance",
@@ -107,6 +107,7 @@ __all__ = [
     "Doubtful",
     "Drift",
     "ErrorBudget",
+    "FewestWeights",
     "Indexed",
     "Infeasible",
     "JointFit",
@@ -131,6 +132,7 @@ __all__ = [
     "drift",
     "drill_depth",
     "error_budget",
+    "fewest_from_stock",
     "fit_with_prior",
     "grade_value",
     "index_balancing",

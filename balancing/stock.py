@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import comb
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +12,10 @@ from balancing.placement import Placement, checked_positions
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+ENOUGH = 0.01
+"""Largest error of weights that come near enough, as a share of the correction."""
+FEW = 3
+"""Largest number of weights that `fewest_from_stock` uses."""
 SUMS = 300_000
 """Largest number of sums that are searched for one half of the positions."""
 
@@ -114,6 +119,55 @@ def place_from_stock(
         place, load = np.divmod(codes[codes > 0], len(loads))
         masses[part[len(part) - place]] = loads[load]
     return Placement(goal, theta, masses, best[0] if room >= len(theta) else 0.0)
+
+
+class FewestWeights(NamedTuple):
+    """The choice of the fewest weights from stock."""
+
+    placed: Placement
+    used: int
+    """The number of weights."""
+    tried: int
+    """The largest number of weights that was tried; one more may leave a smaller error."""
+
+
+def fewest_from_stock(
+    target: complex,
+    angles: ArrayLike,
+    stock: ArrayLike,
+    max_mass: ArrayLike | None = None,
+    *,
+    pieces: int = 1,
+) -> FewestWeights:
+    """Choose the fewest weights from stock that come within 1 % of a correction, at most three.
+
+    Parameters
+    ----------
+    target, angles, stock, max_mass, pieces
+        As of `place_from_stock`.
+
+    Returns
+    -------
+    FewestWeights
+        Where no choice comes within 1 %, the fewest weights of the least error.
+
+    Examples
+    --------
+    >>> choice = fewest_from_stock(0.007, np.radians([0, 90, 180, 270]), [0.001, 0.002, 0.005], pieces=2)
+    >>> choice.placed.masses.round(3).tolist(), choice.used, choice.tried
+    ([0.007, 0.0, 0.0, 0.0], 2, 2)
+    """
+
+    def choose(most: int) -> Placement:
+        return place_from_stock(target, angles, stock, max_mass, pieces=pieces, max_pieces=most)
+
+    placed = [choose(0)]
+    while abs(placed[-1].error) > ENOUGH * abs(target) and len(placed) <= FEW:
+        placed.append(choose(len(placed)))
+    # of those that do not come nearer the fewest
+    least = abs(placed[-1].error) + 1e-12 * abs(target)
+    used = next(k for k, one in enumerate(placed) if abs(one.error) <= least)
+    return FewestWeights(placed[used], used, len(placed) - 1)
 
 
 def _sums(

@@ -9,17 +9,17 @@ docs/library.md has the first sentence of each; `help(dalembert.correct)` shows 
 
 Rotors (`balancing`):
     AmplitudeFit, Balance, CoincidentPlanes, Correction, DependentPlanes, DependentTrials, Doubtful,
-    Drift, ErrorBudget, GRADES, Indexed, Infeasible, JointFit, LogBalance, ModalCorrection, NextRun,
-    NotConverged, OncePerTurn, Placement, Prior, TorqueCycle, TrialEffect, Unbalances, Undetermined,
-    UnreachedMode, ZONE_BOUNDARIES, allocate_tolerance, api_unbalance, condition_number, correct,
-    determined_channels, drift_test, drill_depth, error_budget, fit_with_prior, grade_value,
-    groups_by_size, index_balancing, influence_coefficients, influence_error,
-    influence_from_amplitudes, initial_alone, initial_unbalance, joint_fit, journal_loads,
-    least_squares, mil_unbalance, minimax, modal_corrections, once_per_turn, outlier_probability,
-    permissible_unbalance, phase_sense, place_from_stock, place_masses, place_weights,
-    plane_significance, pooled_prior, region_factor, repeated_readings, robust_fit, severity_zone,
-    shapes_at, spread_of_corrections, stored_prior, suggest_run, torque_cycle, transfer_to_planes,
-    trial_effect, trial_unbalance, unseen_combination
+    Drift, ErrorBudget, FewestWeights, GRADES, Indexed, Infeasible, JointFit, LogBalance,
+    ModalCorrection, NextRun, NotConverged, OncePerTurn, Placement, Prior, TorqueCycle, TrialEffect,
+    Unbalances, Undetermined, UnreachedMode, ZONE_BOUNDARIES, allocate_tolerance, api_unbalance,
+    condition_number, correct, determined_channels, drift_test, drill_depth, error_budget,
+    fewest_from_stock, fit_with_prior, grade_value, groups_by_size, index_balancing,
+    influence_coefficients, influence_error, influence_from_amplitudes, initial_alone,
+    initial_unbalance, joint_fit, journal_loads, least_squares, mil_unbalance, minimax,
+    modal_corrections, once_per_turn, outlier_probability, permissible_unbalance, phase_sense,
+    place_from_stock, place_masses, place_weights, plane_significance, pooled_prior, region_factor,
+    repeated_readings, robust_fit, severity_zone, shapes_at, spread_of_corrections, stored_prior,
+    suggest_run, torque_cycle, transfer_to_planes, trial_effect, trial_unbalance, unseen_combination
 
 Mechanisms (`virtualwork`):
     AssemblyError, Belt, Bound, Cam, Check, Cycle, DescriptionError, Equilibria, Equilibrium, Force, Friction, GROUND,

@@ -56,6 +56,7 @@ Further options (docs/commands.md describes them):
   permissible UNBALANCE  Permissible residual unbalance in place of a grade.
   radius LENGTH  Radius of the trial masses, for the tolerance.
   positions ANGLES  Split the corrections onto these places: 0deg,30deg,60deg.
+  stock MASSES  With --blades or --positions: weights in stock, such as 1g,2g,5g; uses the fewest within 1 % of a correction, at most three.
   first ANGLE  Angle of the first blade.
   numbering  Blade numbers increase with the angles or against them.
   suggest  Suggest the next run within --max-mass that tells most about the corrections.
@@ -88,6 +89,7 @@ def run(
     radius: str | None = None,
     blades: Annotated[int | None, typer.Option(min=1, max=options.PLACES)] = None,
     positions: str | None = None,
+    stock: str | None = None,
     first: str = "0deg",
     numbering: Literal["with", "against"] = "with",
     fit: bool = False,
@@ -126,6 +128,9 @@ def run(
         spread = 100 / (2 * monte_carlo) ** 0.5
         few = f"{monte_carlo} drawn set{'s' * (monte_carlo > 1)} of readings give a standard deviation to {spread:.0f} % only"
         raise options.bad("--monte-carlo", f"{few}: expected {FEWEST_DRAWS} at least")
+    places, in_stock = options.places(positions, blades, first, numbering), options.weights("--stock", stock)
+    options.refuse("expected --positions or --blades for the weights to go to", stock=in_stock and not places)
+    options.refuse("the sheet that --page writes has no stock of weights", stock=in_stock and page)
     arm = options.quantity("--radius", radius, "length", positive=True)
     if runs is None:
         raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
@@ -148,7 +153,8 @@ def run(
         radius=arm,
         phase_lag=phase_lag,
         rotation=rotation,
-        places=options.places(positions, blades, first, numbering),
+        places=places,
+        stock=in_stock,
         fit=fit,
         exclude=exclude or (),
         predict=predict,

@@ -8,8 +8,9 @@ from itertools import islice
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing import place, plane_significance, trial_effect
+from balancing import plane_significance, trial_effect
 from balancing.doubt import LEVEL
+from balancing.stock import ENOUGH
 from cli.field.field_balancing import FieldBalancing, Solved
 from cli.field.rotor import Rotor
 from cli.read.runs.runs import SHOWN
@@ -80,9 +81,14 @@ class _Group:
             )
         if request.places is not None:
             for w in solved.corrections[:SHOWN].ravel().tolist():
-                missed = place(w, np.radians(request.places)).error if w else 0.0
-                if abs(missed) > 1e-9 * abs(w):
-                    yield f"a correction at {degrees(w):.4g}° cannot be reached from the places given"
+                missed = abs(b.placed(w).error) if w else 0.0
+                if request.stock is not None and missed > ENOUGH * abs(w):
+                    yield (
+                        f"the weights in stock miss the correction at {degrees(w):.4g}° by {b.amount(missed):.4g} {b.unit} "
+                        f"({missed / abs(w):.2%}): dalembert place has --max-pieces and --pieces"
+                    )
+                elif request.stock is None and missed > 1e-9 * abs(w):
+                    yield f"a correction at {degrees(w):.4g}° cannot be reached from these places"
 
     def _dependent(self) -> Iterator[str]:
         """Yield which planes are nearly dependent."""

@@ -16,7 +16,9 @@ from balancing import (
     Infeasible,
     LogBalance,
     NotConverged,
+    Placement,
     condition_number,
+    fewest_from_stock,
     initial_unbalance,
     least_squares,
     place,
@@ -143,6 +145,9 @@ class FieldBalancing:
                 "--zone-class",
                 f"zones are of velocities, the readings are in {runs.amplitude_unit}: expected mm_s",
             )
+        if request.stock is not None and runs.per != "mass":
+            raise bad("--stock", "the table has unbalances: expected trial masses")
+        self._placed: dict[complex, Placement] = {}
         self.max_mass = limits_in(request.max_mass, runs) or runs.max_mass
         """Limit of each plane, SI; the key "" is for all."""
         self.ceiling = ceiling_in(request.max_residual, runs)
@@ -359,10 +364,24 @@ class FieldBalancing:
         """Split a correction onto the places: name, angle in degrees, amount in SI of each that is used."""
         if self.request.places is None or w == 0:
             return []
-        masses = place(complex(w), np.radians(self.request.places)).masses.tolist()
         return [
-            (str(k + 1), in_turn(self.request.places[k]), mass) for k, mass in enumerate(masses) if mass > 0
+            (str(k + 1), in_turn(self.request.places[k]), mass)
+            for k, mass in enumerate(self.placed(complex(w)).masses.tolist())
+            if mass > 0
         ]
+
+    def placed(self, w: complex) -> Placement:
+        """Return a correction on the places, made of the weights in stock if there are any."""
+        if w not in self._placed:
+            angles = np.radians(self.request.places or ())
+            stock = self.request.stock
+            try:
+                self._placed[w] = (
+                    place(w, angles) if stock is None else fewest_from_stock(w, angles, stock).placed
+                )
+            except ValueError as error:
+                raise DataError(f"--stock: {error}") from None
+        return self._placed[w]
 
     @property
     def uncertain(self) -> bool:

@@ -38,6 +38,8 @@ class Request:
     rotation: str | None = None
     places: list[float] | None = None
     """Where masses can go, degrees: the corrections are split onto them."""
+    stock: list[float] | None = None
+    """The weights in stock, kg, of which the corrections are made there."""
     fit: bool = False
     """Whether all runs are to be fitted together; from here on what else is asked of that."""
     exclude: Sequence[str] = ()

@@ -12,7 +12,6 @@ from cli.place.corrections import (
     read_drill,
     read_planes,
     read_radii,
-    read_weights,
 )
 from cli.read import options
 from cli.show.commands import ShowOptions
@@ -97,7 +96,7 @@ def run(
     remove = remove or every[0].removed
     radii = read_radii(at_radius, to_radius)
     drilled = read_drill(drill, density, drill_point, max_depth)
-    in_stock, fixed = read_weights("--stock", stock), read_weights("--weights", weights)
+    in_stock, fixed = options.weights("--stock", stock), options.weights("--weights", weights)
     if in_stock is not None and drilled is not None:
         raise options.bad("--stock", "weights from stock are not drilled: expected --stock or --drill")
     if fixed is not None:

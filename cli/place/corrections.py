@@ -209,13 +209,6 @@ def read_drill(
     )
 
 
-def read_weights(flag: str, weights: str | None) -> list[float] | None:
-    """Read --stock or --weights."""
-    if weights is None:
-        return None
-    return [options.needed(flag, part, "mass", positive=True) for part in weights.split(",")]
-
-
 def read_planes(at_z: str | None, to_z: str | None) -> tuple[float, list[float]] | None:
     """Read --at-z and --to-z."""
     at = options.quantity("--at-z", at_z, "length")

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing import Placement, drill_depth, place, place_from_stock, place_weights, transfer
+from balancing import (
+    Placement,
+    drill_depth,
+    fewest_from_stock,
+    place,
+    place_from_stock,
+    place_weights,
+    transfer,
+)
+from balancing.stock import ENOUGH
 from cli.place.corrections import Correction, Drill, Request
 from dalembert.angles import degrees, in_turn, phasor
 from dalembert.errors import DataError
@@ -18,8 +26,6 @@ from dalembert.units import from_si, to_si
 
 Real = NDArray[np.float64]
 HOLES = 10_000  # more at one place are refused
-ENOUGH = 0.01  # of the correction: weights from stock that come so near are enough
-FEW = 3  # weights from stock; more are named and not taken unasked
 
 
 @dataclass(frozen=True)
@@ -119,17 +125,14 @@ class Placing:
     def _from_stock(self, goal: complex, stock: list[float], angles: Real) -> Placement:
         request = self.request
 
-        def choose(most: int) -> Placement:
-            return place_from_stock(
-                goal, angles, stock, request.limit, pieces=request.pieces, max_pieces=most
-            )
-
         try:
             if request.max_pieces is None:
-                placed = self._few(goal, choose)
+                placed = self._few(goal, angles, stock)
             else:
-                placed = choose(request.max_pieces)
                 most = request.max_pieces
+                placed = place_from_stock(
+                    goal, angles, stock, request.limit, pieces=request.pieces, max_pieces=most
+                )
                 self._far(f"at most {most} weight{'s' * (most != 1)} leave{'s' * (most == 1)}", placed)
         except ValueError as error:
             raise DataError(f"--stock: {error}") from None
@@ -139,24 +142,22 @@ class Placing:
             )
         return placed
 
-    def _few(self, goal: complex, choose: Callable[[int], Placement]) -> Placement:
+    def _few(self, goal: complex, angles: Real, stock: list[float]) -> Placement:
         """Take the fewest weights that come near enough, and say what one more would leave."""
-        placed = [choose(0)]
-        while abs(placed[-1].error) > ENOUGH * abs(goal) and len(placed) <= FEW:
-            placed.append(choose(len(placed)))
-        # of those that do not come nearer the fewest
-        least = abs(placed[-1].error) + 1e-12 * abs(goal)
-        used = next(k for k, one in enumerate(placed) if abs(one.error) <= least)
-        more = len(placed)
-        error, further = (abs(one.error) for one in (placed[used], choose(more)))
+        request = self.request
+        choice = fewest_from_stock(goal, angles, stock, request.limit, pieces=request.pieces)
+        placed, used, more = choice.placed, choice.used, choice.tried + 1
+        further = place_from_stock(
+            goal, angles, stock, request.limit, pieces=request.pieces, max_pieces=more
+        ).error
         weights = f"{used} weight{'s' * (used != 1)} leave{'s' * (used == 1)}"
-        if goal and further < error - 1e-12 * abs(goal):
+        if goal and abs(further) < abs(placed.error) - 1e-12 * abs(goal):
             self.warnings.append(
-                f"{weights} {self._missed(placed[used])}; with {more} it would be {self.text(further)} (--max-pieces {more})"
+                f"{weights} {self._missed(placed)}; with {more} it would be {self.text(abs(further))} (--max-pieces {more})"
             )
         else:
-            self._far(weights, placed[used], "; one more leaves no less")
-        return placed[used]
+            self._far(weights, placed, "; one more leaves no less")
+        return placed
 
     def _missed(self, placed: Placement) -> str:
         """The error of weights from stock, and its share of the correction."""

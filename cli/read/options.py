@@ -168,6 +168,11 @@ def places(
     return chosen
 
 
+def weights(flag: str, text: str | None) -> list[float] | None:
+    """Read the masses of an option, kg: 1g,2g,5g."""
+    return None if text is None else [needed(flag, part, "mass", positive=True) for part in text.split(",")]
+
+
 def exact_degrees(text: str) -> Fraction:
     """An angle in degrees as it is written; of radians with fifty digits of π.
 
