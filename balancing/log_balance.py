@@ -357,12 +357,17 @@ class LogBalance:
         exact = np.isinf(nu)
         real = np.where(exact | ~(nu > 0), 1.0, nu)[..., None]
         ratio = np.where(exact[..., None], 1.0, real / gammaincinv(real, node))
-        true = np.maximum(variance[..., None] * ratio, np.finfo(float).tiny)
-        within = chndtr(
-            np.square(ceiling)[..., None] / true, 2.0, np.square(np.abs(self.residual))[..., None] / true
+        # scatter below the last digit of the limit and of the vibration decides nothing
+        size = np.maximum(ceiling, np.abs(self.residual))
+        matters = np.sqrt(np.maximum(variance, 0.0)) > np.finfo(float).eps * size
+        true = np.maximum(np.where(matters, variance, 1.0)[..., None] * ratio, np.finfo(float).tiny)
+        square = (
+            np.square(np.where(matters, ceiling, 0.0)),
+            np.square(np.where(matters, np.abs(self.residual), 0.0)),
         )
+        within = chndtr(square[0][..., None] / true, 2.0, square[1][..., None] / true)
         sure = (np.abs(self.residual) <= ceiling).astype(float)
-        probability = np.where(variance > 0, within @ share, sure)
+        probability = np.where(matters, within @ share, sure)
         return np.asarray(np.where(nu > 0, probability, np.nan))
 
 
