@@ -65,7 +65,7 @@ def test_the_pull_of_a_pendulum_at_one_time(accuracy: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "damping, end, n", [(100.0, 7.0, 40), (107.5616723126892, 5.358242977268, 8), (400.0, 27.0, 40)]
+    ("damping", "end", "n"), [(100.0, 7.0, 40), (107.5616723126892, 5.358242977268, 8), (400.0, 27.0, 40)]
 )
 def test_a_strongly_damped_block_comes_to_rest(damping: float, end: float, n: int) -> None:
     """Long after it has come within rounding of rest it has a place: the pull of its spring has no digit there."""

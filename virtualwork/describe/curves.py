@@ -36,6 +36,24 @@ AXES = {
 }
 
 
+# what every column of these tables is, and its unit
+COLUMNS = {
+    **dict.fromkeys(("t_s", "time_s"), ("time", "s")),
+    "angle_rad": ("angle", "rad"),
+    "angle_deg": ("angle", "deg"),
+    "position_m": ("length", "m"),
+    "position_mm": ("length", "mm"),
+    "speed_rad_s": ("speed", "rad/s"),
+    "speed_rpm": ("speed", "rpm"),
+    **dict.fromkeys(("fx_N", "fy_N"), ("force", "N")),
+    "torque_N_m": ("torque", "N m"),
+    "lift_m": ("length", "m"),
+    "lift_mm": ("length", "mm"),
+    "swing_rad": ("angle", "rad"),
+    "swing_deg": ("angle", "deg"),
+}
+
+
 class Rows(tuple[tuple[float, Any], ...]):
     """The rows of a table with the `name` of its file; it compares as its rows."""
 
@@ -192,6 +210,12 @@ def curve(
     if not all(math.hypot(at, abs(value)) <= LARGEST for at, value in pairs):
         raise wrong(where, name, "finite numbers in every row")
     pairs.name = str(name)
+    for row, (at, value) in zip(rows, pairs, strict=True):
+        for each in row.keys() & COLUMNS.keys():
+            number = at if each == column else value.imag if each == "fy_N" else value.real
+            if row[each]:
+                dimension, unit = COLUMNS[each]
+                entry.file.units.decimals.note(dimension, number, f"{row[each]} {unit}", (1, 1))
     return pairs, column
 
 

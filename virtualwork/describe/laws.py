@@ -15,13 +15,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dalembert.dataclass import dataclass
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.forms import Choice, Scalar
 from virtualwork.describe.keys import declared
 from virtualwork.describe.points import as_number
+
+if TYPE_CHECKING:
+    from decimal import Decimal
 
 TURN = 2 * math.pi
 # of a turn, and of the largest rise: ends this near are the same
@@ -263,22 +266,70 @@ def pieces(law: Sequence[Span], pi: Any = math.pi) -> tuple[tuple[Any, ...], tup
     return tuple(knots), tuple(result)
 
 
-def splined(table: Sequence[tuple[float, float]]) -> tuple[float, tuple[float, ...], tuple[Piece, ...]]:
+def splined(
+    table: Sequence[tuple[float, float]],
+    off: Sequence[tuple[float, float]] = (),
+    number: Callable[[str, Decimal], Any] = lambda _, x: float(x),
+) -> tuple[float, tuple[float, ...], tuple[Piece, ...]]:
     """The periodic cubic spline through a table of lift over a turn: its first angle, knots and pieces.
+
+    Its second derivatives at the rows solve a cyclic system of three diagonals (C. de Boor, A Practical Guide to Splines,
+    ch. IV), in numbers of 40 digits.
 
     Parameters
     ----------
     table : sequence of (angle, lift)
         Rising angles, rad, over one whole turn; the last lift is the first.
+    off : sequence of (angle, lift), optional
+        What the numbers of the table are exactly, less the floats.
+    number : function of a name and a number
+        What a number of a piece becomes; by default a float.
     """
-    from scipy.interpolate import CubicSpline
+    # loaded here: few mechanisms have a cam, and fewer a table of its lift
+    from decimal import Context, Decimal, localcontext
 
-    angles, lifts = [at for at, _ in table], [lift for _, lift in table]
-    lifts[-1] = lifts[0]
-    spline = CubicSpline(angles, lifts, bc_type="periodic")
-    first = angles[0]
-    result = []
-    for (a, b), (c3, c2, c1, c0) in zip(pairwise(angles), spline.c.T.tolist(), strict=True):
-        w = b - a
-        result.append(Piece(a - first, w, c0, 1.0, (0.0, c1 * w, c2 * w * w, c3 * w * w * w)))
-    return first, (*(a - first for a in angles[:-1]), TURN), tuple(result)
+    with localcontext(Context(prec=40)):
+        rows = [(Decimal(at), Decimal(lift)) for at, lift in table]
+        if off:
+            rows = [
+                (at + Decimal(a), lift + Decimal(b)) for (at, lift), (a, b) in zip(rows, off, strict=True)
+            ]
+        at, y = [at for at, _ in rows], [lift for _, lift in rows[:-1]]
+        n = len(y)
+        h = [b - a for a, b in pairwise(at)]
+        slope = [(y[(i + 1) % n] - y[i]) / h[i] for i in range(n)]
+        # of the last row and the first, each in the other's corner: a system without corners, and one of rank one
+        corner, diagonal = h[-1], [2 * (h[i - 1] + h[i]) for i in range(n)]
+        split = -diagonal[0]
+        diagonal[0] -= split
+        diagonal[-1] -= corner * corner / split
+        bends = _solved(h, diagonal, [6 * (slope[i] - slope[i - 1]) for i in range(n)])
+        ends = _solved(h, diagonal, [split, *(0 * x for x in h[2:]), corner])
+        share = (bends[0] + corner * bends[-1] / split) / (1 + ends[0] + corner * ends[-1] / split)
+        bends = [bend - share * end for bend, end in zip(bends, ends, strict=True)]
+        first, result = at[0], []
+        for i, (width, low, bend, following) in enumerate(
+            zip(h, y, bends, [*bends[1:], bends[0]], strict=True)
+        ):
+            rise, square = slope[i] * width, width * width / 6
+            powers = (rise - square * (2 * bend + following), 3 * square * bend, square * (following - bend))
+            numbers = (number(f"{i} {j}", x) for j, x in enumerate((at[i] - first, width, low, *powers)))
+            begin, wide, level, *terms = numbers
+            result.append(Piece(begin, wide, level, 1.0, (0.0, *terms)))
+        begins = tuple(float(a - first) for a in at[:-1])
+    return number("first", first), (*begins, TURN), tuple(result)
+
+
+def _solved(
+    beside: Sequence[Decimal], diagonal: Sequence[Decimal], right: Sequence[Decimal]
+) -> list[Decimal]:
+    """Solve a symmetric system of three diagonals, which dominates: `beside` has those beside the diagonal."""
+    pivots, values = [diagonal[0]], [right[0]]
+    for i in range(1, len(diagonal)):
+        share = beside[i - 1] / pivots[-1]
+        pivots.append(diagonal[i] - share * beside[i - 1])
+        values.append(right[i] - share * values[-1])
+    result = [values[-1] / pivots[-1]]
+    for i in range(len(diagonal) - 2, -1, -1):
+        result.append((values[i] - beside[i] * result[-1]) / pivots[i])
+    return result[::-1]
