@@ -273,9 +273,6 @@ def splined(
 ) -> tuple[float, tuple[float, ...], tuple[Piece, ...]]:
     """The periodic cubic spline through a table of lift over a turn: its first angle, knots and pieces.
 
-    Its second derivatives at the rows solve a cyclic system of three diagonals (C. de Boor, A Practical Guide to Splines,
-    ch. IV), in numbers of 40 digits.
-
     Parameters
     ----------
     table : sequence of (angle, lift)
@@ -288,48 +285,25 @@ def splined(
     # loaded here: few mechanisms have a cam, and fewer a table of its lift
     from decimal import Context, Decimal, localcontext
 
-    with localcontext(Context(prec=40)):
+    from dalembert.arithmetic.splines import DIGITS, periodic
+
+    with localcontext(Context(prec=DIGITS)):
         rows = [(Decimal(at), Decimal(lift)) for at, lift in table]
         if off:
             rows = [
                 (at + Decimal(a), lift + Decimal(b)) for (at, lift), (a, b) in zip(rows, off, strict=True)
             ]
-        at, y = [at for at, _ in rows], [lift for _, lift in rows[:-1]]
-        n = len(y)
-        h = [b - a for a, b in pairwise(at)]
-        slope = [(y[(i + 1) % n] - y[i]) / h[i] for i in range(n)]
-        # of the last row and the first, each in the other's corner: a system without corners, and one of rank one
-        corner, diagonal = h[-1], [2 * (h[i - 1] + h[i]) for i in range(n)]
-        split = -diagonal[0]
-        diagonal[0] -= split
-        diagonal[-1] -= corner * corner / split
-        bends = _solved(h, diagonal, [6 * (slope[i] - slope[i - 1]) for i in range(n)])
-        ends = _solved(h, diagonal, [split, *(0 * x for x in h[2:]), corner])
-        share = (bends[0] + corner * bends[-1] / split) / (1 + ends[0] + corner * ends[-1] / split)
-        bends = [bend - share * end for bend, end in zip(bends, ends, strict=True)]
+        at, y = [at for at, _ in rows], [lift for _, lift in rows]
+        y[-1] = y[0]
+        bends = periodic(at, y)
         first, result = at[0], []
-        for i, (width, low, bend, following) in enumerate(
-            zip(h, y, bends, [*bends[1:], bends[0]], strict=True)
-        ):
-            rise, square = slope[i] * width, width * width / 6
-            powers = (rise - square * (2 * bend + following), 3 * square * bend, square * (following - bend))
-            numbers = (number(f"{i} {j}", x) for j, x in enumerate((at[i] - first, width, low, *powers)))
+        for i, (bend, following) in enumerate(pairwise([*bends, bends[0]])):
+            width = at[i + 1] - at[i]
+            square = width * width / 6
+            slope = y[i + 1] - y[i] - square * (2 * bend + following)
+            powers = (slope, 3 * square * bend, square * (following - bend))
+            numbers = (number(f"{i} {j}", x) for j, x in enumerate((at[i] - first, width, y[i], *powers)))
             begin, wide, level, *terms = numbers
             result.append(Piece(begin, wide, level, 1.0, (0.0, *terms)))
         begins = tuple(float(a - first) for a in at[:-1])
     return number("first", first), (*begins, TURN), tuple(result)
-
-
-def _solved(
-    beside: Sequence[Decimal], diagonal: Sequence[Decimal], right: Sequence[Decimal]
-) -> list[Decimal]:
-    """Solve a symmetric system of three diagonals, which dominates: `beside` has those beside the diagonal."""
-    pivots, values = [diagonal[0]], [right[0]]
-    for i in range(1, len(diagonal)):
-        share = beside[i - 1] / pivots[-1]
-        pivots.append(diagonal[i] - share * beside[i - 1])
-        values.append(right[i] - share * values[-1])
-    result = [values[-1] / pivots[-1]]
-    for i in range(len(diagonal) - 2, -1, -1):
-        result.append((values[i] - beside[i] * result[-1]) / pivots[i])
-    return result[::-1]
