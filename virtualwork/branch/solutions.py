@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from dalembert.arithmetic.varied import rotation
 from virtualwork.branch.choice import Choice
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
@@ -39,7 +40,11 @@ def guessed_unknowns(
     write_unknowns(group, st, x)
     left = []
     for j, g in enumerate(group.slides, len(group.angles)):
-        slide = guessed_slide(g, complex(np.ravel(st.turn[m.guides[g].on])[0]), points, m, directions)
+        body = m.guides[g].on
+        # of a link that a rack turns with a slide of this group the turn is not known yet: the guess says it
+        tied = body in group.links and body in angles
+        on = complex(rotation(angles[body])) if tied else complex(np.ravel(st.turn[body])[0])
+        slide = guessed_slide(g, on, points, m, directions)
         if slide is None:
             left.append(j)
         else:
