@@ -57,7 +57,7 @@ def read_text(
 
 def _parts(file: File) -> dict[str, Any]:
     """Every part of the mechanism, under the name that `Description` gives it."""
-    require_keys(file.data, {*FILE, *TABLES}, "the file", "table or key")
+    require_keys(file.data, [*FILE, *TABLES], "the file", "table or key")
     units = file.data.get("units", {})
     require_keys(units, UNITS, "[units]", "key")
     file.units = Units(units)
