@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from balancing.dependence import damping_norms, threshold
 from dalembert.arithmetic.doubled import Doubled
 from dalembert.arithmetic.doubled_functions import DOUBLED
 from dalembert.arithmetic.doubled_vectors import Vectors, part, total
@@ -134,6 +135,67 @@ def _orthogonal(a: Vectors) -> tuple[list[Vectors], list[list[Vectors]]]:
             columns[j] = columns[j] - q * share[..., None]
             upper[k].append(share)
     return columns, upper
+
+
+def damped(ridge: float, a: Vectors) -> Vectors:
+    """Return A (..., m, n) with the rows λ‖A_k‖ of a ridge below it."""
+    norms, n = DOUBLED.sqrt(total(a.square, -2)), a.shape[-1]
+    given = norms.high > 0
+    norms = Doubled(np.where(given, norms.high, damping_norms(a.value)), np.where(given, norms.low, 0.0))
+    below = part(norms * ridge, (..., None)) * np.eye(n)
+    return Vectors.joined([a, Vectors(below, below * 0.0)], axis=-2)
+
+
+def pseudo_inverse(a: Vectors) -> Vectors:
+    """Return A⁺ (..., n, m) of A (..., m, n); its rank is that of the floats nearest to it.
+
+    Of lower rank A = C F, C independent columns of it, has A⁺ = F⁺ C⁺.
+
+    Examples
+    --------
+    >>> pseudo_inverse(Vectors.of(np.array([[1, 1], [1, 1]]))).value.real
+    array([[0.25, 0.25],
+           [0.25, 0.25]])
+    """
+    rows, columns = a.shape[-2:]
+    floats = a.value
+    sigma = np.linalg.svd(floats, compute_uv=False)
+    rank = (sigma > threshold(rows, columns) * sigma[..., :1]).sum(axis=-1)
+    if (rank == columns).all():
+        return smallest_squares(a[..., None, :, :], Vectors.of(-np.eye(rows)))[0].swapped()
+    inverse = Vectors.of(np.zeros((*a.shape[:-2], columns, rows)))
+    for case in np.ndindex(rank.shape):
+        one, few = a[case], int(rank[case])
+        if few == columns:
+            inverse[case] = pseudo_inverse(one)
+        elif few:
+            chosen = one[:, _independent(floats[case], few)]
+            left = pseudo_inverse(chosen)
+            right = least_norm(product(left, one)[None], Vectors.of(-np.eye(few))).swapped()
+            inverse[case] = product(right, left)
+    return inverse
+
+
+def _independent(a: NDArray[np.complex128], rank: int) -> list[int]:
+    """Return the numbers of independent columns, each the largest off the span of those before."""
+    left, chosen = a.copy(), list[int]()
+    for _ in range(rank):
+        sizes = np.linalg.norm(left, axis=0)
+        sizes[chosen] = -1.0
+        chosen.append(int(np.argmax(sizes)))
+        q = left[:, chosen[-1]] / sizes[chosen[-1]]
+        left -= np.outer(q, q.conj() @ left)
+    return sorted(chosen)
+
+
+def product(a: Vectors, b: Vectors) -> Vectors:
+    """Return A B, (..., l, m) and (..., m, n)."""
+    return (a[..., :, :, None] * b[..., None, :, :]).total(-2)
+
+
+def applied(a: Vectors, x: Vectors) -> Vectors:
+    """Return A x, (..., m, n) and (..., n)."""
+    return (a * x[..., None, :]).total()
 
 
 def spline(x: Doubled, y: Doubled, z: Doubled) -> Doubled:

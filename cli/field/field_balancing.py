@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -26,15 +26,15 @@ from balancing import (
 )
 from balancing.dependence import directions
 from balancing.objective import Objective
-from cli.field.request import Request, ceiling_in, limits_in, masses_at
-from cli.read.options import bad
+from cli.field.fit import Request
+from cli.read.options import bad, mass_at
 from cli.read.runs.runs import SHOWN, Complex, Group, Real, Runs
 from cli.read.stored import Stored
-from dalembert.angles import degrees, in_turn
+from dalembert.angles import degrees, in_turn, phasor
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.parts import in_parts
 from dalembert.errors import DataError
-from dalembert.units import Scaled, amplitude_kind, from_si
+from dalembert.units import UNITS, Scaled, amplitude_kind, from_si, to_si, written
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -148,11 +148,11 @@ class FieldBalancing:
         if request.stock is not None and runs.per != "mass":
             raise bad("--stock", "the table has unbalances: expected trial masses")
         self._placed: dict[complex, Placement] = {}
-        self.max_mass = limits_in(request.max_mass, runs) or runs.max_mass
+        self.max_mass = _limits_in(request.max_mass, runs) or runs.max_mass
         """Limit of each plane, SI; the key "" is for all."""
-        self.ceiling = ceiling_in(request.max_residual, runs)
+        self.ceiling = _ceiling_in(request.max_residual, runs)
         """Of the residuals, in the table's amplitude unit."""
-        self.predict = masses_at(request.predict, runs)
+        self.predict = _masses_at(request.predict, runs)
         """Plane -> mass of a run to be predicted, SI; the key "" is the only plane."""
         self.limited = bool(request.objective == "minimax" or self.max_mass or self.ceiling is not None)
         """Whether the corrections are others than those by plain least squares."""
@@ -354,7 +354,7 @@ class FieldBalancing:
     @property
     def unit(self) -> str:
         """The unit of a correction as people write it."""
-        return self.runs.mass_unit.replace("_", "·")
+        return written(self.runs.mass_unit)
 
     def amount(self, value: Scaled) -> Scaled:
         """Return a correction in the unit of the trial masses."""
@@ -409,3 +409,42 @@ def planes_say(planes: list[str], combination: Complex) -> str:
         f"the readings cannot tell the planes {' and '.join(unseen)} apart (singular): masses in the ratio "
         f"{_combination(planes, combination)} leave no trace; leave one of these planes out, or damp with --ridge"
     )
+
+
+# -- the limits of the request, in the table's units --------------------------------------------------------------------
+
+
+def _limits_in(limits: Mapping[str, tuple[float, str]], runs: Runs) -> dict[str, float]:
+    """Return limits in SI, in the dimension of the trials."""
+    for value, unit in limits.values():
+        if unit not in UNITS[runs.per]:
+            raise bad(
+                "--max-mass", f"'{value:g}{unit}': expected a limit in units of {runs.per}, as the trials are"
+            )
+    return {plane: float(to_si(value, runs.per, unit)) for plane, (value, unit) in limits.items()}
+
+
+def _ceiling_in(limit: tuple[float, str] | None, runs: Runs) -> float | None:
+    """Return the residual limit in the table's unit; without a tag it is meant as the table's amplitudes are."""
+    if limit is None:
+        return None
+    value, unit = limit
+    if not amplitude_kind(unit)[1]:
+        unit += amplitude_kind(runs.amplitude_unit)[1]
+    return runs.in_unit(value, unit, "--max-residual")
+
+
+def _masses_at(text: str | None, runs: Runs) -> dict[str, complex] | None:
+    """Read `10kg@-90deg`, or `A=10kg@-90deg,B=5kg@20deg`, SI; the key "" is the only plane."""
+    if text is None:
+        return None
+    out: dict[str, complex] = {}
+    for part in text.split(","):
+        plane, _, value = part.strip().rpartition("=")
+        expected = f"'{part}': expected MASS@ANGLE, such as 10kg@-90deg"
+        size, unit, angle, of_angle = mass_at("--predict", part, value, runs.per, expected)
+        if plane.strip() in out:
+            raise bad("--predict", f"'{part}': this plane is given twice")
+        on = float(to_si(size, runs.per, unit))
+        out[plane.strip()] = complex(phasor(np.array(on), np.array(angle), of_angle))
+    return out

@@ -11,11 +11,12 @@ import numpy as np
 
 from balancing.picture import Vibration, vibration
 from cli.field.field_balancing import FieldBalancing
-from cli.field.rotor import Rotor, Rows, Tables, amplitude_unit, each, masses_text
-from cli.field.tables import sense
+from cli.field.remarks import sense
+from cli.field.rotor import Rotor, each
+from cli.field.tables import Rows, Tables, amplitude_unit, masses_text
 from cli.read.options import bad
+from cli.read.planes_and_tolerance import verdict_table
 from cli.read.runs.runs import Complex
-from cli.read.tolerance import verdict_table
 from cli.show.picture import blank
 from cli.show.result import Bar, Bars, Section, Sheet
 from dalembert.angles import degrees
@@ -334,7 +335,7 @@ def _on_places(b: FieldBalancing, w: complex) -> list[float]:
 def _history(b: FieldBalancing, rotor: Rotor) -> History:
     from balancing import region_factor
     from balancing.log_picture import History
-    from cli.field.logs import predicted, suggested
+    from cli.field.fit_tables import predicted, suggested
 
     solved, i, balance = rotor.solved, rotor.i, rotor.solved.fitted
     spreads, prediction, masses = [], None, None
@@ -386,7 +387,7 @@ def machine_page(b: FieldBalancing) -> Page:
     """
     from balancing import initial_unbalance
     from balancing.sheet import machine_sheet
-    from cli.field.logs import spread
+    from cli.field.fit_tables import spread
 
     runs, request = b.runs, b.request
     if len(runs.rotors) > 1:

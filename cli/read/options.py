@@ -131,6 +131,43 @@ def mass_at(
     return size, unit, *turn
 
 
+def reading_error(text: str | None) -> tuple[float, float] | None:
+    """Read `2%,2deg`: relative error of the amplitude, error of the phase in rad."""
+    if text is None:
+        return None
+    from dalembert.quantities import parse_number
+
+    amplitude, phase = 0.0, 0.0
+    for part in text.split(","):
+        part = part.strip()
+        if part.endswith("%"):
+            try:
+                amplitude = parse_number(part[:-1]) / 100
+            except ValueError:
+                raise bad("--reading-error", f"'{part}': expected a share such as 2%") from None
+        else:
+            phase = needed("--reading-error", part, "angle")
+    if amplitude < 0 or phase < 0 or amplitude + phase == 0:
+        raise bad("--reading-error", f"'{text}': expected positive errors, such as 2%,2deg")
+    return amplitude, phase
+
+
+def mass_limits(texts: Sequence[str]) -> dict[str, tuple[float, str]]:
+    """Read the limits of --max-mass, `5g` or `A=5g`, joined by commas: plane -> value and unit; the key "" is for all."""
+    limits: dict[str, tuple[float, str]] = {}
+    for text in ",".join(texts).split(",") if texts else ():
+        plane, mark, value = text.rpartition("=")
+        if mark and not plane.strip():
+            raise bad("--max-mass", f"'{text}': expected a plane's name before =, such as A=5g")
+        dimension = "unbalance" if "_" in value or "*" in value or "·" in value else "mass"
+        limit = with_unit("--max-mass", value, dimension, positive=True)
+        assert limit is not None
+        if plane.strip() in limits:
+            raise bad("--max-mass", f"'{text}': this limit is given twice")
+        limits[plane.strip()] = limit
+    return limits
+
+
 def two_bearings(flag: str, text: str) -> tuple[float, float]:
     """Read `Z1:Z2`, the places of two bearings, m."""
     parts = text.split(":")

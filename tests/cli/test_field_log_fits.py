@@ -175,8 +175,7 @@ def test_many_machines_with_runs_of_their_own(dalembert: Dalembert) -> None:
 
 def test_machines_with_runs_planes_and_repeats_of_their_own_are_each_least_squares(tmp_path: Any) -> None:
 
-    from cli.field.groups import measured_groups
-    from cli.field.request import Request
+    from cli.field.fit import Request, measured_groups
 
     rng = np.random.default_rng(11)
     known, lines = {}, []

@@ -1,16 +1,15 @@
-"""The rows of a table of runs side by side: rotors of like shape become arrays together."""
+"""The rows of a table of runs, with the masses of each, side by side: rotors of like shape become arrays together."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.read.runs.masses import NO, YES, Masses
 from cli.read.runs.runs import SHOWN, Channel, Complex, Exact, Group, Lines, Real, Rows, Runs
 from dalembert.errors import DataError
 from dalembert.tables.table import numbered
@@ -18,7 +17,71 @@ from dalembert.tables.table import numbered
 if TYPE_CHECKING:
     from dalembert.arithmetic.doubled_vectors import Vectors
 
+    OfRows = list[dict[str, Vectors] | None]
+
 T = TypeVar("T", Complex, "Vectors")
+Mass = TypeVar("Mass", complex, "Vectors")
+
+
+YES = ("yes", "y", "true", "1", "kept", "on", "ja", "j", "bleibt")
+NO = ("no", "n", "false", "0", "", "removed", "off", "nein")
+
+
+class Masses(NamedTuple):
+    """What the rows of a table put on, an entry for each mass."""
+
+    planes: list[str]
+    row: Rows
+    """Ascending, (k,)."""
+    plane: Rows
+    value: Complex
+    """SI."""
+    stated: NDArray[np.bool_]
+    """Whether a row says anything of masses, (n,)."""
+    exact: Callable[[], Vectors]
+    """The values in 32 digits, as the file has them; worked out on request."""
+
+    @classmethod
+    def of(
+        cls, rows: Sequence[dict[str, complex] | None], exact: Callable[[], OfRows] | None = None
+    ) -> Masses:
+        """Take the masses of each row, plane -> mass; None where it says nothing of them. `exact`: in 32 digits."""
+        planes: dict[str, int] = {}
+        entries = [
+            (i, planes.setdefault(plane, len(planes)), mass)
+            for i, masses in enumerate(rows)
+            for plane, mass in (masses or {}).items()
+        ]
+        row, plane, value = zip(*entries, strict=True) if entries else ((), (), ())
+        stated = np.array([masses is not None for masses in rows])
+        at, of = (np.array(part, dtype=np.intp) for part in (row, plane))
+
+        def values() -> Vectors:
+            from dalembert.arithmetic.doubled_vectors import Vectors
+
+            if exact is None or not entries:
+                return Vectors.of(np.array(value, dtype=complex))
+            each = [mass for masses in exact() for mass in (masses or {}).values()]
+            return Vectors.joined([mass[None] for mass in each])
+
+        return cls(list(planes), at, of, np.array(value, dtype=complex), stated, values)
+
+    def by_row(self) -> list[dict[str, complex] | None]:
+        """Return them as `of` takes them."""
+        return self._rows(self.value.tolist())
+
+    def exact_by_row(self) -> OfRows:
+        """Return the same in 32 digits."""
+        values = self.exact()
+        return self._rows([values[k] for k in range(len(self.row))])
+
+    def _rows(self, values: Sequence[Mass]) -> list[dict[str, Mass] | None]:
+        out: list[dict[str, Mass] | None] = [{} if stated else None for stated in self.stated.tolist()]
+        for i, plane, mass in zip(self.row.tolist(), self.plane.tolist(), values, strict=True):
+            mine = out[i]
+            assert mine is not None
+            mine[self.planes[plane]] = mass
+        return out
 
 
 @dataclass(eq=False, repr=False)

@@ -1,9 +1,11 @@
-"""Runs as arrays: rotors that were measured in the same way, side by side; channels: which sensor, at which speed or in which state, a row reads."""
+"""Runs as arrays: rotors that were measured in the same way, side by side; channels: which sensor, at which speed or in which state, a row reads; dates."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,6 +18,8 @@ from dalembert.tables.table import Table, numbered
 from dalembert.units import UNITS, Scaled, amplitude_kind, from_si, to_si
 
 if TYPE_CHECKING:
+    from balancing.log_again import ExactPrior
+    from dalembert.arithmetic.doubled import Doubled
     from dalembert.arithmetic.doubled_vectors import Vectors
 
 Real = NDArray[np.float64]
@@ -88,6 +92,8 @@ class Before:
     """Between machines, as a share of the coefficients; None of one machine."""
     reading: tuple[float, float] | None
     """Standard deviation of their readings as vectors, in the runs' unit, and its complex degrees of freedom."""
+    exact: Callable[[], tuple[ExactPrior, Doubled]]
+    """The coefficients and that deviation in 32 digits, as the files have them; computed on request."""
 
 
 @dataclass(eq=False, repr=False)
@@ -156,6 +162,11 @@ class Group:
     def chance(self) -> Real:
         """How often by chance a residual of the fit is as large as each of them, (g, r, s)."""
         return balancing.outlier_probability(self.fit)
+
+    @cached_property
+    def drift(self) -> balancing.Drift | None:
+        """How the vibration of each rotor changes in a year, and how often so much by chance; None without dates."""
+        return None if self.lines.years is None else balancing.drift(self.fit, self.lines.years)
 
     @cached_property
     def means(self) -> Complex:
@@ -318,3 +329,50 @@ def channels_of(table: Table, rotor: Rows) -> tuple[list[Channel], Rows]:
         channel = Channel(one, None if none else float(mean[1]), None if none else float(mean[0]), state=of)
         code.append(out.setdefault(channel, len(out)))
     return list(out), np.array(code)[number]
+
+
+# -- dates --------------------------------------------------------------------------------------------------
+
+_ISO = re.compile(
+    r"(\d{4})[-/](\d{1,2})(?:[-/](\d{1,2}))?(?:[T ]+(\d{1,2}):(\d{2})(?::(\d{2})(?:\.\d+)?)?Z?)?"
+)
+_POINTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?:,?\s+(\d{1,2}):(\d{2})(?::(\d{2}))?)?")
+DATE = "a date such as 2019-03-14, 2019-03-14 08:30 or 14.03.2019"
+YEAR = 365.25
+
+
+def years(table: Table) -> Real | None:
+    """Return the date of each row in years, from any origin; NaN where there is none, None without a column of dates."""
+    written = table.texts.get("date")
+    if written is None or not any(written):
+        return None
+    return np.array([_year(table, i, text) if text else np.nan for i, text in enumerate(written)])
+
+
+def _year(table: Table, row: int, text: str) -> float:
+    iso, points = _ISO.fullmatch(text), _POINTS.fullmatch(text)
+    match = iso or points
+    if match is None:
+        raise table.error(row, "date", text, DATE)
+    first, month, last, *clock = match.groups()
+    year, day = (first, last or "1") if iso else (last, first)
+    try:
+        hour, minute, second = (int(part or 0) for part in clock)
+        at = datetime(int(year), int(month), int(day), hour, minute, second)
+    except ValueError:
+        raise table.error(row, "date", text, DATE) from None
+    # in days first, so that no digit is lost
+    return (at - datetime(2000, 1, 1)).total_seconds() / 86400 / YEAR
+
+
+def latest(table: Table) -> str | None:
+    """Return the last date of a table, as 2019-03-14; None where none can be read."""
+    matches = [
+        _ISO.fullmatch(text) or _POINTS.fullmatch(text) for text in table.texts.get("date", ()) if text
+    ]
+    days = []
+    for match in filter(None, matches):
+        first, month, last = match.groups()[:3]
+        year, day = (first, last or "01") if match.re is _ISO else (last, first)
+        days.append(f"{year}-{int(month):02}-{int(day):02}")
+    return max(days, default=None)

@@ -1,4 +1,4 @@
-"""Warnings about a balancing in the field."""
+"""The sentences about a balancing in the field: warnings, and how angles and phases are counted."""
 
 from __future__ import annotations
 
@@ -212,9 +212,7 @@ class _Group:
 
     def _drifts(self) -> Iterator[str]:
         """Where the vibration without masses drifts with time."""
-        from cli.field.logs import drifts
-
-        of_time = drifts(self.group)
+        of_time = self.group.drift
         if of_time is None:
             return
 
@@ -248,3 +246,34 @@ class _Group:
                 f"deviation), more than --reading-error says ({np.sqrt(mean[i]):.4g}): uncertainties are too small"
             ),
         )
+
+
+def sense(b: FieldBalancing) -> str:
+    """Return how phases and mass angles are counted, as a sentence."""
+    request = b.request
+    lags = request.phase_lag or b.runs.lags
+    if request.four_run:
+        return "Mass angles as in the table; no phase is used."
+    if request.rotation is None and not lags:
+        return "Phases and mass angles are counted in one common sense, from one mark on the rotor."
+    turning = (
+        f"the shaft turns {request.rotation} as seen against +z"
+        if request.rotation
+        else "phases are counted with the mass angles"
+    )
+    return (
+        f"The instrument's phases {'lag' if lags else 'lead'} ({turning}); all phases given out are counted in the sense of "
+        "the mass angles."
+    )
+
+
+def conventions(b: FieldBalancing) -> str:
+    """Return how angles and phases are counted and what the corrections mean, as sentences."""
+    amounts = f"{b.runs.per}{'es' if b.runs.per == 'mass' else 's'}"
+    radius = "at the radius of the trial masses"
+    if b.request.from_here:
+        return f"{sense(b)}\nTrim: {amounts} to ADD to the rotor as it stands in its last run, {radius}."
+    return (
+        f"{sense(b)}\nCorrections: {amounts} to ADD to the rotor in its initial state, all trial masses off, {radius}. "
+        "Trim: what to ADD to the rotor as it stands in its last run."
+    )

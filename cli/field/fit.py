@@ -1,9 +1,9 @@
-"""Rotors that were measured in the same way, side by side, and the one fit of their runs."""
+"""The request, and the one fit of the measured runs: rotors that were measured in the same way side by side."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +18,58 @@ from balancing import (
     joint_fit,
     phase_sense,
 )
-from cli.field.request import Request
 from cli.read import options
+from cli.read.planes_and_tolerance import Tolerance
 from cli.read.runs.reading import Measured, read_measured
 from cli.read.runs.runs import SHOWN, Before, Complex, Group, Rows, Runs
 from cli.read.stored import Stored, read_runout
 from dalembert.errors import DataError
 
 Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Request:
+    """The options of a balancing in the field."""
+
+    reading_error: tuple[float, float] | None = None
+    """Relative, rad."""
+    tolerance: Tolerance | None = None
+    max_mass: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    """Limit of each plane, a value and its unit; the key "" is for all."""
+    max_residual: tuple[float, str] | None = None
+    objective: str = "least-squares"
+    from_here: bool = False
+    monte_carlo: int = 0
+    four_run: bool = False
+    ridge: float = 0.0
+    radius: float | None = None
+    phase_lag: bool = False
+    rotation: str | None = None
+    places: list[float] | None = None
+    """Where masses can go, degrees: the corrections are split onto them."""
+    stock: list[float] | None = None
+    """The weights in stock, kg, of which the corrections are made there."""
+    fit: bool = False
+    """Whether all runs are to be fitted together; from here on what else is asked of that."""
+    exclude: Sequence[str] = ()
+    predict: str | None = None
+    suggest: bool = False
+    robust: bool = False
+    view: str | None = None
+    """`static-couple`: the corrections of two planes as a static part and a couple."""
+    zone_class: str | None = None
+    """The machine whose zones of severity are asked for."""
+
+    @property
+    def against(self) -> bool:
+        """Whether the instrument counts phases against the sense of the mass angles."""
+        return self.phase_lag != (self.rotation == "cw")
+
+    @property
+    def lagging(self) -> bool | None:
+        """The same, None where the options do not say it."""
+        return self.against if self.phase_lag or self.rotation is not None else None
 
 
 def measured_groups(
