@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing.dependence import columns_scaled
-from balancing.second_run import applied, damped, product, pseudo_inverse
-from dalembert.arithmetic.doubled import Doubled
+from balancing.second_run import applied, chosen, damped, product, pseudo_inverse
+from dalembert.arithmetic.doubled import Doubled, doubled
 from dalembert.arithmetic.doubled_functions import DOUBLED
 from dalembert.arithmetic.doubled_vectors import Vectors, part, total
 
@@ -79,9 +79,7 @@ def exact_stored(mean: Vectors, covariance: Vectors) -> ExactPrior:
             if i == j:
                 # what is left in the rounding of 32 digits is nothing
                 some = rest.x.high > 1e-28 * covariance[:, j, j].x.high
-                size = DOUBLED.sqrt(
-                    Doubled(np.where(some, rest.x.high, 1.0), np.where(some, rest.x.low, 0.0))
-                )
+                size = DOUBLED.sqrt(chosen(some, rest.x, 1.0))
                 rest = Vectors(size, size * 0.0) * size
             root[:, i, j] = (rest / size) * some.astype(float)
     factor = Vectors.of(np.zeros((channels, planes, channels, planes)))
@@ -98,9 +96,7 @@ def exact_pooled(each: Vectors, covariances: Vectors) -> ExactPrior:
     d = (each - mean[None]) / DOUBLED.sqrt(Doubled(np.array(machines - 1)))
     square = mean.square
     largest = float(square.high.max()) or 1.0
-    scale = Doubled(
-        np.where(square.high > 0, square.high, largest), np.where(square.high > 0, square.low, 0.0)
-    )
+    scale = chosen(square.high > 0, square, largest)
     many = np.array(float(scale.high.size))
 
     def share(sizes: Doubled) -> Doubled:
@@ -129,15 +125,16 @@ def exact_prior_fit(
 ) -> ExactFit:
     """Fit runs and what was known before: `balancing.prior.fit_with_prior`; `deviation` (..., r, s) of the readings."""
     read = np.swapaxes(present, -1, -2)
-    sd = Doubled(*(np.swapaxes(np.where(present, x, 0.0), -1, -2) for x in (deviation.high, deviation.low)))
+    sd = chosen(present, deviation)
+    sd = Doubled(*(np.swapaxes(x, -1, -2) for x in (sd.high, sd.low)))
     typical = total(sd) / read.sum(axis=-1).astype(float)
     least = part(typical, (..., None)) * Doubled.of(Fraction(1, 1000))
     low = sd.high < least.high
     floor = Doubled(np.where(low, least.high, sd.high), np.where(low, least.low, sd.low))
     weighed = read & (floor.high > 0)
-    floor = Doubled(np.where(weighed, floor.high, 1.0), np.where(weighed, floor.low, 0.0))
+    floor = chosen(weighed, floor, 1.0)
     root = part(typical, (..., None)) / floor
-    root = Doubled(np.where(weighed, root.high, read), np.where(weighed, root.low, 0.0))
+    root = chosen(weighed, root, np.where(read, 1.0, 0.0))
     square = root * root
     share = square / part(total(square), (..., None))
     w = masses[..., None, :, :]
@@ -173,37 +170,38 @@ def correction_deviations(
     fit: ExactFit,
     initial: Vectors,
     corrections: Vectors,
-    direction: Vectors,
+    given: Vectors,
     errors: ExactErrors,
     weights: Real | None = None,
-    ridge: float = 0.0,
+    ridge: float | Doubled = 0.0,
 ) -> tuple[Doubled, Doubled]:
-    """Return the deviations of least-squares corrections (..., p) along a direction of theirs and across it.
+    """Return the deviations of least-squares corrections (..., p), as given, along themselves and across.
 
     As `balancing.propagation` and `LogBalance.covariance` have them. `initial`: (..., s), the vibration without masses;
-    `corrections`: all that is added to the rotor without masses.
+    `corrections`: all that is added to the rotor without masses; `given`: what is added to it as it stands.
     """
     alpha = fit.unknowns[..., 1:]
     channels = alpha.shape[-2]
     w = np.ones(alpha.shape[:-1]) if weights is None else weights
     root = DOUBLED.sqrt(Doubled(w))
     a = alpha * part(root, (..., None))
-    inverse = pseudo_inverse(damped(ridge, a) if ridge else a)
+    ridge = doubled(ridge)
+    inverse = pseudo_inverse(damped(ridge, a) if ridge.high else a)
     own = inverse[..., :channels] * part(root, (..., None, slice(None)))
     m = product(inverse, inverse.swapped().conj)[..., :, None, :]
     left = (initial + applied(alpha, corrections)) * w
     ones = Vectors.of(np.ones((*corrections.shape[:-1], 1)))
     linear = -(own[..., None] * Vectors.joined([ones, corrections], axis=-1)[..., None, None, :])
     antilinear = -(m * left[..., None, :, None])
-    if ridge:
-        square = Doubled(np.array(ridge)) * ridge
-        pulled = alpha * corrections[..., None, :] * w[..., None] * square
+    if ridge.high:
+        square = ridge * ridge
+        pulled = alpha * given[..., None, :] * w[..., None] * square
         antilinear = antilinear - m * pulled[..., None, :, :]
-        back = alpha.conj * corrections[..., None, :] * w[..., None] * square
+        back = alpha.conj * given[..., None, :] * w[..., None] * square
         linear[..., 1:] = linear[..., 1:] - m * back[..., None, :, :]
-    size = direction.size
+    size = given.size
     some = size.high > 0
-    turn = direction.conj / Doubled(np.where(some, size.high, 1.0), np.where(some, size.low, 0.0))
+    turn = given.conj / chosen(some, size, 1.0)
     turn = turn + Vectors.of((~some).astype(complex))
     squares = [Doubled(np.zeros(some.shape)) for _ in range(2)]
 

@@ -245,6 +245,7 @@ def fit_with_prior(
 def _again(plain: JointFit, prior: Prior, deviation: Real | None) -> Vectors:
     """Return the unknowns in 32 digits, of floats as exact."""
     from balancing.log_again import ExactPrior, exact_fit, exact_prior_fit
+    from balancing.second_run import chosen
     from dalembert.arithmetic.doubled import Doubled
     from dalembert.arithmetic.doubled_vectors import Vectors, part
 
@@ -254,8 +255,7 @@ def _again(plain: JointFit, prior: Prior, deviation: Real | None) -> Vectors:
     known = ExactPrior(*map(Vectors.of, (prior.mean, prior.factor, prior.root)))
     if deviation is None:
         scattered = np.nan_to_num(plain.residual_sd) > 0
-        sd = Doubled(*(np.where(scattered, x, 0.0) for x in (again.residual_sd.high, again.residual_sd.low)))
-        each = part(sd, (..., None, None)) * np.ones(present.shape)
+        each = part(chosen(scattered, again.residual_sd), (..., None, None)) * np.ones(present.shape)
     else:
         each = Doubled(np.where(present, deviation, 0.0))
     return exact_prior_fit(again, readings, masses, present, known, each).unknowns

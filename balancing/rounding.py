@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from balancing.dependence import roundings
 from balancing.influence import influence_coefficients
 from balancing.second_run import damped, smallest_squares
-from dalembert.arithmetic.doubled import Doubled
+from dalembert.arithmetic.doubled import Doubled, doubled
 from dalembert.arithmetic.doubled_functions import DOUBLED
 from dalembert.arithmetic.doubled_vectors import Vectors, part
 
@@ -80,13 +80,13 @@ class Problem(NamedTuple):
         return self.initial + (self.influence * corrections[..., None, :]).total()
 
 
-def least_squares_again(problem: Problem, ridge: float) -> Vectors:
+def least_squares_again(problem: Problem, ridge: float | Doubled) -> Vectors:
     """Return the corrections of a least-squares problem without limits in 32 digits."""
     a, b = problem.influence, problem.initial
     if problem.weights is not None:
         of_rows = DOUBLED.sqrt(Doubled(np.asarray(problem.weights, dtype=float)))
         a, b = a * part(of_rows, (..., None)), b * of_rows
-    if ridge:
+    if doubled(ridge).high:
         a = damped(ridge, a)
         lead = np.broadcast_shapes(a.shape[:-2], b.shape[:-1])
         b = Vectors.joined(

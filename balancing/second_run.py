@@ -137,7 +137,7 @@ def _orthogonal(a: Vectors) -> tuple[list[Vectors], list[list[Vectors]]]:
     return columns, upper
 
 
-def damped(ridge: float, a: Vectors) -> Vectors:
+def damped(ridge: float | Doubled, a: Vectors) -> Vectors:
     """Return A (..., m, n) with the rows λ‖A_k‖ of a ridge below it."""
     norms, n = DOUBLED.sqrt(total(a.square, -2)), a.shape[-1]
     given = norms.high > 0
@@ -186,6 +186,11 @@ def _independent(a: NDArray[np.complex128], rank: int) -> list[int]:
         q = left[:, chosen[-1]] / sizes[chosen[-1]]
         left -= np.outer(q, q.conj() @ left)
     return sorted(chosen)
+
+
+def chosen(where: NDArray[np.bool_], a: Doubled, otherwise: float | Real = 0.0) -> Doubled:
+    """Return a, and plain numbers elsewhere."""
+    return Doubled(np.where(where, a.high, otherwise), np.where(where, a.low, 0.0))
 
 
 def product(a: Vectors, b: Vectors) -> Vectors:

@@ -203,7 +203,7 @@ def _tables(b: FieldBalancing, warnings: list[str]) -> Tables:
     if request.zone_class is not None:
         made["zones"] = lambda: read.zones(b)
     if request.four_run:
-        made |= {"misfit": lambda: read.misfit(b), "alternatives": lambda: to_add.alternatives(b)}
+        made |= {"misfit": lambda: read.misfit(b), "alternatives": lambda: read.alternatives(b)}
     if request.view is not None:
         made |= {"static": lambda: to_add.static_couple(b, 0), "couple": lambda: to_add.static_couple(b, 1)}
     if not b.runs.fitted:

@@ -66,6 +66,8 @@ class Solved:
     """(g, p): the rotor's own in its initial state; NaN where the readings do not determine it."""
     covariance: Real | None = None
     residual_95: Real | None = None
+    drawn: int = 0
+    """How many sets of readings the covariance is drawn from; 0: it is of first order."""
     balance: LogBalance | None = None
     """Where the errors of the readings are known: what the corrections leave, and how sure it is."""
 
@@ -236,7 +238,7 @@ class FieldBalancing:
             if len(beyond):
                 i = int(beyond[0])
                 hidden = unseen(alpha[i], solved.group.own_weights(i))[0]
-                raise DataError(self.of(solved.group, i) + planes_say(solved.planes, hidden))
+                raise DataError(self.of(solved.group, i) + _dependent(solved.planes, hidden))
         if plain is not None:
             solved.corrections = plain.corrections
         elif objective.minimax:
@@ -280,7 +282,7 @@ class FieldBalancing:
             yield
         except DependentPlanes as error:
             of = self.of(solved.group, *(error.case[:1] if i is None else [i]))
-            raise DataError(of + planes_say(solved.planes, error.combination)) from None
+            raise DataError(of + _dependent(solved.planes, error.combination)) from None
         except Infeasible as error:
             unit = self.runs.amplitude_unit
             with_limits = " with the limits of the masses" if self.max_mass else ""
@@ -328,6 +330,7 @@ class FieldBalancing:
         doubts = list(in_parts(solved.objective.confidence, tasks, self.executor))
         solved.covariance = np.stack([covariance for covariance, _ in doubts])
         solved.residual_95 = np.array([left for _, left in doubts])
+        solved.drawn = solved.objective.drawn(draws)
         self._unknown(solved)
 
     def _unknown(self, solved: Solved) -> None:
@@ -389,17 +392,11 @@ class FieldBalancing:
         return any(solved.covariance is not None for solved in self.solved)
 
 
-def _combination(names: list[str], combination: Complex) -> str:
-    terms = []
-    for name, share in zip(names, combination, strict=True):
-        if abs(share) > 1e-6:
-            terms.append(f"{abs(share):.3g} at {float(degrees(share)):.0f}° in {name}")
-    return ", ".join(terms)
-
-
-def planes_say(planes: list[str], combination: Complex) -> str:
-    """Say which planes the readings cannot tell apart."""
-    unseen = [name for name, share in zip(planes, combination, strict=True) if abs(share) > 1e-6]
+def _dependent(planes: list[str], combination: Complex) -> str:
+    """Write which planes the readings cannot tell apart."""
+    shares = {name: share for name, share in zip(planes, combination, strict=True) if abs(share) > 1e-6}
+    ratio = ", ".join(f"{abs(w):.3g} at {float(degrees(w)):.0f}° in {name}" for name, w in shares.items())
+    unseen = list(shares)
     if len(unseen) == 1:
         return (
             f"plane {unseen[0]} has no effect on any reading: its correction cannot be found; expected sensors that "
@@ -407,7 +404,7 @@ def planes_say(planes: list[str], combination: Complex) -> str:
         )
     return (
         f"the readings cannot tell the planes {' and '.join(unseen)} apart (singular): masses in the ratio "
-        f"{_combination(planes, combination)} leave no trace; leave one of these planes out, or damp with --ridge"
+        f"{ratio} leave no trace; leave one of these planes out, or damp with --ridge"
     )
 
 

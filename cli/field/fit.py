@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,10 @@ from cli.read.runs.reading import Measured, read_measured
 from cli.read.runs.runs import SHOWN, Before, Complex, Group, Rows, Runs
 from cli.read.stored import Stored, read_runout
 from dalembert.errors import DataError
+
+if TYPE_CHECKING:
+    from balancing.log_again import ExactErrors, ExactFit
+    from dalembert.arithmetic.doubled import Doubled
 
 Flags = NDArray[np.bool_]
 
@@ -327,6 +332,57 @@ class _Groups:
             sd = np.where(fit.degrees_of_freedom > 0, fit.residual_sd, prior.reading[0])
             fit = fit_with_prior(readings, masses, prior.prior, sd[:, None, None])
         return fit
+
+
+def exact_fit(group: Group, runs: Runs, request: Request, stored: Stored | None) -> ExactFit:
+    """Return the fit of a group in 32 digits, of readings, masses and coefficients as they are written."""
+    from balancing import log_again
+    from dalembert.arithmetic.doubled_functions import hypot
+    from dalembert.arithmetic.doubled_vectors import Vectors, part
+
+    readings, masses, _ = group.exact()
+    present, freedom = group.fit.present, np.asarray(group.fit.degrees_of_freedom, dtype=float)
+    if stored is not None or group.amplitude_fits:
+        alpha = Vectors.of(np.zeros(group.fit.influence.shape))
+        for i, r in enumerate(group.rotors.tolist()):
+            if stored is not None:
+                alpha[i] = stored.exact_matrix(runs.rotors[r], group.channels, runs)
+            else:
+                alpha[i] = group.exact_of_amplitudes(i)
+        return log_again.exact_mean(readings, present, alpha, freedom)
+    plain = log_again.exact_fit(readings, masses, present, freedom)
+    if group.before is None:
+        return plain
+    deviation = part(group.exact_scatter(plain), (..., None, None)) * np.ones(present.shape)
+    if request.reading_error is not None:
+        deviation = readings.size * hypot(*_as_stated(request.reading_error))
+    return log_again.exact_prior_fit(plain, readings, masses, present, group.before.exact()[0], deviation)
+
+
+def exact_errors(group: Group, request: Request, fit: ExactFit) -> ExactErrors:
+    """Return the errors of the readings in 32 digits: stated, or as they scatter."""
+    from balancing.log_again import ExactErrors
+    from balancing.second_run import chosen
+    from dalembert.arithmetic.doubled import Doubled
+    from dalembert.arithmetic.doubled_functions import DOUBLED
+    from dalembert.arithmetic.doubled_vectors import Vectors, part
+
+    readings = group.exact().readings
+    if request.reading_error is None:
+        ones = np.ones(readings.shape)
+        each = part(group.exact_scatter(fit) * DOUBLED.sqrt(Doubled(np.array(0.5))), (..., None, None)) * ones
+        return ExactErrors(Vectors.of(ones), each, each)
+    (amplitude, phase), size = _as_stated(request.reading_error), readings.size
+    some = size.high > 0
+    unit = readings / chosen(some, size, 1.0) + Vectors.of(~some)
+    return ExactErrors(unit, size * amplitude, size * phase)
+
+
+def _as_stated(errors: tuple[float, float]) -> tuple[Doubled, Doubled]:
+    """Return the errors of --reading-error as they are written: of the amplitude, relative, and of the phase in rad."""
+    from cli.read.exact import rates, writtens
+
+    return writtens(errors[0]), rates(errors[1]).doubled
 
 
 def _missing(planes: list[str], masses: Complex) -> str:

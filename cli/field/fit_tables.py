@@ -36,12 +36,12 @@ def predicted(b: FieldBalancing, solved: Solved) -> tuple[Complex, Real]:
 
 
 def suggested(rotor: Rotor) -> NextRun | None:
-    """The next run of a rotor; None where nothing tells how sure its corrections are."""
+    """The next run of a rotor; None where nothing tells how sure its corrections are, or the planes are dependent."""
     limit = rotor.solved.objective.max_mass
     if limit is None or not np.isfinite(limit).all():
         raise bad("--suggest", f"needs a --max-mass for every plane: {', '.join(rotor.planes)}")
     one = rotor.solved.fitted.machine(rotor.i)
-    if not np.isfinite(one.covariance).all():
+    if not (np.isfinite(rotor.solved.condition[rotor.i]) and np.isfinite(one.covariance).all()):
         return None
     free = least_squares(one.fit.influence, one.fit.initial, one.weights).corrections
     return suggest_run(LogBalance(one.fit, free, one.errors, one.weights), limit)
@@ -146,6 +146,21 @@ def misfit(b: FieldBalancing) -> Table:
     keys = ("rotor", *(column.name for column in columns))
     above = "r.m.s. misfit of the amplitudes"
     return rows.table([*columns, amplitude(b, "amplitude", off)], keys, "misfit[]", above)
+
+
+def alternatives(b: FieldBalancing) -> Table:
+    """The other corrections that fit the amplitudes as well, by the four-run method."""
+    of = [
+        (rotor.name, rotor.planes[0], -v / a)
+        for rotor in each(b)
+        for v, a in zip(
+            rotor.group.fit.initial[rotor.i], rotor.solved.group.amplitude_fits[rotor.i][0].other, strict=True
+        )
+        if a == a
+    ]
+    fix = masses(b, np.array([w for *_, w in of], dtype=complex))
+    columns = [names("plane", [plane for _, plane, _ in of]), *fix]
+    return Rows.of(b, [name for name, *_ in of]).table(columns, ("rotor", "plane"), "alternatives[]")
 
 
 def residuals(b: FieldBalancing) -> Table:

@@ -267,6 +267,21 @@ def sense(b: FieldBalancing) -> str:
     )
 
 
+def instrument(b: FieldBalancing) -> str:
+    """Return how the phases of a report are counted, which are as the instrument shows them."""
+    if b.request.four_run:
+        return sense(b)
+    if not b.against:
+        return (
+            "Phases as the instrument shows them; they and the mass angles are counted in one common sense, from one mark "
+            "on the rotor."
+        )
+    return (
+        "Phases as the instrument shows them, counted against the sense of the mass angles; those of the influence "
+        "coefficients and of the picture are counted in the sense of the mass angles."
+    )
+
+
 def conventions(b: FieldBalancing) -> str:
     """Return how angles and phases are counted and what the corrections mean, as sentences."""
     amounts = f"{b.runs.per}{'es' if b.runs.per == 'mass' else 's'}"

@@ -11,7 +11,7 @@ import numpy as np
 
 from balancing.picture import Vibration, vibration
 from cli.field.field_balancing import FieldBalancing
-from cli.field.remarks import sense
+from cli.field.remarks import instrument, sense
 from cli.field.rotor import Rotor, each
 from cli.field.tables import Rows, Tables, amplitude_unit, masses_text
 from cli.read.options import bad
@@ -207,7 +207,7 @@ class _Pages:
 
     def _phases(self) -> Section:
         """Return the vibration with its phases, as the instrument shows them."""
-        sentences, last = [_convention(self.b)], self.last
+        sentences, last = [instrument(self.b)], self.last
         if self.rotor.first_reading is None:
             sentences.append("Before: as fitted to all runs, of which none was without masses.")
         if last is not None:
@@ -276,20 +276,6 @@ class _Pages:
         return [table, rest]
 
 
-def _convention(b: FieldBalancing) -> str:
-    if b.request.four_run:
-        return sense(b)
-    if not b.against:
-        return (
-            "Phases as the instrument shows them; they and the mass angles are counted in one common sense, from one mark "
-            "on the rotor."
-        )
-    return (
-        "Phases as the instrument shows them, counted against the sense of the mass angles; those of the influence "
-        "coefficients and of the picture are counted in the sense of the mass angles."
-    )
-
-
 # -- pictures --------------------------------------------------------------------------------------------------
 def draw(b: FieldBalancing, rotors: Sequence[Rotor]) -> Figure:
     """Draw for each rotor the vibration before and after, and the corrections; of a fit with all that it was found from."""
@@ -340,7 +326,14 @@ def _history(b: FieldBalancing, rotor: Rotor) -> History:
     solved, i, balance = rotor.solved, rotor.i, rotor.solved.fitted
     spreads, prediction, masses = [], None, None
     if solved.covariance is not None:
-        factors = region_factor(0.95, balance.degrees_of_freedom[i]).tolist()
+        # corrections of dependent planes, under limits, are drawn: to first order they are not determined
+        known = np.isfinite(solved.condition[i]) or b.request.ridge
+        freedom = (
+            balance.degrees_of_freedom[i]
+            if known
+            else balance.errors.degrees_of_freedom[[i] * len(solved.planes)]
+        )
+        factors = region_factor(0.95, freedom).tolist()
         covariances = solved.covariance[i] * b.amount(1.0) ** 2
         spreads = list(zip(covariances, factors, strict=True))
     if b.predict is not None:
@@ -395,6 +388,11 @@ def machine_page(b: FieldBalancing) -> Page:
     if request.four_run:
         raise bad("--page", "a sheet computes from amplitudes with phases")
     solved = b.solved[0]
+    if not (np.isfinite(solved.condition[0]) or request.ridge):
+        raise bad(
+            "--page",
+            "a sheet computes without limits, and the readings cannot tell the planes apart: leave one out",
+        )
     group = solved.group
     spreads = spread(b, solved)
     covariance, deviations = None, None

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from balancing import Balance
 from cli.field.field_balancing import FieldBalancing, Solved
+from cli.field.fit import exact_errors, exact_fit
 from cli.field.remarks import conventions
 from cli.field.rotor import Rotor, Trim, each
 from cli.read.runs.runs import Channel, Complex, Real
@@ -20,6 +22,7 @@ from dalembert.results.text import angle_text
 from dalembert.units import from_si, written
 
 if TYPE_CHECKING:
+    from dalembert.arithmetic.doubled import Doubled
     from dalembert.arithmetic.doubled_vectors import Vectors
 
 Tables = dict[str, Callable[[], Table]]
@@ -134,12 +137,14 @@ def masses(b: FieldBalancing, values: Complex, place: str | None = "") -> list[C
     ]
 
 
-def uncertainties(b: FieldBalancing, along: Real, across: Real) -> list[Column]:
-    """Return the standard deviations of size and angle of masses."""
-    per, unit = b.runs.per, b.runs.mass_unit
+def uncertainties(
+    b: FieldBalancing, along: Real, across: Real, *exact: Callable[[], Doubled]
+) -> list[Column]:
+    """Return the standard deviations of size and angle of masses; `exact`: in 32 digits."""
+    per, again = b.runs.per, exact or (None, None)
     return [
-        number(f"{per}_uncertainty", per, along, unit),
-        number("angle_uncertainty", "angle", across),
+        number(f"{per}_uncertainty", per, along, b.runs.mass_unit, exact=again[0]),
+        number("angle_uncertainty", "angle", across, exact=again[1]),
     ]
 
 
@@ -173,17 +178,17 @@ def corrections(b: FieldBalancing, warnings: list[str]) -> Table:
     per, unit, rows = b.runs.per, b.runs.mass_unit, Rows.planes(b)
     fix, trim = (rows.numbers(lambda s: s.corrections), rows.numbers(lambda s: s.trim))
 
-    @cache
-    def again() -> list[Real]:
-        """The second run."""
-        from cli.field.digits import digits
+    again = cache(lambda: rows.several(lambda solved: digits(b, solved, warnings)))
 
-        return rows.several(lambda solved: digits(b, solved, warnings).parts)
+    def doubled(k: int) -> Doubled:
+        from dalembert.arithmetic.doubled import Doubled
+
+        return Doubled(*again()[2 * k : 2 * k + 2])
 
     def exact(k: int) -> Vectors:
-        from cli.field.digits import vectors_of
+        from dalembert.arithmetic.doubled_vectors import Vectors
 
-        return vectors_of(again()[4 * k :])
+        return Vectors(doubled(2 * k), doubled(2 * k + 1))
 
     def sized(name: str, values: Complex, k: int, place: str | None) -> list[Column]:
         size, angle = np.abs(values), degrees(values)
@@ -192,14 +197,12 @@ def corrections(b: FieldBalancing, warnings: list[str]) -> Table:
             number(f"{name}angle", "angle", angle, "", lambda: exact(k).turned(values), place),
         ]
 
-    uncertainty = uncertainties(b, *rows.several(lambda s: s.uncertainty(s.corrections)))
-    for column in uncertainty:
-        column.error = lambda column=column: again()[8] * np.nan_to_num(column.values)
+    along, across = rows.several(lambda s: s.uncertainty(s.corrections))
+    uncertainty = uncertainties(b, along, across, lambda: doubled(4), lambda: doubled(5))
     columns = [*sized("", fix, 0, ""), *sized("trim_", trim, 1, None)]
     columns[2:2] = uncertainty if b.uncertain else []
-    below = [
-        "or REMOVE the same amounts at the opposite angles (+180°)" if fix.any() else "nothing to correct"
-    ]
+    opposite = "or REMOVE the same amounts at the opposite angles (+180°)"
+    below = [opposite if fix.any() else "nothing to correct"]
     if not any(solved.standing.any() for solved in b.solved):
         below.append("no mass is on the rotor in its last run: the trim is the correction")
     # the CSV has the rotor always
@@ -208,6 +211,115 @@ def corrections(b: FieldBalancing, warnings: list[str]) -> Table:
     return rows.table(
         columns, ("rotor", "plane"), "corrections[]", conventions(b), "\n".join(below), hidden=hidden
     )
+
+
+class SecondRun:
+    """The second run of a group, in 32 digits."""
+
+    def __init__(self, balancing: FieldBalancing, solved: Solved) -> None:
+        self.balancing, self.solved, self.group = balancing, solved, solved.group
+        self.fit = exact_fit(solved.group, balancing.runs, balancing.request, balancing.stored)
+        self.standing = self.group.exact().standing
+
+    @cached_property
+    def initial(self) -> Vectors:
+        """The vibration without masses, run-out off, (g, s)."""
+        from dalembert.arithmetic.doubled_vectors import Vectors
+
+        runout, exact = Vectors.of(self.balancing.runout(self.group)), self.balancing.runs.exact_runout
+        if exact is not None:
+            vectors = exact()
+            for s, channel in enumerate(self.group.channels):
+                if channel.sensor in vectors:
+                    runout[s] = vectors[channel.sensor]
+        return self.fit.unknowns[..., 0] - runout
+
+    @cached_property
+    def here(self) -> Vectors:
+        """The vibration where the corrections start from, (g, s)."""
+        if not self.solved.start.any():
+            return self.initial
+        return self.initial + (self.alpha * self.standing[:, None, :]).total()
+
+    @property
+    def alpha(self) -> Vectors:
+        """The influence coefficients, (g, s, p)."""
+        return self.fit.unknowns[..., 1:]
+
+    @property
+    def ridge(self) -> Doubled:
+        """That of the option, as it is written."""
+        from cli.read.exact import writtens
+
+        return writtens(self.solved.objective.ridge)
+
+    def corrections(self, warnings: list[str]) -> Vectors:
+        """Return the corrections, (g, p); NaN where they are not determined, and `warnings` says why."""
+        solved, group, objective = self.solved, self.group, self.solved.objective
+        whole = Balance(solved.alpha, solved.here, solved.corrections, group.weights, ridge=objective.ridge)
+        if not objective.limited:
+            exact, _ = whole.second_run(self.alpha, self.here, self.ridge)
+            assert exact is not None
+            return exact
+        from dalembert.arithmetic.doubled_vectors import Vectors
+
+        result = Vectors.of(np.full(solved.corrections.shape, complex(np.nan, np.nan)))
+        ceiling = None if objective.max_residual is None or objective.minimax else objective.max_residual
+        for i in range(len(solved.corrections)):
+            one = replace(
+                whole,
+                influence=solved.alpha[i],
+                initial=solved.here[i],
+                corrections=solved.corrections[i],
+                weights=group.own_weights(i),
+                bound=None if solved.bound is None else float(solved.bound[i]),
+                of_largest=solved.bound is not None,
+                max_mass=objective.max_mass,
+                max_residual=None if ceiling is None else np.full(solved.here.shape[-1], ceiling),
+            )
+            exact, reason = one.second_run(self.alpha[i], self.here[i])
+            if exact is not None:
+                result[i] = exact
+            else:
+                warnings.append(
+                    f"{self.balancing.of(group, i)}--digits: the corrections are given in full, for no bound of their error is "
+                    f"known: {reason}"
+                )
+        return result
+
+    def deviations(self, corrections: Vectors) -> tuple[Doubled, Doubled]:
+        """Return the deviations of size and angle (degrees) of the corrections, (g, p), to first order."""
+        from balancing.log_again import correction_deviations
+        from dalembert.arithmetic.doubled import PI
+
+        solved, group, request = self.solved, self.group, self.balancing.request
+        along, across = correction_deviations(
+            self.fit,
+            self.initial,
+            corrections + self.standing if solved.start.any() else corrections,
+            corrections,
+            exact_errors(group, request, self.fit),
+            group.weights,
+            self.ridge,
+        )
+        return along, across / corrections.size * 180.0 / PI
+
+
+def digits(balancing: FieldBalancing, solved: Solved, warnings: list[str]) -> list[Real]:
+    """Return corrections, trims (four numbers each) and the deviations of corrections (two each) in 32 digits; NaN where unknown."""
+    from dalembert.arithmetic.doubled import Doubled
+
+    run = SecondRun(balancing, solved)
+    corrections = run.corrections(warnings)
+    trim = corrections if solved.start.any() else corrections - run.standing
+    deviations = (Doubled(np.full(solved.corrections.shape, np.nan)),) * 2
+    if solved.drawn:
+        sentence = "--digits: the uncertainties from drawn readings are given in full, for their rounding error is not known"
+        warnings += [sentence] if sentence not in warnings else []
+    elif solved.covariance is not None:
+        deviations = run.deviations(corrections)
+    numbers = [corrections.x, corrections.y, trim.x, trim.y, *deviations]
+    return [np.broadcast_to(part, solved.corrections.shape) for x in numbers for part in (x.high, x.low)]
 
 
 def standing(b: FieldBalancing) -> Table:
@@ -324,21 +436,6 @@ def tolerance(b: FieldBalancing) -> Table:
     whole = from_si(limit.permissible, "unbalance", "g_mm")
     named = f"{limit.grade}: " if limit.grade else ""
     return replace(table, above=f"{named}U_per = {whole:.6g} g·mm, {limit.sharing}; residual as predicted")
-
-
-def alternatives(b: FieldBalancing) -> Table:
-    """The other corrections that fit the amplitudes as well, by the four-run method."""
-    of = [
-        (rotor.name, rotor.planes[0], -v / a)
-        for rotor in each(b)
-        for v, a in zip(
-            rotor.group.fit.initial[rotor.i], rotor.solved.group.amplitude_fits[rotor.i][0].other, strict=True
-        )
-        if a == a
-    ]
-    fix = masses(b, np.array([w for *_, w in of], dtype=complex))
-    columns = [names("plane", [plane for _, plane, _ in of]), *fix]
-    return Rows.of(b, [name for name, *_ in of]).table(columns, ("rotor", "plane"), "alternatives[]")
 
 
 def static_couple(b: FieldBalancing, part: int) -> Table:

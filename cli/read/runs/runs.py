@@ -18,7 +18,7 @@ from dalembert.tables.table import Table, numbered
 from dalembert.units import UNITS, Scaled, amplitude_kind, from_si, to_si
 
 if TYPE_CHECKING:
-    from balancing.log_again import ExactPrior
+    from balancing.log_again import ExactFit, ExactPrior
     from dalembert.arithmetic.doubled import Doubled
     from dalembert.arithmetic.doubled_vectors import Vectors
 
@@ -188,6 +188,41 @@ class Group:
     def bare(self) -> NDArray[np.bool_]:
         """Which runs are without masses, (g, runs)."""
         return np.asarray(~self.on.any(axis=2))
+
+    def exact_scatter(self, fit: ExactFit) -> Doubled:
+        """Return the deviation of the readings in 32 digits, (g,): as residuals scatter, or as those of sisters did, or none."""
+        from balancing.second_run import chosen
+        from dalembert.arithmetic.doubled import Doubled
+
+        sd, estimated = self.fit.residual_sd, np.asarray(self.fit.degrees_of_freedom > 0)
+        scatter = chosen(estimated & (sd > 0), fit.residual_sd)
+        if self.before is None or self.before.reading is None:
+            return scatter
+        before = self.before.exact()[1]
+        return Doubled(
+            *(np.where(estimated, *both) for both in ((scatter.high, before.high), (scatter.low, before.low)))
+        )
+
+    def exact_of_amplitudes(self, i: int) -> Vectors:
+        """Return the coefficients of a rotor without phase in 32 digits, (s, p)."""
+        from dalembert.arithmetic.doubled_vectors import Vectors
+
+        readings, masses, _ = self.exact()
+        read = np.isfinite(self.readings[i]).astype(float)
+
+        def mean(rows: list[int]) -> Vectors:
+            counts: Real = read[rows].sum(axis=0)
+            means: Vectors = ((readings[i, rows] * read[rows]).total(0) / counts)[None]
+            return means
+
+        first = mean([j for of in self.lines.rows for j in of if not self.masses[i, j].any()])
+        columns = []
+        for p, fit in enumerate(self.amplitude_fits[i]):
+            tried = [of for of in self.lines.rows if self.masses[i, of[0], p] != 0]
+            each = Vectors.joined([mean(of) for of in tried])
+            on = Vectors.joined([masses[i, of[0], p][None] for of in tried])
+            columns.append(fit.second_run(first[0].x, each.x, on)[0][:, None])
+        return Vectors.joined(columns, axis=-1)
 
 
 class Exact(NamedTuple):
