@@ -229,7 +229,7 @@ class FieldBalancing:
         alpha, here, rotors = solved.alpha, solved.here, range(len(solved.here))
         plain = None
         if not objective.limited:
-            with self._named(solved):
+            with self.named(solved):
                 plain = least_squares(alpha, here, weights, ridge=objective.ridge)
         solved.condition = condition_number(alpha, weights) if plain is None else plain.condition_number
         if objective.max_mass is None and not objective.ridge:
@@ -264,7 +264,7 @@ class FieldBalancing:
         parts = ((solved.alpha[i], solved.here[i], group.own_weights(i)) for i in rotors)
         results, answers = in_parts(solved.objective.solve, parts, self.executor), []
         for i in rotors:
-            with self._named(solved, i):
+            with self.named(solved, i):
                 fix, beyond = next(results)
             if beyond:
                 self.warnings.append(
@@ -276,7 +276,7 @@ class FieldBalancing:
         return answers
 
     @contextmanager
-    def _named(self, solved: Solved, i: int | None = None) -> Iterator[None]:
+    def named(self, solved: Solved, i: int | None = None) -> Iterator[None]:
         """Name the rotor in errors: this one, or of all the one that the error is about."""
         try:
             yield

@@ -60,7 +60,8 @@ def robust(b: FieldBalancing, solved: Solved) -> tuple[Complex, Complex]:
             deviation = float(np.hypot(*error)) * np.abs(np.where(fit.present, readings, 0.0))
         fit = robust_fit(fit, before.prior, deviation)
     here = fit.initial + np.matvec(fit.influence, solved.start)
-    fix = least_squares(fit.influence, here, solved.group.weights, ridge=b.request.ridge)
+    with b.named(solved):
+        fix = least_squares(fit.influence, here, solved.group.weights, ridge=b.request.ridge)
     return fit.initial, fix.corrections
 
 
@@ -283,7 +284,8 @@ def prediction_lines(b: FieldBalancing) -> list[str]:
     table = predicted_run(b)
     cells = {header: printed(header, values) for header, values in table.cells.items()}
     rows = zip(*cells.values(), strict=True)
-    return [f"{table.above}: {', '.join(map(' '.join, zip(cells, row, strict=True)))}" for row in rows]
+    pairs = ([f"{header} {cell}" for header, cell in zip(cells, row, strict=True) if cell] for row in rows)
+    return [f"{table.above}: {', '.join(row)}" for row in pairs]
 
 
 def _suggestions(b: FieldBalancing) -> Iterator[tuple[Rotor, NextRun]]:

@@ -388,7 +388,8 @@ def machine_page(b: FieldBalancing) -> Page:
     if request.four_run:
         raise bad("--page", "a sheet computes from amplitudes with phases")
     solved = b.solved[0]
-    if not (np.isfinite(solved.condition[0]) or request.ridge):
+    # a ridge makes up for dependent planes, not for one without any effect
+    if not (solved.alpha[0].any(axis=0).all() if request.ridge else np.isfinite(solved.condition[0])):
         raise bad(
             "--page",
             "a sheet computes without limits, and the readings cannot tell the planes apart: leave one out",

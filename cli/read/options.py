@@ -191,6 +191,8 @@ def places(
     if blades is not None:
         start, way = in_degrees("--first", first), -1 if numbering == "against" else 1
         return [in_turn(start + way * (360.0 * k / blades)) for k in range(blades)]
+    if first != "0deg":
+        raise bad("--first", "goes with --blades: it is the angle of the first blade")
     if numbering == "against":
         raise bad(
             "--numbering", "goes with --blades: --positions are numbered in the order in which they stand"

@@ -109,6 +109,11 @@ def test_fewer_readings_than_planes_within_limits(dalembert: Dalembert, tmp_path
     assert (
         "the readings cannot tell the planes apart, so that other corrections leave as much" in digits.stderr
     )
+    robust = dalembert(*command, "--robust", "--json")
+    assert (robust.returncode, "the readings cannot tell the planes A and B apart" in robust.stderr) == (
+        1,
+        True,
+    )
     page = dalembert(*command, "--page", "page.html")
     assert (page.returncode, "the readings cannot tell the planes apart" in page.stderr) == (2, True)
 
@@ -134,3 +139,19 @@ def test_a_ridge_damps_what_is_added_to_the_masses_that_stand(dalembert: Dalembe
     )
     for one, other in zip(of_first_order, drawn, strict=True):
         assert one == pytest.approx(other, rel=0.05)
+
+
+def test_a_page_of_a_plane_without_effect_is_refused(dalembert: Dalembert, tmp_path: Path) -> None:
+    """Also with a ridge, which gives it a correction of zero."""
+    rows = ["0,1,0,0,,,", "1,1,0,0,A,2,0"]
+    (tmp_path / "runs.csv").write_text("\n".join([DEPENDENT.splitlines()[0], *rows]) + "\n")
+    done = dalembert(
+        "field", "runs.csv", "--ridge", "0.3", "--reading-error", "2%,2deg", "--page", "page.html"
+    )
+    assert (done.returncode, "--page" in done.stderr) == (2, True), done.stderr
+
+
+def test_the_angle_of_the_first_blade_needs_blades(dalembert: Dalembert, tmp_path: Path) -> None:
+    (tmp_path / "runs.csv").write_text(DEPENDENT)
+    done = dalembert("field", "runs.csv", "--first", "10deg")
+    assert (done.returncode, "--first: goes with --blades" in done.stderr) == (2, True), done.stderr
