@@ -344,10 +344,10 @@ class FieldBalancing:
 
     # -- in the units and by the names of the table ------------------------------------------------------
 
-    @property
-    def against(self) -> bool:
-        """Whether phases were turned round, for the instrument counts them against the sense of the mass angles."""
-        return self.request.against or self.runs.lags
+    def against(self, group: Group, i: int) -> bool:
+        """Whether a rotor's phases were turned round, for the instrument counts them against the sense of the mass angles."""
+        by_its_runs = self.request.lagging is None and group.lines.senses[i] == "lag"
+        return self.request.against or by_its_runs
 
     def in_kg_m(self, corrections: Complex) -> Real:
         """Return the unbalances of masses at the trial radius, or of unbalances as they are."""

@@ -24,7 +24,21 @@ def warnings(b: FieldBalancing) -> list[str]:
     groups = [_Group(b, solved) for solved in b.solved]
     sentences = (sentence for group in groups for sentence in group.warnings())
     fits = (sentence for group in groups for sentence in group.of_fit()) if b.runs.fitted else ()
-    return [*dict.fromkeys([*b.runs.warnings, *b.warnings, *sentences]), *fits]
+    return [*dict.fromkeys([*b.runs.warnings, *_not_turned(b), *b.warnings, *sentences]), *fits]
+
+
+def _not_turned(b: FieldBalancing) -> Iterator[str]:
+    """Name the rotors whose runs do not show the sense of the phase, where those of others show that it lags."""
+    groups = [solved.group for solved in b.solved] if b.runs.lags else []
+    others = sorted(
+        r for of in groups for r, sense in zip(of.rotors, of.lines.senses, strict=True) if sense is None
+    )
+    if others:
+        named = ", ".join(b.runs.rotors[r] for r in others[:SHOWN]) + (" …" if len(others) > SHOWN else "")
+        yield (
+            f"the phases of {len(others)} rotor{'s' * (len(others) > 1)} ({named}) were not turned round, for their runs do not show "
+            "the sense: where one instrument read all rotors, state --phase-lag"
+        )
 
 
 class _Group:
@@ -201,7 +215,7 @@ class _Group:
         for pair in islice(pairs, SHOWN):
             runs = list(dict.fromkeys(lines[j] for j in pair.runs))
             read = group.readings[i, list(pair.runs), pair.channel]
-            shown = read.conj() if self.b.against else read
+            shown = read.conj() if self.b.against(group, i) else read
             first, second = (f"{abs(v):.6g} {unit} at {degrees(v):.6g}°" for v in shown)
             yield (
                 f"{self.b.of(group, i)}run{'s' * (len(runs) > 1)} {' and '.join(runs)}, sensor {group.channels[pair.channel]}: with "
@@ -267,11 +281,12 @@ def sense(b: FieldBalancing) -> str:
     )
 
 
-def instrument(b: FieldBalancing) -> str:
-    """Return how the phases of a report are counted, which are as the instrument shows them."""
+def instrument(rotor: Rotor) -> str:
+    """Return how the phases of a rotor's report are counted, which are as the instrument shows them."""
+    b = rotor.b
     if b.request.four_run:
         return sense(b)
-    if not b.against:
+    if not b.against(rotor.group, rotor.i):
         return (
             "Phases as the instrument shows them; they and the mass angles are counted in one common sense, from one mark "
             "on the rotor."

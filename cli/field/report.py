@@ -71,7 +71,7 @@ class _Pages:
     def __init__(self, rotor: Rotor, made: Mapping[str, Table]) -> None:
         self.rotor, self.b, self.solved, self.i, self.last = rotor, rotor.b, rotor.solved, rotor.i, rotor.last
         self.tables = {name: _of_rotor(table, rotor.name) for name, table in made.items() if table.columns}
-        self.unit = rotor.b.runs.amplitude_unit
+        self.unit, self.against = rotor.b.runs.amplitude_unit, rotor.b.against(rotor.group, rotor.i)
 
     def parts(self, *of: str) -> list[str | Table]:
         """Return tables of the result, where there are such, between the sentences above and below them."""
@@ -207,7 +207,7 @@ class _Pages:
 
     def _phases(self) -> Section:
         """Return the vibration with its phases, as the instrument shows them."""
-        sentences, last = [instrument(self.b)], self.last
+        sentences, last = [instrument(self.rotor)], self.last
         if self.rotor.first_reading is None:
             sentences.append("Before: as fitted to all runs, of which none was without masses.")
         if last is not None:
@@ -224,7 +224,7 @@ class _Pages:
             sizes = [float(f"{value:.4g}") for value in np.abs(vectors).tolist()]
             columns.append(Column(name, self.unit, sizes))
             if not self.b.request.four_run:
-                shown = vectors.conj() if self.b.against else vectors
+                shown = vectors.conj() if self.against else vectors
                 phases = [round(float(degrees(v)), 2) % 360 if abs(v) > 0 else None for v in shown.tolist()]
                 columns.append(Column("phase", "deg", phases))
         return Table(columns, keys=keys)
@@ -267,7 +267,7 @@ class _Pages:
         worst = sorted(range(len(far)), key=lambda k: -float(far[k] or 0))[:READINGS]
         table = _rows_of(residuals, sorted(worst))
         for column in table.columns:
-            if column.name == "phase" and self.b.against:
+            if column.name == "phase" and self.against:
                 column.values = [round(-float(v or 0) % 360, 2) for v in column.values]
             elif column.name in ("residual", "residual_phase", "standardized"):
                 column.values = [v if v is None else float(f"{float(v):.3g}") for v in column.values]
@@ -425,7 +425,7 @@ def machine_page(b: FieldBalancing) -> Page:
         errors=request.reading_error,
         covariance=covariance,
         runout=b.runout(group),
-        against=request.against or runs.lags,
+        against=b.against(group, 0),
         first=next(
             (run for run, bare in zip(group.lines.runs(0), group.bare[0], strict=True) if bare), "initial"
         ),

@@ -157,3 +157,22 @@ def test_planes_that_no_run_tells_apart(dalembert: Dalembert) -> None:
     done = dalembert("field", "-", "--fit", stdin=text)
     assert done.returncode == 1
     assert "do not tell the planes apart; a run with one plane's mass alone changed would" in done.stderr
+
+
+def test_a_rotor_whose_runs_do_not_show_the_sense_beside_one_that_lags(dalembert: Dalembert) -> None:
+    """One instrument may have read both: the rotor that was not turned round is named."""
+    rows = [
+        "R1,0,1,10,0,,,",
+        "R1,1,1,10,90,A,5,0",
+        "R2,0,1,10,0,,,",
+        "R2,1,1,11.18034,-26.565,A,5,0",
+        "R2,2,1,5.0,0,A,5,90",
+    ]
+    rows += ["R2,3,1,11.18034,26.565,A,5,180", "R2,4,1,15.0,0,A,5,270"]
+    text = "\n".join([f"rotor,{HEAD.partition(',')[2].strip()}", *rows]) + "\n"
+    done = dalembert("field", "-", stdin=text)
+    assert done.returncode == 0, done.stderr
+    assert "rotor R2: the runs say that the instrument's phase lags" in done.stderr
+    assert "the phases of 1 rotor (R1) were not turned round" in done.stderr
+    stated = dalembert("field", "-", "--phase-lag", stdin=text)
+    assert "were not turned round" not in stated.stderr
