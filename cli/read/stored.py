@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -19,6 +18,8 @@ from dalembert.tables.table import Numbers, Table, read
 from dalembert.units import UNITS, from_si
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     from balancing.log_again import ExactPrior
     from dalembert.arithmetic.doubled import Doubled
     from dalembert.arithmetic.doubled_vectors import Vectors
@@ -139,6 +140,8 @@ class Stored:
         self, rotor: str, channels: Sequence[Channel], planes: list[str], runs: Runs
     ) -> tuple[Vectors, Vectors, Doubled]:
         """Return α (s, p), the covariance (s, p, p) and the deviation of the readings in 32 digits; 0 where none is stated."""
+        from fractions import Fraction
+
         from cli.read.exact import vectors
         from dalembert.arithmetic.doubled import PI, Doubled
         from dalembert.arithmetic.doubled_functions import DOUBLED
