@@ -36,7 +36,7 @@ class ExactFit(NamedTuple):
 
 
 class ExactPrior(NamedTuple):
-    """Coefficients that are known before the runs, as `balancing.prior.Prior`."""
+    """Prior knowledge of the coefficients, as `balancing.prior.Prior`."""
 
     mean: Vectors
     factor: Vectors
@@ -123,7 +123,7 @@ def exact_pooled(each: Vectors, covariances: Vectors) -> ExactPrior:
 def exact_prior_fit(
     plain: ExactFit, readings: Vectors, masses: Vectors, present: Flags, prior: ExactPrior, deviation: Doubled
 ) -> ExactFit:
-    """Fit runs and what was known before: `balancing.prior.fit_with_prior`; `deviation` (..., r, s) of the readings."""
+    """Fit runs with prior knowledge: `balancing.prior.fit_with_prior`; `deviation` (..., r, s) of the readings."""
     read = np.swapaxes(present, -1, -2)
     sd = chosen(present, deviation)
     sd = Doubled(*(np.swapaxes(x, -1, -2) for x in (sd.high, sd.low)))

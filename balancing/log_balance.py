@@ -202,13 +202,13 @@ class LogBalance:
         prior = fit.foreknown
         if prior is None:
             return self._together(own, None)
-        # what was known before has errors that channels share
+        # the errors of prior knowledge are shared by channels
         shared = np.einsum("...psn,...snq->...pq", linear, prior.sources)
         other = np.einsum("...psn,...snq->...pq", antilinear, prior.sources.conj())
         return self._together(own, components(shared, other, along, *_unit_errors(prior.sources)))
 
     def _together(self, own: Real, before: Real | None) -> Spread:
-        """Add the covariances (..., k, 2, 2) that readings and what was known before bring."""
+        """Add the covariances (..., k, 2, 2) of readings and of prior knowledge."""
         nu = np.asarray(self.errors.degrees_of_freedom, dtype=float)[..., None]
         if before is None or self.fit.foreknown is None:
             return Spread(own, np.broadcast_to(nu, own.shape[:-2]))

@@ -50,7 +50,7 @@ class Foreknown:
     plain: JointFit
     """The runs alone: of least norm where they do not determine the unknowns."""
     sources: Complex
-    """Errors of θ for errors z, E|z|² = 1, of what was known, (..., s, 1 + p, q)."""
+    """Errors of θ for errors z, E|z|² = 1, of the prior knowledge, (..., s, 1 + p, q)."""
     degrees_of_freedom: Real
     """Complex, of the estimate that these are, (...)."""
     again: Callable[[], Vectors]
@@ -102,7 +102,7 @@ class JointFit:
 
     @property
     def alone(self) -> JointFit:
-        """The fit of the runs alone: itself, where nothing else was known."""
+        """The fit of the runs alone: itself, without prior knowledge."""
         return self if self.foreknown is None else self.foreknown.plain
 
     @property

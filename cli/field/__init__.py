@@ -66,7 +66,7 @@ Further options (docs/commands.md describes them):
   stock MASSES  With --blades or --positions: weights in stock, such as 1g,2g,5g; uses the fewest within 1 % of a correction, at most three.
   first ANGLE  Angle of the first blade.
   numbering  Blade numbers increase with the angles or against them.
-  suggest  Suggest the next run within --max-mass that tells most about the corrections.
+  suggest  Suggest the most informative next run within --max-mass.
   view  static-couple: show the corrections of two planes as a static part and a couple.
   zone_class  Show zone A to D of ISO 10816-3 for velocities: group 1 (above 300 kW) or 2 (15 to 300 kW), rigid or flexible support.
   workers N  Processes that solve many machines.
@@ -176,7 +176,7 @@ def run(
 
 
 def _tables(b: FieldBalancing, warnings: list[str]) -> Tables:
-    """The tables of a result, the CSV's first. `warnings` takes in why --digits leaves a correction whole."""
+    """The tables of a result, the CSV's first. `warnings` takes the reasons why --digits prints a number in full."""
     from functools import cache
 
     from cli.field import fit_tables as read

@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from balancing.reading_errors import Errors
 
 SINGULAR = 1e12  # a condition number beyond which the planes count as dependent
-MANY = 200  # rotors whose uncertainties are worked out unasked
-UNKNOWN_ANGLE = 60.0  # an angle that is uncertain by more (degrees) is not known
+MANY = 200  # of more rotors the uncertainties are of first order, unless errors of the readings are stated
+UNKNOWN_ANGLE = 60.0  # an angle with a larger uncertainty (degrees) counts as unknown
 
 
 @dataclass(eq=False, repr=False)
@@ -57,7 +57,7 @@ class Solved:
     """(g, p): what is on the rotor where the corrections start from: that, or nothing."""
     objective: Objective
     corrections: Complex
-    """(g, p), as given out (from here, where that was requested)."""
+    """(g, p), as given: with --from-here what to add to the rotor as it stands."""
     bound: Real | None = None
     """Of the largest residual, as the dual problem proves it."""
     condition: Real = field(init=False)
@@ -339,7 +339,7 @@ class FieldBalancing:
         for i in np.flatnonzero(np.isnan(solved.covariance).any(axis=(1, 2, 3)))[:SHOWN]:
             self.warnings.append(
                 f"{self.of(solved.group, int(i))}the uncertainties of the corrections cannot be determined: from some of the "
-                "drawn readings no corrections can be found"
+                "drawn readings no corrections can be computed"
             )
 
     # -- in the units and by the names of the table ------------------------------------------------------
@@ -399,7 +399,7 @@ def _dependent(planes: list[str], combination: Complex) -> str:
     unseen = list(shares)
     if len(unseen) == 1:
         return (
-            f"plane {unseen[0]} has no effect on any reading: its correction cannot be found; expected sensors that "
+            f"plane {unseen[0]} has no effect on any reading: its correction cannot be computed; expected sensors that "
             "respond to it, or the plane left out"
         )
     return (

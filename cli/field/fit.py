@@ -56,7 +56,7 @@ class Request:
     stock: list[float] | None = None
     """The weights in stock, kg, of which the corrections are made there."""
     fit: bool = False
-    """Whether all runs are to be fitted together; from here on what else is asked of that."""
+    """Whether all runs are fitted together; the options below are for such a fit."""
     exclude: Sequence[str] = ()
     predict: str | None = None
     suggest: bool = False
@@ -64,7 +64,7 @@ class Request:
     view: str | None = None
     """`static-couple`: the corrections of two planes as a static part and a couple."""
     zone_class: str | None = None
-    """The machine whose zones of severity are asked for."""
+    """The class of machine, for zones of severity."""
 
     @property
     def against(self) -> bool:
@@ -73,7 +73,7 @@ class Request:
 
     @property
     def lagging(self) -> bool | None:
-        """The same, None where the options do not say it."""
+        """Whether phases are counted against the mass angles; None where no option states it."""
         return self.against if self.phase_lag or self.rotation is not None else None
 
 
@@ -122,13 +122,13 @@ def _sense(
         sds = [float(np.sqrt(square[i] / nu[i])) for square in (taken, other)]
         word = "lags" if turn > 0 else "leads"
         message = (
-            f"{runs.of(rotors[i])}the runs say that the instrument's phase {word}: residuals of {sds[1]:.4g} {runs.amplitude_unit} (standard "
+            f"{runs.of(rotors[i])}the runs show that the instrument's phase {word}: residuals of {sds[1]:.4g} {runs.amplitude_unit} (standard "
             f"deviation), in the other sense {sds[0]:.4g}"
         )
         runs.warnings.append(
-            f"{message}: it was turned round"
+            f"{message}: the phases were turned round"
             if lagging is None
-            else f"{message}; the option says otherwise, and was obeyed"
+            else f"{message}; the option states otherwise, and counts"
         )
     if lagging is None and len(against):
         fit = again(np.where((certain < 0)[:, None, None], fit.readings.conj(), fit.readings))
@@ -142,7 +142,7 @@ class _Groups:
 
     def __init__(self, measured: Measured, request: Request) -> None:
         self.sorted, self.sisters, self.stored = measured.rows, measured.sisters, measured.stored
-        self.runs, self.request, self.asked = measured.rows.rows.of, request, measured.fit
+        self.runs, self.request, self.requested = measured.rows.rows.of, request, measured.fit
         self.lost = 0
 
     def fitted(self) -> Iterator[Group]:
@@ -188,7 +188,7 @@ class _Groups:
             return [group]
         # with nothing to spare nothing is left out
         more = (present.sum(axis=1) > 1 + len(group.planes)) & keep
-        spare = self.asked | more.any(axis=1) | ~group.bare.any(axis=1)
+        spare = self.requested | more.any(axis=1) | ~group.bare.any(axis=1)
         self._undetermined(group, keep, np.asarray(spare & keep.any(axis=1)))
         # without channels that the runs do not determine, and without runs in which no other was read
         left = (present & keep[:, None, :]).any(axis=2)
@@ -210,7 +210,7 @@ class _Groups:
                 self.runs.warnings.append(f"{self._lost(group, i, s)}; it takes no part in the fit")
 
     def _refusal(self, group: Group, i: int, s: int) -> str:
-        """Write why a rotor cannot be balanced: too few trial runs, a reading that is missing, or runs that tell too little."""
+        """Write why a rotor cannot be balanced: too few trial runs, a missing reading, or runs that do not determine its coefficients."""
         of, planes = self.runs.of(group.rotors[i]), group.planes
         trials = int((~group.bare[i]).sum())
         if group.bare[i].any() and trials < len(planes):
@@ -233,7 +233,7 @@ class _Groups:
         read = np.flatnonzero(np.isfinite(group.readings[i, :, s]))
         masses, lines = group.masses[i, read], group.lines.of(i)
         runs = [lines[j] for j in read]
-        clause = "its vibration without masses is known, " if not masses.any() else ""
+        clause = "its vibration without masses is known, but " if not masses.any() else ""
         times = "once" if len(read) == 1 else f"{len(read)} times"
         return (
             f"{self.runs.of(group.rotors[i])}sensor {group.channels[s]} was read {times} (run{'s' * (len(runs) > 1)} {', '.join(runs)}), which "
@@ -285,7 +285,7 @@ class _Groups:
         if self.request.four_run:
             group.amplitude_fits = by_amplitudes(group, self.runs)
             by_rotor = [[fit.influence for fit in one] for one in group.amplitude_fits]
-            # the runs with masses have told the coefficients
+            # the runs with masses determine the coefficients alone
             loaded = np.asarray(group.masses.any(axis=2))[..., None]
             alone = np.where(loaded, np.nan, group.readings)
             group.fit = initial_alone(alone, np.array(by_rotor).swapaxes(1, 2))
@@ -389,16 +389,16 @@ def _missing(planes: list[str], masses: Complex) -> str:
     """Write what the runs do not determine, and which run would."""
     if masses.all(axis=0).any() and len(masses):
         return (
-            "every run has a trial mass, and what it does is not told from the vibration without it; a run without, or "
-            "with another mass there, would tell"
+            "every run has a trial mass, so that its effect cannot be separated from the vibration without it: add a run without "
+            "it, or with another mass there"
         )
     dark = [
         plane for plane, on in zip(planes, masses.T, strict=True) if np.ptp(on.real) == np.ptp(on.imag) == 0
     ]
     if dark:
         named = f"plane{'s' * (len(dark) > 1)} {' and '.join(dark)}"
-        return f"what a mass in {named} does is not; a run with another mass there would tell"
-    return "the masses of these runs do not tell the planes apart; a run with one plane's mass alone changed would"
+        return f"the effect of a mass in {named} is not: add a run with another mass there"
+    return "the masses of these runs do not separate the planes: add a run in which the mass of one plane alone changes"
 
 
 def by_amplitudes(group: Group, runs: Runs) -> list[list[AmplitudeFit]]:

@@ -36,7 +36,7 @@ def predicted(b: FieldBalancing, solved: Solved) -> tuple[Complex, Real]:
 
 
 def suggested(rotor: Rotor) -> NextRun | None:
-    """The next run of a rotor; None where nothing tells how sure its corrections are, or the planes are dependent."""
+    """The next run of a rotor; None where the uncertainty of its corrections is not known, or its planes are dependent."""
     limit = rotor.solved.objective.max_mass
     if limit is None or not np.isfinite(limit).all():
         raise bad("--suggest", f"needs a --max-mass for every plane: {', '.join(rotor.planes)}")
@@ -177,7 +177,7 @@ def residuals(b: FieldBalancing) -> Table:
     rows = Rows.of(b, [rotor.name for rotor, _ in every])
     rows.shown, rows.hidden = [rows.rotor, names("run", [row.run for row in of])], []
     rows.read(b, [row.channel for row in of])
-    # speeds, and states that say nothing, are of the document alone
+    # speeds, and empty states, are of the document alone
     unseen = [c for c in rows.shown if c.name == "speed" or (c.name == "state" and not any(c.values))]
     rows.shown = [column for column in rows.shown if column not in unseen]
     rows.hidden += unseen
@@ -197,7 +197,7 @@ def residuals(b: FieldBalancing) -> Table:
 
 
 def of_fit(b: FieldBalancing) -> Table:
-    """One row per rotor: how many runs and readings were fitted, how well, and what the runs say of drift and phase."""
+    """One row per rotor: numbers of runs and readings, scatter, drift, and the sense of the phase."""
     rows, rotors = Rows.each(b), list(each(b))
     senses = [rotor.group.lines.senses[rotor.i] for rotor in rotors]
     named = [sense or "not determined" for sense in senses]
@@ -303,7 +303,7 @@ def unsuggested(b: FieldBalancing) -> Column:
 
 
 def suggested_run(b: FieldBalancing) -> Table:
-    """The masses of the next run that tells most: a row for each rotor and plane."""
+    """The masses of the most informative next run: a row for each rotor and plane."""
     every = [
         (rotor.name, *row)
         for rotor, run in _suggestions(b)
@@ -311,9 +311,9 @@ def suggested_run(b: FieldBalancing) -> Table:
     ]
     on = masses(b, np.array([w for *_, w in every], dtype=complex))
     above = (
-        "the next run that tells most (A-optimal) has these masses"
+        "the most informative next run (A-optimal) has these masses"
         if every
-        else "no run is suggested: nothing tells how sure the corrections are"
+        else "no run is suggested: the uncertainty of the corrections is not known"
     )
     rows = Rows.of(b, [name for name, *_ in every])
     columns = [names("plane", [plane for _, plane, _ in every]), *on]
@@ -350,7 +350,7 @@ def robust_initial(b: FieldBalancing, of: RobustFits) -> Table:
 
 
 def spread(b: FieldBalancing, solved: Solved) -> CoefficientSpread | None:
-    """Return how well a group's coefficients are known, from its fit or from stated errors; None where nothing tells."""
+    """Return the uncertainty of a group's coefficients, from its fit or from stated errors; None where it is not known."""
     if b.stored is not None or not (b.runs.fitted or b.request.reading_error) or solved.balance is None:
         return None
     return solved.balance.coefficients
@@ -386,7 +386,7 @@ def influence(b: FieldBalancing) -> Table:
 
 
 def _errors(b: FieldBalancing, rows: Rows, size: Real) -> list[Column]:
-    """Return the columns that say how well the coefficients are known; none where nothing tells."""
+    """Return the columns of the coefficients' uncertainty; none where it is not known."""
     spreads = {id(solved): spread(b, solved) for solved in b.solved}
     if not any(of is not None for of in spreads.values()):
         return []

@@ -257,7 +257,7 @@ class _Group:
             (nu > 0) & (gammaincc(np.maximum(nu, 1), ratio) < LEVEL),
             lambda i: (
                 f"the residuals scatter by {fit.residual_sd[i]:.4g} {self.unit} (standard "
-                f"deviation), more than --reading-error says ({np.sqrt(mean[i]):.4g}): uncertainties are too small"
+                f"deviation), more than --reading-error states ({np.sqrt(mean[i]):.4g}): uncertainties are too small"
             ),
         )
 

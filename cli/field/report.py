@@ -278,7 +278,7 @@ class _Pages:
 
 # -- pictures --------------------------------------------------------------------------------------------------
 def draw(b: FieldBalancing, rotors: Sequence[Rotor]) -> Figure:
-    """Draw for each rotor the vibration before and after, and the corrections; of a fit with all that it was found from."""
+    """Draw for each rotor the vibration before and after, and the corrections; of a fit its history too."""
     if not b.runs.fitted:
         return dials(b, rotors)
     from balancing.log_picture import log_history

@@ -171,11 +171,11 @@ class Rotor:
     def last(self) -> LastRun | None:
         """Its last run, where that shows how well it is balanced; None where it was a trial run."""
         runs = self._runs
-        # of an excluded one nothing is known here
+        # an excluded run is not in the group
         run = self.group.last[self.i] if self.group.last[self.i] in runs else list(runs)[-1]
         if self.b.request.four_run or not runs[run].any():
             return None
-        # as many runs with masses as planes tell the coefficients
+        # as many runs with masses as planes determine the coefficients
         tried = sum(on.any() for on in runs.values()) <= len(self.planes)
         if tried and not self.b.request.from_here:
             return None

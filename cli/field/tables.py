@@ -110,7 +110,7 @@ class Rows:
         return np.concatenate([np.ravel(of(solved)) for solved in self.solved])[self.order]
 
     def several(self, of: Callable[[Solved], Iterable[ArrayLike]]) -> list[NDArray[Any]]:
-        """Put several such numbers into the order of the rows."""
+        """Put several arrays of numbers into the order of the rows."""
         parts = zip(*(of(solved) for solved in self.solved), strict=True)
         return [np.concatenate([np.ravel(part) for part in groups])[self.order] for groups in parts]
 
@@ -174,7 +174,7 @@ def masses_text(b: FieldBalancing, planes: Sequence[str], of: Iterable[complex],
 
 
 def corrections(b: FieldBalancing, warnings: list[str]) -> Table:
-    """One row per rotor and plane. A correction whose error has no bound stays whole, and `warnings` says why."""
+    """One row per rotor and plane. With --digits a correction without an estimate of its error stays whole; `warnings` takes the reason."""
     per, unit, rows = b.runs.per, b.runs.mass_unit, Rows.planes(b)
     fix, trim = (rows.numbers(lambda s: s.corrections), rows.numbers(lambda s: s.trim))
 
@@ -254,7 +254,7 @@ class SecondRun:
         return writtens(self.solved.objective.ridge)
 
     def corrections(self, warnings: list[str]) -> Vectors:
-        """Return the corrections, (g, p); NaN where they are not determined, and `warnings` says why."""
+        """Return the corrections, (g, p); NaN where they are not determined, `warnings` takes the reason."""
         solved, group, objective = self.solved, self.group, self.solved.objective
         whole = Balance(solved.alpha, solved.here, solved.corrections, group.weights, ridge=objective.ridge)
         if not objective.limited:
@@ -282,8 +282,8 @@ class SecondRun:
                 result[i] = exact
             else:
                 warnings.append(
-                    f"{self.balancing.of(group, i)}--digits: the corrections are given in full, for no bound of their error is "
-                    f"known: {reason}"
+                    f"{self.balancing.of(group, i)}--digits: the corrections are printed in full, without an "
+                    f"estimate of their error: {reason}"
                 )
         return result
 
@@ -314,7 +314,7 @@ def digits(balancing: FieldBalancing, solved: Solved, warnings: list[str]) -> li
     trim = corrections if solved.start.any() else corrections - run.standing
     deviations = (Doubled(np.full(solved.corrections.shape, np.nan)),) * 2
     if solved.drawn:
-        sentence = "--digits: the uncertainties from drawn readings are given in full, for their rounding error is not known"
+        sentence = "--digits: the uncertainties from drawn readings are printed in full: their rounding error is not known"
         warnings += [sentence] if sentence not in warnings else []
     elif solved.covariance is not None:
         deviations = run.deviations(corrections)

@@ -230,7 +230,7 @@ def exact_degrees(text: str) -> Fraction:
 def exact_places(
     positions: str | None, blades: int | None, first: str, numbering: str = "with"
 ) -> list[Fraction]:
-    """Return the same angles as `places`, as they are written."""
+    """Return the angles of `places` as they are written."""
     from fractions import Fraction
 
     if blades is None:

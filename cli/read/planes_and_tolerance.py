@@ -227,7 +227,7 @@ def tolerance_of(
     permissible: str | None,
     bearings: str | None,
 ) -> Tolerance | None:
-    """Read the tolerance; None where none is asked for."""
+    """Read the tolerance; None where none is requested."""
     from balancing import api_unbalance, grade_value, mil_unbalance, permissible_unbalance
 
     planes = None if bearings is None else two_bearings("--bearings", bearings)

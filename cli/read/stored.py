@@ -72,9 +72,9 @@ class Coefficients(NamedTuple):
     covariance: Complex | None
     """E δδᴴ of each channel, (s, p, p); None where the file states none."""
     reading_sd: float
-    """Of the readings that they come from, as vectors; NaN where the file does not say."""
+    """Of the readings that they come from, as vectors; NaN where the file does not state it."""
     degrees_of_freedom: float
-    """Complex, of that and of the covariance; inf where the file does not say."""
+    """Complex, of that and of the covariance; inf where the file does not state it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -112,7 +112,7 @@ class Stored:
         return mine
 
     def key(self, rotor: str) -> str:
-        """Return what is the same for rotors with the same planes."""
+        """Return a key that rotors with the same planes share."""
         return "" if "rotor" not in self.table.texts else ";".join(self.planes(rotor))
 
     def planes(self, rotor: str) -> list[str]:
@@ -255,7 +255,7 @@ class Stored:
         """Return size and angle (degrees) of the correlation of channel s between planes p > q; None without deviations."""
         if self.along is None or np.isnan(self.along[at]).all():
             return None
-        found: dict[tuple[int, int, int], tuple[float, float]] = {}
+        correlations: dict[tuple[int, int, int], tuple[float, float]] = {}
         for s, p in np.argwhere(np.ones(at.shape)).tolist():
             cell = self.table.texts["correlation"][at[s, p]] if "correlation" in self.table.texts else ""
             cells = cell.split(";") if cell else []
@@ -264,7 +264,7 @@ class Stored:
                     raise ValueError
                 for q, one in enumerate(cells):
                     part, turn = (parse_number(number) for number in one.split("@"))
-                    found[s, p, q] = part, turn
+                    correlations[s, p, q] = part, turn
             except ValueError:
                 raise self.table.error(
                     int(at[s, p]),
@@ -272,7 +272,7 @@ class Stored:
                     cell,
                     f"{p} correlations with the planes before, joined by ';', such as 0.5@0",
                 ) from None
-        return found
+        return correlations
 
 
 def read_stored(path: str) -> Stored:
@@ -358,7 +358,7 @@ class Sisters:
         return [(one, name) for one in self.files for name in (one.rotors or ("",))]
 
     def key(self, rotor: str) -> str | None:
-        """Return what is the same for rotors of which the same is known."""
+        """Return a key that rotors with the same stored coefficients share."""
         return rotor if any(rotor in one.rotors for one in self.files) else None
 
     def planes(self, rotor: str) -> list[str]:
@@ -401,7 +401,7 @@ class Sisters:
             prior = stored_prior(alpha[0], covariance[0], each[0].degrees_of_freedom)
             if self.key(rotor) is None and stated:
                 runs.warnings.append(
-                    "--influence: one machine's coefficients do not tell how machines differ: they count with the errors of their "
+                    "--influence: one machine's coefficients do not show how machines differ: they count with the errors of their "
                     "own runs alone; expected the files of several machines, --influence once for each"
                 )
             elif not stated:

@@ -40,7 +40,7 @@ class Measured(NamedTuple):
     warnings: list[str]
     """Those of the files of coefficients."""
     fit: bool
-    """Whether the fit is shown whatever it leaves over: a log asks for it, and so do stored coefficients that take part in it."""
+    """Whether the fit is shown even with nothing to spare: of a log, and of stored coefficients that take part in it."""
 
 
 def read_measured(

@@ -37,15 +37,15 @@ class Masses(NamedTuple):
     value: Complex
     """SI."""
     stated: NDArray[np.bool_]
-    """Whether a row says anything of masses, (n,)."""
+    """Whether a row states masses, (n,)."""
     exact: Callable[[], Vectors]
-    """The values in 32 digits, as the file has them; worked out on request."""
+    """The values in 32 digits, as the file has them; computed on request."""
 
     @classmethod
     def of(
         cls, rows: Sequence[dict[str, complex] | None], exact: Callable[[], OfRows] | None = None
     ) -> Masses:
-        """Take the masses of each row, plane -> mass; None where it says nothing of them. `exact`: in 32 digits."""
+        """Take the masses of each row, plane -> mass; None where it states none. `exact`: in 32 digits."""
         planes: dict[str, int] = {}
         entries = [
             (i, planes.setdefault(plane, len(planes)), mass)
@@ -98,14 +98,14 @@ class LogRows:
     exact: Callable[[], Vectors]
     """`vibration` in 32 digits, as the table has it; computed on request."""
     years: Real | None
-    """When it was read; NaN where the row does not say."""
+    """When it was read; NaN where the row has no date."""
     channels: list[Channel]
     channel: Rows
     """The sensor, state and speed of each row."""
 
 
 class _Listed:
-    """What of a kind each rotor has, in the order in which it first stands: rows are sorted by rotor."""
+    """The runs, planes or channels of each rotor, in the order of the table; the rows are sorted by rotor."""
 
     def __init__(self, rotor: Rows, code: Rows, rotors: int) -> None:
         self.number, self.first = numbered(rotor * (int(code.max(initial=0)) + 1) + code)
@@ -206,7 +206,7 @@ class Sorted:
     def _agree(
         self, loaded: Rows, first: Rows, at: Rows, plane: Rows, value: Complex, counts: NDArray[np.bool_]
     ) -> None:
-        """Refuse rows that put on other masses than the first one of their run that tells them."""
+        """Refuse rows with other masses than the first row of their run that states masses."""
         rows = self.rows
         in_order = np.lexsort((plane, at))
         at, plane = at[in_order], plane[in_order]
@@ -391,7 +391,7 @@ class Sorted:
         return weights
 
     def _years(self, mine: Rows, run: Rows, lines: _Listed) -> Real | None:
-        """Return when each row of readings was read: each says it itself, or its run does once."""
+        """Return when each row of readings was read: each has a date itself, or its run has one."""
         if self.rows.years is None:
             return None
         years = self.rows.years[self.order[mine]]
@@ -402,7 +402,7 @@ class Sorted:
         return np.where(np.isnan(of_line), of_run[run[lines.first]], of_line)
 
     def _lacking(self, group: Rows, years: Real, run: Rows) -> None:
-        """Say of which runs the date is not known."""
+        """Warn of runs without a date."""
         for i in np.flatnonzero(np.isnan(years).any(axis=1)).tolist():
             names = dict.fromkeys(self.rows.runs[k] for k in run[i, np.isnan(years[i])].tolist())
             if len(self.warnings) == SHOWN:

@@ -59,7 +59,7 @@ class Lines:
     def __init__(self, names: list[str], run: Rows, place: Rows, years: Real | None) -> None:
         self.names, self.run, self.place, self.years = names, run, place, years
         self.senses: list[str | None] = [None] * len(run)
-        """For each rotor "lead" or "lag", as the runs show it; None where they cannot tell."""
+        """For each rotor "lead" or "lag", as the runs show it; None where they do not."""
 
     @cached_property
     def rows(self) -> list[list[int]]:
@@ -274,7 +274,7 @@ class Runs:
     max_mass: dict[str, float] = field(default_factory=dict)
     """The limits that the file states, plane -> SI."""
     lags: bool = False
-    """Whether the runs themselves told that the phase lags, and it was turned round."""
+    """Whether runs show that the phase lags, so that phases were turned round."""
     runout: dict[str, complex] = field(default_factory=dict)
     """What the file itself states of it, sensor -> vector as read."""
     exact_runout: Callable[[], dict[str, Vectors]] | None = None
@@ -323,7 +323,7 @@ class Runs:
 
 
 def apart(one: float | None, other: float) -> float:
-    """How far two speeds are apart, relatively; 0 where either is not known."""
+    """The relative difference of two speeds; 0 where either is not known."""
     if one is None or other != other or one == other:
         return 0.0
     return abs(one - other) / max(abs(one), abs(other))
