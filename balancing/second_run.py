@@ -162,15 +162,22 @@ def pseudo_inverse(a: Vectors) -> Vectors:
     sigma = np.linalg.svd(floats, compute_uv=False)
     rank = (sigma > threshold(rows, columns) * sigma[..., :1]).sum(axis=-1)
     if (rank == columns).all():
-        return smallest_squares(a[..., None, :, :], Vectors.of(-np.eye(rows)))[0].swapped()
+        # A = Q U with orthogonal columns of Q: A⁺ = U⁻¹ Q⁺
+        orthogonal, upper = _orthogonal(a)
+        x: list[Vectors] = []
+        for q, row in zip(reversed(orthogonal), reversed(upper), strict=True):
+            value = q.conj / part(total(q.square), (..., None))
+            for share, below in zip(row, reversed(x), strict=True):
+                value = value - below * share[..., None]
+            x.append(value)
+        return Vectors.joined([each[..., None, :] for each in reversed(x)], axis=-2)
     inverse = Vectors.of(np.zeros((*a.shape[:-2], columns, rows)))
     for case in np.ndindex(rank.shape):
         one, few = a[case], int(rank[case])
         if few == columns:
             inverse[case] = pseudo_inverse(one)
         elif few:
-            chosen = one[:, _independent(floats[case], few)]
-            left = pseudo_inverse(chosen)
+            left = pseudo_inverse(one[:, _independent(floats[case], few)])
             right = least_norm(product(left, one)[None], Vectors.of(-np.eye(few))).swapped()
             inverse[case] = product(right, left)
     return inverse
@@ -178,14 +185,14 @@ def pseudo_inverse(a: Vectors) -> Vectors:
 
 def _independent(a: NDArray[np.complex128], rank: int) -> list[int]:
     """Return the numbers of independent columns, each the largest off the span of those before."""
-    left, chosen = a.copy(), list[int]()
+    left, numbers = a.copy(), list[int]()
     for _ in range(rank):
         sizes = np.linalg.norm(left, axis=0)
-        sizes[chosen] = -1.0
-        chosen.append(int(np.argmax(sizes)))
-        q = left[:, chosen[-1]] / sizes[chosen[-1]]
+        sizes[numbers] = -1.0
+        numbers.append(int(np.argmax(sizes)))
+        q = left[:, numbers[-1]] / sizes[numbers[-1]]
         left -= np.outer(q, q.conj() @ left)
-    return sorted(chosen)
+    return sorted(numbers)
 
 
 def chosen(where: NDArray[np.bool_], a: Doubled, otherwise: float | Real = 0.0) -> Doubled:

@@ -139,8 +139,14 @@ def test_masses_on_one_line_cannot_tell_the_sense_of_the_phase(dalembert: Dalemb
 def test_a_state_read_once_is_left_out_and_what_is_known_of_it_is_said(dalembert: Dalembert) -> None:
     head = " ;DoubleA;phase;mass;phase\nn;80;40;0;0\nn;99;44;10;20\n"
     for once, words in (
-        ("u;60;30;0;0\n", "its vibration without masses is known, but the effect of a mass in plane 1 is not"),
-        ("u;60;30;10;20\n", "its effect cannot be separated from the vibration without it: add a run without"),
+        (
+            "u;60;30;0;0\n",
+            "its vibration without masses is known, but the effect of a mass in plane 1 is not",
+        ),
+        (
+            "u;60;30;10;20\n",
+            "its effect cannot be separated from the vibration without it: add a run without",
+        ),
     ):
         rotor, warnings = found(dalembert("field", "-", "--json", stdin=head + once))
         assert [one["state"] for one in rotor["residual"]] == ["n"]
