@@ -340,7 +340,7 @@ def exact_fit(group: Group, runs: Runs, request: Request, stored: Stored | None)
     from dalembert.arithmetic.doubled_functions import hypot
     from dalembert.arithmetic.doubled_vectors import Vectors, part
 
-    readings, masses, _ = group.exact()
+    readings, masses, _ = group.in_32_digits
     present, freedom = group.fit.present, np.asarray(group.fit.degrees_of_freedom, dtype=float)
     if stored is not None or group.amplitude_fits:
         alpha = Vectors.of(np.zeros(group.fit.influence.shape))
@@ -367,7 +367,7 @@ def exact_errors(group: Group, request: Request, fit: ExactFit) -> ExactErrors:
     from dalembert.arithmetic.doubled_functions import DOUBLED
     from dalembert.arithmetic.doubled_vectors import Vectors, part
 
-    readings = group.exact().readings
+    readings = group.in_32_digits.readings
     if request.reading_error is None:
         ones = np.ones(readings.shape)
         each = part(group.exact_scatter(fit) * DOUBLED.sqrt(Doubled(np.array(0.5))), (..., None, None)) * ones

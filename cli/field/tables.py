@@ -219,7 +219,7 @@ class SecondRun:
     def __init__(self, balancing: FieldBalancing, solved: Solved) -> None:
         self.balancing, self.solved, self.group = balancing, solved, solved.group
         self.fit = exact_fit(solved.group, balancing.runs, balancing.request, balancing.stored)
-        self.standing = self.group.exact().standing
+        self.standing = self.group.in_32_digits.standing
 
     @cached_property
     def initial(self) -> Vectors:
@@ -290,6 +290,7 @@ class SecondRun:
     def deviations(self, corrections: Vectors) -> tuple[Doubled, Doubled]:
         """Return the deviations of size and angle (degrees) of the corrections, (g, p), to first order."""
         from balancing.log_again import correction_deviations
+        from balancing.second_run import chosen
         from dalembert.arithmetic.doubled import PI
 
         solved, group, request = self.solved, self.group, self.balancing.request
@@ -302,7 +303,8 @@ class SecondRun:
             group.weights,
             self.ridge,
         )
-        return along, across / corrections.size * 180.0 / PI
+        size = corrections.size
+        return along, across / chosen(size.high > 0, size, np.nan) * 180.0 / PI
 
 
 def digits(balancing: FieldBalancing, solved: Solved, warnings: list[str]) -> list[Real]:

@@ -94,3 +94,10 @@ def test_the_digits_that_hold(sisters: int, trial: bool, dalembert: Dalembert, t
             unit = mp.mpf(10) ** (mp.floor(mp.log10(value)) - digits + 1)
             assert abs(mp.mpf(row[name]) - value) <= unit / 2, (name, row[name], mp.nstr(value, 20))
             assert abs(mp.mpf(row[name]) - value) <= value * mp.mpf("1e-12"), (name, row[name])
+
+
+def test_nothing_to_correct(dalembert: Dalembert) -> None:
+    text = f"{RUNS}\n0,1,0,0,,,\n1,1,10,90,A,5,0\n"
+    done = dalembert("field", "-", "--reading-error", "2%,1deg", "--digits", stdin=text)
+    assert done.stdout.splitlines()[1] == "1,A,0.0,0.0,0.0,,5.0,180.0"
+    assert done.stderr == "warning: no vibration in the initial run: nothing to correct\n"

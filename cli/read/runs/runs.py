@@ -189,6 +189,11 @@ class Group:
         """Which runs are without masses, (g, runs)."""
         return np.asarray(~self.on.any(axis=2))
 
+    @cached_property
+    def in_32_digits(self) -> Exact:
+        """Readings, masses and standing, once the fit has shown the sense of the phases."""
+        return self.exact()
+
     def exact_scatter(self, fit: ExactFit) -> Doubled:
         """Return the deviation of the readings in 32 digits, (g,): as residuals scatter, or as those of sisters did, or none."""
         from balancing.second_run import chosen
@@ -207,7 +212,7 @@ class Group:
         """Return the coefficients of a rotor without phase in 32 digits, (s, p)."""
         from dalembert.arithmetic.doubled_vectors import Vectors
 
-        readings, masses, _ = self.exact()
+        readings, masses, _ = self.in_32_digits
         read = np.isfinite(self.readings[i]).astype(float)
 
         def mean(rows: list[int]) -> Vectors:
