@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
 
     from balancing.rounding import Problem
+    from dalembert.arithmetic.doubled import Doubled
     from dalembert.arithmetic.doubled_vectors import Vectors
     from dalembert.page import Page
 
@@ -213,9 +214,11 @@ class Balance:
         """The reason why the corrections have no error estimate; empty if they have one."""
         return self._again[1]
 
-    def second_run(self, influence: Vectors, initial: Vectors) -> tuple[Vectors | None, str]:
+    def second_run(
+        self, influence: Vectors, initial: Vectors, ridge: Doubled | None = None
+    ) -> tuple[Vectors | None, str]:
         """Return the corrections (..., p) of data in 32 digits; None with the reason where they are not determined."""
-        return self._found(self._problem((influence, initial)))
+        return self._found(self._problem((influence, initial)), ridge)
 
     @cached_property
     def _again(self) -> tuple[Vectors | None, str]:
@@ -229,11 +232,16 @@ class Balance:
         data = exact or (Vectors.of(self.influence), Vectors.of(self.initial))
         return Problem(*data, self.corrections, self.weights, floats)
 
-    def _found(self, problem: Problem) -> tuple[Vectors | None, str]:
+    def _found(self, problem: Problem, ridge: Doubled | None = None) -> tuple[Vectors | None, str]:
         if self._free:
             from balancing.rounding import least_squares_again
 
-            return least_squares_again(problem, self.ridge), ""
+            if not (self.ridge or np.isfinite(condition_number(self.influence, self.weights)).all()):
+                return (
+                    None,
+                    "the readings cannot tell the planes apart, so that other corrections leave as much",
+                )
+            return least_squares_again(problem, self.ridge if ridge is None else ridge), ""
         from balancing.optimality import optimum_again
 
         return optimum_again(problem, self.of_largest, self.max_mass, self.max_residual)

@@ -105,7 +105,7 @@ class LogBalance:
     weights: Real | None = None
     """The weights of the channels in the least squares of the corrections, (..., s)."""
     along: Complex | None = None
-    """The directions of the corrections as given out, where they are not these ones', (..., p)."""
+    """The corrections as given, where they are added to masses that stand, (..., p): their directions count, and a ridge damps them."""
     ridge: float = 0.0
     """The ridge of the least squares of the corrections."""
 
@@ -189,7 +189,8 @@ class LogBalance:
         fit = self.fit
         weights = np.ones(fit.initial.shape) if self.weights is None else self.weights
         left = fit.fitted(self.corrections[..., None, :])[..., 0, :]
-        linear, antilinear = response(fit.influence, self.corrections, left, weights, self.ridge)
+        along = self.corrections if self.along is None else self.along
+        linear, antilinear = response(fit.influence, self.corrections, left, weights, self.ridge, along)
         # θ = gain y: from the unknowns of each channel to its readings
         by_channel = np.moveaxis(linear, -3, -2), np.moveaxis(antilinear, -3, -2)
         of_readings = (
@@ -197,18 +198,17 @@ class LogBalance:
             for part, gain in zip(by_channel, (fit.gain, fit.gain.conj()), strict=True)
         )
         flat = [part.reshape(*part.shape[:-2], -1) for part in of_readings]
-        along = self.corrections if self.along is None else self.along
         own = components(flat[0], flat[1], along, *self._each())
         prior = fit.foreknown
         if prior is None:
             return self._together(own, None)
-        # what was known before has errors that channels share
+        # the errors of prior knowledge are shared by channels
         shared = np.einsum("...psn,...snq->...pq", linear, prior.sources)
         other = np.einsum("...psn,...snq->...pq", antilinear, prior.sources.conj())
         return self._together(own, components(shared, other, along, *_unit_errors(prior.sources)))
 
     def _together(self, own: Real, before: Real | None) -> Spread:
-        """Add the covariances (..., k, 2, 2) that readings and what was known before bring."""
+        """Add the covariances (..., k, 2, 2) of readings and of prior knowledge."""
         nu = np.asarray(self.errors.degrees_of_freedom, dtype=float)[..., None]
         if before is None or self.fit.foreknown is None:
             return Spread(own, np.broadcast_to(nu, own.shape[:-2]))
@@ -271,7 +271,12 @@ class LogBalance:
     def correction_samples(self, n: int = 4000, seed: int = 0) -> Complex:
         """Draw least-squares corrections (n, p) of one machine from readings with their errors (Monte Carlo)."""
         drawn = self.unknown_samples(n, seed)
-        return least_squares(drawn[..., 1:], drawn[..., 0], self.weights, ridge=self.ridge).corrections
+        alpha, here = drawn[..., 1:], drawn[..., 0]
+        if not self.ridge or self.along is None:
+            return least_squares(alpha, here, self.weights, ridge=self.ridge).corrections
+        standing = self.corrections - self.along
+        fix = least_squares(alpha, here + alpha @ standing, self.weights, ridge=self.ridge)
+        return np.asarray(fix.corrections + standing)
 
     def residual_samples(self, n: int = 4000, seed: int = 0) -> Complex:
         """Draw the true vibration (n, s) of one machine with its corrections on, Student's errors included.

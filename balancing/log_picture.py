@@ -238,7 +238,7 @@ def _regions(axes: Axes, history: History, unit: str) -> None:
     title = (
         "95 % region of each correction, enlarged"
         if bounded
-        else "nothing tells how sure the corrections are"
+        else "the uncertainty of the corrections is not known"
     )
     axes.set_title(title, pad=8, fontsize=10)
 

@@ -43,6 +43,10 @@ class Objective:
         """Whether the corrections are others than those by plain least squares."""
         return self.minimax or self.max_mass is not None or self.max_residual is not None
 
+    def drawn(self, draws: int | None) -> int:
+        """Return how many sets of readings the covariance is drawn from; 0: it is of first order."""
+        return min(draws or 200, 1000) if self.limited else draws or 0
+
     def met(self, fix: Balance) -> NDArray[np.bool_]:
         """Return which machines of corrections by plain least squares keep the limits, (g,)."""
         beyond = np.zeros(len(fix.corrections), dtype=bool)
@@ -89,7 +93,7 @@ class Objective:
         """
         try:
             if self.limited:
-                problems = balance.problem_samples(min(draws or 200, 1000))
+                problems = balance.problem_samples(self.drawn(draws))
                 covariance = spread(self._samples(problems, standing, balance.weights), corrections)
             elif draws:
                 covariance = spread(balance.correction_samples(draws) - standing, corrections)

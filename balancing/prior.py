@@ -13,6 +13,8 @@ so that informative runs count more.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 from balancing.dependence import adjoint, columns_scaled, design, threshold
 from balancing.run_log import Foreknown, JointFit
 from dalembert.arithmetic.records import record
+
+if TYPE_CHECKING:
+    from dalembert.arithmetic.doubled_vectors import Vectors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -195,6 +200,7 @@ def fit_with_prior(
     if not present.any(axis=-2).all():
         raise ValueError("a channel has no reading")
     plain = runs_alone(y, t)
+    stated = None if deviation is None else np.broadcast_to(np.asarray(deviation, dtype=float), y.shape)
     if deviation is None:
         deviation = np.nan_to_num(plain.residual_sd)[..., None, None]
     sd = np.swapaxes(
@@ -232,8 +238,27 @@ def fit_with_prior(
     )
     leverage = np.clip(np.einsum("...rn,...snr->...rs", design(t), gain).real, 0.0, 1.0)
     nu = np.broadcast_to(prior.degrees_of_freedom, y.shape[:-2])
-    foreknown = Foreknown(plain, of_mean @ prior.factor, nu)
+    foreknown = Foreknown(plain, of_mean @ prior.factor, nu, partial(_again, plain, prior, stated))
     return JointFit(y, t, None, np.asarray(unknowns + 0.0), gain, leverage, foreknown=foreknown)
+
+
+def _again(plain: JointFit, prior: Prior, deviation: Real | None) -> Vectors:
+    """Return the unknowns in 32 digits, of floats as exact."""
+    from balancing.log_again import ExactPrior, exact_fit, exact_prior_fit
+    from balancing.second_run import chosen
+    from dalembert.arithmetic.doubled import Doubled
+    from dalembert.arithmetic.doubled_vectors import Vectors, part
+
+    present = plain.present
+    readings, masses = Vectors.of(np.where(present, plain.readings, 0.0)), Vectors.of(plain.masses)
+    again = exact_fit(readings, masses, present, np.asarray(plain.degrees_of_freedom, dtype=float))
+    known = ExactPrior(*map(Vectors.of, (prior.mean, prior.factor, prior.root)))
+    if deviation is None:
+        scattered = np.nan_to_num(plain.residual_sd) > 0
+        each = part(chosen(scattered, again.residual_sd), (..., None, None)) * np.ones(present.shape)
+    else:
+        each = Doubled(np.where(present, deviation, 0.0))
+    return exact_prior_fit(again, readings, masses, present, known, each).unknowns
 
 
 def runs_alone(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None = None) -> JointFit:

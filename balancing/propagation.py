@@ -12,7 +12,12 @@ Complex = NDArray[np.complex128]
 
 
 def response(
-    alpha: Complex, corrections: Complex, left: Complex, weights: Real, ridge: float = 0.0
+    alpha: Complex,
+    corrections: Complex,
+    left: Complex,
+    weights: Real,
+    ridge: float = 0.0,
+    damped: Complex | None = None,
 ) -> tuple[Complex, Complex]:
     """Return how least-squares corrections follow x₀ and α: L and A, (..., p, s, 1 + p) each.
 
@@ -20,6 +25,8 @@ def response(
     ----------
     alpha, corrections, left, weights, ridge
         α (..., s, p), w (..., p), the residual e = x₀ + α w (..., s), and the weights (..., s) and λ they were found with.
+    damped
+        What the ridge damps, (..., p): the corrections as given, where they are added to masses that stand; None: w.
 
     Notes
     -----
@@ -52,8 +59,9 @@ def response(
     antilinear = np.zeros_like(linear)
     antilinear[..., 1:] = -m[..., :, None, :] * (weights * left)[..., None, :, None]
     if ridge:
-        pull = ridge**2 * (weights[..., None] * alpha * corrections[..., None, :])[..., None, :, :]
-        back = ridge**2 * (weights[..., None] * alpha.conj() * corrections[..., None, :])[..., None, :, :]
+        added = (corrections if damped is None else damped)[..., None, :]
+        pull = ridge**2 * (weights[..., None] * alpha * added)[..., None, :, :]
+        back = ridge**2 * (weights[..., None] * alpha.conj() * added)[..., None, :, :]
         antilinear[..., 1:] -= m[..., :, None, :] * pull
         linear[..., 1:] -= m[..., :, None, :] * back
     return linear, antilinear

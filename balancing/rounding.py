@@ -11,12 +11,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import damping_norms, roundings
+from balancing.dependence import roundings
 from balancing.influence import influence_coefficients
-from balancing.second_run import smallest_squares
-from dalembert.arithmetic.doubled import Doubled
+from balancing.second_run import damped, smallest_squares
+from dalembert.arithmetic.doubled import Doubled, doubled
 from dalembert.arithmetic.doubled_functions import DOUBLED
-from dalembert.arithmetic.doubled_vectors import Vectors, part, total
+from dalembert.arithmetic.doubled_vectors import Vectors, part
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -80,30 +80,16 @@ class Problem(NamedTuple):
         return self.initial + (self.influence * corrections[..., None, :]).total()
 
 
-def least_squares_again(problem: Problem, ridge: float) -> Vectors:
+def least_squares_again(problem: Problem, ridge: float | Doubled) -> Vectors:
     """Return the corrections of a least-squares problem without limits in 32 digits."""
     a, b = problem.influence, problem.initial
     if problem.weights is not None:
         of_rows = DOUBLED.sqrt(Doubled(np.asarray(problem.weights, dtype=float)))
         a, b = a * part(of_rows, (..., None)), b * of_rows
-    if ridge:
-        a, b = _damped(ridge, a, b)
+    if doubled(ridge).high:
+        a = damped(ridge, a)
+        lead = np.broadcast_shapes(a.shape[:-2], b.shape[:-1])
+        b = Vectors.joined(
+            [b + Vectors.of(np.zeros((*lead, 1))), Vectors.of(np.zeros((*lead, a.shape[-1])))], axis=-1
+        )
     return smallest_squares(a, b)[0]
-
-
-def _damped(ridge: float, a: Vectors, b: Vectors) -> tuple[Vectors, Vectors]:
-    """Return the problem with the rows λ‖α_p‖ w_p of `ridge` below it."""
-    norms, planes = DOUBLED.sqrt(total(a.square, -2)), a.shape[-1]
-    given = norms.high > 0
-    norms = Doubled(np.where(given, norms.high, damping_norms(a.value)), np.where(given, norms.low, 0.0))
-    below = part(norms * ridge, (..., None)) * np.eye(planes)
-    lead = np.broadcast_shapes(a.shape[:-2], b.shape[:-1])
-
-    def spread(z: Vectors, *own: int) -> Vectors:
-        return z + Vectors.of(np.zeros((*lead, *own)))
-
-    rows = Vectors(below, below * 0.0)
-    return (
-        Vectors.joined([spread(a, *a.shape[-2:]), spread(rows, planes, planes)], axis=-2),
-        Vectors.joined([spread(b, b.shape[-1]), Vectors.of(np.zeros((*lead, planes)))], axis=-1),
-    )

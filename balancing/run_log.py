@@ -12,9 +12,9 @@ the fit with nothing to spare: x₀ is the initial reading, and α follows from 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -50,9 +50,11 @@ class Foreknown:
     plain: JointFit
     """The runs alone: of least norm where they do not determine the unknowns."""
     sources: Complex
-    """Errors of θ for errors z, E|z|² = 1, of what was known, (..., s, 1 + p, q)."""
+    """Errors of θ for errors z, E|z|² = 1, of the prior knowledge, (..., s, 1 + p, q)."""
     degrees_of_freedom: Real
     """Complex, of the estimate that these are, (...)."""
+    again: Callable[[], Vectors]
+    """Computes the unknowns in 32 digits."""
 
 
 @record
@@ -84,7 +86,8 @@ class JointFit:
         weights, count = (None if part is None else part[i] for part in (self.weights, self.count))
         prior = self.foreknown
         if prior is not None:
-            prior = Foreknown(prior.plain.machine(i), prior.sources[i], prior.degrees_of_freedom[i])
+            again = partial(_of_machine, prior.again, i)
+            prior = Foreknown(prior.plain.machine(i), prior.sources[i], prior.degrees_of_freedom[i], again)
         return JointFit(y, t, weights, unknowns, gain, leverage, count, prior)
 
     def without(self, runout: Complex) -> JointFit:
@@ -93,12 +96,13 @@ class JointFit:
         unknowns[..., 0] -= runout
         prior = self.foreknown
         if prior is not None:
-            prior = replace(prior, plain=prior.plain.without(runout))
+            again = partial(_without, prior.again, runout)
+            prior = replace(prior, plain=prior.plain.without(runout), again=again)
         return replace(self, readings=self.readings - runout, unknowns=unknowns, foreknown=prior)
 
     @property
     def alone(self) -> JointFit:
-        """The fit of the runs alone: itself, where nothing else was known."""
+        """The fit of the runs alone: itself, without prior knowledge."""
         return self if self.foreknown is None else self.foreknown.plain
 
     @property
@@ -186,7 +190,7 @@ class JointFit:
         return np.asarray(np.where(size > 0, size / np.where(sd > 0, sd, np.nan), 0.0 * sd) / np.sqrt(free))
 
     def error_estimate(self) -> Real:
-        """Return the rounding errors of the unknowns, (..., s, 1 + p), the readings and masses taken as exact.
+        """Return the rounding errors of the unknowns, (..., s, 1 + p): readings, masses and prior knowledge taken as exact.
 
         >>> fit = joint_fit([[5], [7], [9.5]], [[0], [1], [2]])
         >>> bool((fit.error_estimate() < 1e-14).all())
@@ -194,13 +198,15 @@ class JointFit:
         """
         from dalembert.arithmetic.doubled_vectors import Vectors
 
+        if self.foreknown is not None:
+            return self.foreknown.again().apart(self.unknowns)
         readings = Vectors.of(np.where(self.present, self.readings, 0.0))
         return self.second_run(readings, Vectors.of(self.masses)).apart(self.unknowns)
 
     def second_run(self, readings: Vectors, masses: Vectors) -> Vectors:
         """Return the unknowns (..., s, 1 + p) in 32 digits, of readings (..., r, s) and masses (..., r, p) in 32 digits.
 
-        Where a reading is missing any number stands. Of the runs alone: not with what was known before.
+        Where a reading is missing any number stands. Of the runs alone: with prior knowledge see `balancing.log_again`.
         """
         from balancing.second_run import smallest_squares
         from dalembert.arithmetic.doubled import Doubled
@@ -234,6 +240,18 @@ class JointFit:
         degrees = np.full(self.readings.shape[:-2], np.inf)
         turn = np.full(size.shape, phase)
         return Errors(unit, amplitude * size, phase * size, degrees, turn, np.ones(size.shape, dtype=bool))
+
+
+def _of_machine(again: Callable[[], Vectors], i: int) -> Vectors:
+    return again()[i]
+
+
+def _without(again: Callable[[], Vectors], runout: Complex) -> Vectors:
+    from dalembert.arithmetic.doubled_vectors import Vectors
+
+    unknowns = again()
+    unknowns[..., 0] = unknowns[..., 0] - Vectors.of(runout)
+    return unknowns
 
 
 def joint_fit(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None = None) -> JointFit:

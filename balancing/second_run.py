@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from balancing.dependence import damping_norms, threshold
 from dalembert.arithmetic.doubled import Doubled
 from dalembert.arithmetic.doubled_functions import DOUBLED
 from dalembert.arithmetic.doubled_vectors import Vectors, part, total
@@ -134,6 +135,79 @@ def _orthogonal(a: Vectors) -> tuple[list[Vectors], list[list[Vectors]]]:
             columns[j] = columns[j] - q * share[..., None]
             upper[k].append(share)
     return columns, upper
+
+
+def damped(ridge: float | Doubled, a: Vectors) -> Vectors:
+    """Return A (..., m, n) with the rows λ‖A_k‖ of a ridge below it."""
+    norms, n = DOUBLED.sqrt(total(a.square, -2)), a.shape[-1]
+    given = norms.high > 0
+    norms = Doubled(np.where(given, norms.high, damping_norms(a.value)), np.where(given, norms.low, 0.0))
+    below = part(norms * ridge, (..., None)) * np.eye(n)
+    return Vectors.joined([a, Vectors(below, below * 0.0)], axis=-2)
+
+
+def pseudo_inverse(a: Vectors) -> Vectors:
+    """Return A⁺ (..., n, m) of A (..., m, n); its rank is that of the floats nearest to it.
+
+    Of lower rank A = C F, C independent columns of it, has A⁺ = F⁺ C⁺.
+
+    Examples
+    --------
+    >>> pseudo_inverse(Vectors.of(np.array([[1, 1], [1, 1]]))).value.real
+    array([[0.25, 0.25],
+           [0.25, 0.25]])
+    """
+    rows, columns = a.shape[-2:]
+    floats = a.value
+    sigma = np.linalg.svd(floats, compute_uv=False)
+    rank = (sigma > threshold(rows, columns) * sigma[..., :1]).sum(axis=-1)
+    if (rank == columns).all():
+        # A = Q U with orthogonal columns of Q: A⁺ = U⁻¹ Q⁺
+        orthogonal, upper = _orthogonal(a)
+        x: list[Vectors] = []
+        for q, row in zip(reversed(orthogonal), reversed(upper), strict=True):
+            value = q.conj / part(total(q.square), (..., None))
+            for share, below in zip(row, reversed(x), strict=True):
+                value = value - below * share[..., None]
+            x.append(value)
+        return Vectors.joined([each[..., None, :] for each in reversed(x)], axis=-2)
+    inverse = Vectors.of(np.zeros((*a.shape[:-2], columns, rows)))
+    for case in np.ndindex(rank.shape):
+        one, few = a[case], int(rank[case])
+        if few == columns:
+            inverse[case] = pseudo_inverse(one)
+        elif few:
+            left = pseudo_inverse(one[:, _independent(floats[case], few)])
+            right = least_norm(product(left, one)[None], Vectors.of(-np.eye(few))).swapped()
+            inverse[case] = product(right, left)
+    return inverse
+
+
+def _independent(a: NDArray[np.complex128], rank: int) -> list[int]:
+    """Return the numbers of independent columns, each the largest off the span of those before."""
+    left, numbers = a.copy(), list[int]()
+    for _ in range(rank):
+        sizes = np.linalg.norm(left, axis=0)
+        sizes[numbers] = -1.0
+        numbers.append(int(np.argmax(sizes)))
+        q = left[:, numbers[-1]] / sizes[numbers[-1]]
+        left -= np.outer(q, q.conj() @ left)
+    return sorted(numbers)
+
+
+def chosen(where: NDArray[np.bool_], a: Doubled, otherwise: float | Real = 0.0) -> Doubled:
+    """Return a, and plain numbers elsewhere."""
+    return Doubled(np.where(where, a.high, otherwise), np.where(where, a.low, 0.0))
+
+
+def product(a: Vectors, b: Vectors) -> Vectors:
+    """Return A B, (..., l, m) and (..., m, n)."""
+    return (a[..., :, :, None] * b[..., None, :, :]).total(-2)
+
+
+def applied(a: Vectors, x: Vectors) -> Vectors:
+    """Return A x, (..., m, n) and (..., n)."""
+    return (a * x[..., None, :]).total()
 
 
 def spline(x: Doubled, y: Doubled, z: Doubled) -> Doubled:

@@ -49,7 +49,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("sheet",),
         ("tapes",),
         ("optimality",),
-        ("limited", "loads", "rounding"),
+        ("limited", "loads", "log_again", "rounding"),
         ("influence", "modal", "propagation", "qr", "second_run"),
         (
             "cone_problem",

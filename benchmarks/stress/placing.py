@@ -111,8 +111,7 @@ def _vector(size: str, phase: str) -> Any:
 def _wrapped(rng: np.random.Generator) -> Pairs:
     """Single-plane balancing from a written table to the columns of the command."""
     from cli.field.field_balancing import FieldBalancing
-    from cli.field.groups import measured_groups
-    from cli.field.request import Request
+    from cli.field.fit import Request, measured_groups
     from cli.field.tables import corrections
 
     v0, t, v1 = _written(rng), _written(rng), _written(rng)

@@ -17,11 +17,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.field.field_balancing import FieldBalancing
+    from cli.field.tables import Tables
     from cli.show.result import Result, Sheet
+    from dalembert.results.columns import Column
     from dalembert.results.way import Topic
 
 
 EXAMPLE = "fan-one-plane"
+METHOD = (
+    "Influence coefficients from trial runs (E. L. Thearle 1934), corrections by least squares or by the smallest largest "
+    "residual (T. P. Goodman 1964; second-order cone program), all runs of a log fitted together; tolerance after ISO "
+    "21940-11. The masses are at the radius of the trial masses."
+)
 FEWEST_DRAWS = 40  # they give a standard deviation to a ninth
 OPTIONS = """
 Arguments:
@@ -59,7 +66,7 @@ Further options (docs/commands.md describes them):
   stock MASSES  With --blades or --positions: weights in stock, such as 1g,2g,5g; uses the fewest within 1 % of a correction, at most three.
   first ANGLE  Angle of the first blade.
   numbering  Blade numbers increase with the angles or against them.
-  suggest  Suggest the next run within --max-mass that tells most about the corrections.
+  suggest  Suggest the most informative next run within --max-mass.
   view  static-couple: show the corrections of two planes as a static part and a couple.
   zone_class  Show zone A to D of ISO 10816-3 for velocities: group 1 (above 300 kW) or 2 (15 to 300 kW), rigid or flexible support.
   workers N  Processes that solve many machines.
@@ -135,15 +142,14 @@ def run(
     if runs is None:
         raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
 
-    from cli.field import request as read
     from cli.field.field_balancing import FieldBalancing
-    from cli.field.groups import measured_groups
-    from cli.read.tolerance import tolerance_of
+    from cli.field.fit import Request, measured_groups
+    from cli.read.planes_and_tolerance import tolerance_of
 
-    request = read.Request(
-        reading_error=read.reading_error(reading_error),
+    request = Request(
+        reading_error=options.reading_error(reading_error),
         tolerance=tolerance_of(grade, speed, rotor_mass, permissible, None),
-        max_mass=read.limits(max_mass or []),
+        max_mass=options.mass_limits(max_mass or []),
         max_residual=options.with_unit("--max-residual", max_residual, "amplitude", positive=True),
         objective=objective,
         from_here=from_here,
@@ -169,14 +175,65 @@ def run(
     return _result(balancing, save_influence, page)
 
 
+def _tables(b: FieldBalancing, warnings: list[str]) -> Tables:
+    """The tables of a result, the CSV's first. `warnings` takes the reasons why --digits prints a number in full."""
+    from functools import cache
+
+    from cli.field import fit_tables as read
+    from cli.field import tables as to_add
+
+    request = b.request
+    further: list[Column] = []
+    made: Tables = {
+        "corrections": cache(lambda: to_add.corrections(b, warnings)),
+        "influence": lambda: read.influence(b),
+        "prediction": lambda: read.prediction(b),
+    }
+    if request.places is not None:
+        on = any(solved.standing.any() for solved in b.solved)
+        made["split"] = lambda: to_add.split(b, lambda rotor: rotor.solved.corrections, "corrections")
+        made["trim_split"] = lambda: to_add.split(b, lambda rotor: rotor.solved.trim, "trim", shown=on)
+    made |= {
+        "trim": lambda: to_add.trim(b),
+        "standing": lambda: to_add.standing(b),
+        "rotors": lambda: to_add.rotors(b, further),
+    }
+    if request.tolerance is not None:
+        made["tolerance"] = lambda: to_add.tolerance(b)
+    if request.zone_class is not None:
+        made["zones"] = lambda: read.zones(b)
+    if request.four_run:
+        made |= {"misfit": lambda: read.misfit(b), "alternatives": lambda: read.alternatives(b)}
+    if request.view is not None:
+        made |= {"static": lambda: to_add.static_couple(b, 0), "couple": lambda: to_add.static_couple(b, 1)}
+    if not b.runs.fitted:
+        return made
+    made |= {
+        "residuals": lambda: read.residuals(b),
+        "fit": lambda: read.of_fit(b),
+        "fit_initial": lambda: read.initial(b),
+    }
+    if any(solved.group.drift is not None for solved in b.solved):
+        made["drift"] = lambda: read.drift_rates(b)
+    if b.predict is not None:
+        made["predict"] = lambda: read.predicted_run(b)
+    if request.suggest:
+        further.append(read.unsuggested(b))
+        made |= {"suggest": lambda: read.suggested_run(b), "suggest_gain": lambda: read.suggested_gain(b)}
+    if request.robust:
+        of = cache(lambda solved: read.robust(b, solved))
+        made["robust"] = lambda: read.robust_corrections(b, of)
+        made["robust_initial"] = lambda: read.robust_initial(b, of)
+    return made
+
+
 def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -> Result:
-    from cli.field.doubts import warnings
-    from cli.field.tables import METHOD, sense, tables
-    from cli.read.runs.reading import latest
+    from cli.field.remarks import sense, warnings
+    from cli.read.runs.runs import latest
     from cli.show.result import Result
 
     remarks, day = warnings(b), latest(b.runs.table)
-    made = tables(b, remarks)
+    made = _tables(b, remarks)
 
     def stored() -> bytes:
         from dalembert.results.text import csv_text
@@ -195,14 +252,14 @@ def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -
         return draw(b, list(each(b, 3)))
 
     def way() -> list[Topic]:
-        from cli.field.way import way
+        from cli.field.rotor import way
 
         return way(b)
 
     def aside() -> list[str]:
         if b.predict is None:
             return []
-        from cli.field.logs import prediction_lines
+        from cli.field.fit_tables import prediction_lines
 
         return prediction_lines(b)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -26,15 +26,15 @@ from balancing import (
 )
 from balancing.dependence import directions
 from balancing.objective import Objective
-from cli.field.request import Request, ceiling_in, limits_in, masses_at
-from cli.read.options import bad
+from cli.field.fit import Request
+from cli.read.options import bad, mass_at
 from cli.read.runs.runs import SHOWN, Complex, Group, Real, Runs
 from cli.read.stored import Stored
-from dalembert.angles import degrees, in_turn
+from dalembert.angles import degrees, in_turn, phasor
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.parts import in_parts
 from dalembert.errors import DataError
-from dalembert.units import Scaled, amplitude_kind, from_si
+from dalembert.units import UNITS, Scaled, amplitude_kind, from_si, to_si, written
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from balancing.reading_errors import Errors
 
 SINGULAR = 1e12  # a condition number beyond which the planes count as dependent
-MANY = 200  # rotors whose uncertainties are worked out unasked
-UNKNOWN_ANGLE = 60.0  # an angle that is uncertain by more (degrees) is not known
+MANY = 200  # of more rotors the uncertainties are of first order, unless errors of the readings are stated
+UNKNOWN_ANGLE = 60.0  # an angle with a larger uncertainty (degrees) counts as unknown
 
 
 @dataclass(eq=False, repr=False)
@@ -57,7 +57,7 @@ class Solved:
     """(g, p): what is on the rotor where the corrections start from: that, or nothing."""
     objective: Objective
     corrections: Complex
-    """(g, p), as given out (from here, where that was requested)."""
+    """(g, p), as given: with --from-here what to add to the rotor as it stands."""
     bound: Real | None = None
     """Of the largest residual, as the dual problem proves it."""
     condition: Real = field(init=False)
@@ -66,6 +66,8 @@ class Solved:
     """(g, p): the rotor's own in its initial state; NaN where the readings do not determine it."""
     covariance: Real | None = None
     residual_95: Real | None = None
+    drawn: int = 0
+    """How many sets of readings the covariance is drawn from; 0: it is of first order."""
     balance: LogBalance | None = None
     """Where the errors of the readings are known: what the corrections leave, and how sure it is."""
 
@@ -148,11 +150,11 @@ class FieldBalancing:
         if request.stock is not None and runs.per != "mass":
             raise bad("--stock", "the table has unbalances: expected trial masses")
         self._placed: dict[complex, Placement] = {}
-        self.max_mass = limits_in(request.max_mass, runs) or runs.max_mass
+        self.max_mass = _limits_in(request.max_mass, runs) or runs.max_mass
         """Limit of each plane, SI; the key "" is for all."""
-        self.ceiling = ceiling_in(request.max_residual, runs)
+        self.ceiling = _ceiling_in(request.max_residual, runs)
         """Of the residuals, in the table's amplitude unit."""
-        self.predict = masses_at(request.predict, runs)
+        self.predict = _masses_at(request.predict, runs)
         """Plane -> mass of a run to be predicted, SI; the key "" is the only plane."""
         self.limited = bool(request.objective == "minimax" or self.max_mass or self.ceiling is not None)
         """Whether the corrections are others than those by plain least squares."""
@@ -227,7 +229,7 @@ class FieldBalancing:
         alpha, here, rotors = solved.alpha, solved.here, range(len(solved.here))
         plain = None
         if not objective.limited:
-            with self._named(solved):
+            with self.named(solved):
                 plain = least_squares(alpha, here, weights, ridge=objective.ridge)
         solved.condition = condition_number(alpha, weights) if plain is None else plain.condition_number
         if objective.max_mass is None and not objective.ridge:
@@ -236,7 +238,7 @@ class FieldBalancing:
             if len(beyond):
                 i = int(beyond[0])
                 hidden = unseen(alpha[i], solved.group.own_weights(i))[0]
-                raise DataError(self.of(solved.group, i) + planes_say(solved.planes, hidden))
+                raise DataError(self.of(solved.group, i) + _dependent(solved.planes, hidden))
         if plain is not None:
             solved.corrections = plain.corrections
         elif objective.minimax:
@@ -262,7 +264,7 @@ class FieldBalancing:
         parts = ((solved.alpha[i], solved.here[i], group.own_weights(i)) for i in rotors)
         results, answers = in_parts(solved.objective.solve, parts, self.executor), []
         for i in rotors:
-            with self._named(solved, i):
+            with self.named(solved, i):
                 fix, beyond = next(results)
             if beyond:
                 self.warnings.append(
@@ -274,13 +276,13 @@ class FieldBalancing:
         return answers
 
     @contextmanager
-    def _named(self, solved: Solved, i: int | None = None) -> Iterator[None]:
+    def named(self, solved: Solved, i: int | None = None) -> Iterator[None]:
         """Name the rotor in errors: this one, or of all the one that the error is about."""
         try:
             yield
         except DependentPlanes as error:
             of = self.of(solved.group, *(error.case[:1] if i is None else [i]))
-            raise DataError(of + planes_say(solved.planes, error.combination)) from None
+            raise DataError(of + _dependent(solved.planes, error.combination)) from None
         except Infeasible as error:
             unit = self.runs.amplitude_unit
             with_limits = " with the limits of the masses" if self.max_mass else ""
@@ -328,6 +330,7 @@ class FieldBalancing:
         doubts = list(in_parts(solved.objective.confidence, tasks, self.executor))
         solved.covariance = np.stack([covariance for covariance, _ in doubts])
         solved.residual_95 = np.array([left for _, left in doubts])
+        solved.drawn = solved.objective.drawn(draws)
         self._unknown(solved)
 
     def _unknown(self, solved: Solved) -> None:
@@ -336,15 +339,15 @@ class FieldBalancing:
         for i in np.flatnonzero(np.isnan(solved.covariance).any(axis=(1, 2, 3)))[:SHOWN]:
             self.warnings.append(
                 f"{self.of(solved.group, int(i))}the uncertainties of the corrections cannot be determined: from some of the "
-                "drawn readings no corrections can be found"
+                "drawn readings no corrections can be computed"
             )
 
     # -- in the units and by the names of the table ------------------------------------------------------
 
-    @property
-    def against(self) -> bool:
-        """Whether phases were turned round, for the instrument counts them against the sense of the mass angles."""
-        return self.request.against or self.runs.lags
+    def against(self, group: Group, i: int) -> bool:
+        """Whether a rotor's phases were turned round, for the instrument counts them against the sense of the mass angles."""
+        by_its_runs = self.request.lagging is None and group.lines.senses[i] == "lag"
+        return self.request.against or by_its_runs
 
     def in_kg_m(self, corrections: Complex) -> Real:
         """Return the unbalances of masses at the trial radius, or of unbalances as they are."""
@@ -354,7 +357,7 @@ class FieldBalancing:
     @property
     def unit(self) -> str:
         """The unit of a correction as people write it."""
-        return self.runs.mass_unit.replace("_", "·")
+        return written(self.runs.mass_unit)
 
     def amount(self, value: Scaled) -> Scaled:
         """Return a correction in the unit of the trial masses."""
@@ -389,23 +392,56 @@ class FieldBalancing:
         return any(solved.covariance is not None for solved in self.solved)
 
 
-def _combination(names: list[str], combination: Complex) -> str:
-    terms = []
-    for name, share in zip(names, combination, strict=True):
-        if abs(share) > 1e-6:
-            terms.append(f"{abs(share):.3g} at {float(degrees(share)):.0f}° in {name}")
-    return ", ".join(terms)
-
-
-def planes_say(planes: list[str], combination: Complex) -> str:
-    """Say which planes the readings cannot tell apart."""
-    unseen = [name for name, share in zip(planes, combination, strict=True) if abs(share) > 1e-6]
+def _dependent(planes: list[str], combination: Complex) -> str:
+    """Write which planes the readings cannot tell apart."""
+    shares = {name: share for name, share in zip(planes, combination, strict=True) if abs(share) > 1e-6}
+    ratio = ", ".join(f"{abs(w):.3g} at {float(degrees(w)):.0f}° in {name}" for name, w in shares.items())
+    unseen = list(shares)
     if len(unseen) == 1:
         return (
-            f"plane {unseen[0]} has no effect on any reading: its correction cannot be found; expected sensors that "
+            f"plane {unseen[0]} has no effect on any reading: its correction cannot be computed; expected sensors that "
             "respond to it, or the plane left out"
         )
     return (
         f"the readings cannot tell the planes {' and '.join(unseen)} apart (singular): masses in the ratio "
-        f"{_combination(planes, combination)} leave no trace; leave one of these planes out, or damp with --ridge"
+        f"{ratio} leave no trace; leave one of these planes out, or damp with --ridge"
     )
+
+
+# -- the limits of the request, in the table's units --------------------------------------------------------------------
+
+
+def _limits_in(limits: Mapping[str, tuple[float, str]], runs: Runs) -> dict[str, float]:
+    """Return limits in SI, in the dimension of the trials."""
+    for value, unit in limits.values():
+        if unit not in UNITS[runs.per]:
+            raise bad(
+                "--max-mass", f"'{value:g}{unit}': expected a limit in units of {runs.per}, as the trials are"
+            )
+    return {plane: float(to_si(value, runs.per, unit)) for plane, (value, unit) in limits.items()}
+
+
+def _ceiling_in(limit: tuple[float, str] | None, runs: Runs) -> float | None:
+    """Return the residual limit in the table's unit; without a tag it is meant as the table's amplitudes are."""
+    if limit is None:
+        return None
+    value, unit = limit
+    if not amplitude_kind(unit)[1]:
+        unit += amplitude_kind(runs.amplitude_unit)[1]
+    return runs.in_unit(value, unit, "--max-residual")
+
+
+def _masses_at(text: str | None, runs: Runs) -> dict[str, complex] | None:
+    """Read `10kg@-90deg`, or `A=10kg@-90deg,B=5kg@20deg`, SI; the key "" is the only plane."""
+    if text is None:
+        return None
+    out: dict[str, complex] = {}
+    for part in text.split(","):
+        plane, _, value = part.strip().rpartition("=")
+        expected = f"'{part}': expected MASS@ANGLE, such as 10kg@-90deg"
+        size, unit, angle, of_angle = mass_at("--predict", part, value, runs.per, expected)
+        if plane.strip() in out:
+            raise bad("--predict", f"'{part}': this plane is given twice")
+        on = float(to_si(size, runs.per, unit))
+        out[plane.strip()] = complex(phasor(np.array(on), np.array(angle), of_angle))
+    return out

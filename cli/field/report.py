@@ -11,11 +11,12 @@ import numpy as np
 
 from balancing.picture import Vibration, vibration
 from cli.field.field_balancing import FieldBalancing
-from cli.field.rotor import Rotor, Rows, Tables, amplitude_unit, each, masses_text
-from cli.field.tables import sense
+from cli.field.remarks import instrument, sense
+from cli.field.rotor import Rotor, each
+from cli.field.tables import Rows, Tables, amplitude_unit, masses_text
 from cli.read.options import bad
+from cli.read.planes_and_tolerance import verdict_table
 from cli.read.runs.runs import Complex
-from cli.read.tolerance import verdict_table
 from cli.show.picture import blank
 from cli.show.result import Bar, Bars, Section, Sheet
 from dalembert.angles import degrees
@@ -70,7 +71,7 @@ class _Pages:
     def __init__(self, rotor: Rotor, made: Mapping[str, Table]) -> None:
         self.rotor, self.b, self.solved, self.i, self.last = rotor, rotor.b, rotor.solved, rotor.i, rotor.last
         self.tables = {name: _of_rotor(table, rotor.name) for name, table in made.items() if table.columns}
-        self.unit = rotor.b.runs.amplitude_unit
+        self.unit, self.against = rotor.b.runs.amplitude_unit, rotor.b.against(rotor.group, rotor.i)
 
     def parts(self, *of: str) -> list[str | Table]:
         """Return tables of the result, where there are such, between the sentences above and below them."""
@@ -206,7 +207,7 @@ class _Pages:
 
     def _phases(self) -> Section:
         """Return the vibration with its phases, as the instrument shows them."""
-        sentences, last = [_convention(self.b)], self.last
+        sentences, last = [instrument(self.rotor)], self.last
         if self.rotor.first_reading is None:
             sentences.append("Before: as fitted to all runs, of which none was without masses.")
         if last is not None:
@@ -223,7 +224,7 @@ class _Pages:
             sizes = [float(f"{value:.4g}") for value in np.abs(vectors).tolist()]
             columns.append(Column(name, self.unit, sizes))
             if not self.b.request.four_run:
-                shown = vectors.conj() if self.b.against else vectors
+                shown = vectors.conj() if self.against else vectors
                 phases = [round(float(degrees(v)), 2) % 360 if abs(v) > 0 else None for v in shown.tolist()]
                 columns.append(Column("phase", "deg", phases))
         return Table(columns, keys=keys)
@@ -266,7 +267,7 @@ class _Pages:
         worst = sorted(range(len(far)), key=lambda k: -float(far[k] or 0))[:READINGS]
         table = _rows_of(residuals, sorted(worst))
         for column in table.columns:
-            if column.name == "phase" and self.b.against:
+            if column.name == "phase" and self.against:
                 column.values = [round(-float(v or 0) % 360, 2) for v in column.values]
             elif column.name in ("residual", "residual_phase", "standardized"):
                 column.values = [v if v is None else float(f"{float(v):.3g}") for v in column.values]
@@ -275,23 +276,9 @@ class _Pages:
         return [table, rest]
 
 
-def _convention(b: FieldBalancing) -> str:
-    if b.request.four_run:
-        return sense(b)
-    if not b.against:
-        return (
-            "Phases as the instrument shows them; they and the mass angles are counted in one common sense, from one mark "
-            "on the rotor."
-        )
-    return (
-        "Phases as the instrument shows them, counted against the sense of the mass angles; those of the influence "
-        "coefficients and of the picture are counted in the sense of the mass angles."
-    )
-
-
 # -- pictures --------------------------------------------------------------------------------------------------
 def draw(b: FieldBalancing, rotors: Sequence[Rotor]) -> Figure:
-    """Draw for each rotor the vibration before and after, and the corrections; of a fit with all that it was found from."""
+    """Draw for each rotor the vibration before and after, and the corrections; of a fit its history too."""
     if not b.runs.fitted:
         return dials(b, rotors)
     from balancing.log_picture import log_history
@@ -334,12 +321,19 @@ def _on_places(b: FieldBalancing, w: complex) -> list[float]:
 def _history(b: FieldBalancing, rotor: Rotor) -> History:
     from balancing import region_factor
     from balancing.log_picture import History
-    from cli.field.logs import predicted, suggested
+    from cli.field.fit_tables import predicted, suggested
 
     solved, i, balance = rotor.solved, rotor.i, rotor.solved.fitted
     spreads, prediction, masses = [], None, None
     if solved.covariance is not None:
-        factors = region_factor(0.95, balance.degrees_of_freedom[i]).tolist()
+        # corrections of dependent planes, under limits, are drawn: to first order they are not determined
+        known = np.isfinite(solved.condition[i]) or b.request.ridge
+        freedom = (
+            balance.degrees_of_freedom[i]
+            if known
+            else balance.errors.degrees_of_freedom[[i] * len(solved.planes)]
+        )
+        factors = region_factor(0.95, freedom).tolist()
         covariances = solved.covariance[i] * b.amount(1.0) ** 2
         spreads = list(zip(covariances, factors, strict=True))
     if b.predict is not None:
@@ -386,7 +380,7 @@ def machine_page(b: FieldBalancing) -> Page:
     """
     from balancing import initial_unbalance
     from balancing.sheet import machine_sheet
-    from cli.field.logs import spread
+    from cli.field.fit_tables import spread
 
     runs, request = b.runs, b.request
     if len(runs.rotors) > 1:
@@ -394,6 +388,12 @@ def machine_page(b: FieldBalancing) -> Page:
     if request.four_run:
         raise bad("--page", "a sheet computes from amplitudes with phases")
     solved = b.solved[0]
+    # a ridge makes up for dependent planes, not for one without any effect
+    if not (solved.alpha[0].any(axis=0).all() if request.ridge else np.isfinite(solved.condition[0])):
+        raise bad(
+            "--page",
+            "a sheet computes without limits, and the readings cannot tell the planes apart: leave one out",
+        )
     group = solved.group
     spreads = spread(b, solved)
     covariance, deviations = None, None
@@ -425,7 +425,7 @@ def machine_page(b: FieldBalancing) -> Page:
         errors=request.reading_error,
         covariance=covariance,
         runout=b.runout(group),
-        against=request.against or runs.lags,
+        against=b.against(group, 0),
         first=next(
             (run for run, bare in zip(group.lines.runs(0), group.bare[0], strict=True) if bare), "initial"
         ),

@@ -1,24 +1,24 @@
-"""One rotor: its runs, its trim and whether that is needed, its tolerance; and the rows that tables have of rotors."""
+"""One rotor: its runs, its trim and whether that is needed, its tolerance, and the worked solution of `--steps`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from balancing import initial_unbalance
 from cli.field.field_balancing import SINGULAR, FieldBalancing, Solved
+from cli.read.planes_and_tolerance import Verdict
 from cli.read.runs.runs import Channel, Complex, Group, Real
-from cli.read.tolerance import Verdict
 from dalembert.angles import degrees
 from dalembert.arithmetic.exact import EPS
-from dalembert.results.columns import ABSENT, Column, Table, names, number
-from dalembert.results.text import angle_text
-from dalembert.units import from_si, written
+from dalembert.results.columns import Column, Table, finite, names
+from dalembert.results.way import Topic, figures
+from dalembert.units import written
 
 Flags = NDArray[np.bool_]
 
@@ -171,11 +171,11 @@ class Rotor:
     def last(self) -> LastRun | None:
         """Its last run, where that shows how well it is balanced; None where it was a trial run."""
         runs = self._runs
-        # of an excluded one nothing is known here
+        # an excluded run is not in the group
         run = self.group.last[self.i] if self.group.last[self.i] in runs else list(runs)[-1]
         if self.b.request.four_run or not runs[run].any():
             return None
-        # as many runs with masses as planes tell the coefficients
+        # as many runs with masses as planes determine the coefficients
         tried = sum(on.any() for on in runs.values()) <= len(self.planes)
         if tried and not self.b.request.from_here:
             return None
@@ -240,149 +240,210 @@ def each(b: FieldBalancing, most: int | None = None) -> Iterator[Rotor]:
         yield Rotor(b, b.solved[k], i)
 
 
-# -- the rows of tables --------------------------------------------------------------------------------------
-
-Tables = dict[str, Callable[[], Table]]
-
-READINGS = ("rotor", "sensor", "state", "speed_rpm")
-"""What names a row that is of a sensor."""
+# -- the worked solution ------------------------------------------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
-class Rows:
-    """The rows of a table, and the columns that name them: the rotor, where there are several, then plane, sensor …"""
-
-    rotor: Column
-    shown: list[Column]
-    hidden: list[Column]
-    """Those of the JSON document alone."""
-    solved: Sequence[Solved] = ()
-    sizes: Sequence[int] = ()
-    """How many rows the rotors of each group have together."""
-    order: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
-
-    @classmethod
-    def of(cls, b: FieldBalancing, rotors: Iterable[str]) -> Rows:
-        """Return rows of these rotors."""
-        rotor = names("rotor", rotors)
-        return cls(rotor, [rotor] if b.runs.several else [], [] if b.runs.several else [rotor])
-
-    @classmethod
-    def each(cls, b: FieldBalancing, count: Callable[[Solved], int] = lambda _: 1) -> Rows:
-        """Return rows of all rotors, as many of each rotor of a group."""
-        counts = [count(solved) for solved in b.solved]
-        groups = list(zip((solved.group.rotors for solved in b.solved), counts, strict=True))
-        rotor = np.concatenate([np.repeat(of, n) for of, n in groups])
-        order = np.lexsort((np.concatenate([np.tile(np.arange(n), len(of)) for of, n in groups]), rotor))
-        rows = cls.of(b, [b.runs.rotors[r] for r in rotor[order].tolist()])
-        return replace(rows, solved=b.solved, sizes=[len(of) * n for of, n in groups], order=order)
-
-    @classmethod
-    def planes(cls, b: FieldBalancing) -> Rows:
-        """Return a row for each rotor and plane."""
-        rows = cls.each(b, lambda solved: len(solved.planes))
-        rows.shown.append(names("plane", rows.cells(lambda solved: solved.planes)))
-        return rows
-
-    @classmethod
-    def sensors(cls, b: FieldBalancing) -> Rows:
-        """Return a row for each rotor and sensor."""
-        rows = cls.each(b, lambda solved: len(solved.group.channels))
-        return rows.read(b, rows.cells(lambda solved: solved.group.channels))
-
-    def read(self, b: FieldBalancing, of: Sequence[Channel]) -> Rows:
-        """Add the columns that name sensors: with state and speed where the table has them, else those are JSON's alone."""
-        self.shown.append(names("sensor", [channel.sensor for channel in of]))
-        states = [channel.state for channel in of]
-        if any(state is not None for state in states):
-            stored = [ABSENT if state is None else state for state in states]
-            self.shown.append(Column("state", "", states, None, "state", stored))
-        # in JSON states stand where speeds do
-        speeds = [ABSENT if c.state is not None and c.speed is None else c.speed for c in of]
-        unit = b.runs.speed_unit or "rpm"
-        cells = [None if c.speed is None else from_si(c.speed, "speed", unit) for c in of]
-        column = Column("speed", unit, cells, None, "speed_rad_s", speeds)
-        (self.hidden if all(cell is None for cell in cells) else self.shown).append(column)
-        return self
-
-    def table(
-        self,
-        columns: Sequence[Column],
-        keys: Sequence[str],
-        place: str,
-        above: str = "",
-        below: str = "",
-        *,
-        hidden: Sequence[Column] = (),
-        shown: bool = True,
-    ) -> Table:
-        """Return the table of these rows; one that is not shown is of the document alone."""
-        every, unseen = [*self.shown, *columns], [*self.hidden, *hidden]
-        if not shown:
-            every, unseen = [], [*every, *unseen]
-        return Table(every, keys, f"rotors[].{place}".removesuffix("."), above, below, unseen)
-
-    def numbers(self, of: Callable[[Solved], ArrayLike]) -> NDArray[Any]:
-        """Put numbers of the groups, (g, n) each, into the order of the rows."""
-        return np.concatenate([np.ravel(of(solved)) for solved in self.solved])[self.order]
-
-    def several(self, of: Callable[[Solved], Iterable[ArrayLike]]) -> list[NDArray[Any]]:
-        """Put several such numbers into the order of the rows."""
-        parts = zip(*(of(solved) for solved in self.solved), strict=True)
-        return [np.concatenate([np.ravel(part) for part in groups])[self.order] for groups in parts]
-
-    def cells(self, of: Callable[[Solved], Sequence[Any]]) -> list[Any]:
-        """Put cells that all rotors of a group have into the order of the rows."""
-        every = [cell for solved in self.solved for cell in list(of(solved)) * len(solved.group.rotors)]
-        return [every[k] for k in self.order.tolist()]
-
-    def some(self, of: Callable[[Solved], ArrayLike | None]) -> tuple[Real, list[Any]]:
-        """Put numbers that not every group has into the order of the rows: as shown, and as JSON has them."""
-        parts = [(of(solved), n) for solved, n in zip(self.solved, self.sizes, strict=True)]
-        there = np.repeat([v is not None for v, _ in parts], self.sizes)[self.order].tolist()
-        numbers = [np.broadcast_to(np.nan if v is None else np.asarray(v, dtype=float), n) for v, n in parts]
-        values = np.concatenate(numbers)[self.order]
-        return values, [v if has else ABSENT for v, has in zip(values.tolist(), there, strict=True)]
+def way(b: FieldBalancing) -> list[Topic]:
+    """The topics of every rotor, one after the other."""
+    steps: list[Topic] = []
+    for rotor in each(b):
+        topics = _Way(rotor).topics()
+        if b.runs.several:
+            for topic in topics:
+                topic.title = f"Rotor {rotor.name}: {topic.heading}"
+                topic.head = {"rotor": rotor.name, **topic.head}
+        steps += topics
+    return steps
 
 
-def masses(b: FieldBalancing, values: Complex, place: str | None = "") -> list[Column]:
-    """Return size and angle of masses or unbalances."""
-    per, unit = b.runs.per, b.runs.mass_unit
-    return [
-        number(per, per, np.abs(values), unit, place=place),
-        number("angle", "angle", degrees(values), place=place),
-    ]
+def _angle(z: complex) -> float | None:
+    return None if z == 0 or z != z else float(degrees(np.array([z]))[0])
 
 
-def uncertainties(b: FieldBalancing, along: Real, across: Real) -> list[Column]:
-    """Return the standard deviations of size and angle of masses."""
-    per, unit = b.runs.per, b.runs.mass_unit
-    return [
-        number(f"{per}_uncertainty", per, along, unit),
-        number("angle_uncertainty", "angle", across),
-    ]
+def _parts(z: complex) -> dict[str, Any]:
+    """The components of a vector as JSON has them."""
+    return {"x": finite(z.real + 0.0), "y": finite(z.imag + 0.0)}
 
 
-def amplitude(b: FieldBalancing, name: str, values: ArrayLike, place: str | None = "") -> Column:
-    """Return a quantity in the unit of the readings, which JSON keeps; `place`: its key, if that is not the name."""
-    array = np.asarray(values, dtype=float)
-    return Column(name, b.runs.amplitude_unit, array, None, name if place == "" else place, array)
+def _vector(z: complex, phase: bool = True) -> dict[str, Any]:
+    """A vibration as JSON has it."""
+    parts = {"phase_deg": _angle(z), **_parts(z)} if phase else {"phase_deg": None, "x": None, "y": None}
+    return {"amplitude": finite(abs(z)), **parts}
 
 
-def vibration(b: FieldBalancing, value: Complex) -> list[Column]:
-    """Return amplitude and phase."""
-    return [amplitude(b, "amplitude", np.abs(value)), number("phase", "angle", degrees(value))]
+def _text(z: complex) -> str:
+    """A vector in both forms: `3.2 ∠ 55° = (1.83547, 2.62128)`."""
+    return f"{figures(abs(z))} ∠ {figures(_angle(z) or 0.0)}° = ({_pair(z)})"
 
 
-def amplitude_unit(b: FieldBalancing) -> str:
-    """The amplitude's unit as people write it."""
-    return written(b.runs.amplitude_unit)
+def _pair(z: complex) -> str:
+    return f"{figures(z.real)}, {figures(z.imag)}"
 
 
-def masses_text(b: FieldBalancing, planes: Sequence[str], of: Iterable[complex], spec: str = ".2f") -> str:
-    """Write masses in their planes as a sentence has them; those that are zero are left out."""
-    return " and ".join(
-        f"{b.amount(abs(w)):.6g} {b.unit} at {angle_text(degrees(complex(w)), spec)}° in {plane}"
-        for plane, w in zip(planes, of, strict=True)
-        if w
-    )
+class _Way:
+    """The worked solution of a rotor."""
+
+    def __init__(self, rotor: Rotor) -> None:
+        self.b, self.solved, self.group, self.i = rotor.b, rotor.solved, rotor.group, rotor.i
+        self.channels, self.planes, self.runs = rotor.channels, rotor.planes, rotor.b.runs
+        self.mass = f"{self.runs.per}_{self.runs.per_si}"
+        self.unit = written(self.runs.amplitude_unit)
+
+    def topics(self) -> list[Topic]:
+        """Return the steps."""
+        effects = not (self.b.runs.fitted or self.b.request.four_run or self.b.stored)
+        return [
+            self._vectors(),
+            *([self._effects()] if effects else []),
+            self._coefficients(),
+            self._system(),
+            self._solution(),
+        ]
+
+    def _rows(self) -> list[tuple[str, list[complex], list[complex]]]:
+        """Every run: its name, its mean readings (s,), what was on the rotor (p,)."""
+        group, i = self.group, self.i
+        return list(zip(group.lines.runs(i), group.means[i].tolist(), group.on[i].tolist(), strict=True))
+
+    def _masses(self, on: list[complex]) -> list[dict[str, Any]]:
+        return [
+            {"plane": plane, self.mass: float(abs(m)), "angle_deg": _angle(m)}
+            for plane, m in zip(self.group.planes, on, strict=True)
+            if m
+        ]
+
+    def _amount(self, m: complex) -> str:
+        return f"{figures(float(self.b.amount(abs(m))))} {self.b.unit} ∠ {figures(_angle(m) or 0.0)}°"
+
+    def _amounts(self, on: list[complex]) -> str:
+        pairs = zip(self.group.planes, on, strict=True)
+        return ", ".join(f"{plane}: {self._amount(m)}" for plane, m in pairs if m)
+
+    def _read(self, vectors: Complex | list[complex], phase: bool = True) -> list[dict[str, Any]]:
+        """Vibrations of all sensors as JSON has them."""
+        return [
+            {**channel.key, **_vector(complex(v), phase)}
+            for channel, v in zip(self.channels, vectors, strict=True)
+        ]
+
+    def _vectors(self) -> Topic:
+        phase, unit = not self.b.request.four_run, self.runs.amplitude_unit
+        entries: list[dict[str, Any]] = []
+        cells: list[tuple[str, str, str, complex]] = []
+        for run, read, on in self._rows():
+            entries.append({"run": run, "masses": self._masses(on), "readings": self._read(read, phase)})
+            put = self._amounts(on) or "none"
+            cells += [(run, str(channel), put, v) for channel, v in zip(self.channels, read, strict=True)]
+        columns = [
+            names("run", [run for run, *_ in cells]),
+            names("sensor", [sensor for _, sensor, *_ in cells]),
+            names("masses", [put for _, _, put, _ in cells]),
+            Column("amplitude", unit, [abs(v) for *_, v in cells]),
+        ]
+        if phase:
+            columns += [
+                Column("phase", "deg", [_angle(v) for *_, v in cells]),
+                Column("x", unit, [v.real for *_, v in cells]),
+                Column("y", unit, [v.imag for *_, v in cells]),
+            ]
+        text = ["V = amplitude ∠ phase = (amplitude·cos, amplitude·sin), repeats of a run by their mean:"]
+        if self.runs.lags:
+            text.append("The runs show that the phase lags: it is counted the other way here.")
+        table = Table(columns, ("run", "sensor"))
+        return Topic("vectors", [*text, table], "Vectors of the runs", {"runs": entries})
+
+    def _effects(self) -> Topic:
+        entries, text = [], ["What a trial mass does is the difference of two runs, T = V_run − V_before:"]
+        rows = self._rows()
+        for j, (run, read, on) in enumerate(rows):
+            at = int(self.group.before_run(j)[self.i])
+            if at < 0:
+                continue
+            before, other, under = rows[at]
+            put = [m - n for m, n in zip(on, under, strict=True)]
+            text.append(f"Run {run} against run {before}, {self._amounts(put) or 'no mass'}:")
+            effects = [v - w for v, w in zip(read, other, strict=True)]
+            text += [
+                f"  {channel}: ({_pair(v)}) − ({_pair(w)}) = {_text(t)}"
+                for channel, v, w, t in zip(self.channels, read, other, effects, strict=True)
+            ]
+            masses = self._masses(put)
+            entries += [
+                {"run": run, "against": before, **channel.key, "masses": masses, **_vector(t)}
+                for channel, t in zip(self.channels, effects, strict=True)
+            ]
+        return Topic("effects", text, "Effects of the trial masses", {"effects": entries})
+
+    def _coefficients(self) -> Topic:
+        unit = f"{self.unit}/{written(self.runs.per_si)}"
+        rows = [
+            (channel, plane, a)
+            for channel, of in zip(self.channels, self.solved.alpha[self.i].tolist(), strict=True)
+            for plane, a in zip(self.planes, of, strict=True)
+        ]
+        entries = [
+            {
+                **channel.key,
+                "plane": plane,
+                f"magnitude_per_{self.runs.per_si}": abs(a),
+                "phase_deg": _angle(a),
+                **_parts(a),
+            }
+            for channel, plane, a in rows
+        ]
+        if self.b.request.four_run:
+            text = "From amplitudes alone (four runs): the coefficient whose circles fit the readings best."
+        elif self.b.stored:
+            text = "Stored coefficients:"
+        elif not self.b.runs.fitted:
+            text = f"α = T/m of each trial mass ({unit}); with trial masses left on, the runs' equations together:"
+        else:
+            text = f"Initial vibration and coefficients by least squares on all runs, V_run = V0 + Σ α·m ({unit}):"
+        columns = [
+            names("sensor", [str(channel) for channel, *_ in rows]),
+            names("plane", [plane for _, plane, _ in rows]),
+            Column("magnitude", "", [abs(a) for *_, a in rows]),
+            Column("phase", "deg", [_angle(a) for *_, a in rows]),
+        ]
+        table = Table(columns, ("sensor", "plane"))
+        return Topic("coefficients", [text, table], "Influence coefficients", {"coefficients": entries})
+
+    def _system(self) -> Topic:
+        alpha, here = self.solved.alpha[self.i], self.solved.here[self.i].tolist()
+        weights = self.group.own_weights(self.i)
+        rows = []
+        for channel, of, v in zip(self.channels, alpha.tolist(), here, strict=True):
+            left = " + ".join(
+                f"({figures(a.real)} + i·({figures(a.imag)}))·w_{plane}"
+                for a, plane in zip(of, self.planes, strict=True)
+            )
+            rows.append(f"  {channel}: {left} = −({figures(v.real)} + i·({figures(v.imag)}))")
+        n, p = alpha.shape
+        how = "as many equations as unknowns" if n == p else "Σ|α·w + V0|² least" if n > p else "least norm"
+        if self.b.limited:
+            how = "the corrections within the limits that leave the least"
+        head: dict[str, Any] = {
+            "planes": list(self.planes),
+            "matrix": [[[a.real + 0.0, a.imag + 0.0] for a in row] for row in alpha.tolist()],
+            "right": [[-v.real + 0.0, -v.imag + 0.0] for v in here],
+            "weights": None if weights is None else [float(v) for v in weights],
+        }
+        begin = "as it stands" if self.b.request.from_here else "without masses"
+        return Topic("system", [f"α·w = −V0, V0 the vibration {begin}: {how}.", *rows], "System", head)
+
+    def _solution(self) -> Topic:
+        solved, i = self.solved, self.i
+        corrections, residual = solved.corrections[i].tolist(), solved.residual[i].tolist()
+        text = [f"  w_{plane} = {self._amount(w)}" for plane, w in zip(self.planes, corrections, strict=True)]
+        text.append("What is left, V0 + α·w:")
+        text += [
+            f"  {channel}: {_text(v)} {self.unit}" for channel, v in zip(self.channels, residual, strict=True)
+        ]
+        head: dict[str, Any] = {
+            "corrections": [
+                {"plane": plane, self.mass: abs(w), "angle_deg": _angle(w), **_parts(w)}
+                for plane, w in zip(self.planes, corrections, strict=True)
+            ],
+            "residual": self._read(residual),
+        }
+        return Topic("solution", text, "Solution", head)

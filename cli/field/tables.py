@@ -1,85 +1,194 @@
-"""The tables of a balancing in the field: corrections, trim, vibration before and after, tolerance, zones, coefficients."""
+"""The tables of what to add: corrections with their digits, trims, splits, tolerance; and the rows that tables have of rotors."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
-from functools import cache
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from balancing import Balance
 from cli.field.field_balancing import FieldBalancing, Solved
-from cli.field.rotor import READINGS, Rotor, Rows, Tables, Trim, amplitude, each, masses, uncertainties
-from cli.read.runs.runs import Complex, Real
+from cli.field.fit import exact_errors, exact_fit
+from cli.field.remarks import conventions
+from cli.field.rotor import Rotor, Trim, each
+from cli.read.runs.runs import Channel, Complex, Real
 from dalembert.angles import degrees
 from dalembert.results.columns import ABSENT, Column, Table, names, number
-from dalembert.units import amplitude_kind, from_si, to_si
+from dalembert.results.text import angle_text
+from dalembert.units import from_si, written
 
 if TYPE_CHECKING:
+    from dalembert.arithmetic.doubled import Doubled
     from dalembert.arithmetic.doubled_vectors import Vectors
 
-METHOD = (
-    "Influence coefficients from trial runs (E. L. Thearle 1934), corrections by least squares or by the smallest largest "
-    "residual (T. P. Goodman 1964; second-order cone program), all runs of a log fitted together; tolerance after ISO "
-    "21940-11. The masses are at the radius of the trial masses."
-)
-RMS = {"": 1.0, "_rms": 1.0, "_pk": 0.5**0.5, "_pp": 0.5 * 0.5**0.5}
-"""The r.m.s. value of a vibration whose amplitude is read in one of these ways is 1."""
+Tables = dict[str, Callable[[], Table]]
+
+READINGS = ("rotor", "sensor", "state", "speed_rpm")
+"""What names a row that is of a sensor."""
 
 
-def tables(b: FieldBalancing, warnings: list[str]) -> Tables:
-    """The tables of a result, the CSV's first. `warnings` takes in why --digits leaves a correction whole."""
-    request, logs, further = b.request, Tables(), list[Column]()
-    if b.runs.fitted:
-        from cli.field import logs as of
+@dataclass(eq=False, repr=False)
+class Rows:
+    """The rows of a table, and the columns that name them: the rotor, where there are several, then plane, sensor …"""
 
-        logs = of.tables(b)
-        further = [of.unsuggested(b)] if request.suggest else []
-    made: Tables = {
-        "corrections": cache(lambda: corrections(b, warnings)),
-        "influence": lambda: _influence(b),
-        "prediction": lambda: prediction(b),
-    }
-    if request.places is not None:
-        on = any(solved.standing.any() for solved in b.solved)
-        made["split"] = lambda: split(b, lambda rotor: rotor.solved.corrections, "corrections")
-        made["trim_split"] = lambda: split(b, lambda rotor: rotor.solved.trim, "trim", shown=on)
-    made |= {"trim": lambda: trim(b), "standing": lambda: standing(b), "rotors": lambda: rotors(b, further)}
-    if request.tolerance is not None:
-        made["tolerance"] = lambda: tolerance(b)
-    if request.zone_class is not None:
-        made["zones"] = lambda: zones(b)
-    if request.four_run:
-        made |= {"misfit": lambda: misfit(b), "alternatives": lambda: alternatives(b)}
-    if request.view is not None:
-        made |= {"static": lambda: static_couple(b, 0), "couple": lambda: static_couple(b, 1)}
-    return {**made, **logs}
+    rotor: Column
+    shown: list[Column]
+    hidden: list[Column]
+    """Those of the JSON document alone."""
+    solved: Sequence[Solved] = ()
+    sizes: Sequence[int] = ()
+    """How many rows the rotors of each group have together."""
+    order: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+
+    @classmethod
+    def of(cls, b: FieldBalancing, rotors: Iterable[str]) -> Rows:
+        """Return rows of these rotors."""
+        rotor = names("rotor", rotors)
+        return cls(rotor, [rotor] if b.runs.several else [], [] if b.runs.several else [rotor])
+
+    @classmethod
+    def each(cls, b: FieldBalancing, count: Callable[[Solved], int] = lambda _: 1) -> Rows:
+        """Return rows of all rotors, as many of each rotor of a group."""
+        counts = [count(solved) for solved in b.solved]
+        groups = list(zip((solved.group.rotors for solved in b.solved), counts, strict=True))
+        rotor = np.concatenate([np.repeat(of, n) for of, n in groups])
+        order = np.lexsort((np.concatenate([np.tile(np.arange(n), len(of)) for of, n in groups]), rotor))
+        rows = cls.of(b, [b.runs.rotors[r] for r in rotor[order].tolist()])
+        return replace(rows, solved=b.solved, sizes=[len(of) * n for of, n in groups], order=order)
+
+    @classmethod
+    def planes(cls, b: FieldBalancing) -> Rows:
+        """Return a row for each rotor and plane."""
+        rows = cls.each(b, lambda solved: len(solved.planes))
+        rows.shown.append(names("plane", rows.cells(lambda solved: solved.planes)))
+        return rows
+
+    @classmethod
+    def sensors(cls, b: FieldBalancing) -> Rows:
+        """Return a row for each rotor and sensor."""
+        rows = cls.each(b, lambda solved: len(solved.group.channels))
+        return rows.read(b, rows.cells(lambda solved: solved.group.channels))
+
+    def read(self, b: FieldBalancing, of: Sequence[Channel]) -> Rows:
+        """Add the columns that name sensors: with state and speed where the table has them, else those are JSON's alone."""
+        self.shown.append(names("sensor", [channel.sensor for channel in of]))
+        states = [channel.state for channel in of]
+        if any(state is not None for state in states):
+            stored = [ABSENT if state is None else state for state in states]
+            self.shown.append(Column("state", "", states, None, "state", stored))
+        # in JSON states stand where speeds do
+        speeds = [ABSENT if c.state is not None and c.speed is None else c.speed for c in of]
+        unit = b.runs.speed_unit or "rpm"
+        cells = [None if c.speed is None else from_si(c.speed, "speed", unit) for c in of]
+        column = Column("speed", unit, cells, None, "speed_rad_s", speeds)
+        (self.hidden if all(cell is None for cell in cells) else self.shown).append(column)
+        return self
+
+    def table(
+        self,
+        columns: Sequence[Column],
+        keys: Sequence[str],
+        place: str,
+        above: str = "",
+        below: str = "",
+        *,
+        hidden: Sequence[Column] = (),
+        shown: bool = True,
+    ) -> Table:
+        """Return the table of these rows; one that is not shown is of the document alone."""
+        every, unseen = [*self.shown, *columns], [*self.hidden, *hidden]
+        if not shown:
+            every, unseen = [], [*every, *unseen]
+        return Table(every, keys, f"rotors[].{place}".removesuffix("."), above, below, unseen)
+
+    def numbers(self, of: Callable[[Solved], ArrayLike]) -> NDArray[Any]:
+        """Put numbers of the groups, (g, n) each, into the order of the rows."""
+        return np.concatenate([np.ravel(of(solved)) for solved in self.solved])[self.order]
+
+    def several(self, of: Callable[[Solved], Iterable[ArrayLike]]) -> list[NDArray[Any]]:
+        """Put several arrays of numbers into the order of the rows."""
+        parts = zip(*(of(solved) for solved in self.solved), strict=True)
+        return [np.concatenate([np.ravel(part) for part in groups])[self.order] for groups in parts]
+
+    def cells(self, of: Callable[[Solved], Sequence[Any]]) -> list[Any]:
+        """Put cells that all rotors of a group have into the order of the rows."""
+        every = [cell for solved in self.solved for cell in list(of(solved)) * len(solved.group.rotors)]
+        return [every[k] for k in self.order.tolist()]
+
+    def some(self, of: Callable[[Solved], ArrayLike | None]) -> tuple[Real, list[Any]]:
+        """Put numbers that not every group has into the order of the rows: as shown, and as JSON has them."""
+        parts = [(of(solved), n) for solved, n in zip(self.solved, self.sizes, strict=True)]
+        there = np.repeat([v is not None for v, _ in parts], self.sizes)[self.order].tolist()
+        numbers = [np.broadcast_to(np.nan if v is None else np.asarray(v, dtype=float), n) for v, n in parts]
+        values = np.concatenate(numbers)[self.order]
+        return values, [v if has else ABSENT for v, has in zip(values.tolist(), there, strict=True)]
 
 
-def _influence(b: FieldBalancing) -> Table:
-    from cli.field.logs import influence
+def masses(b: FieldBalancing, values: Complex, place: str | None = "") -> list[Column]:
+    """Return size and angle of masses or unbalances."""
+    per, unit = b.runs.per, b.runs.mass_unit
+    return [
+        number(per, per, np.abs(values), unit, place=place),
+        number("angle", "angle", degrees(values), place=place),
+    ]
 
-    return influence(b)
+
+def uncertainties(
+    b: FieldBalancing, along: Real, across: Real, *exact: Callable[[], Doubled]
+) -> list[Column]:
+    """Return the standard deviations of size and angle of masses; `exact`: in 32 digits."""
+    per, again = b.runs.per, exact or (None, None)
+    return [
+        number(f"{per}_uncertainty", per, along, b.runs.mass_unit, exact=again[0]),
+        number("angle_uncertainty", "angle", across, exact=again[1]),
+    ]
+
+
+def amplitude(b: FieldBalancing, name: str, values: ArrayLike, place: str | None = "") -> Column:
+    """Return a quantity in the unit of the readings, which JSON keeps; `place`: its key, if that is not the name."""
+    array = np.asarray(values, dtype=float)
+    return Column(name, b.runs.amplitude_unit, array, None, name if place == "" else place, array)
+
+
+def vibration(b: FieldBalancing, value: Complex) -> list[Column]:
+    """Return amplitude and phase."""
+    return [amplitude(b, "amplitude", np.abs(value)), number("phase", "angle", degrees(value))]
+
+
+def amplitude_unit(b: FieldBalancing) -> str:
+    """The amplitude's unit as people write it."""
+    return written(b.runs.amplitude_unit)
+
+
+def masses_text(b: FieldBalancing, planes: Sequence[str], of: Iterable[complex], spec: str = ".2f") -> str:
+    """Write masses in their planes as a sentence has them; those that are zero are left out."""
+    return " and ".join(
+        f"{b.amount(abs(w)):.6g} {b.unit} at {angle_text(degrees(complex(w)), spec)}° in {plane}"
+        for plane, w in zip(planes, of, strict=True)
+        if w
+    )
 
 
 def corrections(b: FieldBalancing, warnings: list[str]) -> Table:
-    """One row per rotor and plane. A correction whose error has no bound stays whole, and `warnings` says why."""
+    """One row per rotor and plane. With --digits a correction without an estimate of its error stays whole; `warnings` takes the reason."""
     per, unit, rows = b.runs.per, b.runs.mass_unit, Rows.planes(b)
     fix, trim = (rows.numbers(lambda s: s.corrections), rows.numbers(lambda s: s.trim))
 
-    @cache
-    def again() -> list[Real]:
-        """The second run."""
-        from cli.field.rounding import digits
+    again = cache(lambda: rows.several(lambda solved: digits(b, solved, warnings)))
 
-        return rows.several(lambda solved: digits(b, solved, warnings).parts)
+    def doubled(k: int) -> Doubled:
+        from dalembert.arithmetic.doubled import Doubled
+
+        return Doubled(*again()[2 * k : 2 * k + 2])
 
     def exact(k: int) -> Vectors:
-        from cli.field.rounding import vectors_of
+        from dalembert.arithmetic.doubled_vectors import Vectors
 
-        return vectors_of(again()[4 * k :])
+        return Vectors(doubled(2 * k), doubled(2 * k + 1))
 
     def sized(name: str, values: Complex, k: int, place: str | None) -> list[Column]:
         size, angle = np.abs(values), degrees(values)
@@ -88,14 +197,12 @@ def corrections(b: FieldBalancing, warnings: list[str]) -> Table:
             number(f"{name}angle", "angle", angle, "", lambda: exact(k).turned(values), place),
         ]
 
-    uncertainty = uncertainties(b, *rows.several(lambda s: s.uncertainty(s.corrections)))
-    for column in uncertainty:
-        column.error = lambda column=column: again()[8] * np.nan_to_num(column.values)
+    along, across = rows.several(lambda s: s.uncertainty(s.corrections))
+    uncertainty = uncertainties(b, along, across, lambda: doubled(4), lambda: doubled(5))
     columns = [*sized("", fix, 0, ""), *sized("trim_", trim, 1, None)]
     columns[2:2] = uncertainty if b.uncertain else []
-    below = [
-        "or REMOVE the same amounts at the opposite angles (+180°)" if fix.any() else "nothing to correct"
-    ]
+    opposite = "or REMOVE the same amounts at the opposite angles (+180°)"
+    below = [opposite if fix.any() else "nothing to correct"]
     if not any(solved.standing.any() for solved in b.solved):
         below.append("no mass is on the rotor in its last run: the trim is the correction")
     # the CSV has the rotor always
@@ -106,35 +213,115 @@ def corrections(b: FieldBalancing, warnings: list[str]) -> Table:
     )
 
 
-def sense(b: FieldBalancing) -> str:
-    """Return how phases and mass angles are counted, as a sentence."""
-    request = b.request
-    lags = request.phase_lag or b.runs.lags
-    if request.four_run:
-        return "Mass angles as in the table; no phase is used."
-    if request.rotation is None and not lags:
-        return "Phases and mass angles are counted in one common sense, from one mark on the rotor."
-    turning = (
-        f"the shaft turns {request.rotation} as seen against +z"
-        if request.rotation
-        else "phases are counted with the mass angles"
-    )
-    return (
-        f"The instrument's phases {'lag' if lags else 'lead'} ({turning}); all phases given out are counted in the sense of "
-        "the mass angles."
-    )
+class SecondRun:
+    """The second run of a group, in 32 digits."""
+
+    def __init__(self, balancing: FieldBalancing, solved: Solved) -> None:
+        self.balancing, self.solved, self.group = balancing, solved, solved.group
+        self.fit = exact_fit(solved.group, balancing.runs, balancing.request, balancing.stored)
+        self.standing = self.group.in_32_digits.standing
+
+    @cached_property
+    def initial(self) -> Vectors:
+        """The vibration without masses, run-out off, (g, s)."""
+        from dalembert.arithmetic.doubled_vectors import Vectors
+
+        runout, exact = Vectors.of(self.balancing.runout(self.group)), self.balancing.runs.exact_runout
+        if exact is not None:
+            vectors = exact()
+            for s, channel in enumerate(self.group.channels):
+                if channel.sensor in vectors:
+                    runout[s] = vectors[channel.sensor]
+        return self.fit.unknowns[..., 0] - runout
+
+    @cached_property
+    def here(self) -> Vectors:
+        """The vibration where the corrections start from, (g, s)."""
+        if not self.solved.start.any():
+            return self.initial
+        return self.initial + (self.alpha * self.standing[:, None, :]).total()
+
+    @property
+    def alpha(self) -> Vectors:
+        """The influence coefficients, (g, s, p)."""
+        return self.fit.unknowns[..., 1:]
+
+    @property
+    def ridge(self) -> Doubled:
+        """That of the option, as it is written."""
+        from cli.read.exact import writtens
+
+        return writtens(self.solved.objective.ridge)
+
+    def corrections(self, warnings: list[str]) -> Vectors:
+        """Return the corrections, (g, p); NaN where they are not determined, `warnings` takes the reason."""
+        solved, group, objective = self.solved, self.group, self.solved.objective
+        whole = Balance(solved.alpha, solved.here, solved.corrections, group.weights, ridge=objective.ridge)
+        if not objective.limited:
+            exact, _ = whole.second_run(self.alpha, self.here, self.ridge)
+            assert exact is not None
+            return exact
+        from dalembert.arithmetic.doubled_vectors import Vectors
+
+        result = Vectors.of(np.full(solved.corrections.shape, complex(np.nan, np.nan)))
+        ceiling = None if objective.max_residual is None or objective.minimax else objective.max_residual
+        for i in range(len(solved.corrections)):
+            one = replace(
+                whole,
+                influence=solved.alpha[i],
+                initial=solved.here[i],
+                corrections=solved.corrections[i],
+                weights=group.own_weights(i),
+                bound=None if solved.bound is None else float(solved.bound[i]),
+                of_largest=solved.bound is not None,
+                max_mass=objective.max_mass,
+                max_residual=None if ceiling is None else np.full(solved.here.shape[-1], ceiling),
+            )
+            exact, reason = one.second_run(self.alpha[i], self.here[i])
+            if exact is not None:
+                result[i] = exact
+            else:
+                warnings.append(
+                    f"{self.balancing.of(group, i)}--digits: the corrections are printed in full, without an "
+                    f"estimate of their error: {reason}"
+                )
+        return result
+
+    def deviations(self, corrections: Vectors) -> tuple[Doubled, Doubled]:
+        """Return the deviations of size and angle (degrees) of the corrections, (g, p), to first order."""
+        from balancing.log_again import correction_deviations
+        from balancing.second_run import chosen
+        from dalembert.arithmetic.doubled import PI
+
+        solved, group, request = self.solved, self.group, self.balancing.request
+        along, across = correction_deviations(
+            self.fit,
+            self.initial,
+            corrections + self.standing if solved.start.any() else corrections,
+            corrections,
+            exact_errors(group, request, self.fit),
+            group.weights,
+            self.ridge,
+        )
+        size = corrections.size
+        return along, across / chosen(size.high > 0, size, np.nan) * 180.0 / PI
 
 
-def conventions(b: FieldBalancing) -> str:
-    """Return how angles and phases are counted and what the corrections mean, as sentences."""
-    amounts = f"{b.runs.per}{'es' if b.runs.per == 'mass' else 's'}"
-    radius = "at the radius of the trial masses"
-    if b.request.from_here:
-        return f"{sense(b)}\nTrim: {amounts} to ADD to the rotor as it stands in its last run, {radius}."
-    return (
-        f"{sense(b)}\nCorrections: {amounts} to ADD to the rotor in its initial state, all trial masses off, {radius}. "
-        "Trim: what to ADD to the rotor as it stands in its last run."
-    )
+def digits(balancing: FieldBalancing, solved: Solved, warnings: list[str]) -> list[Real]:
+    """Return corrections, trims (four numbers each) and the deviations of corrections (two each) in 32 digits; NaN where unknown."""
+    from dalembert.arithmetic.doubled import Doubled
+
+    run = SecondRun(balancing, solved)
+    corrections = run.corrections(warnings)
+    trim = corrections if solved.start.any() else corrections - run.standing
+    deviations = (Doubled(np.full(solved.corrections.shape, np.nan)),) * 2
+    if solved.drawn:
+        sentence = "--digits: the uncertainties from drawn readings are printed in full: their rounding error is not known"
+        warnings += [sentence] if sentence not in warnings else []
+    elif solved.covariance is not None:
+        deviations = run.deviations(corrections)
+    numbers = [corrections.x, corrections.y, trim.x, trim.y, *deviations]
+    return [np.broadcast_to(part, solved.corrections.shape) for x in numbers for part in (x.high, x.low)]
 
 
 def standing(b: FieldBalancing) -> Table:
@@ -166,40 +353,6 @@ def trim(b: FieldBalancing) -> Table:
     hidden = [] if finite else uncertainty
     # with nothing on the rotor there is nothing to show: the trim is the correction
     return rows.table(columns, ("rotor", "plane"), "trim[]", above, hidden=hidden, shown=bool(on.any()))
-
-
-def prediction(b: FieldBalancing) -> Table:
-    """The vibration before, and as predicted with the corrections: a row for each rotor and sensor."""
-    rows = Rows.sensors(b)
-    before, after = rows.several(lambda s: (s.initial, s.residual))
-
-    def phase(name: str, values: Complex, place: str | None = None) -> Column:
-        # none is shown where nothing moves; JSON has 0
-        column = number(name, "angle", np.where(values == 0, np.nan, degrees(values)), place=place)
-        column.stored = degrees(values)
-        return column
-
-    phases = [
-        number("before_phase", "angle", degrees(before), place=None),
-        phase("predicted_phase", after, "phase"),
-    ]
-    sizes = [
-        amplitude(b, "before_amplitude", np.abs(before), None),
-        amplitude(b, "predicted_amplitude", np.abs(after), "amplitude"),
-    ]
-    columns, hidden = [column for pair in zip(sizes, phases, strict=True) for column in pair], list[Column]()
-    if b.request.four_run:
-        columns, hidden = sizes, [Column("phase", "deg", [None] * len(after), None, "phase_deg")]
-    if b.runs.fitted:
-        deviation = rows.numbers(lambda s: s.fitted.vibration_deviation(s.total))
-        spread = [amplitude(b, "amplitude_uncertainty", deviation)]
-        ceiling = b.ceiling
-        if ceiling is not None:
-            chance = rows.numbers(lambda s: s.fitted.probability_within(ceiling))
-            spread.append(number("probability_within", "number", chance))
-        (columns if np.isfinite(deviation).any() else hidden).extend(spread)
-    above = "vibration before, and as predicted with the corrections"
-    return rows.table(columns, READINGS, "residual[]", above, hidden=hidden)
 
 
 def rotors(b: FieldBalancing, further: Sequence[Column] = ()) -> Table:
@@ -277,7 +430,7 @@ def split(b: FieldBalancing, of: Callable[[Rotor], Complex], name: str, *, shown
 
 def tolerance(b: FieldBalancing) -> Table:
     """One row per rotor and plane: what is permissible, what the unbalance was, what is predicted."""
-    from cli.read.tolerance import verdict_table
+    from cli.read.planes_and_tolerance import verdict_table
 
     limit = b.request.tolerance
     assert limit is not None
@@ -285,65 +438,6 @@ def tolerance(b: FieldBalancing) -> Table:
     whole = from_si(limit.permissible, "unbalance", "g_mm")
     named = f"{limit.grade}: " if limit.grade else ""
     return replace(table, above=f"{named}U_per = {whole:.6g} g·mm, {limit.sharing}; residual as predicted")
-
-
-def zones(b: FieldBalancing) -> Table:
-    """One row per rotor and sensor: the zone of its vibration velocity before, in the last run with corrections, as predicted."""
-    from balancing import ZONE_BOUNDARIES, severity_zone
-
-    machine, (_, tag) = b.request.zone_class or "", amplitude_kind(b.runs.amplitude_unit)
-    unit = b.runs.amplitude_unit.removesuffix(tag)
-
-    def zone(vibration: Complex) -> list[str | None]:
-        size = to_si(np.abs(vibration), "amplitude", unit)
-        speed = RMS[tag] * np.asarray(size) / to_si(1.0, "amplitude", "m_s")
-        return [str(severity_zone(v, machine)) if v == v else None for v in speed.tolist()]
-
-    def measured(solved: Solved) -> Complex:
-        runs = [Rotor(b, solved, i).last for i in range(len(solved.initial))]
-        unread = np.full(solved.initial.shape[1], np.nan)
-        return np.array([unread if run is None else run.vibration for run in runs])
-
-    rows = Rows.sensors(b)
-    before, last, after = map(zone, rows.several(lambda s: (s.initial, measured(s), s.residual)))
-    columns = [
-        names("before_zone", before),
-        *([names("measured_zone", last)] if any(last) else []),
-        names("predicted_zone", after),
-    ]
-    a, bb, c = (f"{1e3 * bound:g}" for bound in ZONE_BOUNDARIES[machine])
-    meant = "" if tag else ", taken as r.m.s."
-    above = f"zones of ISO 10816-3, {machine}: A to {a}, B to {bb}, C to {c} mm/s r.m.s.; of the once-per-turn vibration{meant}"
-    return rows.table(columns, READINGS, "zones[]", above)
-
-
-def misfit(b: FieldBalancing) -> Table:
-    """How far the amplitudes of each sensor are from any vector's, by the four-run method."""
-    rows = Rows.each(b, lambda solved: len(solved.group.channels) * len(solved.planes))
-    off = rows.numbers(lambda solved: [[fit.misfit for fit in one] for one in solved.group.amplitude_fits])
-    plane = names("plane", rows.cells(lambda s: [name for name in s.planes for _ in s.group.channels]))
-    columns = [
-        names("sensor", rows.cells(lambda s: [c.sensor for c in s.group.channels] * len(s.planes))),
-        *([plane] if any(len(solved.planes) > 1 for solved in b.solved) else []),
-    ]
-    keys = ("rotor", *(column.name for column in columns))
-    above = "r.m.s. misfit of the amplitudes"
-    return rows.table([*columns, amplitude(b, "amplitude", off)], keys, "misfit[]", above)
-
-
-def alternatives(b: FieldBalancing) -> Table:
-    """The other corrections that fit the amplitudes as well, by the four-run method."""
-    of = [
-        (rotor.name, rotor.planes[0], -v / a)
-        for rotor in each(b)
-        for v, a in zip(
-            rotor.group.fit.initial[rotor.i], rotor.solved.group.amplitude_fits[rotor.i][0].other, strict=True
-        )
-        if a == a
-    ]
-    fix = masses(b, np.array([w for *_, w in of], dtype=complex))
-    columns = [names("plane", [plane for _, plane, _ in of]), *fix]
-    return Rows.of(b, [name for name, *_ in of]).table(columns, ("rotor", "plane"), "alternatives[]")
 
 
 def static_couple(b: FieldBalancing, part: int) -> Table:

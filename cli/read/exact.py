@@ -36,7 +36,7 @@ def writtens(numbers: ArrayLike) -> Doubled:
 
 
 def quantity(text: str, dimension: str) -> Doubled:
-    """A quantity of an option, in SI, as its decimals say.
+    """A quantity of an option, in SI, as it is written.
 
     >>> quantity("0.1 mm", "length").high
     0.0001

@@ -131,6 +131,43 @@ def mass_at(
     return size, unit, *turn
 
 
+def reading_error(text: str | None) -> tuple[float, float] | None:
+    """Read `2%,2deg`: relative error of the amplitude, error of the phase in rad."""
+    if text is None:
+        return None
+    from dalembert.quantities import parse_number
+
+    amplitude, phase = 0.0, 0.0
+    for part in text.split(","):
+        part = part.strip()
+        if part.endswith("%"):
+            try:
+                amplitude = parse_number(part[:-1]) / 100
+            except ValueError:
+                raise bad("--reading-error", f"'{part}': expected a share such as 2%") from None
+        else:
+            phase = needed("--reading-error", part, "angle")
+    if amplitude < 0 or phase < 0 or amplitude + phase == 0:
+        raise bad("--reading-error", f"'{text}': expected positive errors, such as 2%,2deg")
+    return amplitude, phase
+
+
+def mass_limits(texts: Sequence[str]) -> dict[str, tuple[float, str]]:
+    """Read the limits of --max-mass, `5g` or `A=5g`, joined by commas: plane -> value and unit; the key "" is for all."""
+    limits: dict[str, tuple[float, str]] = {}
+    for text in ",".join(texts).split(",") if texts else ():
+        plane, mark, value = text.rpartition("=")
+        if mark and not plane.strip():
+            raise bad("--max-mass", f"'{text}': expected a plane's name before =, such as A=5g")
+        dimension = "unbalance" if "_" in value or "*" in value or "·" in value else "mass"
+        limit = with_unit("--max-mass", value, dimension, positive=True)
+        assert limit is not None
+        if plane.strip() in limits:
+            raise bad("--max-mass", f"'{text}': this limit is given twice")
+        limits[plane.strip()] = limit
+    return limits
+
+
 def two_bearings(flag: str, text: str) -> tuple[float, float]:
     """Read `Z1:Z2`, the places of two bearings, m."""
     parts = text.split(":")
@@ -154,6 +191,8 @@ def places(
     if blades is not None:
         start, way = in_degrees("--first", first), -1 if numbering == "against" else 1
         return [in_turn(start + way * (360.0 * k / blades)) for k in range(blades)]
+    if first != "0deg":
+        raise bad("--first", "goes with --blades: it is the angle of the first blade")
     if numbering == "against":
         raise bad(
             "--numbering", "goes with --blades: --positions are numbered in the order in which they stand"
@@ -191,7 +230,7 @@ def exact_degrees(text: str) -> Fraction:
 def exact_places(
     positions: str | None, blades: int | None, first: str, numbering: str = "with"
 ) -> list[Fraction]:
-    """Return the same angles as `places`, as they are written."""
+    """Return the angles of `places` as they are written."""
     from fractions import Fraction
 
     if blades is None:

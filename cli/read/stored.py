@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -20,6 +20,8 @@ from dalembert.units import UNITS, from_si
 if TYPE_CHECKING:
     from fractions import Fraction
 
+    from balancing.log_again import ExactPrior
+    from dalembert.arithmetic.doubled import Doubled
     from dalembert.arithmetic.doubled_vectors import Vectors
 
 
@@ -70,9 +72,9 @@ class Coefficients(NamedTuple):
     covariance: Complex | None
     """E δδᴴ of each channel, (s, p, p); None where the file states none."""
     reading_sd: float
-    """Of the readings that they come from, as vectors; NaN where the file does not say."""
+    """Of the readings that they come from, as vectors; NaN where the file does not state it."""
     degrees_of_freedom: float
-    """Complex, of that and of the covariance; inf where the file does not say."""
+    """Complex, of that and of the covariance; inf where the file does not state it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -110,7 +112,7 @@ class Stored:
         return mine
 
     def key(self, rotor: str) -> str:
-        """Return what is the same for rotors with the same planes."""
+        """Return a key that rotors with the same planes share."""
         return "" if "rotor" not in self.table.texts else ";".join(self.planes(rotor))
 
     def planes(self, rotor: str) -> list[str]:
@@ -122,11 +124,61 @@ class Stored:
         """Return α (s, p) of a rotor in 32 digits, of the decimals as they are written."""
         from cli.read.exact import vectors
 
-        size, phase = (self.table.numbers[name] for name in ("magnitude_per", "phase"))
-        sizes = [x / exactly("1", UNITS["per"][size.unit]) for x in size.decimals]
+        sizes = self._exact_sizes("magnitude_per", runs)
+        return vectors(sizes, self.table.numbers["phase"])[self._rows_of(rotor, channels, self.planes(rotor))]
+
+    def _exact_sizes(self, name: str, runs: Runs) -> list[Fraction]:
+        """Return the numbers of a column per kg or kg·m, as they are written; 0 where it is blank."""
+        size = self.table.numbers[name]
+        sizes = replace(size, values=np.nan_to_num(size.values)).decimals
+        sizes = [x / exactly("1", UNITS["per"][size.unit]) for x in sizes]
         if self.amplitude_unit:
             sizes = _converted(sizes, "amplitude", self.amplitude_unit, runs.amplitude_unit)
-        return vectors(sizes, phase)[self._rows_of(rotor, channels, self.planes(rotor))]
+        return sizes
+
+    def exact_coefficients(
+        self, rotor: str, channels: Sequence[Channel], planes: list[str], runs: Runs
+    ) -> tuple[Vectors, Vectors, Doubled]:
+        """Return α (s, p), the covariance (s, p, p) and the deviation of the readings in 32 digits; 0 where none is stated."""
+        from fractions import Fraction
+
+        from cli.read.exact import vectors
+        from dalembert.arithmetic.doubled import PI, Doubled
+        from dalembert.arithmetic.doubled_functions import DOUBLED
+        from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array, part
+
+        table, at = self.table, self._rows_of(rotor, channels, planes)
+        alpha = vectors(self._exact_sizes("magnitude_per", runs), table.numbers["phase"])[at]
+        sd = Doubled(np.array(0.0))
+        if "reading_sd" in table.numbers and (value := table.numbers["reading_sd"].values[at[0, 0]]) > 0:
+            (exactly_sd,) = _converted(
+                [Fraction(repr(float(value)))],
+                "amplitude",
+                self.amplitude_unit or runs.amplitude_unit,
+                runs.amplitude_unit,
+            )
+            sd = doubled_array([exactly_sd], ())
+        correlation = self._correlation(at)
+        if correlation is None:
+            return alpha, Vectors.of(np.zeros((*at.shape, at.shape[1]))), sd
+        rows = (table.rows,)
+        along = part(doubled_array(self._exact_sizes("magnitude_uncertainty_per", runs), rows), at)
+        across = along
+        if "phase_uncertainty" in table.numbers:
+            of_phase = table.numbers["phase_uncertainty"]
+            turn = part(
+                doubled_array(replace(of_phase, values=np.nan_to_num(of_phase.values)).exact, rows), at
+            )
+            aside = alpha.size * (turn * PI / 180.0 if of_phase.unit == "deg" else turn)
+            blank = np.isnan(of_phase.values[at])
+            across = Doubled(np.where(blank, along.high, aside.high), np.where(blank, along.low, aside.low))
+        sizes = DOUBLED.sqrt(along * along + across * across)
+        share = Vectors.of(np.eye(at.shape[1]) + np.zeros((*at.shape, 1)))
+        for (s, p, q), (size, angle) in correlation.items():
+            numbers = Numbers("", "deg", np.array([angle]), "angle")
+            share[s, p, q] = vectors([Fraction(repr(size))], numbers)[0]
+            share[s, q, p] = share[s, p, q].conj
+        return alpha, share * part(sizes, (..., None)) * part(sizes, (..., None, slice(None))), sd
 
     def matrix(self, rotor: str, channels: Sequence[Channel], runs: Runs) -> Complex:
         """Return α (s, p) of a rotor."""
@@ -187,12 +239,23 @@ class Stored:
 
     def _covariance(self, at: Rows) -> Complex | None:
         """Return E δδᴴ of each channel, (s, p, p), out of deviations and correlations."""
-        if self.along is None or self.across is None or np.isnan(self.along[at]).all():
+        correlation = self._correlation(at)
+        if correlation is None or self.along is None or self.across is None:
             return None
         along, across = (np.nan_to_num(part[at]) for part in (self.along, self.across))
         size = np.sqrt(np.square(along) + np.square(across))
         planes = at.shape[1]
         share = np.zeros((*at.shape, planes), dtype=complex) + np.eye(planes)
+        for (s, p, q), (one, turn) in correlation.items():
+            share[s, p, q] = complex(phasor(np.array([one]), np.array([turn]), "deg")[0])
+            share[s, q, p] = share[s, p, q].conjugate()
+        return np.asarray(size[:, :, None] * size[:, None, :] * share)
+
+    def _correlation(self, at: Rows) -> dict[tuple[int, int, int], tuple[float, float]] | None:
+        """Return size and angle (degrees) of the correlation of channel s between planes p > q; None without deviations."""
+        if self.along is None or np.isnan(self.along[at]).all():
+            return None
+        correlations: dict[tuple[int, int, int], tuple[float, float]] = {}
         for s, p in np.argwhere(np.ones(at.shape)).tolist():
             cell = self.table.texts["correlation"][at[s, p]] if "correlation" in self.table.texts else ""
             cells = cell.split(";") if cell else []
@@ -201,8 +264,7 @@ class Stored:
                     raise ValueError
                 for q, one in enumerate(cells):
                     part, turn = (parse_number(number) for number in one.split("@"))
-                    share[s, p, q] = complex(phasor(np.array([part]), np.array([turn]), "deg")[0])
-                    share[s, q, p] = share[s, p, q].conjugate()
+                    correlations[s, p, q] = part, turn
             except ValueError:
                 raise self.table.error(
                     int(at[s, p]),
@@ -210,7 +272,7 @@ class Stored:
                     cell,
                     f"{p} correlations with the planes before, joined by ';', such as 0.5@0",
                 ) from None
-        return np.asarray(size[:, :, None] * size[:, None, :] * share)
+        return correlations
 
 
 def read_stored(path: str) -> Stored:
@@ -296,7 +358,7 @@ class Sisters:
         return [(one, name) for one in self.files for name in (one.rotors or ("",))]
 
     def key(self, rotor: str) -> str | None:
-        """Return what is the same for rotors of which the same is known."""
+        """Return a key that rotors with the same stored coefficients share."""
         return rotor if any(rotor in one.rotors for one in self.files) else None
 
     def planes(self, rotor: str) -> list[str]:
@@ -339,18 +401,37 @@ class Sisters:
             prior = stored_prior(alpha[0], covariance[0], each[0].degrees_of_freedom)
             if self.key(rotor) is None and stated:
                 runs.warnings.append(
-                    "--influence: one machine's coefficients do not tell how machines differ: they count with the errors of their "
+                    "--influence: one machine's coefficients do not show how machines differ: they count with the errors of their "
                     "own runs alone; expected the files of several machines, --influence once for each"
                 )
             elif not stated:
                 runs.warnings.append("--influence: the coefficients state no uncertainty and count as exact")
-        spreads = [(one.reading_sd, one.degrees_of_freedom) for one in each if one.reading_sd > 0]
+        # of machines whose readings' deviation is known
+        weight = np.array([one.degrees_of_freedom if one.reading_sd > 0 else 0.0 for one in each])
+        freedom = float(weight.sum())
+        if np.isinf(freedom):
+            weight = np.isinf(weight).astype(float)
         scatter = None
-        if spreads:
-            sds, nus = (np.array(part) for part in zip(*spreads, strict=True))
-            exact = np.isinf(nus).any()
-            weight = np.isinf(nus).astype(float) if exact else nus
-            sd = float(np.sqrt((weight * np.square(sds)).sum() / weight.sum()))
-            scatter = (sd, np.inf if exact else float(nus.sum()))
+        if weight.any():
+            sds = np.nan_to_num([one.reading_sd for one in each])
+            scatter = (float(np.sqrt((weight * np.square(sds)).sum() / weight.sum())), freedom)
         between = float(prior.scatter)
-        return Before(prior, len(each), between if between == between else None, scatter)
+
+        def exact() -> tuple[ExactPrior, Doubled]:
+            from balancing.log_again import exact_pooled, exact_stored
+            from dalembert.arithmetic.doubled import Doubled
+            from dalembert.arithmetic.doubled_functions import DOUBLED
+            from dalembert.arithmetic.doubled_vectors import Vectors
+
+            known = [one.exact_coefficients(name, channels, planes, runs) for one, name in machines]
+            alphas, covariances, _ = zip(*known, strict=True)
+            alpha, covariance = (Vectors.joined([of[None] for of in part]) for part in (alphas, covariances))
+            square = sum(
+                (sd * sd * w for (_, _, sd), w in zip(known, weight.tolist(), strict=True)), Doubled(0.0)
+            )
+            reading = DOUBLED.sqrt(square / (float(weight.sum()) or 1.0))
+            if len(known) > 1:
+                return exact_pooled(alpha, covariance), reading
+            return exact_stored(alpha[0], covariance[0]), reading
+
+        return Before(prior, len(each), between if between == between else None, scatter, exact)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mpmath as mp
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -17,6 +18,8 @@ from balancing import (
     robust_fit,
     stored_prior,
 )
+from balancing.second_run import pseudo_inverse
+from dalembert.arithmetic.doubled_vectors import Vectors
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -232,3 +235,41 @@ def test_bad_input_is_refused() -> None:
     ):
         with pytest.raises(ValueError, match=r"expected|shapes|negative|no reading|finite"):
             call()
+
+
+def test_the_errors_of_a_fit_with_a_prior_are_those_against_fifty_digits() -> None:
+    """Mixed estimation by its normal equations (Theil and Goldberger 1961), of the floats as exact."""
+    rng = np.random.default_rng(11)
+    on, read = circular(rng, 3, 5, 2), circular(rng, 3, 5, 2)
+    root = circular(rng, 2, 2, 2) + np.eye(2)
+    prior = stored_prior(circular(rng, 2, 2), root @ np.swapaxes(root, -1, -2).conj())
+    deviation = 0.125
+    fit = fit_with_prior(read, on, prior, deviation)
+    error = fit.error_estimate()
+    shifted, runout = fit.without(np.ones(2, dtype=complex)), np.array([[1.0, 0, 0]] * 2)
+    assert shifted.error_estimate() == pytest.approx(error, rel=0.3, abs=1e-16)
+    assert np.allclose(shifted.unknowns, fit.unknowns - runout)
+    with mp.workdps(50):
+        for i, s in np.ndindex(3, 2):
+            rows = mp.matrix([[1, *map(mp.mpmathify, w)] for w in on[i].tolist()])
+            weighed = mp.matrix(prior.root[s].tolist())
+            gamma = (weighed * weighed.H) ** -1
+            below = mp.zeros(3, 3)
+            below[1:, 1:] = gamma
+            mean = mp.matrix([0, *prior.mean[s].tolist()])
+            y = mp.matrix(read[i, :, s].tolist())
+            scale = mp.mpf(deviation) ** -2
+            exact = mp.lu_solve(rows.H * rows * scale + below, rows.H * y * scale + below * mean)
+            true = [float(abs(exact[k] - mp.mpmathify(fit.unknowns[i, s, k]))) for k in range(3)]
+            assert (true <= error[i, s] * (1 + 1e-9)).all()
+            assert (error[i, s] <= 2 * np.array(true) + 1e-25).all()
+            one = fit.machine(i).error_estimate()[s]
+            assert (one == error[i, s]).all()
+
+
+def test_the_inverse_of_dependent_columns_is_numpy_s() -> None:
+    rng = np.random.default_rng(3)
+    a = circular(rng, 4, 6, 3)
+    a[1, :, 2], a[2] = 2j * a[1, :, 0], 0.0
+    a[3, :, 1:] = a[3, :, :1]
+    assert np.allclose(pseudo_inverse(Vectors.of(a)).value, np.linalg.pinv(a), atol=1e-13)

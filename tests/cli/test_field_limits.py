@@ -85,3 +85,73 @@ def test_the_limit_that_is_named_can_be_met(dalembert: Dalembert, tmp_path: Path
         assert json.loads(met.stdout)["rotors"][0]["residual_max"] <= float(named)
         just_below = f"{float(named) * (1 - 1e-5):.8g}um"
         assert dalembert(*words, just_below, stdin=INITIAL).returncode == 1
+
+
+DEPENDENT = """run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg
+0,1,34,116,,,
+1,1,18,42,A,2,0
+2,1,25,200,B,2,90
+3,1,20,100,A;B,2;1,30;10
+"""
+
+
+def test_fewer_readings_than_planes_within_limits(dalembert: Dalembert, tmp_path: Path) -> None:
+    """The corrections are chosen among many; no run, no page and no digits can be had of one choice alone."""
+    (tmp_path / "runs.csv").write_text(DEPENDENT)
+    command = ("field", "runs.csv", "--max-mass", "5g")
+    plain = dalembert(*command)
+    assert plain.returncode == 0, plain.stderr
+    suggested = dalembert(*command, "--suggest", "--json")
+    assert json.loads(suggested.stdout)["rotors"][0]["suggest"] is None, suggested.stderr
+    assert dalembert(*command, "--report", "report.html").stdout == plain.stdout
+    digits = dalembert(*command, "--digits")
+    assert digits.stdout == plain.stdout
+    assert (
+        "the readings cannot tell the planes apart, so that other corrections leave as much" in digits.stderr
+    )
+    robust = dalembert(*command, "--robust", "--json")
+    assert (robust.returncode, "the readings cannot tell the planes A and B apart" in robust.stderr) == (
+        1,
+        True,
+    )
+    page = dalembert(*command, "--page", "page.html")
+    assert (page.returncode, "the readings cannot tell the planes apart" in page.stderr) == (2, True)
+
+
+def test_a_ridge_damps_what_is_added_to_the_masses_that_stand(dalembert: Dalembert, tmp_path: Path) -> None:
+    """To first order as drawn readings scatter; the uncertainties were those of a ridge on all masses."""
+    rows = [
+        "0,1,34,116,,,",
+        "0,2,20,16,,,",
+        "1,1,18,42,A,2,0",
+        "1,2,28,142,A,2,0",
+        "2,1,25,200,B,2,90",
+        "2,2,10,220,B,2,90",
+    ]
+    (tmp_path / "runs.csv").write_text("\n".join([DEPENDENT.splitlines()[0], *rows]) + "\n")
+    command = ("field", "runs.csv", "--from-here", "--ridge", "0.5", "--reading-error", "2%,2deg", "--json")
+    of_first_order, drawn = (
+        [
+            (one["mass_uncertainty_kg"], one["angle_uncertainty_deg"])
+            for one in json.loads(dalembert(*command, *words).stdout)["rotors"][0]["corrections"]
+        ]
+        for words in ((), ("--monte-carlo", "4000"))
+    )
+    for one, other in zip(of_first_order, drawn, strict=True):
+        assert one == pytest.approx(other, rel=0.05)
+
+
+def test_a_page_of_a_plane_without_effect_is_refused(dalembert: Dalembert, tmp_path: Path) -> None:
+    """Also with a ridge, which gives it a correction of zero."""
+    rows = ["0,1,0,0,,,", "1,1,0,0,A,2,0"]
+    (tmp_path / "runs.csv").write_text("\n".join([DEPENDENT.splitlines()[0], *rows]) + "\n")
+    done = dalembert(
+        "field", "runs.csv", "--ridge", "0.3", "--reading-error", "2%,2deg", "--page", "page.html"
+    )
+    assert (done.returncode, "--page" in done.stderr) == (2, True), done.stderr
+
+
+def test_the_angle_of_the_first_blade_needs_blades(dalembert: Dalembert, tmp_path: Path) -> None:
+    (tmp_path / "runs.csv").write_text(DEPENDENT)
+    done = dalembert("field", "runs.csv", "--first", "10deg")
+    assert (done.returncode, "--first: goes with --blades" in done.stderr) == (2, True), done.stderr

@@ -139,8 +139,14 @@ def test_masses_on_one_line_cannot_tell_the_sense_of_the_phase(dalembert: Dalemb
 def test_a_state_read_once_is_left_out_and_what_is_known_of_it_is_said(dalembert: Dalembert) -> None:
     head = " ;DoubleA;phase;mass;phase\nn;80;40;0;0\nn;99;44;10;20\n"
     for once, words in (
-        ("u;60;30;0;0\n", "its vibration without masses is known, what a mass in plane 1 does is not"),
-        ("u;60;30;10;20\n", "what it does is not told from the vibration without it; a run without"),
+        (
+            "u;60;30;0;0\n",
+            "its vibration without masses is known, but the effect of a mass in plane 1 is not",
+        ),
+        (
+            "u;60;30;10;20\n",
+            "its effect cannot be separated from the vibration without it: add a run without",
+        ),
     ):
         rotor, warnings = found(dalembert("field", "-", "--json", stdin=head + once))
         assert [one["state"] for one in rotor["residual"]] == ["n"]
@@ -156,4 +162,23 @@ def test_planes_that_no_run_tells_apart(dalembert: Dalembert) -> None:
         text += f"{run},1,{80 + size},40,{on}\n{run},2,{70 - size},30,{on}\n"
     done = dalembert("field", "-", "--fit", stdin=text)
     assert done.returncode == 1
-    assert "do not tell the planes apart; a run with one plane's mass alone changed would" in done.stderr
+    assert "do not separate the planes: add a run in which the mass of one plane alone changes" in done.stderr
+
+
+def test_a_rotor_whose_runs_do_not_show_the_sense_beside_one_that_lags(dalembert: Dalembert) -> None:
+    """One instrument may have read both: the rotor that was not turned round is named."""
+    rows = [
+        "R1,0,1,10,0,,,",
+        "R1,1,1,10,90,A,5,0",
+        "R2,0,1,10,0,,,",
+        "R2,1,1,11.18034,-26.565,A,5,0",
+        "R2,2,1,5.0,0,A,5,90",
+    ]
+    rows += ["R2,3,1,11.18034,26.565,A,5,180", "R2,4,1,15.0,0,A,5,270"]
+    text = "\n".join([f"rotor,{HEAD.partition(',')[2].strip()}", *rows]) + "\n"
+    done = dalembert("field", "-", stdin=text)
+    assert done.returncode == 0, done.stderr
+    assert "rotor R2: the runs show that the instrument's phase lags" in done.stderr
+    assert "the phases of 1 rotor (R1) were not turned round" in done.stderr
+    stated = dalembert("field", "-", "--phase-lag", stdin=text)
+    assert "were not turned round" not in stated.stderr

@@ -94,7 +94,7 @@ def test_the_sense_of_the_phase(dalembert: Dalembert) -> None:
     assert abs(correction(told) - BEST) < 1e-11
     against, warnings = found(dalembert("field", "-", "--json", "--phase-lag", stdin=log(off_line)))
     assert against["fit"]["phase_sense"] == "lead"
-    assert any("phase leads" in warning and "was obeyed" in warning for warning in warnings)
+    assert any("phase leads" in warning and "states otherwise, and counts" in warning for warning in warnings)
     line, _ = found(dalembert("field", "-", "--json", stdin=log([(0, 0), (10, 20), (30, 20), (15, 200)])))
     assert line["fit"]["phase_sense"] is None
 
@@ -175,8 +175,7 @@ def test_many_machines_with_runs_of_their_own(dalembert: Dalembert) -> None:
 
 def test_machines_with_runs_planes_and_repeats_of_their_own_are_each_least_squares(tmp_path: Any) -> None:
 
-    from cli.field.groups import measured_groups
-    from cli.field.request import Request
+    from cli.field.fit import Request, measured_groups
 
     rng = np.random.default_rng(11)
     known, lines = {}, []

@@ -92,7 +92,7 @@ def test_coefficients_are_stored_with_what_is_known_of_them(dalembert: Dalembert
     found = LogBalance(known, least_squares(known.influence, known.initial).corrections, known.known(sd, 4))
     told = [1000 * one["mass_uncertainty_kg"] for one in rotor["corrections"]]
     assert told == pytest.approx(found.deviations[0], rel=1e-9)
-    assert any("do not tell how machines differ" in warning for warning in warnings)
+    assert any("do not show how machines differ" in warning for warning in warnings)
     assert rotor["fit"]["prior"] == {
         "machines": 1,
         "scatter_between_machines": None,
@@ -254,7 +254,9 @@ def test_alpha_of_a_file_of_vectors(dalembert: Dalembert, tmp_path: Path) -> Non
     both = text + "B: [[99.030381@43.960790], [84.932821@53.529955]]\nU: [10@-90]\n"
     rotor, warnings = document(dalembert("field", "-", "--json", stdin=both.replace("2@150", "9@9")))
     assert rotor["corrections"][0]["mass_kg"] == pytest.approx(abs(best), rel=1e-6)
-    assert any("ALPHA is not used: the trial runs tell the coefficients" in warning for warning in warnings)
+    assert any(
+        "ALPHA is not used: the trial runs determine the coefficients" in warning for warning in warnings
+    )
     # slow roll is taken off
     slow = text + "A0: [5@10, 3@20]\n"
     rotor, _ = document(dalembert("field", "-", "--json", stdin=slow))

@@ -80,7 +80,7 @@ def test_a_stated_error_holds_in_place_of_the_scatter(dalembert: Dalembert) -> N
     assert size * 1000 == pytest.approx(np.sqrt(np.sum(np.square(each))), rel=1e-9)
     small, warned = answer(CONTRADICTION, "--reading-error", "0.01%,0.01deg")
     assert small < answer(CONTRADICTION)[0] / 100
-    assert "more than --reading-error says" in warned
+    assert "more than --reading-error states" in warned
 
 
 def test_repeats_that_agree_entirely_tell_no_error(dalembert: Dalembert) -> None:

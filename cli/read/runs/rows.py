@@ -1,16 +1,15 @@
-"""The rows of a table of runs side by side: rotors of like shape become arrays together."""
+"""The rows of a table of runs, with the masses of each, side by side: rotors of like shape become arrays together."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.read.runs.masses import NO, YES, Masses
 from cli.read.runs.runs import SHOWN, Channel, Complex, Exact, Group, Lines, Real, Rows, Runs
 from dalembert.errors import DataError
 from dalembert.tables.table import numbered
@@ -18,7 +17,71 @@ from dalembert.tables.table import numbered
 if TYPE_CHECKING:
     from dalembert.arithmetic.doubled_vectors import Vectors
 
+    OfRows = list[dict[str, Vectors] | None]
+
 T = TypeVar("T", Complex, "Vectors")
+Mass = TypeVar("Mass", complex, "Vectors")
+
+
+YES = ("yes", "y", "true", "1", "kept", "on", "ja", "j", "bleibt")
+NO = ("no", "n", "false", "0", "", "removed", "off", "nein")
+
+
+class Masses(NamedTuple):
+    """What the rows of a table put on, an entry for each mass."""
+
+    planes: list[str]
+    row: Rows
+    """Ascending, (k,)."""
+    plane: Rows
+    value: Complex
+    """SI."""
+    stated: NDArray[np.bool_]
+    """Whether a row states masses, (n,)."""
+    exact: Callable[[], Vectors]
+    """The values in 32 digits, as the file has them; computed on request."""
+
+    @classmethod
+    def of(
+        cls, rows: Sequence[dict[str, complex] | None], exact: Callable[[], OfRows] | None = None
+    ) -> Masses:
+        """Take the masses of each row, plane -> mass; None where it states none. `exact`: in 32 digits."""
+        planes: dict[str, int] = {}
+        entries = [
+            (i, planes.setdefault(plane, len(planes)), mass)
+            for i, masses in enumerate(rows)
+            for plane, mass in (masses or {}).items()
+        ]
+        row, plane, value = zip(*entries, strict=True) if entries else ((), (), ())
+        stated = np.array([masses is not None for masses in rows])
+        at, of = (np.array(part, dtype=np.intp) for part in (row, plane))
+
+        def values() -> Vectors:
+            from dalembert.arithmetic.doubled_vectors import Vectors
+
+            if exact is None or not entries:
+                return Vectors.of(np.array(value, dtype=complex))
+            each = [mass for masses in exact() for mass in (masses or {}).values()]
+            return Vectors.joined([mass[None] for mass in each])
+
+        return cls(list(planes), at, of, np.array(value, dtype=complex), stated, values)
+
+    def by_row(self) -> list[dict[str, complex] | None]:
+        """Return them as `of` takes them."""
+        return self._rows(self.value.tolist())
+
+    def exact_by_row(self) -> OfRows:
+        """Return the same in 32 digits."""
+        values = self.exact()
+        return self._rows([values[k] for k in range(len(self.row))])
+
+    def _rows(self, values: Sequence[Mass]) -> list[dict[str, Mass] | None]:
+        out: list[dict[str, Mass] | None] = [{} if stated else None for stated in self.stated.tolist()]
+        for i, plane, mass in zip(self.row.tolist(), self.plane.tolist(), values, strict=True):
+            mine = out[i]
+            assert mine is not None
+            mine[self.planes[plane]] = mass
+        return out
 
 
 @dataclass(eq=False, repr=False)
@@ -35,14 +98,14 @@ class LogRows:
     exact: Callable[[], Vectors]
     """`vibration` in 32 digits, as the table has it; computed on request."""
     years: Real | None
-    """When it was read; NaN where the row does not say."""
+    """When it was read; NaN where the row has no date."""
     channels: list[Channel]
     channel: Rows
     """The sensor, state and speed of each row."""
 
 
 class _Listed:
-    """What of a kind each rotor has, in the order in which it first stands: rows are sorted by rotor."""
+    """The runs, planes or channels of each rotor, in the order of the table; the rows are sorted by rotor."""
 
     def __init__(self, rotor: Rows, code: Rows, rotors: int) -> None:
         self.number, self.first = numbered(rotor * (int(code.max(initial=0)) + 1) + code)
@@ -143,7 +206,7 @@ class Sorted:
     def _agree(
         self, loaded: Rows, first: Rows, at: Rows, plane: Rows, value: Complex, counts: NDArray[np.bool_]
     ) -> None:
-        """Refuse rows that put on other masses than the first one of their run that tells them."""
+        """Refuse rows with other masses than the first row of their run that states masses."""
         rows = self.rows
         in_order = np.lexsort((plane, at))
         at, plane = at[in_order], plane[in_order]
@@ -328,7 +391,7 @@ class Sorted:
         return weights
 
     def _years(self, mine: Rows, run: Rows, lines: _Listed) -> Real | None:
-        """Return when each row of readings was read: each says it itself, or its run does once."""
+        """Return when each row of readings was read: each has a date itself, or its run has one."""
         if self.rows.years is None:
             return None
         years = self.rows.years[self.order[mine]]
@@ -339,7 +402,7 @@ class Sorted:
         return np.where(np.isnan(of_line), of_run[run[lines.first]], of_line)
 
     def _lacking(self, group: Rows, years: Real, run: Rows) -> None:
-        """Say of which runs the date is not known."""
+        """Warn of runs without a date."""
         for i in np.flatnonzero(np.isnan(years).any(axis=1)).tolist():
             names = dict.fromkeys(self.rows.runs[k] for k in run[i, np.isnan(years[i])].tolist())
             if len(self.warnings) == SHOWN:

@@ -1,9 +1,11 @@
-"""Runs as arrays: rotors that were measured in the same way, side by side; channels: which sensor, at which speed or in which state, a row reads."""
+"""Runs as arrays: rotors that were measured in the same way, side by side; channels: which sensor, at which speed or in which state, a row reads; dates."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,6 +18,8 @@ from dalembert.tables.table import Table, numbered
 from dalembert.units import UNITS, Scaled, amplitude_kind, from_si, to_si
 
 if TYPE_CHECKING:
+    from balancing.log_again import ExactFit, ExactPrior
+    from dalembert.arithmetic.doubled import Doubled
     from dalembert.arithmetic.doubled_vectors import Vectors
 
 Real = NDArray[np.float64]
@@ -55,7 +59,7 @@ class Lines:
     def __init__(self, names: list[str], run: Rows, place: Rows, years: Real | None) -> None:
         self.names, self.run, self.place, self.years = names, run, place, years
         self.senses: list[str | None] = [None] * len(run)
-        """For each rotor "lead" or "lag", as the runs show it; None where they cannot tell."""
+        """For each rotor "lead" or "lag", as the runs show it; None where they do not."""
 
     @cached_property
     def rows(self) -> list[list[int]]:
@@ -88,6 +92,8 @@ class Before:
     """Between machines, as a share of the coefficients; None of one machine."""
     reading: tuple[float, float] | None
     """Standard deviation of their readings as vectors, in the runs' unit, and its complex degrees of freedom."""
+    exact: Callable[[], tuple[ExactPrior, Doubled]]
+    """The coefficients and that deviation in 32 digits, as the files have them; computed on request."""
 
 
 @dataclass(eq=False, repr=False)
@@ -158,6 +164,11 @@ class Group:
         return balancing.outlier_probability(self.fit)
 
     @cached_property
+    def drift(self) -> balancing.Drift | None:
+        """How the vibration of each rotor changes in a year, and how often so much by chance; None without dates."""
+        return None if self.lines.years is None else balancing.drift(self.fit, self.lines.years)
+
+    @cached_property
     def means(self) -> Complex:
         """The mean reading of each run as vectors, (g, runs, s); NaN where a run lacks a channel."""
         read = np.isfinite(self.readings)
@@ -177,6 +188,46 @@ class Group:
     def bare(self) -> NDArray[np.bool_]:
         """Which runs are without masses, (g, runs)."""
         return np.asarray(~self.on.any(axis=2))
+
+    @cached_property
+    def in_32_digits(self) -> Exact:
+        """Readings, masses and standing, once the fit has shown the sense of the phases."""
+        return self.exact()
+
+    def exact_scatter(self, fit: ExactFit) -> Doubled:
+        """Return the deviation of the readings in 32 digits, (g,): as residuals scatter, or as those of sisters did, or none."""
+        from balancing.second_run import chosen
+        from dalembert.arithmetic.doubled import Doubled
+
+        sd, estimated = self.fit.residual_sd, np.asarray(self.fit.degrees_of_freedom > 0)
+        scatter = chosen(estimated & (sd > 0), fit.residual_sd)
+        if self.before is None or self.before.reading is None:
+            return scatter
+        before = self.before.exact()[1]
+        return Doubled(
+            *(np.where(estimated, *both) for both in ((scatter.high, before.high), (scatter.low, before.low)))
+        )
+
+    def exact_of_amplitudes(self, i: int) -> Vectors:
+        """Return the coefficients of a rotor without phase in 32 digits, (s, p)."""
+        from dalembert.arithmetic.doubled_vectors import Vectors
+
+        readings, masses, _ = self.in_32_digits
+        read = np.isfinite(self.readings[i]).astype(float)
+
+        def mean(rows: list[int]) -> Vectors:
+            counts: Real = read[rows].sum(axis=0)
+            means: Vectors = ((readings[i, rows] * read[rows]).total(0) / counts)[None]
+            return means
+
+        first = mean([j for of in self.lines.rows for j in of if not self.masses[i, j].any()])
+        columns = []
+        for p, fit in enumerate(self.amplitude_fits[i]):
+            tried = [of for of in self.lines.rows if self.masses[i, of[0], p] != 0]
+            each = Vectors.joined([mean(of) for of in tried])
+            on = Vectors.joined([masses[i, of[0], p][None] for of in tried])
+            columns.append(fit.second_run(first[0].x, each.x, on)[0][:, None])
+        return Vectors.joined(columns, axis=-1)
 
 
 class Exact(NamedTuple):
@@ -228,7 +279,7 @@ class Runs:
     max_mass: dict[str, float] = field(default_factory=dict)
     """The limits that the file states, plane -> SI."""
     lags: bool = False
-    """Whether the runs themselves told that the phase lags, and it was turned round."""
+    """Whether runs show that the phase lags, so that phases were turned round."""
     runout: dict[str, complex] = field(default_factory=dict)
     """What the file itself states of it, sensor -> vector as read."""
     exact_runout: Callable[[], dict[str, Vectors]] | None = None
@@ -277,7 +328,7 @@ class Runs:
 
 
 def apart(one: float | None, other: float) -> float:
-    """How far two speeds are apart, relatively; 0 where either is not known."""
+    """The relative difference of two speeds; 0 where either is not known."""
     if one is None or other != other or one == other:
         return 0.0
     return abs(one - other) / max(abs(one), abs(other))
@@ -318,3 +369,50 @@ def channels_of(table: Table, rotor: Rows) -> tuple[list[Channel], Rows]:
         channel = Channel(one, None if none else float(mean[1]), None if none else float(mean[0]), state=of)
         code.append(out.setdefault(channel, len(out)))
     return list(out), np.array(code)[number]
+
+
+# -- dates --------------------------------------------------------------------------------------------------
+
+_ISO = re.compile(
+    r"(\d{4})[-/](\d{1,2})(?:[-/](\d{1,2}))?(?:[T ]+(\d{1,2}):(\d{2})(?::(\d{2})(?:\.\d+)?)?Z?)?"
+)
+_POINTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?:,?\s+(\d{1,2}):(\d{2})(?::(\d{2}))?)?")
+DATE = "a date such as 2019-03-14, 2019-03-14 08:30 or 14.03.2019"
+YEAR = 365.25
+
+
+def years(table: Table) -> Real | None:
+    """Return the date of each row in years, from any origin; NaN where there is none, None without a column of dates."""
+    written = table.texts.get("date")
+    if written is None or not any(written):
+        return None
+    return np.array([_year(table, i, text) if text else np.nan for i, text in enumerate(written)])
+
+
+def _year(table: Table, row: int, text: str) -> float:
+    iso, points = _ISO.fullmatch(text), _POINTS.fullmatch(text)
+    match = iso or points
+    if match is None:
+        raise table.error(row, "date", text, DATE)
+    first, month, last, *clock = match.groups()
+    year, day = (first, last or "1") if iso else (last, first)
+    try:
+        hour, minute, second = (int(part or 0) for part in clock)
+        at = datetime(int(year), int(month), int(day), hour, minute, second)
+    except ValueError:
+        raise table.error(row, "date", text, DATE) from None
+    # in days first, so that no digit is lost
+    return (at - datetime(2000, 1, 1)).total_seconds() / 86400 / YEAR
+
+
+def latest(table: Table) -> str | None:
+    """Return the last date of a table, as 2019-03-14; None where none can be read."""
+    matches = [
+        _ISO.fullmatch(text) or _POINTS.fullmatch(text) for text in table.texts.get("date", ()) if text
+    ]
+    days = []
+    for match in filter(None, matches):
+        first, month, last = match.groups()[:3]
+        year, day = (first, last or "01") if match.re is _ISO else (last, first)
+        days.append(f"{year}-{int(month):02}-{int(day):02}")
+    return max(days, default=None)

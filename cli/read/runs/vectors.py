@@ -159,7 +159,7 @@ def _vectors(file: str, text: str) -> Layout:
         "weight_const",
         *(["ALPHA"] if stored else []),
     }:
-        why = ": the trial runs tell the coefficients" if key == "ALPHA" else ""
+        why = ": the trial runs determine the coefficients" if key == "ALPHA" else ""
         table.warnings.append(f"{file}: {key} is not used{why}")
     rest, around = (np.array([float(one[k]) for one in slow]) for k in (0, 1))
     limits = re.findall(r"([\d.]+)\s*:\s*([\d.]+)", str(values.get("weight_const", "")))

@@ -1,9 +1,10 @@
-"""Rotors that were measured in the same way, side by side, and the one fit of their runs."""
+"""The request, and the one fit of the measured runs: rotors that were measured in the same way side by side."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +19,62 @@ from balancing import (
     joint_fit,
     phase_sense,
 )
-from cli.field.request import Request
 from cli.read import options
+from cli.read.planes_and_tolerance import Tolerance
 from cli.read.runs.reading import Measured, read_measured
 from cli.read.runs.runs import SHOWN, Before, Complex, Group, Rows, Runs
 from cli.read.stored import Stored, read_runout
 from dalembert.errors import DataError
 
+if TYPE_CHECKING:
+    from balancing.log_again import ExactErrors, ExactFit
+    from dalembert.arithmetic.doubled import Doubled
+
 Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Request:
+    """The options of a balancing in the field."""
+
+    reading_error: tuple[float, float] | None = None
+    """Relative, rad."""
+    tolerance: Tolerance | None = None
+    max_mass: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    """Limit of each plane, a value and its unit; the key "" is for all."""
+    max_residual: tuple[float, str] | None = None
+    objective: str = "least-squares"
+    from_here: bool = False
+    monte_carlo: int = 0
+    four_run: bool = False
+    ridge: float = 0.0
+    radius: float | None = None
+    phase_lag: bool = False
+    rotation: str | None = None
+    places: list[float] | None = None
+    """Where masses can go, degrees: the corrections are split onto them."""
+    stock: list[float] | None = None
+    """The weights in stock, kg, of which the corrections are made there."""
+    fit: bool = False
+    """Whether all runs are fitted together; the options below are for such a fit."""
+    exclude: Sequence[str] = ()
+    predict: str | None = None
+    suggest: bool = False
+    robust: bool = False
+    view: str | None = None
+    """`static-couple`: the corrections of two planes as a static part and a couple."""
+    zone_class: str | None = None
+    """The class of machine, for zones of severity."""
+
+    @property
+    def against(self) -> bool:
+        """Whether the instrument counts phases against the sense of the mass angles."""
+        return self.phase_lag != (self.rotation == "cw")
+
+    @property
+    def lagging(self) -> bool | None:
+        """Whether phases are counted against the mass angles; None where no option states it."""
+        return self.against if self.phase_lag or self.rotation is not None else None
 
 
 def measured_groups(
@@ -73,13 +122,13 @@ def _sense(
         sds = [float(np.sqrt(square[i] / nu[i])) for square in (taken, other)]
         word = "lags" if turn > 0 else "leads"
         message = (
-            f"{runs.of(rotors[i])}the runs say that the instrument's phase {word}: residuals of {sds[1]:.4g} {runs.amplitude_unit} (standard "
+            f"{runs.of(rotors[i])}the runs show that the instrument's phase {word}: residuals of {sds[1]:.4g} {runs.amplitude_unit} (standard "
             f"deviation), in the other sense {sds[0]:.4g}"
         )
         runs.warnings.append(
-            f"{message}: it was turned round"
+            f"{message}: the phases were turned round"
             if lagging is None
-            else f"{message}; the option says otherwise, and was obeyed"
+            else f"{message}; the option states otherwise, and counts"
         )
     if lagging is None and len(against):
         fit = again(np.where((certain < 0)[:, None, None], fit.readings.conj(), fit.readings))
@@ -93,7 +142,7 @@ class _Groups:
 
     def __init__(self, measured: Measured, request: Request) -> None:
         self.sorted, self.sisters, self.stored = measured.rows, measured.sisters, measured.stored
-        self.runs, self.request, self.asked = measured.rows.rows.of, request, measured.fit
+        self.runs, self.request, self.requested = measured.rows.rows.of, request, measured.fit
         self.lost = 0
 
     def fitted(self) -> Iterator[Group]:
@@ -139,7 +188,7 @@ class _Groups:
             return [group]
         # with nothing to spare nothing is left out
         more = (present.sum(axis=1) > 1 + len(group.planes)) & keep
-        spare = self.asked | more.any(axis=1) | ~group.bare.any(axis=1)
+        spare = self.requested | more.any(axis=1) | ~group.bare.any(axis=1)
         self._undetermined(group, keep, np.asarray(spare & keep.any(axis=1)))
         # without channels that the runs do not determine, and without runs in which no other was read
         left = (present & keep[:, None, :]).any(axis=2)
@@ -161,7 +210,7 @@ class _Groups:
                 self.runs.warnings.append(f"{self._lost(group, i, s)}; it takes no part in the fit")
 
     def _refusal(self, group: Group, i: int, s: int) -> str:
-        """Write why a rotor cannot be balanced: too few trial runs, a reading that is missing, or runs that tell too little."""
+        """Write why a rotor cannot be balanced: too few trial runs, a missing reading, or runs that do not determine its coefficients."""
         of, planes = self.runs.of(group.rotors[i]), group.planes
         trials = int((~group.bare[i]).sum())
         if group.bare[i].any() and trials < len(planes):
@@ -184,7 +233,7 @@ class _Groups:
         read = np.flatnonzero(np.isfinite(group.readings[i, :, s]))
         masses, lines = group.masses[i, read], group.lines.of(i)
         runs = [lines[j] for j in read]
-        clause = "its vibration without masses is known, " if not masses.any() else ""
+        clause = "its vibration without masses is known, but " if not masses.any() else ""
         times = "once" if len(read) == 1 else f"{len(read)} times"
         return (
             f"{self.runs.of(group.rotors[i])}sensor {group.channels[s]} was read {times} (run{'s' * (len(runs) > 1)} {', '.join(runs)}), which "
@@ -236,7 +285,7 @@ class _Groups:
         if self.request.four_run:
             group.amplitude_fits = by_amplitudes(group, self.runs)
             by_rotor = [[fit.influence for fit in one] for one in group.amplitude_fits]
-            # the runs with masses have told the coefficients
+            # the runs with masses determine the coefficients alone
             loaded = np.asarray(group.masses.any(axis=2))[..., None]
             alone = np.where(loaded, np.nan, group.readings)
             group.fit = initial_alone(alone, np.array(by_rotor).swapaxes(1, 2))
@@ -285,20 +334,71 @@ class _Groups:
         return fit
 
 
+def exact_fit(group: Group, runs: Runs, request: Request, stored: Stored | None) -> ExactFit:
+    """Return the fit of a group in 32 digits, of readings, masses and coefficients as they are written."""
+    from balancing import log_again
+    from dalembert.arithmetic.doubled_functions import hypot
+    from dalembert.arithmetic.doubled_vectors import Vectors, part
+
+    readings, masses, _ = group.in_32_digits
+    present, freedom = group.fit.present, np.asarray(group.fit.degrees_of_freedom, dtype=float)
+    if stored is not None or group.amplitude_fits:
+        alpha = Vectors.of(np.zeros(group.fit.influence.shape))
+        for i, r in enumerate(group.rotors.tolist()):
+            if stored is not None:
+                alpha[i] = stored.exact_matrix(runs.rotors[r], group.channels, runs)
+            else:
+                alpha[i] = group.exact_of_amplitudes(i)
+        return log_again.exact_mean(readings, present, alpha, freedom)
+    plain = log_again.exact_fit(readings, masses, present, freedom)
+    if group.before is None:
+        return plain
+    deviation = part(group.exact_scatter(plain), (..., None, None)) * np.ones(present.shape)
+    if request.reading_error is not None:
+        deviation = readings.size * hypot(*_as_stated(request.reading_error))
+    return log_again.exact_prior_fit(plain, readings, masses, present, group.before.exact()[0], deviation)
+
+
+def exact_errors(group: Group, request: Request, fit: ExactFit) -> ExactErrors:
+    """Return the errors of the readings in 32 digits: stated, or as they scatter."""
+    from balancing.log_again import ExactErrors
+    from balancing.second_run import chosen
+    from dalembert.arithmetic.doubled import Doubled
+    from dalembert.arithmetic.doubled_functions import DOUBLED
+    from dalembert.arithmetic.doubled_vectors import Vectors, part
+
+    readings = group.in_32_digits.readings
+    if request.reading_error is None:
+        ones = np.ones(readings.shape)
+        each = part(group.exact_scatter(fit) * DOUBLED.sqrt(Doubled(np.array(0.5))), (..., None, None)) * ones
+        return ExactErrors(Vectors.of(ones), each, each)
+    (amplitude, phase), size = _as_stated(request.reading_error), readings.size
+    some = size.high > 0
+    unit = readings / chosen(some, size, 1.0) + Vectors.of(~some)
+    return ExactErrors(unit, size * amplitude, size * phase)
+
+
+def _as_stated(errors: tuple[float, float]) -> tuple[Doubled, Doubled]:
+    """Return the errors of --reading-error as they are written: of the amplitude, relative, and of the phase in rad."""
+    from cli.read.exact import rates, writtens
+
+    return writtens(errors[0]), rates(errors[1]).doubled
+
+
 def _missing(planes: list[str], masses: Complex) -> str:
     """Write what the runs do not determine, and which run would."""
     if masses.all(axis=0).any() and len(masses):
         return (
-            "every run has a trial mass, and what it does is not told from the vibration without it; a run without, or "
-            "with another mass there, would tell"
+            "every run has a trial mass, so that its effect cannot be separated from the vibration without it: add a run without "
+            "it, or with another mass there"
         )
     dark = [
         plane for plane, on in zip(planes, masses.T, strict=True) if np.ptp(on.real) == np.ptp(on.imag) == 0
     ]
     if dark:
         named = f"plane{'s' * (len(dark) > 1)} {' and '.join(dark)}"
-        return f"what a mass in {named} does is not; a run with another mass there would tell"
-    return "the masses of these runs do not tell the planes apart; a run with one plane's mass alone changed would"
+        return f"the effect of a mass in {named} is not: add a run with another mass there"
+    return "the masses of these runs do not separate the planes: add a run in which the mass of one plane alone changes"
 
 
 def by_amplitudes(group: Group, runs: Runs) -> list[list[AmplitudeFit]]:

@@ -1,4 +1,4 @@
-"""Warnings about a balancing in the field."""
+"""The sentences about a balancing in the field: warnings, and how angles and phases are counted."""
 
 from __future__ import annotations
 
@@ -24,7 +24,21 @@ def warnings(b: FieldBalancing) -> list[str]:
     groups = [_Group(b, solved) for solved in b.solved]
     sentences = (sentence for group in groups for sentence in group.warnings())
     fits = (sentence for group in groups for sentence in group.of_fit()) if b.runs.fitted else ()
-    return [*dict.fromkeys([*b.runs.warnings, *b.warnings, *sentences]), *fits]
+    return [*dict.fromkeys([*b.runs.warnings, *_not_turned(b), *b.warnings, *sentences]), *fits]
+
+
+def _not_turned(b: FieldBalancing) -> Iterator[str]:
+    """Name the rotors whose runs do not show the sense of the phase, where those of others show that it lags."""
+    groups = [solved.group for solved in b.solved] if b.runs.lags else []
+    others = sorted(
+        r for of in groups for r, sense in zip(of.rotors, of.lines.senses, strict=True) if sense is None
+    )
+    if others:
+        named = ", ".join(b.runs.rotors[r] for r in others[:SHOWN]) + (" …" if len(others) > SHOWN else "")
+        yield (
+            f"the phases of {len(others)} rotor{'s' * (len(others) > 1)} ({named}) were not turned round, for their runs do not show "
+            "the sense: where one instrument read all rotors, state --phase-lag"
+        )
 
 
 class _Group:
@@ -201,7 +215,7 @@ class _Group:
         for pair in islice(pairs, SHOWN):
             runs = list(dict.fromkeys(lines[j] for j in pair.runs))
             read = group.readings[i, list(pair.runs), pair.channel]
-            shown = read.conj() if self.b.against else read
+            shown = read.conj() if self.b.against(group, i) else read
             first, second = (f"{abs(v):.6g} {unit} at {degrees(v):.6g}°" for v in shown)
             yield (
                 f"{self.b.of(group, i)}run{'s' * (len(runs) > 1)} {' and '.join(runs)}, sensor {group.channels[pair.channel]}: with "
@@ -212,9 +226,7 @@ class _Group:
 
     def _drifts(self) -> Iterator[str]:
         """Where the vibration without masses drifts with time."""
-        from cli.field.logs import drifts
-
-        of_time = drifts(self.group)
+        of_time = self.group.drift
         if of_time is None:
             return
 
@@ -245,6 +257,53 @@ class _Group:
             (nu > 0) & (gammaincc(np.maximum(nu, 1), ratio) < LEVEL),
             lambda i: (
                 f"the residuals scatter by {fit.residual_sd[i]:.4g} {self.unit} (standard "
-                f"deviation), more than --reading-error says ({np.sqrt(mean[i]):.4g}): uncertainties are too small"
+                f"deviation), more than --reading-error states ({np.sqrt(mean[i]):.4g}): uncertainties are too small"
             ),
         )
+
+
+def sense(b: FieldBalancing) -> str:
+    """Return how phases and mass angles are counted, as a sentence."""
+    request = b.request
+    lags = request.phase_lag or b.runs.lags
+    if request.four_run:
+        return "Mass angles as in the table; no phase is used."
+    if request.rotation is None and not lags:
+        return "Phases and mass angles are counted in one common sense, from one mark on the rotor."
+    turning = (
+        f"the shaft turns {request.rotation} as seen against +z"
+        if request.rotation
+        else "phases are counted with the mass angles"
+    )
+    return (
+        f"The instrument's phases {'lag' if lags else 'lead'} ({turning}); all phases given out are counted in the sense of "
+        "the mass angles."
+    )
+
+
+def instrument(rotor: Rotor) -> str:
+    """Return how the phases of a rotor's report are counted, which are as the instrument shows them."""
+    b = rotor.b
+    if b.request.four_run:
+        return sense(b)
+    if not b.against(rotor.group, rotor.i):
+        return (
+            "Phases as the instrument shows them; they and the mass angles are counted in one common sense, from one mark "
+            "on the rotor."
+        )
+    return (
+        "Phases as the instrument shows them, counted against the sense of the mass angles; those of the influence "
+        "coefficients and of the picture are counted in the sense of the mass angles."
+    )
+
+
+def conventions(b: FieldBalancing) -> str:
+    """Return how angles and phases are counted and what the corrections mean, as sentences."""
+    amounts = f"{b.runs.per}{'es' if b.runs.per == 'mass' else 's'}"
+    radius = "at the radius of the trial masses"
+    if b.request.from_here:
+        return f"{sense(b)}\nTrim: {amounts} to ADD to the rotor as it stands in its last run, {radius}."
+    return (
+        f"{sense(b)}\nCorrections: {amounts} to ADD to the rotor in its initial state, all trial masses off, {radius}. "
+        "Trim: what to ADD to the rotor as it stands in its last run."
+    )

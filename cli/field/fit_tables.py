@@ -1,19 +1,16 @@
-"""The tables of a log: its fit, residuals, drift, a predicted run, the next run, a robust fit; influence coefficients as stored."""
+"""The tables of what was read: vibration before and after, coefficients; the fit of a log, a predicted run, the next run."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing import (
-    Drift,
     LogBalance,
     NextRun,
-    drift,
     least_squares,
     robust_fit,
     suggest_run,
@@ -21,13 +18,14 @@ from balancing import (
 from balancing.doubt import LEVEL
 from balancing.log_balance import CoefficientSpread
 from cli.field.field_balancing import FieldBalancing, Solved
-from cli.field.rotor import READINGS, Rotor, Rows, Tables, amplitude, each, masses, masses_text, vibration
+from cli.field.rotor import Rotor, each
+from cli.field.tables import READINGS, Rows, amplitude, masses, masses_text, vibration
 from cli.read.options import bad
-from cli.read.runs.runs import Before, Complex, Group, Real
+from cli.read.runs.runs import Before, Complex, Real
 from dalembert.angles import degrees
 from dalembert.results.columns import ABSENT, Column, Table, names, number
 from dalembert.results.text import printed
-from dalembert.units import from_si, to_si
+from dalembert.units import amplitude_kind, from_si, to_si
 
 
 def predicted(b: FieldBalancing, solved: Solved) -> tuple[Complex, Real]:
@@ -38,12 +36,12 @@ def predicted(b: FieldBalancing, solved: Solved) -> tuple[Complex, Real]:
 
 
 def suggested(rotor: Rotor) -> NextRun | None:
-    """The next run of a rotor; None where nothing tells how sure its corrections are."""
+    """The next run of a rotor; None where the uncertainty of its corrections is not known, or its planes are dependent."""
     limit = rotor.solved.objective.max_mass
     if limit is None or not np.isfinite(limit).all():
         raise bad("--suggest", f"needs a --max-mass for every plane: {', '.join(rotor.planes)}")
     one = rotor.solved.fitted.machine(rotor.i)
-    if not np.isfinite(one.covariance).all():
+    if not (np.isfinite(rotor.solved.condition[rotor.i]) and np.isfinite(one.covariance).all()):
         return None
     free = least_squares(one.fit.influence, one.fit.initial, one.weights).corrections
     return suggest_run(LogBalance(one.fit, free, one.errors, one.weights), limit)
@@ -62,34 +60,108 @@ def robust(b: FieldBalancing, solved: Solved) -> tuple[Complex, Complex]:
             deviation = float(np.hypot(*error)) * np.abs(np.where(fit.present, readings, 0.0))
         fit = robust_fit(fit, before.prior, deviation)
     here = fit.initial + np.matvec(fit.influence, solved.start)
-    fix = least_squares(fit.influence, here, solved.group.weights, ridge=b.request.ridge)
+    with b.named(solved):
+        fix = least_squares(fit.influence, here, solved.group.weights, ridge=b.request.ridge)
     return fit.initial, fix.corrections
 
 
-def drifts(group: Group) -> Drift | None:
-    """How the vibration of each rotor changes in a year, and how often so much by chance; None without dates."""
-    years = group.lines.years
-    return None if years is None else drift(group.fit, years)
+# -- before and after ----------------------------------------------------------------------------------------
+
+RMS = {"": 1.0, "_rms": 1.0, "_pk": 0.5**0.5, "_pp": 0.5 * 0.5**0.5}
+"""The r.m.s. value of a vibration whose amplitude is read in one of these ways is 1."""
 
 
-def tables(b: FieldBalancing) -> Tables:
-    """The tables of a fit."""
-    made: Tables = {
-        "residuals": lambda: residuals(b),
-        "fit": lambda: of_fit(b),
-        "fit_initial": lambda: initial(b),
-    }
-    if any(drifts(solved.group) is not None for solved in b.solved):
-        made["drift"] = lambda: drift_rates(b)
-    if b.predict is not None:
-        made["predict"] = lambda: predicted_run(b)
-    if b.request.suggest:
-        made |= {"suggest": lambda: suggested_run(b), "suggest_gain": lambda: suggested_gain(b)}
-    if b.request.robust:
-        of = cache(lambda solved: robust(b, solved))
-        made["robust"] = lambda: robust_corrections(b, of)
-        made["robust_initial"] = lambda: robust_initial(b, of)
-    return made
+def prediction(b: FieldBalancing) -> Table:
+    """The vibration before, and as predicted with the corrections: a row for each rotor and sensor."""
+    rows = Rows.sensors(b)
+    before, after = rows.several(lambda s: (s.initial, s.residual))
+
+    def phase(name: str, values: Complex, place: str | None = None) -> Column:
+        # none is shown where nothing moves; JSON has 0
+        column = number(name, "angle", np.where(values == 0, np.nan, degrees(values)), place=place)
+        column.stored = degrees(values)
+        return column
+
+    phases = [
+        number("before_phase", "angle", degrees(before), place=None),
+        phase("predicted_phase", after, "phase"),
+    ]
+    sizes = [
+        amplitude(b, "before_amplitude", np.abs(before), None),
+        amplitude(b, "predicted_amplitude", np.abs(after), "amplitude"),
+    ]
+    columns, hidden = [column for pair in zip(sizes, phases, strict=True) for column in pair], list[Column]()
+    if b.request.four_run:
+        columns, hidden = sizes, [Column("phase", "deg", [None] * len(after), None, "phase_deg")]
+    if b.runs.fitted:
+        deviation = rows.numbers(lambda s: s.fitted.vibration_deviation(s.total))
+        spread = [amplitude(b, "amplitude_uncertainty", deviation)]
+        ceiling = b.ceiling
+        if ceiling is not None:
+            chance = rows.numbers(lambda s: s.fitted.probability_within(ceiling))
+            spread.append(number("probability_within", "number", chance))
+        (columns if np.isfinite(deviation).any() else hidden).extend(spread)
+    above = "vibration before, and as predicted with the corrections"
+    return rows.table(columns, READINGS, "residual[]", above, hidden=hidden)
+
+
+def zones(b: FieldBalancing) -> Table:
+    """One row per rotor and sensor: the zone of its vibration velocity before, in the last run with corrections, as predicted."""
+    from balancing import ZONE_BOUNDARIES, severity_zone
+
+    machine, (_, tag) = b.request.zone_class or "", amplitude_kind(b.runs.amplitude_unit)
+    unit = b.runs.amplitude_unit.removesuffix(tag)
+
+    def zone(vibration: Complex) -> list[str | None]:
+        size = to_si(np.abs(vibration), "amplitude", unit)
+        speed = RMS[tag] * np.asarray(size) / to_si(1.0, "amplitude", "m_s")
+        return [str(severity_zone(v, machine)) if v == v else None for v in speed.tolist()]
+
+    def measured(solved: Solved) -> Complex:
+        runs = [Rotor(b, solved, i).last for i in range(len(solved.initial))]
+        unread = np.full(solved.initial.shape[1], np.nan)
+        return np.array([unread if run is None else run.vibration for run in runs])
+
+    rows = Rows.sensors(b)
+    before, last, after = map(zone, rows.several(lambda s: (s.initial, measured(s), s.residual)))
+    columns = [
+        names("before_zone", before),
+        *([names("measured_zone", last)] if any(last) else []),
+        names("predicted_zone", after),
+    ]
+    a, bb, c = (f"{1e3 * bound:g}" for bound in ZONE_BOUNDARIES[machine])
+    meant = "" if tag else ", taken as r.m.s."
+    above = f"zones of ISO 10816-3, {machine}: A to {a}, B to {bb}, C to {c} mm/s r.m.s.; of the once-per-turn vibration{meant}"
+    return rows.table(columns, READINGS, "zones[]", above)
+
+
+def misfit(b: FieldBalancing) -> Table:
+    """How far the amplitudes of each sensor are from any vector's, by the four-run method."""
+    rows = Rows.each(b, lambda solved: len(solved.group.channels) * len(solved.planes))
+    off = rows.numbers(lambda solved: [[fit.misfit for fit in one] for one in solved.group.amplitude_fits])
+    plane = names("plane", rows.cells(lambda s: [name for name in s.planes for _ in s.group.channels]))
+    columns = [
+        names("sensor", rows.cells(lambda s: [c.sensor for c in s.group.channels] * len(s.planes))),
+        *([plane] if any(len(solved.planes) > 1 for solved in b.solved) else []),
+    ]
+    keys = ("rotor", *(column.name for column in columns))
+    above = "r.m.s. misfit of the amplitudes"
+    return rows.table([*columns, amplitude(b, "amplitude", off)], keys, "misfit[]", above)
+
+
+def alternatives(b: FieldBalancing) -> Table:
+    """The other corrections that fit the amplitudes as well, by the four-run method."""
+    of = [
+        (rotor.name, rotor.planes[0], -v / a)
+        for rotor in each(b)
+        for v, a in zip(
+            rotor.group.fit.initial[rotor.i], rotor.solved.group.amplitude_fits[rotor.i][0].other, strict=True
+        )
+        if a == a
+    ]
+    fix = masses(b, np.array([w for *_, w in of], dtype=complex))
+    columns = [names("plane", [plane for _, plane, _ in of]), *fix]
+    return Rows.of(b, [name for name, *_ in of]).table(columns, ("rotor", "plane"), "alternatives[]")
 
 
 def residuals(b: FieldBalancing) -> Table:
@@ -105,7 +177,7 @@ def residuals(b: FieldBalancing) -> Table:
     rows = Rows.of(b, [rotor.name for rotor, _ in every])
     rows.shown, rows.hidden = [rows.rotor, names("run", [row.run for row in of])], []
     rows.read(b, [row.channel for row in of])
-    # speeds, and states that say nothing, are of the document alone
+    # speeds, and empty states, are of the document alone
     unseen = [c for c in rows.shown if c.name == "speed" or (c.name == "state" and not any(c.values))]
     rows.shown = [column for column in rows.shown if column not in unseen]
     rows.hidden += unseen
@@ -125,7 +197,7 @@ def residuals(b: FieldBalancing) -> Table:
 
 
 def of_fit(b: FieldBalancing) -> Table:
-    """One row per rotor: how many runs and readings were fitted, how well, and what the runs say of drift and phase."""
+    """One row per rotor: numbers of runs and readings, scatter, drift, and the sense of the phase."""
     rows, rotors = Rows.each(b), list(each(b))
     senses = [rotor.group.lines.senses[rotor.i] for rotor in rotors]
     named = [sense or "not determined" for sense in senses]
@@ -155,7 +227,7 @@ def of_fit(b: FieldBalancing) -> Table:
         )
 
     def probability(solved: Solved) -> Real | None:
-        of = drifts(solved.group)
+        of = solved.group.drift
         return None if of is None else of.probability
 
     chance, stored = rows.some(probability)
@@ -184,7 +256,7 @@ def drift_rates(b: FieldBalancing) -> Table:
     every = [
         (rotor.name, *row)
         for rotor in each(b)
-        if (of := drifts(rotor.group)) is not None
+        if (of := rotor.group.drift) is not None
         for row in zip(rotor.channels, of.rate[rotor.i].tolist(), of.deviation[rotor.i].tolist(), strict=True)
     ]
     rows = Rows.of(b, [name for name, *_ in every]).read(b, [channel for _, channel, *_ in every])
@@ -212,7 +284,8 @@ def prediction_lines(b: FieldBalancing) -> list[str]:
     table = predicted_run(b)
     cells = {header: printed(header, values) for header, values in table.cells.items()}
     rows = zip(*cells.values(), strict=True)
-    return [f"{table.above}: {', '.join(map(' '.join, zip(cells, row, strict=True)))}" for row in rows]
+    pairs = ([f"{header} {cell}" for header, cell in zip(cells, row, strict=True) if cell] for row in rows)
+    return [f"{table.above}: {', '.join(row)}" for row in pairs]
 
 
 def _suggestions(b: FieldBalancing) -> Iterator[tuple[Rotor, NextRun]]:
@@ -230,7 +303,7 @@ def unsuggested(b: FieldBalancing) -> Column:
 
 
 def suggested_run(b: FieldBalancing) -> Table:
-    """The masses of the next run that tells most: a row for each rotor and plane."""
+    """The masses of the most informative next run: a row for each rotor and plane."""
     every = [
         (rotor.name, *row)
         for rotor, run in _suggestions(b)
@@ -238,9 +311,9 @@ def suggested_run(b: FieldBalancing) -> Table:
     ]
     on = masses(b, np.array([w for *_, w in every], dtype=complex))
     above = (
-        "the next run that tells most (A-optimal) has these masses"
+        "the most informative next run (A-optimal) has these masses"
         if every
-        else "no run is suggested: nothing tells how sure the corrections are"
+        else "no run is suggested: the uncertainty of the corrections is not known"
     )
     rows = Rows.of(b, [name for name, *_ in every])
     columns = [names("plane", [plane for _, plane, _ in every]), *on]
@@ -276,11 +349,8 @@ def robust_initial(b: FieldBalancing, of: RobustFits) -> Table:
     return rows.table(vibration(b, value), READINGS, "robust.initial[]", above)
 
 
-# -- coefficients --------------------------------------------------------------------------------------------
-
-
 def spread(b: FieldBalancing, solved: Solved) -> CoefficientSpread | None:
-    """Return how well a group's coefficients are known, from its fit or from stated errors; None where nothing tells."""
+    """Return the uncertainty of a group's coefficients, from its fit or from stated errors; None where it is not known."""
     if b.stored is not None or not (b.runs.fitted or b.request.reading_error) or solved.balance is None:
         return None
     return solved.balance.coefficients
@@ -316,7 +386,7 @@ def influence(b: FieldBalancing) -> Table:
 
 
 def _errors(b: FieldBalancing, rows: Rows, size: Real) -> list[Column]:
-    """Return the columns that say how well the coefficients are known; none where nothing tells."""
+    """Return the columns of the coefficients' uncertainty; none where it is not known."""
     spreads = {id(solved): spread(b, solved) for solved in b.solved}
     if not any(of is not None for of in spreads.values()):
         return []
