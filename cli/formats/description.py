@@ -342,14 +342,3 @@ def _seek(d: Drawing, source: str) -> None:
     for e, at in zip(d.drives, start, strict=True):
         e.at = at
     d.notes.append(f"no assembly was found{': ' + why if why else ''}")
-
-
-# --- from a description ---------------------------------------------------------------------------------------------
-def bodies_of(m: Mechanism, motion: Motion) -> dict[str, Body]:
-    """Return the ground and the links as bodies that stand in the first pose of a motion; m, kg, rad."""
-    bodies = {GROUND: Body(dict(m.ground))}
-    for name, link in m.links.items():
-        at, turn = complex(motion.at(name, 0j).complex(0)[0]), float(motion.link(name).angle[0])
-        rigid = m.rigid[name]
-        bodies[name] = Body(dict(link.points), at, turn, rigid.mass, rigid.center, rigid.inertia)
-    return bodies

@@ -24,7 +24,7 @@ from cli.formats.drawn import (
     together,
     unused,
 )
-from cli.formats.robot import BLOCK, Motor, Robot, RobotJoint, RobotLink, Spring, plane_of
+from cli.formats.robots.robot import BLOCK, Motor, Robot, RobotJoint, RobotLink, Spring, plane_of
 from dalembert.errors import DataError
 
 # two ends of a joint nearer than this share of the robot's size are one place

@@ -11,13 +11,12 @@ import numpy as np
 
 from cli.formats.drawn import GROUND
 from cli.formats.markup import At, add, child, children, digits, document, include, named, spatial
-from cli.formats.mjcf_shapes import Frames, mass_of_shapes
-from cli.formats.robot import (
+from cli.formats.robots.robot import (
     DIAGONAL_FIRST,
     LIGHT,
-    THICK,
     WORLD,
     Array,
+    Frames,
     Inertial,
     Kind,
     Motor,
@@ -25,14 +24,14 @@ from cli.formats.robot import (
     RobotJoint,
     RobotLink,
     Spring,
+    mass_of_shapes,
     pose,
     printed,
-    strokes,
 )
 from dalembert.errors import DataError, quote
 
 if TYPE_CHECKING:
-    from cli.formats.skeleton import Branching, Joint, Skeleton, Travel
+    from cli.formats.robots.skeleton import Branching, Joint, Skeleton
 
 PLURAL = {"gear": "gears", "belt": "belt", "rack": "rack"}
 # MuJoCo takes nothing lighter
@@ -316,8 +315,11 @@ def _leading(at: At, values: Mapping[str, str], *keys: str) -> list[float]:
 
 
 # --- writing ------------------------------------------------------------------------------------------------------
-def write(s: Skeleton, travel: Travel, comment: str) -> bytes:
-    """Return the file of a mechanism."""
+HOLDS = ("springs", "torsion springs", "inputs", "gravity")
+
+
+def write(s: Skeleton, comment: str) -> tuple[bytes, list[str]]:
+    """Return the file of a mechanism, and what it leaves out."""
     m = s.m
     root = Element("mujoco", model=m.name or "mechanism")
     masses = [p.mass for p in s.bodies.values() if p.mass > 0]
@@ -360,11 +362,11 @@ def write(s: Skeleton, travel: Travel, comment: str) -> bytes:
             motor.set("tendon", f"input {e.name}")
         else:
             motor.set("joint", joint.name)
-        if travel.peak is not None:
-            motor.set("ctrlrange", digits(-travel.peak, travel.peak))
+        if s.travel.peak is not None:
+            motor.set("ctrlrange", digits(-s.travel.peak, s.travel.peak))
     root.extend(e for e in (equality, tendon, actuator) if len(e))
     _key(s, add(root, "keyframe"))
-    return document(root, comment)
+    return document(root, comment), s.left_out(HOLDS)
 
 
 def _fixed(tendon: Element, name: str, terms: dict[str, float]) -> Element:
@@ -426,8 +428,8 @@ def _add_contents(s: Skeleton, name: str, body: Element) -> None:
         # a point of several links stands on the first
         if next(holder for holder, other in s.bodies.items() if point in other.points) == name:
             add(body, "site", name=point, pos=spatial(z))
-    for a, b in strokes(part):
-        add(body, "geom", type="capsule", size=THICK * s.m.size, fromto=f"{spatial(a)} {spatial(b)}")
+    for a, b in s.strokes(name):
+        add(body, "geom", type="capsule", size=s.thickness, fromto=f"{spatial(a)} {spatial(b)}")
 
 
 def _close(j: Joint, bodies: dict[str, Element], equality: Element) -> None:
