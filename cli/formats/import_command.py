@@ -80,7 +80,10 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
             part.name = part.name if len(parts) == 1 else f"{part.name} {k}".strip()
             result.append((described(part, f"imported from {program}"), part.notes))
     if not result:
-        raise DataError("; ".join([f"{name}: no mechanism: nothing in it is driven by an input", *lost]))
+        mend = ": give it an actuator on a joint that can move" if program in ROOTS.values() else ""
+        raise DataError(
+            "; ".join([f"{name}: no mechanism: nothing in it is driven by an input{mend}", *lost])
+        )
     several = len(result) > 1
     if several and output is None:
         raise bad(

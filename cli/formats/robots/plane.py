@@ -167,7 +167,7 @@ class _Layer:
         """Add a prism; its position is the joint's own coordinate."""
         (on, through), (link, z) = self._sides(j)
         sense = 1.0
-        if link == GROUND:
+        if self._carried_by_child(j):
             on, link, through, z, sense = link, on, z, through, -1.0
         a, b = self.d.bodies[on], self.d.bodies[link]
         angle = cmath.phase(self.plane.direction(j.axis) * sense) - a.turn
@@ -178,6 +178,22 @@ class _Layer:
         held[point] = at
         self.slides[j.name] = Slide(point, link, on, start, _turn(angle), _turn(b.turn - a.turn - angle))
         self.d.slides.append(self.slides[j.name])
+
+    def _carried_by_child(self, j: RobotJoint) -> bool:
+        """Return whether a slide's line is on the child, not the parent: on the ground, under a rack's wheel, away from its point."""
+        pair = self.name(j.parent), self.name(j.child)
+        if GROUND in pair:
+            return pair[1] == GROUND
+        joints, links = self.robot.joints, self.robot.links
+        for _, terms in self.robot.couplings:
+            others = [name for name, _ in terms if name != j.name]
+            if len(terms) != 2 or len(others) != 1 or others[0] not in joints:
+                continue
+            wheel = joints[others[0]]
+            shared = {*pair} & {self.name(wheel.parent), self.name(wheel.child)}
+            if wheel.kind == "turn" and len(shared) == 1:
+                return pair[1] in shared
+        return j.name in links[j.parent].points and j.name not in links[j.child].points
 
     def _slots(self) -> None:
         """Make slots again of the blocks that `dalembert export` made of them, each with one slide and one pin."""
@@ -250,7 +266,7 @@ class _Layer:
     ) -> dict[str, float] | None:
         """Return Σ factor·(joint's coordinate) as a sum of the bodies' angles; None where it holds a slide.
 
-        Of bodies that turn alike the `wanted` one is named, or one that the joints name.
+        Of bodies that turn alike the `wanted` one is named, or one that the joints name; a block only where nothing else turns as it does.
         """
         result: dict[str, float] = {}
         names: dict[str, str] = {}
@@ -265,7 +281,8 @@ class _Layer:
                 body = self.name(link)
                 top = self.alike.of(body)
                 result[top] = result.get(top, 0.0) + c
-                if body == wanted or (top not in names and body in self.d.bodies):
+                first = top not in names and body in self.d.bodies and not body.startswith(BLOCK)
+                if body == wanted or first:
                     names[top] = body
         scale = max(map(abs, result.values()), default=0.0)
         return {
