@@ -338,6 +338,36 @@ class Drawing:
         return unused(wanted, used)
 
 
+def pins_of(
+    joints: Iterable[tuple[str, dict[str, complex]]], near: float, name: Callable[[str, str], str]
+) -> list[tuple[str, dict[str, complex]]]:
+    """Return the pins of joints, each its name and its place on its bodies: joints that meet in one place of a body are one pin.
+
+    Parameters
+    ----------
+    joints : iterable of (name, {body: place})
+    near : float
+        Places of a body no farther apart than this are one.
+    name : callable
+        Chooses the name of a pin among that of a joint and of the pin that it joins.
+
+    Examples
+    --------
+    >>> pins_of([("A", {"a": 0j, "b": 1j}), ("B", {"b": 1j, "c": 0j})], 0.0, min)
+    [('A', {'b': 1j, 'c': 0j, 'a': 0j})]
+    """
+    pins: list[tuple[str, dict[str, complex]]] = []
+    for label, ends in joints:
+        for pin in [e for e in pins if any(b in e[1] and abs(e[1][b] - z) <= near for b, z in ends.items())]:
+            pins.remove(pin)
+            label, ends = name(label, pin[0]), ends | pin[1]
+        pins.append((label, ends))
+    names: list[str] = []
+    for label, _ in pins:
+        names.append(unused(label, names))
+    return list(zip(names, (ends for _, ends in pins), strict=True))
+
+
 def start_of(m: Mechanism, inputs: tuple[float, ...]) -> Motion:
     """Return the motion of the pose in which a file begins, at the speed of the mechanism's own file.
 

@@ -19,9 +19,9 @@ from cli.formats.drawn import (
     coordinates,
     damaged,
     exact,
+    pins_of,
     place,
     together,
-    unused,
 )
 from dalembert.errors import DataError
 
@@ -213,20 +213,12 @@ class _Reader:
 
     def _pin(self, revolutes: dict[str, tuple[str, str, str, str]]) -> None:
         """Points that revolutes join are one pin, and so are those at the same place of one body."""
-        groups: list[tuple[str, set[tuple[str, Exact]]]] = []
-        for name, (i, p, j, q) in revolutes.items():
-            ends = {(i, self.points[i][p]), (j, self.points[j][q])}
-            label = p if p == q else name
-            for group in [g for g in groups if g[1] & ends]:
-                groups.remove(group)
-                ends |= group[1]
-                label = group[0]
-            groups.append((label, ends))
-        used: set[str] = set()
-        for label, ends in groups:
-            pin = unused(label, used)
-            used.add(pin)
-            for body, z in sorted(ends, key=lambda end: (end[0], end[1].x, end[1].y)):
+        joints: list[tuple[str, dict[str, complex]]] = [
+            (p if p == q else name, {i: self.points[i][p], j: self.points[j][q]})
+            for name, (i, p, j, q) in revolutes.items()
+        ]
+        for pin, ends in pins_of(joints, 0.0, lambda _, earlier: earlier):
+            for body, z in sorted(ends.items()):
                 self.d.body(body).points[pin] = z
 
     def _prism(self, name: str, e: dict[str, Any]) -> None:

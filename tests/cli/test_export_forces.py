@@ -211,3 +211,42 @@ def test_a_robot_that_cannot_move_is_refused_in_one_line(dalembert: Dalembert, t
     )
     assert "a, b: left out: no joint there can move" in line
     assert not (tmp_path / "m.toml").exists()
+
+
+WINCH = """
+[ground]
+O = [0, 0]
+[links.arm]
+points = { O = [0, 0], C = [1, 0] }
+mass = 1
+[links.drum]
+points = { C = [0, 0] }
+mass = 2
+[[input]]
+link = "arm"
+speed = 2
+acceleration = 3
+[[input]]
+link = "drum"
+jerk = 1
+acceleration = 4
+[[motors]]
+carrier = "arm"
+drives = "drum"
+mass = 0.5
+[[friction]]
+joint = "O"
+coefficient = 0.1
+radius = 0.01
+"""
+
+
+@pytest.mark.whole
+@pytest.mark.parametrize("suffix", ROBOTS)
+def test_what_a_robot_cannot_hold_is_named(suffix: str) -> None:
+    m = Mechanism.from_toml_text(WINCH)
+    notes = file_bytes(m, home(m), suffix, "file.toml", {})[1]
+    assert notes[0] == "friction is left out: 1"
+    assert "acceleration of input arm is left out: the format has its speed alone" in notes
+    assert "acceleration and jerk of input drum are left out: the format has its speed alone" in notes
+    assert "the motor of input drum is left out: it sits on arm, and drives against ground" in notes

@@ -21,6 +21,7 @@ from cli.formats.drawn import (
     Mesh,
     Slide,
     Toothed,
+    pins_of,
     together,
     unused,
 )
@@ -65,13 +66,15 @@ class _Layer:
         self.digits = 15 - math.ceil(math.log10(self.size))
         self._groups()
         d.posed = all(self._closed(j) for j in moving)
-        self.pins: list[tuple[str, set[tuple[str, complex]]]] = []
         self.slides: dict[str, Slide] = {}
-        for j in moving:
-            if j.kind != "slide":
-                self._pin(j)
+        turning = [
+            (j.name, {name: self._place(z) for name, z in self._sides(j)})
+            for j in moving
+            if j.kind != "slide"
+        ]
+        self.pins = pins_of(turning, SAME * self.size, lambda new, earlier: min(new, earlier, key=len))
         for label, ends in self.pins:
-            for name, z in sorted(ends, key=lambda end: end[0]):
+            for name, z in sorted(ends.items()):
                 d.bodies[name].points[label] = z
         for j in moving:
             if j.kind == "slide":
@@ -151,18 +154,6 @@ class _Layer:
             for name, end in zip((self.name(j.parent), self.name(j.child)), j.ends, strict=True)
         ]
 
-    def _pin(self, j: RobotJoint) -> None:
-        """Add a pin; pins at one place of a body are one."""
-        ends = {(name, self._place(z)) for name, z in self._sides(j)}
-        near = SAME * self.size
-        label = j.name
-        for held, others in list(self.pins):
-            if any(name == other and abs(z - w) <= near for name, z in ends for other, w in others):
-                self.pins.remove((held, others))
-                label = min(label, held, key=len)
-                ends = others | {e for e in ends if e[0] not in {name for name, _ in others}}
-        self.pins.append((unused(label, (held for held, _ in self.pins)), ends))
-
     def _slide(self, j: RobotJoint) -> None:
         """Add a prism; its position is the joint's own coordinate."""
         (on, through), (link, z) = self._sides(j)
@@ -200,7 +191,7 @@ class _Layer:
         d = self.d
         for name, s in self.slides.items():
             for block, carrier in ((s.link, s.on), (s.on, s.link)):
-                pins = [label for label, ends in self.pins if block in {body for body, _ in ends}]
+                pins = [label for label, ends in self.pins if block in ends]
                 if not self._is_block(block) or len(pins) != 1:
                     continue
                 riders = [n for n, body in d.bodies.items() if pins[0] in body.points and n != block]

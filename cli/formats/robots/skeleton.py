@@ -315,7 +315,7 @@ class Skeleton:
             "friction": m.friction,
         }
         result = [
-            f"{what} are left out: {len(parts)}"
+            f"{what} {'is' if what == 'friction' else 'are'} left out: {len(parts)}"
             for what, parts in loads.items()
             if parts and what not in holds
         ]
@@ -332,6 +332,18 @@ class Skeleton:
             if j is None or j.input != k:
                 instead = f": {j.link} is driven against {j.on} instead" if j is not None else ""
                 result.append(f"input {e.name} is left out: no pin joins {e.link} and {e.on}{instead}")
+        for k, e in enumerate(m.inputs):
+            laws = {"acceleration": e.acceleration, "jerk": e.jerk, "table of its motion": e.history}
+            lost = [what for what, law in laws.items() if law]
+            if lost:
+                are = "is" if len(lost) == 1 else "are"
+                result.append(
+                    f"{' and '.join(lost)} of input {e.name} {are} left out: the format has its speed alone"
+                )
+            if k in m.carried:
+                result.append(
+                    f"the motor of input {e.name} is left out: it sits on {m.carrier(k)}, and drives against {e.on}"
+                )
         if m.gravity and "gravity" not in holds:
             result.append("gravity is left out: the format has none")
         return result
