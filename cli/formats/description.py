@@ -125,7 +125,7 @@ def _named(d: Drawing) -> Drawing:
     for e in d.drives:
         if e.speed is not None and float(str(e.speed).split()[0]) == 0:
             e.speed = None
-            d.notes.append(f"the input {' against '.join(e.pair)} has the speed 0: it has no speed here")
+            d.notes.append(f"the input {' against '.join(e.pair)} has the speed 0: left out")
     for body in d.bodies.values():
         for p in body.points:
             if p not in points:
@@ -161,7 +161,7 @@ def _places(points: dict[str, complex], origin: complex = ORIGIN) -> dict[str, c
     return {p: complex(z - origin) for p, z in points.items()}
 
 
-# degrees of an input that says nothing of where it begins
+# inputs that are tried where the file has none, degrees
 TRIED = tuple(range(0, 360, 15))
 # how far from its drawn place a point may stand, of the drawing's size: rounding, magnified near change points
 NEAR = 1e-9
@@ -185,7 +185,7 @@ def described(d: Drawing, source: str) -> str:
                 made, m, off = again, closer, 0.0
         warnings = m.assembly.warnings
         if not _motion(m, d).assembled.all():
-            d.notes.append("it cannot be assembled as it is drawn")
+            d.notes.append("it cannot be assembled as drawn")
             return made
         d.notes += warnings
         # a little way to one side of the drawn pose at least
@@ -257,9 +257,9 @@ def _seek(d: Drawing, source: str) -> None:
         if turn:
             d.notes.append(f"no assembly at the input's own value: it begins at {math.degrees(turn):g} deg")
         d.notes.append(
-            "the file does not say where its bodies stand: the assembly nearest to all angles 0 is taken"
+            "the file does not say where its bodies stand: the assembly nearest to all angles 0 is used"
         )
         return
     for e, at in zip(d.drives, start, strict=True):
         e.at = at
-    d.notes.append(f"no assembly was found{': ' + why if why else ''}")
+    d.notes.append(f"no assembly found{': ' + why if why else ''}")

@@ -262,9 +262,7 @@ def curves(travel: Travel, length: str, metres: float, angle: str) -> bytes:
     """Return the table of the input and of every moving point over its travel."""
     m = travel.m
     if travel.motion is None:
-        raise DataError(
-            "curves are of one input, and it has several: `dalembert mechanism --cases` takes them"
-        )
+        raise DataError("curves need one input, and it has several: use `dalembert mechanism --cases`")
     q = travel.motion.inputs[:, 0]
     if m.inputs[0].is_slide:
         columns = {f"input_{length}": q / metres}

@@ -217,7 +217,7 @@ class Drawing:
     length: str = "m"
     angle: str = "deg"
     posed: bool = True
-    """It stands as it is drawn; False: at angles that are sought."""
+    """True: it stands as it is drawn; False: its angles are unknown."""
     own_axes: bool = False
     """Each body's points are in axes of its own, which the file gives; False: in the ground's, as they are drawn."""
     bodies: dict[str, Body] = field(default_factory=lambda: {GROUND: Body()})
@@ -265,9 +265,9 @@ class Drawing:
         """Note what is left out, and why.
 
         >>> d = Drawing()
-        >>> d.leave("slide radius of C7", "arcs have no joint here")
+        >>> d.leave("slide radius of C7", "there is no joint on an arc")
         >>> d.notes
-        ['slide radius of C7: left out: arcs have no joint here']
+        ['slide radius of C7: left out: there is no joint on an arc']
         """
         self.notes.append(f"{what}: left out: {why}")
 
@@ -330,7 +330,7 @@ class Drawing:
         off = float((b.x - a.x) * (z.y - a.y) - (b.y - a.y) * (z.x - a.x)) / length
         if abs(off) > 1e3 * SAME * length:
             by = f"{abs(off):.3g} {self.length}"
-            self.notes.append(f"{what}: its line is moved by {by} to go through {point}")
+            self.notes.append(f"{what}: its line is moved by {by} to pass through {point}")
 
     def fresh(self, wanted: str) -> str:
         """Return a point's name that no body uses yet."""

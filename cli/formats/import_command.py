@@ -140,7 +140,7 @@ def _pages(title: str, taken: list[str], made: str) -> list[Sheet]:
 def unknown(file: str) -> DataError:
     """Return the error of a file whose kind is not recognized."""
     programs = "; ".join(f"{name} ({what})" for name, what in KINDS.items())
-    return DataError(f"{file}: of no known kind: expected {programs}; --from names one")
+    return DataError(f"{file}: of no known kind: expected {programs}; name it with --from")
 
 
 def decoded(file: str, data: bytes) -> str:

@@ -50,7 +50,7 @@ class _List:
         rpm, clockwise, gravity, length = (*next(iter(self.rows.get("s", [])), []), "", "", "", "")[:4]
         d.length = length if length in ("cm", "m", "in", "mm") else "m"
         if d.length != length:
-            d.notes.append("the link names no unit of length: given in m")
+            d.notes.append("the link has no unit of length: numbers are taken as metres")
         d.gravity = (0.0, -9.81) if gravity and self._yes("s=", gravity) else None
         joints: dict[str, list[str]] = {}
         at: dict[str, Exact] = {}
@@ -70,7 +70,7 @@ class _List:
             elif held:
                 angle = 0.0 if row[6] in ("", "Null", "null") else finite(file, f"joint {id_}", row[6])
                 if angle:
-                    d.notes.append(f"joint {id_}: the angle {angle:g} of its guide is taken in rad")
+                    d.notes.append(f"joint {id_}: the angle {angle:g} of its guide is read in rad")
                 # a piston keeps its direction; a link that has the joint itself turns on it
                 body = next((name for name in held if name in self.pistons), held[0])
                 prism = body in self.pistons
@@ -271,7 +271,7 @@ class _String:
         unset = _are_defaults(self.d, (self._decimal("mass", t[k]) for t in real for k in (2, 3)))
         if not unset:
             self.d.notes.append(
-                f"masses are taken as kg, inertias as kg·{self.d.length}2: the string names no unit"
+                f"masses are read as kg, inertias as kg·{self.d.length}2: the string has no unit"
             )
         for what, kind, tokens, ids, _rest in rows:
             id_ = tokens[0]
@@ -311,7 +311,7 @@ class _String:
         elif j.grounded:
             on, angle = GROUND, math.degrees(j.angle)
         else:
-            self.d.leave(f"slider {j.name}", "the string says of no guide")
+            self.d.leave(f"slider {j.name}", "the string has no guide for it")
             return
         for link in [name for name in held if name != on][:1]:
             self.slides[id_] = self.d.guide(id_, link, on, j.at, angle)

@@ -105,7 +105,7 @@ def _drop_what_is_rigid(d: Drawing) -> None:
         d.leave(f"slide at {s.point}", "both sides are one body")
     for m in [m for m in d.meshes if len({m.a, m.b, m.arm}) < 3]:
         d.meshes.remove(m)
-        d.leave(f"gears {m.a}, {m.b}", "they are one body, or one is its own arm")
+        d.leave(f"gears {m.a}, {m.b}", "they are one body, or one of them is the arm")
     slides = list(map(id, d.slides))
     for r in list(d.racks):
         # a wheel in a slot may roll along a rack
@@ -132,7 +132,7 @@ def _drop_what_dangles(d: Drawing) -> None:
             return
         for name in gone:
             d.bodies.pop(name)
-            alone = "one joint alone holds it, and nothing drives it"
+            alone = "only one joint holds it, and nothing drives it"
             d.leave(name, alone if holds[name] else "it has no joint")
         d.slides = [s for s in d.slides if {s.link, s.on} <= d.bodies.keys()]
         d.racks = [r for r in d.racks if {r.gear, r.slide.link, r.slide.on} <= d.bodies.keys()]
@@ -252,7 +252,9 @@ def _fit_inputs(d: Drawing) -> None:
             kept.append(e)
             free = np.linalg.svd(row[None])[2][1:] @ free
     _note(
-        d, (e for e in d.drives if e not in kept), "left out as an input: its motion follows from the others'"
+        d,
+        (e for e in d.drives if e not in kept),
+        "left out as an input: the joints and the other inputs determine its motion",
     )
     _note(d, (e for e in kept if e not in d.drives), "taken as an input in addition: it was free to move")
     d.drives = [e for e in (*d.drives, *spare) if e in kept]

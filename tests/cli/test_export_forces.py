@@ -182,7 +182,7 @@ def test_urdf_names_the_racks_that_it_leaves_out() -> None:
     notes = file_bytes(m, home(m), ".urdf", "file.toml", {})[1]
     assert notes == ["racks are left out: 1: <mimic> ties one joint to one other"]
     assert file_bytes(m, home(m), ".xml", "file.toml", {})[1] == [
-        "without mass: arm, wheel, bar: the format takes none: a millionth of the heaviest is given"
+        "without mass: arm, wheel, bar: the format requires a mass: a millionth of the heaviest is written"
     ]
 
 

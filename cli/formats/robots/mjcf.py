@@ -109,9 +109,7 @@ class _Reader:
             elif e.tag == "body":
                 self._body(e, link, base, e.get("childclass", of))
             elif e.tag in ("replicate", "attach", "composite", "flexcomp"):
-                self.robot.notes.append(
-                    f"<{e.tag}> is left out: bodies that are made while reading are not read"
-                )
+                self.robot.notes.append(f"<{e.tag}> is left out: generated bodies are not read")
 
     def _body(self, e: Element, parent: str, base: Array, of: str) -> None:
         robot = self.robot
@@ -120,7 +118,7 @@ class _Reader:
         here = base @ self.frames.pose(where, e.attrib)
         joints = list(children(e, "joint"))
         if child(e, "freejoint") is not None or any(self.whole(j, of).get("type") == "free" for j in joints):
-            robot.notes.append(f"{where}: its free joint is left out: it is taken as fixed")
+            robot.notes.append(f"{where}: its free joint is left out: the body is fixed")
             joints = []
         inertial = child(e, "inertial")
         held = self._inertial(where, inertial)
@@ -207,7 +205,7 @@ class _Reader:
             elif e.tag == "tendon" and "tendon2" not in values:
                 robot.couplings.append((name, self._fixed(named(self.file, e, "tendon1"), at)))
             else:
-                robot.notes.append(f"{where}: left out: <{e.tag}> has no like here")
+                robot.notes.append(f"{where}: left out: <{e.tag}> has no equivalent")
 
     def _connect(self, tag: str, name: str, at: At, values: dict[str, str]) -> None:
         robot = self.robot
@@ -270,7 +268,7 @@ class _Reader:
             ends = [self.sites[s] for s in sites]
         if len(rest) > 1 and rest[0] != rest[-1]:
             self.robot.notes.append(
-                f"{at.where}: it is slack from {rest[0]:g} to {rest[-1]:g}: the first is taken"
+                f"{at.where}: it is slack from {rest[0]:g} to {rest[-1]:g}: the first length is used"
             )
         open_ = "springlength" not in values or (rest[0] == -1.0 and not terms)
         self.robot.springs.append(
@@ -305,7 +303,7 @@ class _Reader:
         result = At(self.file, "key").numbers("qvel", keys[0].get("qvel"))
         if len(result) != len(own):
             return {}
-        # a key frame at rest says of no speed
+        # a key frame at rest has no speed
         return {name: v for name, v in zip(own, result, strict=True) if v != 0}
 
 

@@ -62,7 +62,7 @@ class _Layer:
         places = [self.plane.place(end) for j in moving for end in j.ends]
         places += [self.plane.place(link.pose[:3, 3]) for link in robot.links.values()]
         self.size = max(abs(a - places[0]) for a in places) or 1.0
-        # digits after the point that say something: the rest is rounding of the way through the tree
+        # significant digits after the point: the rest is rounding on the way through the tree
         self.digits = 15 - math.ceil(math.log10(self.size))
         self._groups()
         d.posed = all(self._closed(j) for j in moving)
@@ -87,7 +87,7 @@ class _Layer:
         self._springs(moving)
         for what in dict.fromkeys(what for j in moving for what in j.more):
             names = ", ".join(j.name for j in moving if what in j.more)
-            d.leave(f"{what} of {names}", "it moves as far as its links let it, without friction")
+            d.leave(f"{what} of {names}", "the joint moves without limits and friction")
         if robot.gravity is not None:
             g = self.plane.direction(robot.gravity)
             d.gravity = (g.real, g.imag) if abs(g) > 1e-12 * float(np.linalg.norm(robot.gravity)) else None
@@ -128,7 +128,7 @@ class _Layer:
         if inertia < 0:
             raise DataError(
                 f"{self.robot.file}: link '{links[0].name}', inertia about the plane's normal: found {inertia:g}, "
-                "expected one of zero or more: `dalembert body --check-inertias` says more"
+                "expected zero or more: see `dalembert body --check-inertias`"
             )
         body.mass, body.center, body.inertia = mass, self._place(center), inertia
 
@@ -299,7 +299,7 @@ class _Layer:
             # any of the three may be called the arm
             arm = GROUND if GROUND in shares else (carriers or list(shares))[0]
             if len(shares) == 2:
-                # two that turn alike: whatever carries them
+                # two that turn alike: any other body may be the arm
                 arm = next((body for body in d.bodies if body not in shares), GROUND)
             pair = [body for body in shares if body != arm]
             b, a = pair[:2]
@@ -369,7 +369,7 @@ class _Layer:
             first = ordered[0] if ordered and ordered[0] in here else None
             if first is None:
                 raise DataError(f"{robot.file}: nothing is driven: no actuator, and no joint on the ground")
-            d.notes.append(f"the file says of no actuator: {first.name} is taken as the input")
+            d.notes.append(f"the file has no actuator: {first.name} is taken as the input")
             motors = [Motor(first.name, [(first.name, 1.0)])]
         for m in motors:
             drive = self._drive(m)

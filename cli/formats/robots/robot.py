@@ -422,7 +422,7 @@ def plane_of(file: str, joints: list[RobotJoint], notes: list[str]) -> Plane:
             )
         worst = max(worst, off)
     if worst > SILENT:
-        notes.append(f"axes are off by up to {math.degrees(worst):.2g} deg: taken as planar")
+        notes.append(f"axes are off by up to {math.degrees(worst):.2g} deg: read as planar")
     return plane
 
 

@@ -102,7 +102,9 @@ class _Model:
         robot, file = self.robot, self.file
         self.at[MODEL] = read_pose(At(file, "model"), child(self.element, "pose"))
         for e in children(self.element, "model", "include"):
-            robot.notes.append(f"<{plain(e)}> in the model: left out: files and models inside are not read")
+            robot.notes.append(
+                f"<{plain(e)}> in the model: left out: nested models and included files are not read"
+            )
         static = text(self.element, "static") in ("true", "1")
         if static:
             robot.notes.append(f"model '{robot.name}' is static: nothing in it moves")

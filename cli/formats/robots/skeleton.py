@@ -213,7 +213,9 @@ class Skeleton:
                 waiting.append(child)
         lost = [name for name in self.bodies if name not in self.path]
         if lost:
-            raise DataError(f"{', '.join(lost)}: no pin or guide leads there from the ground: not exported")
+            raise DataError(
+                f"{', '.join(lost)}: no chain of pins and guides joins it to the ground: not exported"
+            )
 
     def world(self, body: str, z: complex) -> complex:
         """Return where a place of a body stands, m."""
@@ -325,7 +327,7 @@ class Skeleton:
         light = [name for name, body in self.bodies.items() if body.mass <= 0 and name in m.links]
         if light and "massless" not in holds:
             result.append(
-                f"without mass: {', '.join(light)}: the format takes none: a millionth of the heaviest is given"
+                f"without mass: {', '.join(light)}: the format requires a mass: a millionth of the heaviest is written"
             )
         for k, e in enumerate(m.inputs if "inputs" not in holds else ()):
             j = self.driven(k)

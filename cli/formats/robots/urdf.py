@@ -151,7 +151,7 @@ def _tree(robot: Robot, joints: list[Element]) -> None:
     below = {joint.child for joint in waiting}
     roots = [name for name in robot.links if name not in below]
     if not roots:
-        raise DataError(f"{robot.file}: every link is the child of a joint: expected one that stands still")
+        raise DataError(f"{robot.file}: every link is the child of a joint: expected one that is fixed")
     robot.ground = roots[0]
     there = set(roots)
     closing = []
@@ -219,7 +219,7 @@ def _mimic(robot: Robot, name: str, mimic: Element) -> None:
     )
     robot.couplings.append((name, [(name, 1.0), (other, -factor)]))
     if offset:
-        robot.notes.append(f"{where}: its offset {offset:g} is left out: the drawn pose is that of the file")
+        robot.notes.append(f"{where}: its offset {offset:g} is left out: the pose is that of the file")
 
 
 def _motors(robot: Robot, root: Element) -> None:
