@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from cli.formats.drawn import bodies_of, start_of
+from cli.formats.drawn import Body
 from cli.formats.markup import add, digits, document
 from cli.read.options import bad
 from dalembert.errors import DataError
@@ -36,6 +36,32 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
+
+
+def start_of(m: Mechanism, inputs: tuple[float, ...]) -> Motion:
+    """Return the motion of the pose in which a file begins, at the speed of the mechanism's own file.
+
+    Raises
+    ------
+    DataError
+        Where it cannot be assembled there.
+    """
+    rates = [e.speed or 0.0 for e in m.inputs]
+    start = m.motion([inputs], speed=[rates]) if len(inputs) > 1 else m.motion(inputs[0], speed=rates[0])
+    if not start.assembled[0]:
+        raise DataError("it cannot be assembled at that input: nothing is exported")
+    return start
+
+
+def bodies_of(m: Mechanism, motion: Motion) -> dict[str, Body]:
+    """Return the ground and the links as bodies that stand in the first pose of a motion; m, kg, rad."""
+    bodies = {GROUND: Body(dict(m.ground))}
+    for name, link in m.links.items():
+        at, turn = complex(motion.at(name, 0j).complex(0)[0]), float(motion.link(name).angle[0])
+        rigid = m.rigid[name]
+        bodies[name] = Body(dict(link.points), at, turn, rigid.mass, rigid.center, rigid.inertia)
+    return bodies
+
 
 # poses over the travel of the input
 SAMPLES = 721

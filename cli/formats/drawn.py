@@ -12,14 +12,10 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import product
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from dalembert.errors import DataError, quote
 from dalembert.units import to_si
-
-if TYPE_CHECKING:
-    from virtualwork import Mechanism
-    from virtualwork.motion import Motion
 
 GROUND = "ground"
 LARGEST = 1e60
@@ -366,31 +362,6 @@ def pins_of(
     for label, _ in pins:
         names.append(unused(label, names))
     return list(zip(names, (ends for _, ends in pins), strict=True))
-
-
-def start_of(m: Mechanism, inputs: tuple[float, ...]) -> Motion:
-    """Return the motion of the pose in which a file begins, at the speed of the mechanism's own file.
-
-    Raises
-    ------
-    DataError
-        Where it cannot be assembled there.
-    """
-    rates = [e.speed or 0.0 for e in m.inputs]
-    start = m.motion([inputs], speed=[rates]) if len(inputs) > 1 else m.motion(inputs[0], speed=rates[0])
-    if not start.assembled[0]:
-        raise DataError("it cannot be assembled at that input: nothing is exported")
-    return start
-
-
-def bodies_of(m: Mechanism, motion: Motion) -> dict[str, Body]:
-    """Return the ground and the links as bodies that stand in the first pose of a motion; m, kg, rad."""
-    bodies = {GROUND: Body(dict(m.ground))}
-    for name, link in m.links.items():
-        at, turn = complex(motion.at(name, 0j).complex(0)[0]), float(motion.link(name).angle[0])
-        rigid = m.rigid[name]
-        bodies[name] = Body(dict(link.points), at, turn, rigid.mass, rigid.center, rigid.inertia)
-    return bodies
 
 
 def centers(d: Drawing, a: str, b: str) -> Iterator[tuple[str, str, str]]:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cli.formats.drawn import Body, Groups, bodies_of, start_of, unused
+from cli.formats.drawing import Travel, bodies_of, start_of
+from cli.formats.drawn import Body, Groups, unused
 from cli.formats.robots.robot import BLOCK
 from dalembert.errors import DataError
 from virtualwork.describe.meshes import Mesh
@@ -21,7 +22,6 @@ from virtualwork.drawing import hull
 from virtualwork.parts_of_motion import SlideMotion
 
 if TYPE_CHECKING:
-    from cli.formats.drawing import Travel
     from virtualwork import Mechanism
 
 # half the thickness of a link's strokes, of the mechanism's size
