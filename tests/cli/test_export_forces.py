@@ -186,12 +186,13 @@ def test_urdf_names_the_racks_that_it_leaves_out() -> None:
     ]
 
 
-@pytest.mark.parametrize("seed", [15, 22])
-def test_a_pose_that_angles_alone_do_not_choose_comes_back(seed: int) -> None:
-    """From the angles alone Newton's method closes the loops elsewhere: the guess then names every joint."""
+@pytest.mark.whole
+@pytest.mark.parametrize(("seed", "toothed"), [(15, True), (22, True), (254, False)])
+def test_a_pose_that_angles_alone_do_not_choose_comes_back(seed: int, toothed: bool) -> None:
+    """The guess names every joint where Newton's method goes elsewhere from angles alone, and gears count its whole turns."""
     from benchmarks.stress.topologies import generate
 
-    m = generate(seed, toothed=True).mechanism
+    m = generate(seed, toothed).mechanism
     back = only(exported(m, ".xml"))
     ours, theirs = moved(m, np.array([home(m)])), moved(back, np.array([home(back)]))
     for name, link in m.links.items():
@@ -250,3 +251,29 @@ def test_what_a_robot_cannot_hold_is_named(suffix: str) -> None:
     assert "acceleration of input arm is left out: the format has its speed alone" in notes
     assert "acceleration and jerk of input drum are left out: the format has its speed alone" in notes
     assert "the motor of input drum is left out: it sits on arm, and drives against ground" in notes
+
+
+DOOR = """
+[ground]
+O = [0, 0]
+[links.door]
+points = { O = [0, 0], E = [1, 0] }
+mass = 1
+[[torsion_springs]]
+links = ["ground", "door"]
+stiffness = 2
+free_angle = 3
+[input]
+link = "door"
+angle = 4
+"""
+
+
+@pytest.mark.parametrize("angle", [4, 2, -9])
+def test_a_torsion_spring_counts_the_whole_turns_of_its_input(angle: int) -> None:
+    m = Mechanism.from_toml_text(DOOR.replace("angle = 4", f"angle = {angle}"))
+    back = only(exported(m, ".xml"))
+    assert home(back) == pytest.approx(home(m), rel=1e-15)
+    steps = np.linspace(-1, 1, 5)
+    ours, theirs = m.motion(angle + steps).effort, back.motion(angle + steps).effort
+    assert theirs == pytest.approx(ours, rel=1e-12)

@@ -377,6 +377,10 @@ class _Layer:
                 d.leave(f"actuator {m.name}", "it drives neither one slide nor the angle between two links")
             elif all(drive.moves != e.moves for e in d.drives):
                 d.drives.append(drive)
+                if drive.link is not None:
+                    # gears and torsion springs count the whole turns of the input
+                    link, on = d.bodies[drive.link], d.bodies[drive.on]
+                    link.turn += 2 * math.pi * round((drive.at - link.turn + on.turn) / (2 * math.pi))
         spare = [self._drive(Motor(j.name, [(j.name, 1.0)])) for j in ordered]
         d.spare = [e for e in spare if e is not None]
 
@@ -395,8 +399,9 @@ class _Layer:
         if link == GROUND:
             link, on, sense = on, link, -1.0
         turn = d.bodies[link].turn - d.bodies[on].turn
-        value = sense * sum(factor * robot.joints[name].value for name, factor in m.terms) / c
-        # the file's own coordinate may count whole turns
+        # the coordinate of a joint may count whole turns; a sum of several begins anywhere
+        name, factor = m.terms[0]
+        value = sense * factor * robot.joints[name].value / c if len(m.terms) == 1 else 0.0
         at = turn + 2 * math.pi * round((value - turn) / (2 * math.pi)) if value else turn
         return Drive(link, on, at=at, speed=None if m.speed is None else f"{sense * m.speed / c!r} rad/s")
 

@@ -249,12 +249,20 @@ class Skeleton:
         return result
 
     def twist(self, spring: TorsionSpring) -> float:
-        """Return how far a torsion spring is wound, rad: within half a turn at the guess, and followed from there."""
+        """Return how far a torsion spring is wound, rad: within half a turn at the guess, and followed from there.
+
+        Where the inputs alone fix both angles they count with their whole turns.
+        """
+        angles = [self.m.assembly.plan.angles[body] for body in spring.links]
+        more = 2 * np.pi * spring.turns - spring.free_angle
+        if all(angle.by_inputs for angle in angles):
+            on, link = (a.const + sum(k * self.inputs[j] for j, k in a.inputs) for a in angles)
+            return float(link - on + more)
         way = np.linspace(self.m.at, self.inputs, FOLLOWED)
         motion = self.m.motion(way if len(self.inputs) > 1 else way[:, 0])
-        on, link = (motion.link(b).angle if b != GROUND else np.zeros(FOLLOWED) for b in spring.links)
-        wound = np.unwrap(link - on) - spring.free_angle
-        return float(wound[-1] - 2 * np.pi * np.round(wound[0] / (2 * np.pi)))
+        first, second = (motion.link(b).angle if b != GROUND else np.zeros(FOLLOWED) for b in spring.links)
+        wound = np.unwrap(second - first)
+        return float(wound[-1] + more - 2 * np.pi * np.round((wound[0] - spring.free_angle) / (2 * np.pi)))
 
     def driven(self, k: int) -> Joint | None:
         """Return the joint whose coordinate is an input; where none is, the one on which its link hangs in the tree."""
