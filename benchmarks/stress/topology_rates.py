@@ -52,6 +52,16 @@ def _series(value: Any) -> _Series:
     return _Series([mp.mpmathify(value), *[mp.mpf(0)] * ORDER])
 
 
+def _turn(data: tuple[Any, ...]) -> tuple[dict[str, Any], Any, Any]:
+    """A relation of angles; of a gear's arm the share is what makes all shares together zero, which a float rounds."""
+    held, const, j = data
+    exact = {body: mp.mpf(c) for body, c in held.items()}
+    if const is None and len(held) == 3:
+        arm = list(held)[2]
+        exact[arm] -= sum(exact.values())
+    return exact, const, j
+
+
 # rad: so near the guess a gear's constant that the program fixes is the guess's, but for rounding
 GUESSED = 1e-9
 
@@ -64,13 +74,11 @@ def _constants(t: Topology, inputs: list[_Series]) -> list[Any]:
     """
     placed, found = _placed(t, inputs), []
     gears = [
-        held
-        for kind, (held, const, *_) in ((kind, data) for kind, data in t.rows if kind == "turn")
-        if const is None
+        held for held, const, _ in (_turn(data) for kind, data in t.rows if kind == "turn") if const is None
     ]
     by_loops = {gear for turn in turns(plan(t.mechanism).steps) for gear, _ in turn.angle.gears}
     for i, held in enumerate(gears):
-        stands = sum((mp.mpf(c) * placed.get(b, t.angles.get(b, 0.0)) for b, c in held.items()), mp.mpf(0))
+        stands = sum((c * placed.get(b, t.angles.get(b, 0.0)) for b, c in held.items()), mp.mpf(0))
         own = (
             t.mechanism.assembly.phases[i] if i in by_loops and not placed.keys() >= held.keys() else math.inf
         )
@@ -81,7 +89,7 @@ def _constants(t: Topology, inputs: list[_Series]) -> list[Any]:
 def _placed(t: Topology, inputs: list[_Series]) -> dict[str, Any]:
     """The angles of the guess's pose that guides, inputs and gears fix without any loop."""
     fixed: dict[str, Any] = {GROUND: mp.mpf(0)}
-    rows = [data for kind, data in t.rows if kind == "turn"]
+    rows = [_turn(data) for kind, data in t.rows if kind == "turn"]
     while True:
         rows = [row for row in rows if not fixed.keys() >= row[0].keys()]
         choices = (some for k in range(1, len(rows) + 1) for some in combinations(rows, k))
@@ -130,7 +138,7 @@ def _exact_rows(t: Topology, x: list[_Series], inputs: list[_Series]) -> list[_S
             gap = seat(*data[:2]) - seat(*data[2:])
             out += [_Series([mp.re(c) for c in gap.c]), _Series([mp.im(c) for c in gap.c])]
         elif kind == "turn":
-            held, const, j = data
+            held, const, j = _turn(data)
             if const is None:
                 const = next(constants)
             else:

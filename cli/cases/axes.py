@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,8 +19,11 @@ from virtualwork.describe import DescriptionError
 from virtualwork.describe.units import Units
 
 if TYPE_CHECKING:
+    from decimal import Decimal
+
     from numpy.typing import NDArray
 
+    from dalembert.tables.table import Numbers
     from virtualwork import Mechanism
     from virtualwork.describe.dimensions import Dimension
 
@@ -231,7 +235,9 @@ def cases_axis(m: Mechanism, path: str, elsewhere: set[int], remarks: list[str])
         order, shown, values = _with_rates_at_rest(m, order, shown, values)
     elif time is not None and driven_here:
         here = [i for i, name in enumerate(order) if isinstance(name, Driven)]
-        speed, acceleration = rates_over_time(path, time, values[:, here])
+        exact = [_exact(columns[order[i]]) for i in here]
+        times = next(_exact(table.numbers[t]) for t in TIMES if t in table.numbers)
+        speed, acceleration = rates_over_time(path, times, exact)
         order = [*order, *(order[i].rate(1) for i in here), *(order[i].rate(2) for i in here)]  # type: ignore[union-attr]
         shown = [*shown, *speed.T, *acceleration.T]
         values = np.concatenate([values, speed, acceleration], axis=1)
@@ -258,20 +264,25 @@ def _with_rates_at_rest(
     return order, shown, values
 
 
-def rates_over_time(path: str, time: Reals, q: Reals) -> tuple[Reals, Reals]:
-    """Return speed and acceleration of a law of motion over time, from the cubic spline through its rows."""
-    if len(time) < 4 or not (np.diff(time) > 0).all():
+def _exact(column: Numbers) -> list[Decimal]:
+    """Return the numbers of a column in SI, as the decimals that the file has."""
+    from dalembert.arithmetic.splines import decimals
+
+    return decimals(map(repr, column.values.tolist()), UNITS[column.dimension][column.unit])
+
+
+def rates_over_time(
+    path: str, time: Sequence[Decimal], q: Sequence[Sequence[Decimal]]
+) -> tuple[Reals, Reals]:
+    """Return speed and acceleration (n, k) of a law of motion over time, from the cubic spline through its rows; `q`: a list for each input."""
+    from dalembert.arithmetic.splines import rates
+
+    if len(time) < 4 or not all(a < b for a, b in pairwise(time)):
         raise DataError(
             f"{path}: time_s: expected at least 4 rows with rising time, for the speeds of the law of motion"
         )
-    from scipy.interpolate import CubicSpline
-
-    with np.errstate(all="ignore"):
-        try:
-            spline = CubicSpline(time, q, axis=0)
-            speed, acceleration = spline(time, 1), spline(time, 2)
-        except (ValueError, np.linalg.LinAlgError):
-            speed = acceleration = np.array([np.nan])
+    of_inputs = [rates(time, values) for values in q]
+    speed, acceleration = (np.array([[*map(float, of[k])] for of in of_inputs]).T for k in range(2))
     if not (np.isfinite(speed).all() and np.isfinite(acceleration).all()):
         raise DataError(f"{path}: time_s: rows too close in time for the speeds of the law of motion")
     return speed, acceleration
@@ -291,7 +302,16 @@ def history_axis(m: Mechanism) -> Axis:
             q[:, j] = law[:, 1]
         else:
             raise DataError("[[input]] law: the tables of several inputs must have the same times")
-    speed, acceleration = rates_over_time("[input] law", time, q)
+    # loaded where a file has a table over time
+    from decimal import Decimal
+
+    known = m.decimals
+    exact = [
+        [Decimal(x) + Decimal(known.rest(name.dimension, x) if known else 0.0) for x in q[:, name.j].tolist()]
+        for name in names
+    ]
+    times = [Decimal(t) + Decimal(known.rest("time", t) if known else 0.0) for t in time.tolist()]
+    speed, acceleration = rates_over_time("[input] law", times, exact)
     shown = np.array([[name.shown(v) for name, v in zip(names, row, strict=True)] for row in q])
     order = [*names, *(name.rate(1) for name in names), *(name.rate(2) for name in names)]
     si = np.concatenate([q, speed, acceleration], axis=1)

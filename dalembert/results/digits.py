@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from decimal import Decimal
-from math import floor, inf, log10
+from math import floor, inf, log10, ulp
 from typing import TYPE_CHECKING
 
 from dalembert.results.columns import Column, Table
@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from dalembert.results.columns import Cell
 
 
-EPS = 2.0**-52
+# what the logarithms round, and more
+NEAR = 1e-9
 
 
 def digits_that_hold(table: Table) -> tuple[Table, int]:
@@ -41,14 +42,19 @@ def _cut(value: Cell, error: float) -> Cell:
         return None
     if isinstance(value, str) or value is None or not value or not error > 0:
         return value
-    most = floor(log10(abs(value) / error)) if error < abs(value) else -1
+    size = abs(value)
+    # half a unit of the last digit is no less than the error
+    most = max(0, floor(floor(log10(size)) - log10(2 * error) + NEAR)) if error < size else -1
     for last in range(min(most, 16), -1, -1):
         cut = f"{value:.{last}e}"
         shown = float(cut)
         room = 0.5 * 10.0 ** (int(cut[cut.index("e") + 1 :]) - last) - error
-        if abs(value - shown) > room + EPS * abs(value):
+        # exact; the digits themselves are off the double that they stand for by half a unit of its last place at most
+        off, half = abs(value - shown), 0.5 * ulp(shown)
+        if off - half > room:
             continue
-        # all that lies within the error has these digits, and the double that is printed has no others
-        if abs(float(Decimal(value) - Decimal(cut))) <= room and cut == f"{shown:.{last}e}":
+        # all that lies within the error has these digits, and the double that is printed has no others: 15 are its own
+        within = off + half <= room or abs(float(Decimal(value) - Decimal(cut))) <= room
+        if within and (last < 15 or cut == f"{shown:.{last}e}"):
             return shown
     return 0.0

@@ -7,6 +7,7 @@ import io
 import math
 import subprocess
 from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 
 import mpmath as mp
@@ -16,6 +17,9 @@ from benchmarks.truth.four_bar import coupler_point
 from benchmarks.truth.mechanism import Exact
 from tests.conftest import Dalembert
 from virtualwork import Mechanism
+
+# 40 digits
+PI = Fraction("3.141592653589793238462643383279502884197")
 
 # the triple rocker of 2.1, 1.3, 0.9 and 2.7 ends where coupler and rocker are in line
 LENGTHS = ("2.1", "1.3", "0.9", "2.7")
@@ -268,3 +272,27 @@ def test_potential_and_period_of_a_pendulum(dalembert: Dalembert, tmp_path: Path
         assert holds(below["period_s"], period) >= 14
     call = ("equilibrium", file, "--json")
     assert dalembert(*call).stdout == dalembert(*call, "--digits").stdout
+
+
+@pytest.mark.parametrize("way", ["--cases", "law"])
+def test_rates_of_a_table_over_time_have_all_digits(dalembert: Dalembert, tmp_path: Path, way: str) -> None:
+    """A cubic is its own spline: of θ = 1000 t³ degrees every 0.01 s speed and acceleration are right to the last digit."""
+    table = "".join(f"{k / 100},{k**3 / 1000}\n" for k in range(60))
+    (tmp_path / "law.csv").write_text(f"time_s,{'crank' if way == '--cases' else 'angle'}_deg\n{table}")
+    law = 'law = "law.csv"\n' if way == "law" else ""
+    text = (
+        '[ground]\nO = [0, 0]\n[links.crank]\npoints = { O = [0, 0], P = [1, 0] }\n[input]\nlink = "crank"\n'
+    )
+    (tmp_path / "crank.toml").write_text(text + law)
+    call = ["mechanism", str(tmp_path / "crank.toml"), "--only", "crank.omega,crank.alpha"]
+    done = dalembert(*call, *(["--cases", str(tmp_path / "law.csv")] if way == "--cases" else []))
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader(io.StringIO(done.stdout)))
+    assert len(rows) == 60
+    for k, row in enumerate(rows):
+        for name, exact in (
+            ("omega_rad_s", Fraction(3 * k**2, 10)),
+            ("alpha_rad_s2", Fraction(6 * k * 10)),
+        ):
+            right = float(exact * PI / 180)
+            assert float(row[f"crank_{name}"]) == pytest.approx(right, rel=4e-16, abs=1e-25)

@@ -11,7 +11,7 @@ import pytest
 from benchmarks.stress.let_go import LINKAGES, _linkage, _slider_crank
 from tests.virtualwork.let_go import G, block, double_pendulum, four_bar, pendulum
 from tests.virtualwork.test_fast_parallelograms import parallelogram
-from virtualwork import Friction, Gear, Guess, Input, Link, Mechanism, MechanismError, Rack, Spring
+from virtualwork import Friction, Gear, Guess, Guide, Input, Link, Mechanism, MechanismError, Rack, Spring
 from virtualwork.intime.run import Run
 
 Values = dict[str, Any]
@@ -62,6 +62,36 @@ def test_the_pull_of_a_pendulum_at_one_time(accuracy: float) -> None:
         answers, errors = estimated(run)
         for name, value in exact.items():
             assert abs(answers[name][-1] - float(value)) <= errors[name][-1], (name, end)
+
+
+@pytest.mark.parametrize(
+    ("damping", "end", "n"), [(100.0, 7.0, 40), (107.5616723126892, 5.358242977268, 8), (400.0, 27.0, 40)]
+)
+def test_a_strongly_damped_block_comes_to_rest(damping: float, end: float, n: int) -> None:
+    """Long after it has come within rounding of rest it has a place: the pull of its spring has no digit there."""
+    from mpmath import exp, mp, mpf, re, sqrt
+
+    stiffness = 875.1716174912565
+    slide = Guide("P", "block", turned=0.0)
+    spring = Spring((("block", 0j), ("ground", -1 + 0j)), stiffness, 1.0, damping)
+    m = Mechanism(
+        {"O": 0j},
+        {"block": Link({"P": 0j}, mass=1)},
+        guides=[slide],
+        inputs=Input(slider="P", value=0.0),
+        springs=[spring],
+    )
+    run = m.simulate(np.linspace(0, end, n), angle=0.5, accuracy=1.45e-10)
+    with mp.workdps(40):
+        c, k, x = mpf(damping), mpf(stiffness), mpf(1) / 2
+        fast = (-c - sqrt(c * c - 4 * k)) / 2
+        slow = k / fast
+        part = -x * slow / (fast - slow)
+        exact = [re(part * exp(fast * t) + (x - part) * exp(slow * t)) for t in map(mpf, run.t.tolist())]
+        errors = [float(abs(q - of)) for q, of in zip(run.angle[:, 0].tolist(), exact, strict=True)]
+    assert np.isfinite(run.angle).all()
+    assert (np.array(errors) <= run.error_estimate[:, 0]).all()
+    assert max(errors) < 1.45e-10
 
 
 def test_what_vanishes_by_symmetry() -> None:

@@ -72,8 +72,9 @@ class Cam(Part):
         unless="law",
     )
 
-    # in a run with more digits π has them too
+    # in a run with more digits π has them too, and the spline through a table
     pi: float = field(default=math.pi, compare=False, repr=False)
+    spline: Any = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "base_radius", as_number(self.base_radius))
@@ -145,7 +146,7 @@ class Cam(Part):
             law = spans(self.law, "law", self.pi)
             return Lift(self.cam, on, law[0].start, 2 * self.pi, *pieces(law, self.pi))
         assert self.history is not None
-        first, knots, curve = splined(self.history)
+        first, knots, curve = self.spline or splined(self.history)
         return Lift(self.cam, on, first, 2 * self.pi, knots, curve)
 
 

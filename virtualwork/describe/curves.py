@@ -19,21 +19,29 @@ from virtualwork.describe.units import SI, Units, wrong
 
 N = TypeVar("N", float, complex)
 
-# columns of a table over the input, with what makes them SI
-TURNS = {"angle_rad": 1.0, "angle_deg": math.pi / 180}
-TRAVELS = {"position_m": 1.0, "position_mm": 1e-3}
-# the lift of a sliding follower, and of an arm
-LIFTS = {"lift_m": 1.0, "lift_mm": 1e-3}
-SWINGS = {"swing_rad": 1.0, "swing_deg": math.pi / 180}
-# the columns that a table of torque may be over
-AXES = {
-    "t_s": ("time", 1.0),
-    "time_s": ("time", 1.0),
-    "angle_rad": ("angle", 1.0),
-    "angle_deg": ("angle", math.pi / 180),
-    "speed_rad_s": ("speed", 1.0),
-    "speed_rpm": ("speed", math.pi / 30),
+DEGREE, RPM = math.pi / 180, math.pi / 30
+# what every column of these tables is, its unit, and what makes it SI
+COLUMNS = {
+    **dict.fromkeys(("t_s", "time_s"), ("time", "s", 1.0)),
+    "angle_rad": ("angle", "rad", 1.0),
+    "angle_deg": ("angle", "deg", DEGREE),
+    "position_m": ("length", "m", 1.0),
+    "position_mm": ("length", "mm", 1e-3),
+    "speed_rad_s": ("speed", "rad/s", 1.0),
+    "speed_rpm": ("speed", "rpm", RPM),
+    **dict.fromkeys(("fx_N", "fy_N"), ("force", "N", 1.0)),
+    "torque_N_m": ("torque", "N m", 1.0),
+    "lift_m": ("length", "m", 1.0),
+    "lift_mm": ("length", "mm", 1e-3),
+    "swing_rad": ("angle", "rad", 1.0),
+    "swing_deg": ("angle", "deg", DEGREE),
 }
+# those of an input that turns and of one that slides; the lift of a sliding follower, and of an arm
+TURNS, TRAVELS = ("angle_rad", "angle_deg"), ("position_m", "position_mm")
+LIFTS, SWINGS = ("lift_m", "lift_mm"), ("swing_rad", "swing_deg")
+# the parts of a force; the columns that a table of torque may be over
+PARTS = ("fx_N", "fy_N")
+AXES = ("t_s", "time_s", *TURNS, "speed_rad_s", "speed_rpm")
 
 
 class Rows(tuple[tuple[float, Any], ...]):
@@ -65,7 +73,7 @@ class Law(Curve):
             over,
             ("time_s",),
             f"time_s and {' or '.join(over)}",
-            lambda row, column: (float(row["time_s"]), float(row[column]) * over[column]),
+            lambda row, column: (_si(row, "time_s"), _si(row, column)),
         )
         return rows
 
@@ -79,7 +87,7 @@ class LiftTable(Curve):
 
         def pair(row: dict[str, str], column: str) -> tuple[float, float]:
             lift = next(name for name in lifts if name in row)
-            return float(row[column]) * TURNS[column], float(row[lift]) * lifts[lift]
+            return _si(row, column), _si(row, lift)
 
         columns = f"{' or '.join(TURNS)}, and {' or '.join(lifts)}"
         rows, column = curve(entry, value, where, TURNS, lifts, columns, pair)
@@ -110,12 +118,9 @@ class ForceTable(Curve):
             value,
             where,
             over,
-            ("fx_N", "fy_N"),
+            PARTS,
             f"{' or '.join(over)}, fx_N and fy_N",
-            lambda row, column: (
-                float(row[column]) * over[column],
-                complex(float(row.get("fx_N") or 0), float(row.get("fy_N") or 0)),
-            ),
+            lambda row, column: (_si(row, column), complex(*(_si(row, of) for of in PARTS))),
         )
         rises([at for at, _ in rows], value, where, column)
         return {name: rows, "periodic": over is TURNS and is_cycle(rows[0][0], rows[-1][0])}
@@ -144,10 +149,10 @@ class TorqueOrTable(Form):
             AXES,
             ("torque_N_m",),
             f"torque_N_m and one of {', '.join(AXES)}",
-            lambda row, column: (float(row[column]) * AXES[column][1], float(row["torque_N_m"])),
+            lambda row, column: (_si(row, column), _si(row, "torque_N_m")),
         )
         rises([at for at, _ in rows], value, where, column)
-        axis = AXES[column][0]
+        axis = COLUMNS[column][0]
         periodic = axis == "angle" and is_cycle(rows[0][0], rows[-1][0])
         return {name: 0.0, "history": rows, "over": axis, "periodic": periodic}
 
@@ -192,7 +197,19 @@ def curve(
     if not all(math.hypot(at, abs(value)) <= LARGEST for at, value in pairs):
         raise wrong(where, name, "finite numbers in every row")
     pairs.name = str(name)
+    known = [each for each in rows[0] if each in COLUMNS]
+    for row in rows:
+        for each in known:
+            if row[each]:
+                dimension, unit, _ = COLUMNS[each]
+                entry.file.units.decimals.note(dimension, _si(row, each), f"{row[each]} {unit}", (1, 1))
     return pairs, column
+
+
+def _si(row: dict[str, str], column: str) -> float:
+    """The number of a row in SI; 0 of a part of a force that is left out."""
+    text = row.get(column) or "0" if column in PARTS else row[column]
+    return float(text) * COLUMNS[column][2]
 
 
 def rises(at: Sequence[float], name: Any, where: str, column: str) -> None:

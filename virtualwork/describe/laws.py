@@ -15,13 +15,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dalembert.dataclass import dataclass
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.forms import Choice, Scalar
 from virtualwork.describe.keys import declared
 from virtualwork.describe.points import as_number
+
+if TYPE_CHECKING:
+    from decimal import Decimal
 
 TURN = 2 * math.pi
 # of a turn, and of the largest rise: ends this near are the same
@@ -263,22 +266,44 @@ def pieces(law: Sequence[Span], pi: Any = math.pi) -> tuple[tuple[Any, ...], tup
     return tuple(knots), tuple(result)
 
 
-def splined(table: Sequence[tuple[float, float]]) -> tuple[float, tuple[float, ...], tuple[Piece, ...]]:
+def splined(
+    table: Sequence[tuple[float, float]],
+    off: Sequence[tuple[float, float]] = (),
+    number: Callable[[str, Decimal], Any] = lambda _, x: float(x),
+) -> tuple[float, tuple[float, ...], tuple[Piece, ...]]:
     """The periodic cubic spline through a table of lift over a turn: its first angle, knots and pieces.
 
     Parameters
     ----------
     table : sequence of (angle, lift)
         Rising angles, rad, over one whole turn; the last lift is the first.
+    off : sequence of (angle, lift), optional
+        What the numbers of the table are exactly, less the floats.
+    number : function of a name and a number
+        What a number of a piece becomes; by default a float.
     """
-    from scipy.interpolate import CubicSpline
+    # loaded here: few mechanisms have a cam, and fewer a table of its lift
+    from decimal import Context, Decimal, localcontext
 
-    angles, lifts = [at for at, _ in table], [lift for _, lift in table]
-    lifts[-1] = lifts[0]
-    spline = CubicSpline(angles, lifts, bc_type="periodic")
-    first = angles[0]
-    result = []
-    for (a, b), (c3, c2, c1, c0) in zip(pairwise(angles), spline.c.T.tolist(), strict=True):
-        w = b - a
-        result.append(Piece(a - first, w, c0, 1.0, (0.0, c1 * w, c2 * w * w, c3 * w * w * w)))
-    return first, (*(a - first for a in angles[:-1]), TURN), tuple(result)
+    from dalembert.arithmetic.splines import DIGITS, periodic
+
+    with localcontext(Context(prec=DIGITS)):
+        rows = [(Decimal(at), Decimal(lift)) for at, lift in table]
+        if off:
+            rows = [
+                (at + Decimal(a), lift + Decimal(b)) for (at, lift), (a, b) in zip(rows, off, strict=True)
+            ]
+        at, y = [at for at, _ in rows], [lift for _, lift in rows]
+        y[-1] = y[0]
+        bends = periodic(at, y)
+        first, result = at[0], []
+        for i, (bend, following) in enumerate(pairwise([*bends, bends[0]])):
+            width = at[i + 1] - at[i]
+            square = width * width / 6
+            slope = y[i + 1] - y[i] - square * (2 * bend + following)
+            powers = (slope, 3 * square * bend, square * (following - bend))
+            numbers = (number(f"{i} {j}", x) for j, x in enumerate((at[i] - first, width, y[i], *powers)))
+            begin, wide, level, *terms = numbers
+            result.append(Piece(begin, wide, level, 1.0, (0.0, *terms)))
+        begins = tuple(float(a - first) for a in at[:-1])
+    return number("first", first), (*begins, TURN), tuple(result)

@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from decimal import Decimal
 from functools import cached_property
 from typing import Any
 
@@ -25,8 +26,10 @@ from dalembert.arithmetic.doubled import PI, Doubled
 from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.recorded import Number, Recorder, bare, lifted
 from dalembert.arithmetic.varied import Precise, Varied
+from virtualwork.describe.cams import Cam
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, dimensions, value
+from virtualwork.describe.laws import splined
 from virtualwork.formulas.branch import Branch
 from virtualwork.formulas.group_loops import gaps, unknowns
 from virtualwork.formulas.numbers import Written
@@ -93,7 +96,10 @@ class Numbers:
             self.mechanism = replace(self.mechanism, guess=self._guess())
         if m.cams:
             pi: Any = self.enter("pi", math.pi, PI)
-            cams = tuple(replace(cam, pi=pi) for cam in self.mechanism.cams)
+            cams = tuple(
+                replace(cam, pi=pi, spline=self._spline(f"cam {i}", cam))
+                for i, cam in enumerate(self.mechanism.cams)
+            )
             self.mechanism = replace(self.mechanism, cams=cams)
 
     def _number(self, dimension: Dimension) -> Any:
@@ -112,6 +118,20 @@ class Numbers:
         """A number as an input of the tape."""
         self.known[name] = exact
         return Precise(x, self._recorder.input(name))
+
+    def _spline(self, name: str, cam: Cam) -> Any:
+        """The spline through a cam's table, to 32 digits; None of a law."""
+        if cam.history is None:
+            return None
+
+        def number(of: str, x: Decimal) -> Any:
+            high = float(x)
+            low = float(x - Decimal(high))
+            return self.enter(f"{name} {of}", high, Doubled(high, low)) if high or low else 0.0
+
+        kind = "length" if cam.slides else "angle"
+        off = [(self.rest("angle", at), self.rest(kind, lift)) for at, lift in cam.history]
+        return splined(cam.history, off, number)
 
     def rest(self, kind: str, x: float) -> float:
         """What a number of the description is exactly, less the float."""

@@ -325,21 +325,33 @@ class SecondRun:
         x, y = (rise / step for rise in change)
         return x, y
 
-    def _row(self, number: int) -> tuple[Doubled, tuple[Doubled, Any], tuple[list[Doubled], list[Any]]]:
+    def _row(
+        self, number: int
+    ) -> tuple[Doubled, tuple[Doubled, Doubled], tuple[list[Doubled], list[Doubled]]]:
         """The place in a table, and of the row before it: the step to the next and where it begins; the same of the force's parts."""
         table = self.exact.tables[number]
-        at, force = (np.array(column) for column in zip(*table.table, strict=True))
+        at, *parts = (np.array(column) for column in zip(*self._exact_rows(table), strict=True))
         place = self._place(table)
         if table.periodic:
-            cycles = np.floor((place.high - at[0]) / (at[-1] - at[0]))
-            turns = (at[-1] - at[0]) / (2 * math.pi)
+            first, last = at[0, 0], at[-1, 0]
+            cycles = np.floor((place.high - first) / (last - first))
+            turns = (last - first) / (2 * math.pi)
             whole = abs(turns - round(turns)) <= 4 * EPS * abs(turns)
-            period = TURN * float(round(turns)) if whole else Doubled(at[-1]) - at[0]
+            period = TURN * float(round(turns)) if whole else Doubled(*at[-1]) - Doubled(*at[0])
             place = place - period * cycles
-        i = np.clip(np.searchsorted(at, place.high, "right") - 1, 0, len(at) - 2)
-        parts = force.real, force.imag
-        step, change = Doubled(at[i + 1]) - at[i], [Doubled(part[i + 1]) - part[i] for part in parts]
-        return place, (step, at[i]), (change, [part[i] for part in parts])
+        i = np.clip(np.searchsorted(at[:, 0], place.high, "right") - 1, 0, len(at) - 2)
+        step, *change = (Doubled(*of[i + 1].T) - Doubled(*of[i].T) for of in (at, *parts))
+        return place, (step, Doubled(*at[i].T)), (change, [Doubled(*part[i].T) for part in parts])
+
+    def _exact_rows(self, table: Tabled) -> list[list[tuple[float, float]]]:
+        """The numbers of a table, place and both parts of the force, each as the float and what its decimals are off it."""
+        decimals, m = self.poses.mechanism.decimals, self.poses.mechanism
+        over = "length" if table.axis == "input" and m.inputs[0].is_slide else table.axis
+        kinds = "angle" if over == "input" else over, *["force" if table.axis == "input" else "torque"] * 2
+        return [
+            [(x, decimals.rest(kind, x) if decimals else 0.0) for kind, x in zip(kinds, row, strict=True)]
+            for row in ((at, force.real, force.imag) for at, force in table.table)
+        ]
 
     def _place(self, table: Tabled) -> Doubled:
         """What a table is over."""

@@ -24,6 +24,8 @@ from virtualwork.intime.watch import Floats, Step
 STAGES = 5
 # iterations of Newton's method; a change of the speeds, relative, at which it has converged
 LIMIT, CLOSE = 40, 4 * EPS
+# of the length of a spring, or of a speed, in the accelerations
+ROUNDINGS = 8.0
 Many = Callable[[Reals, Reals, Reals], Reals]
 
 
@@ -79,11 +81,10 @@ class Radau:
             return np.array([f(*state) for state in zip(t.tolist(), q.tolist(), v.tolist(), strict=True)])
 
         state = np.array([t]), np.array([q]), np.array([v]), np.array([rates]), np.array([h])
-        stages = _stages(one_by_one, *state)
-        if stages is None:
+        values, k = _stages(one_by_one, np.array(f.scale), *state)[0], len(q)
+        if not np.isfinite(values).all():
             raise Lost
         _, a, legendre = nodes()
-        values, k = stages[0], len(q)
         dv = h * (a[-1] @ values[:, :k])
         dq = h * np.array(v) + h * h * ((a @ a)[-1] @ values[:, :k])
         size = np.abs(legendre @ values[:, :k])
@@ -102,10 +103,8 @@ class Radau:
         self, f: Equations, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals
     ) -> tuple[Reals, Reals, Reals]:
         """Changes of q and q̇ (n, k) and the work (n,) over a step from each of n states, each of its own length."""
-        result = _stages(f.many, t, q, v, rates, h)
+        result = _stages(f.many, np.array(f.scale), t, q, v, rates, h)
         k = q.shape[1]
-        if result is None:
-            return np.full_like(q, np.nan), np.full_like(v, np.nan), np.full(len(q), np.nan)
         _, a, _ = nodes()
         length = h[:, None]
         dv = length * np.einsum("s,nsk->nk", a[-1], result[..., :k])
@@ -113,8 +112,12 @@ class Radau:
         return dq, dv, h * (result[..., k] @ a[-1])
 
 
-def _stages(f: Many, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals) -> Reals | None:
-    """The rates at the nodes of steps from n states, (n, s, k + 1); None where Newton's method does not converge."""
+def _stages(f: Many, scale: Reals, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals) -> Reals:
+    """The rates at the nodes of steps from n states, (n, s, k + 1); NaN where Newton's method does not converge.
+
+    `scale`: what errors of the inputs are relative to, (k,). The acceleration of a spring near its free length has no digit
+    beyond what rounding of its length leaves: there a change within this rounding has converged.
+    """
     c, a, _ = nodes()
     n, k = q.shape
     twice, step = a @ a, h[:, None, None]
@@ -124,31 +127,38 @@ def _stages(f: Many, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals) -> Re
         - step * np.einsum("ij,nab->niajb", a, by_v).reshape(n, STAGES * k, STAGES * k)
         - step**2 * np.einsum("ij,nab->niajb", twice, by_q).reshape(n, STAGES * k, STAGES * k)
     )
-    if not np.isfinite(whole).all():
-        return None
-    inverse = np.linalg.inv(whole)
+    result = np.full((n, STAGES, k + 1), np.nan)
+    left = np.isfinite(whole).all(axis=(1, 2))
+    inverse = np.linalg.inv(np.where(left[:, None, None], whole, np.eye(STAGES * k)))
     values = np.repeat(rates[:, None, :k], STAGES, axis=1)
     times = (t[:, None] + h[:, None] * c).ravel()
-    before = np.inf
+    before = np.full(n, np.inf)
     for _ in range(LIMIT):
         speeds = v[:, None] + step * np.einsum("ij,njk->nik", a, values)
         places = (
             q[:, None] + step * c[:, None] * v[:, None] + step**2 * np.einsum("ij,njk->nik", twice, values)
         )
-        result = f(times, places.reshape(-1, k), speeds.reshape(-1, k)).reshape(n, STAGES, k + 1)
-        rest = (result[..., :k] - values).reshape(n, -1, 1)
+        there = f(times, places.reshape(-1, k), speeds.reshape(-1, k)).reshape(n, STAGES, k + 1)
+        rest = (there[..., :k] - values).reshape(n, -1, 1)
         change = (inverse @ rest).reshape(n, STAGES, k)
         values = values + change
-        size = np.abs(speeds).max(axis=1) + np.abs(step[:, 0] * values.max(axis=1)) + 1e-300
-        much = float((np.abs(step * change).max(axis=1) / size).max())
-        if not much < np.inf:
-            return None
-        if much <= CLOSE or (much >= before and much < 1e-10):
-            return np.concatenate([values, result[..., k:]], axis=2)
-        if much > 2 * before and before < 1.0:
-            return None
+        fastest = np.abs(speeds).max(axis=1)
+        size = fastest + np.abs(step[:, 0] * values.max(axis=1)) + 1e-300
+        farthest = np.maximum(np.abs(places).max(axis=1), scale)
+        rounded = np.einsum("nab,nb->na", np.abs(by_q), farthest) + np.einsum(
+            "nab,nb->na", np.abs(by_v), fastest
+        )
+        size = np.maximum(size, ROUNDINGS / CLOSE * EPS * h[:, None] * rounded)
+        much = (np.abs(step * change).max(axis=1) / size).max(axis=1)
+        done = left & ((much <= CLOSE) | ((much >= before) & (much < 1e-10)))
+        result[done] = np.concatenate([values, there[..., k:]], axis=2)[done]
+        left = left & ~done & (much < np.inf) & ~((much > 2 * before) & (before < 1.0))
+        if not left.any():
+            break
         before = much
-    return None
+        # a step that is done, or lost, goes no further
+        values = np.where(left[:, None, None], values, rates[:, None, :k])
+    return result
 
 
 def _slopes(f: Many, t: Reals, q: Reals, v: Reals, rates: Reals) -> tuple[Reals, Reals]:

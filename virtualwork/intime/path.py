@@ -12,6 +12,7 @@ import numpy as np
 
 from dalembert.arithmetic.engines import rounds
 from dalembert.arithmetic.loop import Loop
+from virtualwork.describe import MechanismError
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.positions import unwound
 from virtualwork.intime.coordinates import Coordinates
@@ -114,7 +115,13 @@ class Path:
         return float(0.5 * (low + high))
 
     def at(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
-        """q, q̇, q̈ (n, k) and the work (n,) at times on the way: a step of the method from the node before each."""
+        """q, q̇, q̈ (n, k) and the work (n,) at times on the way: a step of the method from the node before each.
+
+        Raises
+        ------
+        MechanismError
+            A step of the implicit method does not converge.
+        """
         t = self.nodes.t
         # a stiff method does not go back
         if self.backwards and self.method.stable < np.inf:
@@ -131,6 +138,10 @@ class Path:
             else:
                 state = here.t, here.q, here.v, here.rates
                 dq, dv, dw = self.method.steps(self.equations, *state, h[on])
+                lost = ~np.isfinite(dq).all(axis=1)
+                if lost.any() and self.method.stable == np.inf:
+                    at = float(times[on][lost][0])
+                    raise MechanismError(f"at {at:.6g} s Newton's method does not converge within a step")
             q[on] += dq
             v[on] += dv
             work[on] += dw
