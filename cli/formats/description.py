@@ -1,24 +1,20 @@
-"""Drawings and descriptions: a drawing as the TOML text of a mechanism, checked against its pose; a mechanism as bodies in a pose."""
+"""The description of a drawing: its TOML text, read again, assembled and compared with the drawn pose."""
 
 from __future__ import annotations
 
-import cmath
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cli.formats.drawn import (
     GROUND,
     ORIGIN,
     Body,
     Drawing,
-    Drive,
     Exact,
     Load,
-    Slide,
     coordinates,
     exact,
     unused,
@@ -29,100 +25,12 @@ from virtualwork.describe.parts import Gear, Guess, Guide, Input, Link, Rack
 from virtualwork.describe.text import AsWritten, Table, document, written
 from virtualwork.motion import Motion
 
-Rows = NDArray[np.float64]
-# below this share a row of speeds follows from others: a file's decimals are fewer than ours
-FOLLOWS = 1e-6
 
-
-class _Speeds:
-    """The linear equations of the bodies' speeds: three columns (vx, vy, ω) for each body; lengths are shares of the drawing's size."""
-
-    def __init__(self, d: Drawing) -> None:
-        self.d = d
-        self.size = d.size() or 1.0
-        self.columns = {name: 3 * k for k, name in enumerate(d.bodies)}
-
-    def at(self, body: str, z: complex) -> complex:
-        """Return where a place of a body stands, a share of the size."""
-        return self.d.bodies[body].world(z) / self.size
-
-    def moves(self, body: str, at: complex) -> Rows:
-        """Return the velocity of a point of a body, (2, columns)."""
-        rows = np.zeros((2, 3 * len(self.columns)))
-        k = self.columns[body]
-        rows[:, k : k + 2] = np.eye(2)
-        rows[:, k + 2] = -at.imag, at.real
-        return rows
-
-    def turns(self, body: str) -> Rows:
-        """Return the angular velocity of a body, (columns,)."""
-        row = np.zeros(3 * len(self.columns))
-        row[self.columns[body] + 2] = 1.0
-        return row
-
-    def along(self, s: Slide, turned: float) -> Rows:
-        """Return the velocity of a slide's point against its guide, along the line turned by `turned`."""
-        way = cmath.rect(1.0, self.d.bodies[s.on].turn + s.angle + turned)
-        at = self.at(s.link, self.d.bodies[s.link].points[s.point])
-        relative = self.moves(s.link, at) - self.moves(s.on, at)
-        return np.asarray(np.array([way.real, way.imag]) @ relative)
-
-    def joints(self) -> Rows:
-        """Return the sums that the ground, pins, slides, gears and racks keep at zero."""
-        d = self.d
-        rows = [np.eye(3, 3 * len(self.columns))]
-        for point, (first, *others) in d.pins().items():
-            at = self.at(first, d.bodies[first].points[point])
-            rows += [self.moves(first, at) - self.moves(other, at) for other in others]
-        for s in d.slides:
-            rows.append(self.along(s, np.pi / 2)[None])
-            if s.turned is not None:
-                rows.append((self.turns(s.link) - self.turns(s.on))[None])
-        for m in d.meshes:
-            a, b, arm = (self.turns(name) for name in (m.a, m.b, m.arm))
-            rows.append((b - arm - m.ratio * (a - arm))[None])
-        for r in d.racks:
-            turned = self.turns(r.gear) - self.turns(r.slide.on)
-            rows.append((self.along(r.slide, 0.0) - r.radius / self.size * turned)[None])
-        return np.concatenate(rows)
-
-    def driven(self, e: Drive) -> Rows:
-        """Return the speed that an input drives."""
-        if e.slide is not None:
-            return self.along(e.slide, 0.0)
-        return self.turns(str(e.link)) - self.turns(e.on)
-
-
-def fit(d: Drawing) -> None:
-    """Remove inputs that depend on those before them, and add free joints as inputs until all is driven."""
-    speeds = _Speeds(d)
-    _, s, vt = np.linalg.svd(speeds.joints())
-    free = vt[int(np.sum(s > FOLLOWS * s[0])) :]
-    kept: list[Drive] = []
-    spare = [e for e in d.spare if all(e.moves != other.moves for other in d.drives)]
-    # where the file drives too many, those at the ground stay
-    for e in (*sorted(d.drives, key=lambda e: GROUND not in e.pair), *spare):
-        row = free @ speeds.driven(e)
-        if np.linalg.norm(row) > FOLLOWS:
-            # what the input holds is free no more
-            kept.append(e)
-            free = np.linalg.svd(row[None])[2][1:] @ free
-    _note(
-        d, (e for e in d.drives if e not in kept), "left out as an input: its motion follows from the others'"
-    )
-    _note(d, (e for e in kept if e not in d.drives), "taken as an input in addition: it was free to move")
-    d.drives = [e for e in (*d.drives, *spare) if e in kept]
-
-
-def _note(d: Drawing, drives: Iterable[Drive], what: str) -> None:
-    d.notes += [f"{e.pair[0]} against {e.pair[1]}: {what}" for e in drives]
-
-
-def text(d: Drawing, source: str) -> str:
-    """Return the TOML text; `source` says where the mechanism is from."""
+def text(d: Drawing, source: str, every_point: bool = False) -> str:
+    """Return the TOML text; `source` says where the mechanism is from, `every_point` puts all joints into the guess."""
     d = _named(d)
     origins = {name: _origin(d, name, body) for name, body in d.bodies.items()}
-    tree = document(_parts(d, origins), AsWritten())
+    tree = document(_parts(d, origins, every_point), AsWritten())
     for drive, table in zip(d.drives, tree.get("input", []), strict=True):
         # a speed keeps the unit of the other program
         table |= {} if drive.speed is None else {"speed": drive.speed}
@@ -131,9 +39,11 @@ def text(d: Drawing, source: str) -> str:
     return written(tree | {"source": source, "units": {"length": d.length, "angle": d.angle}})
 
 
-def _parts(d: Drawing, origins: dict[str, complex]) -> dict[str, object]:
+def _parts(d: Drawing, origins: dict[str, complex], every_point: bool) -> dict[str, object]:
     """Return the parts of a description, their numbers in the units of the file."""
     links = {name: body for name, body in d.bodies.items() if name != GROUND}
+    guides = d.slides if every_point else [r.slide for r in d.racks]
+    pins = d.pins() if every_point else {}
     return {
         "name": d.name,
         "gravity": complex(*(d.gravity or (0.0, 0.0))),
@@ -152,15 +62,16 @@ def _parts(d: Drawing, origins: dict[str, complex]) -> dict[str, object]:
         "guess": Guess(
             [e.at for e in d.drives],
             {name: b.turn for name, b in links.items()},
-            {r.slide.point: _stands(d, r.slide) for r in d.racks},
+            {point: _stands(d, names[0], point) for point, names in pins.items()}
+            | {s.point: _stands(d, s.link, s.point) for s in guides},
         ),
     }
 
 
-def _stands(d: Drawing, s: Slide) -> complex:
-    """Return where the point of a slide stands in the pose."""
-    body = d.bodies[s.link]
-    return body.world(body.points[s.point])
+def _stands(d: Drawing, name: str, point: str) -> complex:
+    """Return where a point of a body stands in the pose."""
+    body = d.bodies[name]
+    return complex(body.world(body.points[point]))
 
 
 def _link(b: Body, origin: complex) -> Link:
@@ -214,7 +125,7 @@ def _named(d: Drawing) -> Drawing:
     for e in d.drives:
         if e.speed is not None and float(str(e.speed).split()[0]) == 0:
             e.speed = None
-            d.notes.append(f"the input {' against '.join(e.pair)} has the speed 0: it has no speed here")
+            d.notes.append(f"the input {' against '.join(e.pair)} has the speed 0: left out")
     for body in d.bodies.values():
         for p in body.points:
             if p not in points:
@@ -250,7 +161,7 @@ def _places(points: dict[str, complex], origin: complex = ORIGIN) -> dict[str, c
     return {p: complex(z - origin) for p, z in points.items()}
 
 
-# degrees of an input that says nothing of where it begins
+# inputs that are tried where the file has none, degrees
 TRIED = tuple(range(0, 360, 15))
 # how far from its drawn place a point may stand, of the drawing's size: rounding, magnified near change points
 NEAR = 1e-9
@@ -260,17 +171,21 @@ LITTLE = 1e-3
 
 def described(d: Drawing, source: str) -> str:
     """Return the TOML text of a drawing, and note on the drawing what does not hold."""
-    if d.spare:
-        fit(d)
     if not d.posed:
         _seek(d, source)
     made = text(d, source)
     try:
         m = Mechanism.from_toml_text(made)
+        off, point = _gap(m, d)
+        if off > NEAR * m.size:
+            # from the angles alone Newton's method may close the loops in another pose nearby
+            again = text(d, source, every_point=True)
+            closer = Mechanism.from_toml_text(again)
+            if _gap(closer, d)[0] <= NEAR * m.size:
+                made, m, off = again, closer, 0.0
         warnings = m.assembly.warnings
-        motion = _motion(m, d)
-        if not motion.assembled.all():
-            d.notes.append("it cannot be assembled as it is drawn")
+        if not _motion(m, d).assembled.all():
+            d.notes.append("it cannot be assembled as drawn")
             return made
         d.notes += warnings
         # a little way to one side of the drawn pose at least
@@ -279,12 +194,8 @@ def described(d: Drawing, source: str) -> str:
             d.notes.append(
                 "its input moves to neither side of the drawn pose: it stands at a limit there, or where assemblies meet"
             )
-        if d.posed:
-            off, point = max(_gaps(d, motion), default=(0.0, ""))
-            if not off <= NEAR * m.size:
-                d.notes.append(
-                    f"{point} stands {off:.3g} m from where it is drawn: singular there, or nearly"
-                )
+        if off > NEAR * m.size:
+            d.notes.append(f"{point} stands {off:.3g} m from where it is drawn: singular there, or nearly")
     except (MechanismError, np.linalg.LinAlgError) as error:
         d.notes.append(f"`dalembert mechanism` will refuse it: {error}")
     return made
@@ -297,12 +208,22 @@ def _motion(m: Mechanism, d: Drawing, *ways: Sequence[float]) -> Motion:
     return m.motion(inputs if len(at) > 1 else inputs[:, 0])
 
 
-def _gaps(d: Drawing, motion: Motion) -> Iterator[tuple[float, str]]:
-    """Yield how far each point stands from its drawn place."""
+def _gap(m: Mechanism, d: Drawing) -> tuple[float, str]:
+    """Return the largest distance of a point from its drawn place, m, and the point; infinite where it is not assembled."""
+    if not d.posed:
+        return 0.0, ""
+    try:
+        motion = _motion(m, d)
+    except (MechanismError, np.linalg.LinAlgError):
+        return math.inf, ""
+    if not motion.assembled.all():
+        return math.inf, ""
+    result = (0.0, "")
     for name, body in d.bodies.items():
         for point, z in body.points.items() if name != GROUND else ():
-            x, y = motion.point(point).position[0]
-            yield abs(complex(x, y) - body.world(z) * d.metres), point
+            off = abs(complex(*motion.point(point).position[0]) - body.world(z) * d.metres)
+            result = max(result, (off if off >= 0 else math.inf, point))
+    return result
 
 
 def _seek(d: Drawing, source: str) -> None:
@@ -336,20 +257,9 @@ def _seek(d: Drawing, source: str) -> None:
         if turn:
             d.notes.append(f"no assembly at the input's own value: it begins at {math.degrees(turn):g} deg")
         d.notes.append(
-            "the file does not say where its bodies stand: the assembly nearest to all angles 0 is taken"
+            "the file does not say where its bodies stand: the assembly nearest to all angles 0 is used"
         )
         return
     for e, at in zip(d.drives, start, strict=True):
         e.at = at
-    d.notes.append(f"no assembly was found{': ' + why if why else ''}")
-
-
-# --- from a description ---------------------------------------------------------------------------------------------
-def bodies_of(m: Mechanism, motion: Motion) -> dict[str, Body]:
-    """Return the ground and the links as bodies that stand in the first pose of a motion; m, kg, rad."""
-    bodies = {GROUND: Body(dict(m.ground))}
-    for name, link in m.links.items():
-        at, turn = complex(motion.at(name, 0j).complex(0)[0]), float(motion.link(name).angle[0])
-        rigid = m.rigid[name]
-        bodies[name] = Body(dict(link.points), at, turn, rigid.mass, rigid.center, rigid.inertia)
-    return bodies
+    d.notes.append(f"no assembly found{': ' + why if why else ''}")

@@ -1,26 +1,135 @@
-"""Drawings of a mechanism in SVG and DXF: shapes, curves and names, on layers and in the unit of its file."""
+"""Drawings and tables of a mechanism: its shapes and curves in SVG and DXF, curves in CSV, the profile of a cam in all three."""
 
 from __future__ import annotations
 
 import io
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from cli.formats.drawn import Body
 from cli.formats.markup import add, digits, document
-from cli.formats.skeleton import Skeleton, Travel
+from cli.read.options import bad
 from dalembert.errors import DataError
+from dalembert.hints import nearest
+from dalembert.results.text import csv_text
+from dalembert.units import UNITS, to_si
 from virtualwork import drawing
+from virtualwork.describe.cams import CamDrive
+from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
-from virtualwork.drawing import Circle, Line, standing
+from virtualwork.drawing import Circle, Line, standing, tracers
+from virtualwork.formulas.profiles import FINE, ProfilePoint, profile
+from virtualwork.parts_of_motion import SlideMotion
+from virtualwork.study.cams import check_cam
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from virtualwork import Mechanism
+    from virtualwork.motion import Motion
+
+    Array = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
 
+
+def start_of(m: Mechanism, inputs: tuple[float, ...]) -> Motion:
+    """Return the motion of the pose in which a file begins, at the speed of the mechanism's own file.
+
+    Raises
+    ------
+    DataError
+        Where it cannot be assembled there.
+    """
+    rates = [e.speed or 0.0 for e in m.inputs]
+    start = m.motion([inputs], speed=[rates]) if len(inputs) > 1 else m.motion(inputs[0], speed=rates[0])
+    if not start.assembled[0]:
+        raise DataError("it cannot be assembled at that input: nothing is exported")
+    return start
+
+
+def bodies_of(m: Mechanism, motion: Motion) -> dict[str, Body]:
+    """Return the ground and the links as bodies that stand in the first pose of a motion; m, kg, rad."""
+    bodies = {GROUND: Body(dict(m.ground))}
+    for name, link in m.links.items():
+        at, turn = complex(motion.at(name, 0j).complex(0)[0]), float(motion.link(name).angle[0])
+        rigid = m.rigid[name]
+        bodies[name] = Body(dict(link.points), at, turn, rigid.mass, rigid.center, rigid.inertia)
+    return bodies
+
+
+# poses over the travel of the input
+SAMPLES = 721
+
+
+class Travel:
+    """One input from one end of its travel to the other, or over a whole period; nothing with several inputs."""
+
+    def __init__(self, m: Mechanism) -> None:
+        self.m = m
+
+    @cached_property
+    def limits(self) -> tuple[float, float] | None:
+        """The ends of the input's travel, rad or m; None where it is not limited on both sides."""
+        result = self.m.check.input_limits
+        return None if result is None or not all(map(math.isfinite, result)) else result
+
+    @cached_property
+    def motion(self) -> Motion | None:
+        """The motion over the travel at the file's speed."""
+        m = self.m
+        if len(m.inputs) != 1:
+            return None
+        track = m.assembly.track
+        low, high = self.limits or (track.start, track.start + (m.assembly.reach.period or track.length))
+        input_limits = self.m.check.input_limits
+        if self.limits is None and input_limits is not None:
+            low, high = (
+                (input_limits[0], input_limits[0] + track.length)
+                if math.isfinite(input_limits[0])
+                else (input_limits[1] - track.length, input_limits[1])
+            )
+        e = m.inputs[0]
+        return m.motion(np.linspace(low, high, SAMPLES), e.speed or 0.0, e.acceleration or 0.0)
+
+    def curve(self, point: str) -> Array:
+        """The places (n, 2) of a point over the travel, m; NaN where it is not assembled."""
+        assert self.motion is not None
+        return self.motion.point(point).position
+
+    @cached_property
+    def traced(self) -> list[str]:
+        """The points whose curves are drawn: those that no joint holds; where there are none, all that move."""
+        return tracers(self.m) or self.moving
+
+    @property
+    def moving(self) -> list[str]:
+        """The points that are not the ground's."""
+        return [p for p in self.m.points if p not in self.m.ground]
+
+    def way(self, guide: int) -> tuple[float, float] | None:
+        """The least and the largest position along a guide, m."""
+        if self.motion is None:
+            return None
+        result = SlideMotion(self.motion, guide).position
+        return (float(np.nanmin(result)), float(np.nanmax(result))) if np.isfinite(result).any() else None
+
+    @cached_property
+    def peak(self) -> float | None:
+        """The greatest effort of the input over a whole period, N·m or N; None where it is limited or nothing acts."""
+        if self.motion is None or self.m.check.input_limits is not None:
+            return None
+        effort = np.abs(self.motion.effort)
+        peak = float(effort.max())
+        return peak if math.isfinite(peak) and peak > 0 else None
+
+
+# --- shapes -------------------------------------------------------------------------------------------------------
 # layer -> its colour as a number of DXF and for the web, and the roles of the shapes on it
 LAYERS = {
     "GROUND": (8, "#777777", "hatch frame"),
@@ -71,20 +180,24 @@ class Strokes:
         return complex(z.real.min(), z.imag.min()), complex(z.real.max(), z.imag.max())
 
 
-def draw(s: Skeleton, travel: Travel, unit: str, factor: float) -> Strokes:
-    """Return the drawing of the start pose and of the curves over the travel; `factor` metres are one of the unit."""
-    ways = [travel.way(k) or (np.nan, np.nan) for k in range(len(s.m.guides))]
-    drawn = drawing.draw(s.m, ways)
+def draw(m: Mechanism, inputs: tuple[float, ...], travel: Travel, unit: str, metres: float) -> Strokes:
+    """Return the drawing of a pose and of the curves over the travel; `metres` are one of the unit."""
+    bodies = bodies_of(m, start_of(m, inputs))
+    ways = [travel.way(k) or (np.nan, np.nan) for k in range(len(m.guides))]
+    drawn = drawing.draw(m, ways)
+
+    def world(body: str, z: complex) -> complex:
+        return bodies[body].world(z)
+
     made = Strokes(unit, [])
     for shape in drawn.shapes:
-        stood = standing(shape, s.world, factor)
-        made.shapes.append(replace(stood, role=LAYER[shape.role]))
+        made.shapes.append(replace(standing(shape, world, metres), role=LAYER[shape.role]))
     for name in travel.traced if travel.motion is not None else ():
-        z = travel.curve(name) @ np.array([1, 1j]) / factor
+        z = travel.curve(name) @ np.array([1, 1j]) / metres
         made.shapes += [_run(part) for part in _runs(z)]
-    symbol = drawn.symbol / factor
+    symbol = drawn.symbol / metres
     for label in drawn.labels:
-        place = s.world(label.body, label.at) / factor + symbol * (1.2 + 1.2j)
+        place = world(label.body, label.at) / metres + symbol * (1.2 + 1.2j)
         made.shapes.append(Text("NAMES", place, label.text, NAME * symbol))
     return made
 
@@ -100,7 +213,12 @@ def _run(z: Complexes) -> Line:
     return Line("CURVES", GROUND, tuple((z[:-1] if closed else z).tolist()), closed)
 
 
-def svg(drawing: Strokes, comment: str, millimetres: float) -> bytes:
+def picture(drawing: Strokes, suffix: str, comment: str, metres: float) -> bytes:
+    """Return the drawing as a file; `metres` are one of its unit."""
+    return _svg(drawing, comment, metres * 1000) if suffix == ".svg" else _dxf(drawing, comment)
+
+
+def _svg(drawing: Strokes, comment: str, millimetres: float) -> bytes:
     """Return the drawing as SVG, in its true size; `millimetres` are one of its unit."""
     low, high = drawing.extent()
     extent = max(high.real - low.real, high.imag - low.imag) or 1.0
@@ -130,7 +248,7 @@ def svg(drawing: Strokes, comment: str, millimetres: float) -> bytes:
     return document(root, comment)
 
 
-def dxf(drawing: Strokes, comment: str) -> bytes:
+def _dxf(drawing: Strokes, comment: str) -> bytes:
     """Return the drawing as DXF (AutoCAD 2010), by ezdxf."""
     try:
         from ezdxf.filemanagement import new
@@ -156,3 +274,101 @@ def dxf(drawing: Strokes, comment: str) -> bytes:
     made.write(text)
     # 999: a comment, which every reader skips
     return f"999\n{comment}\n{text.getvalue()}".encode()
+
+
+# --- tables and profiles ------------------------------------------------------------------------------------------
+def unit_of(bare: Mapping[str, str], suffix: str) -> tuple[str, float]:
+    """Return the unit of length of a file with this suffix, and its metres: that of the mechanism's own file, or the metre."""
+    length = bare.get("length", "m")
+    held = length in (UNITS["length"] if suffix == ".csv" else DXF_UNITS)
+    return (length, to_si(1.0, "length", length)) if held else ("m", 1.0)
+
+
+def curves(travel: Travel, length: str, metres: float, angle: str) -> bytes:
+    """Return the table of the input and of every moving point over its travel."""
+    m = travel.m
+    if travel.motion is None:
+        raise DataError("curves need one input, and it has several: use `dalembert mechanism --cases`")
+    q = travel.motion.inputs[:, 0]
+    if m.inputs[0].is_slide:
+        columns = {f"input_{length}": q / metres}
+    else:
+        columns = {"input_rad": q} if angle == "rad" else {"input_deg": np.degrees(q)}
+    for name in travel.moving:
+        for k, axis in enumerate("xy"):
+            columns[f"{name}_{axis}_{length}"] = travel.curve(name)[:, k] / metres
+    return csv_text({name: values.tolist() for name, values in columns.items()}).encode()
+
+
+def of_follower(m: Description, name: str) -> CamDrive:
+    """Return the cam that moves a follower, which is named by its sliding point or its arm.
+
+    Raises
+    ------
+    BadParameter
+    """
+    names = {str(cam.slider or cam.follower): number for number, cam in enumerate(m.cams)}
+    if name not in names:
+        expected = (
+            f"one of the followers {', '.join(names)}{nearest(name, names)}"
+            if names
+            else "a mechanism with [[cams]]"
+        )
+        raise bad("--profile", f"'{name}': expected {expected}")
+    return m.cam_drives[names[name]]
+
+
+def cam_bytes(
+    m: Description, drive: CamDrive, suffix: str, file: str, bare: Mapping[str, str]
+) -> tuple[bytes, list[str]]:
+    """Return the profile of a cam as a file, and warnings; `bare` are the units of the mechanism's own file."""
+    points = profile(m, drive, FINE)
+    length, metres = unit_of(bare, suffix)
+    notes = check_cam(m, drive.number).warnings
+    if suffix == ".csv":
+        return _profile_table(points, drive, length, metres, bare.get("angle", "rad")), notes
+    comment = " ".join(f"{m.name}: profile of {drive.label}, from {file}".split())
+    center = m.bodies[drive.cam.cam][drive.pin] / metres
+    strokes = _profile(points, length, metres, center, drive.cam.base_radius / metres)
+    return picture(strokes, suffix, comment, metres), notes
+
+
+def _profile(
+    points: list[ProfilePoint], length: str, metres: float, center: complex, radius: float
+) -> Strokes:
+    """Return the profile, the pitch curve and a cross at the axis."""
+    shapes = [
+        Line("GEARS", GROUND, tuple(point.profile / metres for point in points), closed=True),
+        *(
+            Line("JOINTS", GROUND, (center - way * radius / 10, center + way * radius / 10))
+            for way in (1 + 0j, 1j)
+        ),
+    ]
+    if any(point.pitch != point.profile for point in points):
+        shapes.append(Line("CURVES", GROUND, tuple(point.pitch / metres for point in points), closed=True))
+    return Strokes(length, list(shapes))
+
+
+def _profile_table(
+    points: list[ProfilePoint], drive: CamDrive, length: str, metres: float, angle: str
+) -> bytes:
+    """Return a row for each point: the cam's angle, the lift, the profile, the pitch curve, pressure angle and radius."""
+    turned: Callable[[float], float] = float if angle == "rad" else math.degrees
+    unit = "rad" if angle == "rad" else "deg"
+    slides = drive.guide is not None
+    columns = {
+        f"cam_{unit}": [turned(point.angle) for point in points],
+        (f"lift_{length}" if slides else f"swing_{unit}"): [
+            point.lift / metres if slides else turned(point.lift) for point in points
+        ],
+        f"profile_x_{length}": [point.profile.real / metres for point in points],
+        f"profile_y_{length}": [point.profile.imag / metres for point in points],
+        f"pitch_x_{length}": [point.pitch.real / metres for point in points],
+        f"pitch_y_{length}": [point.pitch.imag / metres for point in points],
+        f"pressure_angle_{unit}": [turned(point.pressure_angle) for point in points],
+        f"curvature_radius_{length}": [
+            None if math.isinf(point.curvature_radius) else point.curvature_radius / metres
+            for point in points
+        ],
+    }
+    return csv_text(columns).encode()

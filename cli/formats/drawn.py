@@ -213,7 +213,7 @@ class Drawing:
     length: str = "m"
     angle: str = "deg"
     posed: bool = True
-    """It stands as it is drawn; False: at angles that are sought."""
+    """True: it stands as it is drawn; False: its angles are unknown."""
     own_axes: bool = False
     """Each body's points are in axes of its own, which the file gives; False: in the ground's, as they are drawn."""
     bodies: dict[str, Body] = field(default_factory=lambda: {GROUND: Body()})
@@ -261,9 +261,9 @@ class Drawing:
         """Note what is left out, and why.
 
         >>> d = Drawing()
-        >>> d.leave("slide radius of C7", "arcs have no joint here")
+        >>> d.leave("slide radius of C7", "there is no joint on an arc")
         >>> d.notes
-        ['slide radius of C7: left out: arcs have no joint here']
+        ['slide radius of C7: left out: there is no joint on an arc']
         """
         self.notes.append(f"{what}: left out: {why}")
 
@@ -326,12 +326,42 @@ class Drawing:
         off = float((b.x - a.x) * (z.y - a.y) - (b.y - a.y) * (z.x - a.x)) / length
         if abs(off) > 1e3 * SAME * length:
             by = f"{abs(off):.3g} {self.length}"
-            self.notes.append(f"{what}: its line is moved by {by} to go through {point}")
+            self.notes.append(f"{what}: its line is moved by {by} to pass through {point}")
 
     def fresh(self, wanted: str) -> str:
         """Return a point's name that no body uses yet."""
         used = {p for body in self.bodies.values() for p in body.points}
         return unused(wanted, used)
+
+
+def pins_of(
+    joints: Iterable[tuple[str, dict[str, complex]]], near: float, name: Callable[[str, str], str]
+) -> list[tuple[str, dict[str, complex]]]:
+    """Return the pins of joints, each its name and its place on its bodies: joints that meet in one place of a body are one pin.
+
+    Parameters
+    ----------
+    joints : iterable of (name, {body: place})
+    near : float
+        Places of a body no farther apart than this are one.
+    name : callable
+        Chooses the name of a pin among that of a joint and of the pin that it joins.
+
+    Examples
+    --------
+    >>> pins_of([("A", {"a": 0j, "b": 1j}), ("B", {"b": 1j, "c": 0j})], 0.0, min)
+    [('A', {'b': 1j, 'c': 0j, 'a': 0j})]
+    """
+    pins: list[tuple[str, dict[str, complex]]] = []
+    for label, ends in joints:
+        for pin in [e for e in pins if any(b in e[1] and abs(e[1][b] - z) <= near for b, z in ends.items())]:
+            pins.remove(pin)
+            label, ends = name(label, pin[0]), ends | pin[1]
+        pins.append((label, ends))
+    names: list[str] = []
+    for label, _ in pins:
+        names.append(unused(label, names))
+    return list(zip(names, (ends for _, ends in pins), strict=True))
 
 
 def centers(d: Drawing, a: str, b: str) -> Iterator[tuple[str, str, str]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +13,7 @@ from dalembert.errors import DataError
 
 if TYPE_CHECKING:
     from cli.show.result import Result, Sheet
+    from virtualwork import Mechanism
 
 FORMATS = {
     ".dxf": "drawing (DXF), and curves over the travel of the input",
@@ -20,6 +23,8 @@ FORMATS = {
     ".sdf": "robot (SDF) with closed loops",
     ".xml": "robot (MJCF, of MuJoCo) with closed loops",
 }
+
+PROFILES = (".csv", ".dxf", ".svg")
 
 METHOD = (
     "The pose is closed by the mechanism's own solution, joint by joint, to rounding; what is written holds it with 17 "
@@ -47,9 +52,7 @@ def run(file: str, output: Path, at: str | None = None, profile: str | None = No
     from cli.cases.axes import grids
     from cli.cases.cases import load
     from cli.cases.inputs import of_one
-    from cli.formats.cam_profile import SUFFIXES, of_follower
-    from cli.formats.cam_profile import file_bytes as profile_bytes
-    from cli.formats.exported import file_bytes
+    from cli.formats.drawing import cam_bytes, of_follower
     from cli.show.result import Result
     from virtualwork import MechanismError
 
@@ -58,9 +61,9 @@ def run(file: str, output: Path, at: str | None = None, profile: str | None = No
         raise bad("-o", f"'{output}': expected a name that ends in {', '.join(FORMATS)}")
     described = load(file)
     m, bare = described.mechanism, described.bare
-    if profile is not None and (suffix not in SUFFIXES or at is not None):
+    if profile is not None and (suffix not in PROFILES or at is not None):
         wrong = (
-            "it has no pose: leave --at out" if suffix in SUFFIXES else f"expected -o {', '.join(SUFFIXES)}"
+            "it has no pose: leave --at out" if suffix in PROFILES else f"expected -o {', '.join(PROFILES)}"
         )
         raise bad("--profile", wrong)
     _, moved = grids(m, None if at is None else [at], None, None, bare, [])
@@ -68,7 +71,7 @@ def run(file: str, output: Path, at: str | None = None, profile: str | None = No
     name = "standard input" if file == "-" else Path(file).name
     try:
         if profile is not None:
-            data, notes = profile_bytes(m, of_follower(m, profile), suffix, name, bare)
+            data, notes = cam_bytes(m, of_follower(m, profile), suffix, name, bare)
         else:
             data, notes = file_bytes(m, inputs, suffix, name, bare)
     except MechanismError as error:
@@ -89,3 +92,40 @@ def run(file: str, output: Path, at: str | None = None, profile: str | None = No
         method=METHOD,
         about={"title": m.name or "Mechanism"} | described.about,
     )
+
+
+def file_bytes(
+    m: Mechanism, inputs: tuple[float, ...], suffix: str, file: str, bare: Mapping[str, str]
+) -> tuple[bytes, list[str]]:
+    """Return the file of a mechanism that starts at the inputs, rad or m, and what is left out.
+
+    `bare` are the units that the mechanism's own file uses.
+    """
+    from cli.formats.drawing import Travel, curves, draw, picture, unit_of
+
+    travel = Travel(m)
+    length, metres = unit_of(bare, suffix)
+    if suffix == ".csv":
+        return curves(travel, length, metres, bare.get("angle", "rad")), []
+    comment = _comment(m, inputs, file)
+    if suffix in (".dxf", ".svg"):
+        data = picture(draw(m, inputs, travel, length, metres), suffix, comment, metres)
+        several = travel.motion is None
+        return data, ["curves are left out: they need one input, and it has several"] if several else []
+    from cli.formats.robots import mjcf, sdf, urdf
+    from cli.formats.robots.skeleton import Skeleton
+
+    writers = {".urdf": urdf.write, ".sdf": sdf.write, ".xml": mjcf.write}
+    return writers[suffix](Skeleton(m, inputs, travel), comment)
+
+
+def _comment(m: Mechanism, inputs: tuple[float, ...], file: str) -> str:
+    """Return the comment: what it is, from which file, by which version, in which pose."""
+    from importlib.metadata import version
+
+    poses = ", ".join(
+        f"{e.name} = {v if e.is_slide else math.degrees(v):.12g} {'m' if e.is_slide else 'deg'}"
+        for e, v in zip(m.inputs, inputs, strict=True)
+    )
+    title = f"{m.name}, " if m.name else ""
+    return " ".join(f"{title}from {file} by dalembert {version('dalembert')}, at {poses}".split())

@@ -148,7 +148,9 @@ class _Linkage:
         ]
         if driven:
             d.drives.append(Drive(driven[0]))
-            d.notes.append(f"a sketch names no input: {driven[0]}, pinned to the ground, drives")
+            d.notes.append(
+                f"the sketch names no input: {driven[0]}, which is pinned to the ground, is the input"
+            )
         return d
 
     def _vertex(self, line: int, end: int) -> Vertex:

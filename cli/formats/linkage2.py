@@ -114,10 +114,10 @@ class _Reader:
         units = program.attributes.get("units", "").lower()
         self.d = Drawing(length="mm" if units.startswith(("milli", "mm")) else "in")
         if not units:
-            self.d.notes.append("the file says no unit: 1/96 inch each, given in inches")
+            self.d.notes.append("the file has no unit: its numbers are 1/96 inch, written in inches")
         self.scale = UNITS[self.d.length]
         if self.number(program, "scalefactor", 1.0) != 1.0:
-            self.d.leave("scalefactor", "it scales what the program shows, not what it keeps")
+            self.d.leave("scalefactor", "it scales the display, not the coordinates")
 
     def number(self, e: Element, key: str, default: float | None = None) -> float:
         """Return a finite number of an attribute."""
@@ -138,7 +138,7 @@ class _Reader:
                 layers += 1
                 continue
             if e.id in self.connectors:
-                d.leave(f"second connector {e.id} (line {e.line})", "the program takes the first of that id")
+                d.leave(f"second connector {e.id} (line {e.line})", "the program uses the first with that id")
                 continue
             x, y = (exact(self.number(e, key)) * self.scale for key in "xy")
             self.connectors[e.id], self.at[e.id] = e, Exact(x, y)
@@ -185,7 +185,7 @@ class _Reader:
         d, e, ids = self.d, self.links[id_], self.held[id_]
         wanted = yes(e, "actuator")
         if wanted and not (len(ids) == 2 and apart(self.at[ids[0]], self.at[ids[1]]) > 0):
-            d.notes.append(f"actuator L{id_}: it has not two ends apart: it is a link that keeps its length")
+            d.notes.append(f"actuator L{id_}: its two ends coincide: it is a link that keeps its length")
         elif wanted:
             a, b = ids
             names = f"L{id_}", f"L{id_} rod"
@@ -220,7 +220,7 @@ class _Reader:
         for kind, id_ in wanted:
             fastened = (self.links if kind == "fastenlink" else self.connectors).get(id_)
             if fastened is None:
-                self.d.leave(f"{kind} {id_} (line {e.line})", "there is none of that id")
+                self.d.leave(f"{kind} {id_} (line {e.line})", "there is none with that id")
                 continue
             mine, its = self._body(e), self._body(fastened)
             if mine is None and its is not None:
@@ -236,11 +236,11 @@ class _Reader:
         if len(limits) != 2 or not set(limits) <= self.at.keys():
             raise damaged(self.file, f"line {e.line}: {what}", limits, "two slidelimits that are connectors")
         if self.number(e, "slideradius", 0.0) != 0:
-            d.leave(f"slideradius of C{id_}", "a guide that is an arc has no joint here")
+            d.leave(f"slideradius of C{id_}", "there is no joint on an arc")
             return
         a, b = (self.at[c] for c in limits)
         if apart(a, b) == 0:
-            d.leave(what, "its two limits are at one place: they give no direction")
+            d.leave(what, "its two limits coincide: they give no direction")
             return
         carriers = [k for k, held in self.held.items() if set(limits) <= set(held)]
         both = all(yes(self.connectors[c], "anchor") for c in limits)
@@ -261,13 +261,13 @@ class _Reader:
         d, what = self.d, f"input C{id_}"
         links = [f"L{k}" for k, held in self.held.items() if id_ in held and f"L{k}" in d.bodies]
         if not yes(e, "anchor"):
-            d.leave(what, "a motor that is at no anchor")
+            d.leave(what, "its motor is not on an anchor")
             return
         turning = [n for n in links if not self._fixed(n)]
         if self.number(e, "limitangle", 0.0) > 0:
-            d.leave(f"the limit of {what}", "it turns on, where the program turns it to and fro")
+            d.leave(f"the limit of {what}", "the input turns without a limit")
         if not turning:
-            d.leave(what, "no link that could turn is on it")
+            d.leave(what, "no link on it can turn")
             return
         d.weld(turning)
         rpm = self.number(e, "rpm", 0.0)

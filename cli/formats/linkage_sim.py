@@ -1,4 +1,4 @@
-"""linkage_sim: JSON in SI; bodies with points in their own axes, and nothing that says where they stand."""
+"""linkage_sim: JSON in SI; bodies with points in their own axes, and no pose."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from cli.formats.drawn import (
     coordinates,
     damaged,
     exact,
+    pins_of,
     place,
     together,
-    unused,
 )
 from dalembert.errors import DataError
 
@@ -112,7 +112,7 @@ class _Reader:
             if e.get("type") == "prismatic":
                 self._prism(name, e)
             elif e.get("type") not in ("revolute", "fixed", "revolute_driver"):
-                d.leave(f"joint {name}", f"a joint of type {e.get('type')} has no like here")
+                d.leave(f"joint {name}", f"a joint of type {e.get('type')} has no equivalent")
         self._drives(joints)
         self._traced()
         for e in self.listed(data, "forces"):
@@ -121,7 +121,7 @@ class _Reader:
             d.bodies[GROUND] = Body(d.bodies[GROUND].points)
         for key in ("load_cases", "sweep_config"):
             if data.get(key):
-                d.leave(key, "the drivers say what drives; ranges are given to the command")
+                d.leave(key, "drivers are the inputs; a range is an option of the command")
         if data.get("mounting_angle"):
             d.leave("mounting_angle", "it turns gravity: turn `gravity` in the file instead")
         return d
@@ -213,20 +213,12 @@ class _Reader:
 
     def _pin(self, revolutes: dict[str, tuple[str, str, str, str]]) -> None:
         """Points that revolutes join are one pin, and so are those at the same place of one body."""
-        groups: list[tuple[str, set[tuple[str, Exact]]]] = []
-        for name, (i, p, j, q) in revolutes.items():
-            ends = {(i, self.points[i][p]), (j, self.points[j][q])}
-            label = p if p == q else name
-            for group in [g for g in groups if g[1] & ends]:
-                groups.remove(group)
-                ends |= group[1]
-                label = group[0]
-            groups.append((label, ends))
-        used: set[str] = set()
-        for label, ends in groups:
-            pin = unused(label, used)
-            used.add(pin)
-            for body, z in sorted(ends, key=lambda end: (end[0], end[1].x, end[1].y)):
+        joints: list[tuple[str, dict[str, complex]]] = [
+            (p if p == q else name, {i: self.points[i][p], j: self.points[j][q]})
+            for name, (i, p, j, q) in revolutes.items()
+        ]
+        for pin, ends in pins_of(joints, 0.0, lambda _, earlier: earlier):
+            for body, z in sorted(ends.items()):
                 self.d.body(body).points[pin] = z
 
     def _prism(self, name: str, e: dict[str, Any]) -> None:
@@ -254,13 +246,13 @@ class _Reader:
             if e.get("type") == "constant_speed":
                 at = self.real(where, e.get("theta_0", 0.0)) + offset
                 if d.posed and at != 0:
-                    d.notes.append(f"{where}: theta_0 is left out: the drawn pose is that of angle 0")
+                    d.notes.append(f"{where}: theta_0 is left out: the drawn pose is at angle 0")
                     at = 0.0
                 d.drives.append(
                     Drive(link, on, at=sign * at, speed=sign * self.real(where, e.get("omega", 0.0)))
                 )
             else:
-                why = "the file does not store it" if marker else "an expression is not evaluated"
+                why = "the file does not store it" if marker else "expressions are not evaluated"
                 d.leave(f"law of motion of {where}", why)
                 d.drives.append(Drive(link, on, at=0.0 if d.posed else sign * offset))
         for e in self.listed(self.data, "linear_drivers"):
@@ -307,7 +299,7 @@ class _Reader:
             d.gravity = g.real, g.imag
             return
         if kind not in LOADS or (kind.startswith("External") and not constant):
-            d.leave(f"force of type {kind or '?'}", "it has no like here")
+            d.leave(f"force of type {kind or '?'}", "it has no equivalent")
             return
         table, ends, keys = LOADS[kind]
         values: dict[str, object] = {k: self.real(f"{where}, {k}", e.get(k, 0.0)) for k in keys}

@@ -12,10 +12,9 @@ from xml.parsers.expat import errors
 from xml.parsers.expat.errors import codes
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from cli.formats.drawn import LARGEST
-from cli.formats.robot import Array, quaternion
 from dalembert.errors import DataError, quote
 from dalembert.tables.files import load
 
@@ -146,20 +145,13 @@ class At(NamedTuple):
             raise self.error(of, quote(text or ""), f"{n} number{'s' * (n != 1)}")
         return numbers
 
-    def direction(self, of: str, vector: ArrayLike) -> Array:
+    def direction(self, of: str, vector: ArrayLike) -> NDArray[np.float64]:
         """Return a direction of length 1."""
         v = np.array(vector, dtype=float)
         length = float(np.linalg.norm(v))
         if not length > 0:
             raise self.error(of, "0 0 0", "a direction")
         return np.asarray(v / length)
-
-    def rotation(self, wxyz: Sequence[float]) -> Array:
-        """Return the rotation of a quaternion."""
-        try:
-            return quaternion(*wxyz)
-        except ValueError as error:
-            raise DataError(f"{self.file}: {self.where}: {error}") from None
 
 
 def named(file: str, element: Element, attribute: str = "name") -> str:

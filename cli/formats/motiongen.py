@@ -39,7 +39,7 @@ class _Reader:
         unit = str(units.get("length", "m") if isinstance(units, dict) else units)
         self.d = Drawing(name=str(data.get("name", "")), length=unit if unit in LENGTHS else "m")
         if unit not in LENGTHS or not units:
-            self.d.notes.append(f"no unit of length is known ('{unit}'): its numbers are taken as metres")
+            self.d.notes.append(f"unknown unit of length '{unit}': numbers are taken as metres")
 
     def entries(self, key: str) -> list[dict[str, Any]]:
         """Return the objects of a list, or of an object by their ids."""
@@ -97,7 +97,7 @@ class _Reader:
             self._actuator(k, e)
         for key, value in self.data.items():
             if key not in KEYS and isinstance(value, list | dict) and value:
-                d.leave(key, "it has no like here")
+                d.leave(key, "it has no equivalent")
         return d
 
     def _slot(self, k: int, e: dict[str, Any]) -> None:
@@ -107,7 +107,7 @@ class _Reader:
             raise damaged(self.file, where, ends, "two ends at different places")
         on = self.slot_of.get(str(e.get("id")))
         if on is None:
-            d.leave(where, "no link carries it")
+            d.leave(where, "it is on no link")
             return
         a, b = (self.at[id_] for id_ in ends)
         angle = direction(a, b)
@@ -146,7 +146,7 @@ class _Reader:
             del held["min"], held["max"]
         if held:
             values = ", ".join(f"{key} {value}" for key, value in held.items())
-            self.d.leave(f"{values} of {where}", "an input has no limits of its own here")
+            self.d.leave(f"{values} of {where}", "an input has no limits")
 
     def _actuator(self, k: int, e: dict[str, Any]) -> None:
         d, where = self.d, f"actuator {k}"

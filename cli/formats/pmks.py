@@ -82,7 +82,7 @@ def _one(file: str, text: str, first: int) -> Drawing:
         d.leave("ts", "a target shape is no part of the mechanism")
     body, *more = body.split("&")
     for rest in more:
-        d.leave(rest[:40], "it stands behind the joints")
+        d.leave(rest[:40], "it follows the joints")
     line = first + head.count("\n")
     joints = []
     for i, row in enumerate(body.split("\n")):
@@ -156,7 +156,7 @@ def _drawing(file: str, d: Drawing, joints: list[Joint], speed: float) -> Drawin
             a, b = j.links[:2]
             link, on = (a, b) if b == GROUND else (b, a)
             d.drives.append(Drive(link, on, speed=f"{speed!r} rpm"))
-    d.notes.append("no unit of length is written in the file: its numbers are taken as metres")
+    d.notes.append("the file has no unit of length: numbers are taken as metres")
     return d
 
 
@@ -175,9 +175,7 @@ def _slot(d: Drawing, j: Joint, name: str, joints: list[Joint]) -> None:
         along = direction(j.at, others[0].at) - j.angle
         if apart(j.at, others[0].at) > 0 and abs((along + 90) % 180 - 90) > 0.5:
             on, link = link, on
-            d.notes.append(
-                f"{j.where}: the slot is taken as the ground's, for its line misses {link}'s other joint"
-            )
+            d.notes.append(f"{j.where}: the slot is the ground's: its line misses the other joint of {link}")
     d.guide(name, link, on, j.at, j.angle, prism=False)
 
 
@@ -205,7 +203,7 @@ def mesh(d: Drawing, a: str, b: str, at: Exact, what: str) -> None:
         return
     if best[0] > 1e-6:
         d.notes.append(
-            f"{what}: its pitch point is off the line of the centres; the nearest point of it serves"
+            f"{what}: its pitch point is off the line of the centres: the nearest point of the line is used"
         )
     d.meshes.append(best[1])
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 from urllib.parse import unquote
@@ -49,7 +50,7 @@ class _List:
         rpm, clockwise, gravity, length = (*next(iter(self.rows.get("s", [])), []), "", "", "", "")[:4]
         d.length = length if length in ("cm", "m", "in", "mm") else "m"
         if d.length != length:
-            d.notes.append("the link names no unit of length: given in m")
+            d.notes.append("the link has no unit of length: numbers are taken as metres")
         d.gravity = (0.0, -9.81) if gravity and self._yes("s=", gravity) else None
         joints: dict[str, list[str]] = {}
         at: dict[str, Exact] = {}
@@ -69,7 +70,7 @@ class _List:
             elif held:
                 angle = 0.0 if row[6] in ("", "Null", "null") else finite(file, f"joint {id_}", row[6])
                 if angle:
-                    d.notes.append(f"joint {id_}: the angle {angle:g} of its guide is taken in rad")
+                    d.notes.append(f"joint {id_}: the angle {angle:g} of its guide is read in rad")
                 # a piston keeps its direction; a link that has the joint itself turns on it
                 body = next((name for name in held if name in self.pistons), held[0])
                 prism = body in self.pistons
@@ -90,9 +91,7 @@ class _List:
                 raise damaged(self.file, f"link {row[0]}", ",".join(row), "id,mass,inertia,x,y,joints")
             rows.append((row[0], rest))
         real = [rest[:2] for name, rest in rows if name not in self.pistons]
-        unset = bool(real) and all(finite(self.file, "mass", v) == 1 for pair in real for v in pair)
-        if unset:
-            self.d.leave("masses and inertias", "every link has 1 and 1, the defaults nobody set")
+        unset = _are_defaults(self.d, (finite(self.file, "mass", v) for pair in real for v in pair))
         for name, rest in rows:
             body, what = self.d.body(name), f"link {name}"
             for joint in filter(None, rest[4].split("|")):
@@ -130,19 +129,9 @@ class _List:
         if len(row) != 9 or row[1] not in self.d.bodies:
             self.d.leave(what, "expected id,link,x1,y1,x2,y2,global,outward,size")
             return
-        (x1, y1, x2, y2), size = (
-            [finite(self.file, what, v) for v in row[2:6]],
-            finite(self.file, what, row[8]),
-        )
-        span = math.hypot(x2 - x1, y2 - y1)
-        if span == 0:
-            self.d.leave(what, "its two ends coincide: it has no direction")
-            return
-        size = size if self._yes(what, row[7]) else -size
-        values: dict[str, object] = {"force": [f"{size * v / span!r} N" for v in (x2 - x1, y2 - y1)]}
-        if not self._yes(what, row[6]):
-            values["frame"] = "link"
-        self.d.loads.append(Load("forces", [(row[1], place(x1, y1))], values))
+        *ends, size = (finite(self.file, what, row[k]) for k in (2, 3, 4, 5, 8))
+        sign = 1.0 if self._yes(what, row[7]) else -1.0
+        _add_force(self.d, what, row[1], ends, (sign * size, "N"), local=not self._yes(what, row[6]))
 
 
 DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_-"
@@ -279,12 +268,10 @@ class _String:
             rows.append((what, part[:2], tokens, [i for i in outer.split(",") if i], inner.split(",")))
         inside = {s for *_, subsets in rows for s in subsets if s}
         real = [tokens for _, kind, tokens, *_ in rows if kind[1:] == "R"]
-        unset = bool(real) and all(self._decimal("mass", t[k]) == 1 for t in real for k in (2, 3))
-        if unset:
-            self.d.leave("masses and inertias", "every link has 1 and 1, the defaults nobody set")
-        else:
+        unset = _are_defaults(self.d, (self._decimal("mass", t[k]) for t in real for k in (2, 3)))
+        if not unset:
             self.d.notes.append(
-                f"masses are taken as kg, inertias as kg·{self.d.length}2: the string names no unit"
+                f"masses are read as kg, inertias as kg·{self.d.length}2: the string has no unit"
             )
         for what, kind, tokens, ids, _rest in rows:
             id_ = tokens[0]
@@ -324,7 +311,7 @@ class _String:
         elif j.grounded:
             on, angle = GROUND, math.degrees(j.angle)
         else:
-            self.d.leave(f"slider {j.name}", "the string says of no guide")
+            self.d.leave(f"slider {j.name}", "the string has no guide for it")
             return
         for link in [name for name in held if name != on][:1]:
             self.slides[id_] = self.d.guide(id_, link, on, j.at, angle)
@@ -353,15 +340,32 @@ class _String:
         what = f"force {k}"
         local, outward = flags(part[:1], 2)
         tokens = self._tokens(what, part[1:], 8)
-        x1, y1, x2, y2, size = (self._decimal(what, t) for t in tokens[3:8])
+        *ends, size = (self._decimal(what, t) for t in tokens[3:8])
         if tokens[1] not in self.d.bodies:
             self.d.leave(f"force {tokens[2]}", f"its link {tokens[1]} is none of the string's")
             return
-        span = math.hypot(x2 - x1, y2 - y1)
-        if span == 0:
-            self.d.leave(f"force {tokens[2]}", "its two ends coincide: it has no direction")
-            return
-        size = size if outward else -size
-        force = [f"{size * (b - a) / span!r} {unit}" for a, b in ((x1, x2), (y1, y2))]
-        values: dict[str, object] = {"force": force} | ({"frame": "link"} if local else {})
-        self.d.loads.append(Load("forces", [(tokens[1], place(x1, y1))], values))
+        sign = 1.0 if outward else -1.0
+        _add_force(self.d, f"force {tokens[2]}", tokens[1], ends, (sign * size, unit), local)
+
+
+def _add_force(
+    d: Drawing, what: str, link: str, ends: Sequence[float], force: tuple[float, str], local: bool
+) -> None:
+    """Add a force, its size and its unit, at the first of two places (x, y, x, y) in the direction of the second."""
+    x1, y1, x2, y2 = ends
+    span = math.hypot(x2 - x1, y2 - y1)
+    if span == 0:
+        d.leave(what, "its two ends coincide: it has no direction")
+        return
+    size, unit = force
+    values: dict[str, object] = {"force": [f"{size * way / span!r} {unit}" for way in (x2 - x1, y2 - y1)]}
+    d.loads.append(Load("forces", [(link, place(x1, y1))], values | ({"frame": "link"} if local else {})))
+
+
+def _are_defaults(d: Drawing, masses: Iterable[float]) -> bool:
+    """Return whether all masses and inertias are 1, the program's defaults; they are left out then."""
+    values = list(masses)
+    if not values or any(value != 1 for value in values):
+        return False
+    d.leave("masses and inertias", "every link has 1 and 1, the program's defaults")
+    return True

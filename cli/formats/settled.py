@@ -1,10 +1,19 @@
-"""The mechanisms of a drawing: what is rigid is one body, what nothing holds or drives is left out."""
+"""The mechanisms of a drawing: rigid parts become one body, what nothing holds or drives is left out, the inputs are completed."""
 
 from __future__ import annotations
 
+import cmath
+from collections.abc import Iterable
 from dataclasses import replace
 
-from cli.formats.drawn import GROUND, SAME, Body, Drawing, Drive, Groups, apart, together
+import numpy as np
+from numpy.typing import NDArray
+
+from cli.formats.drawn import GROUND, SAME, Body, Drawing, Drive, Groups, Slide, apart, together
+
+Rows = NDArray[np.float64]
+# below this share a row of speeds follows from others: a file's decimals are fewer than ours
+FOLLOWS = 1e-6
 
 
 def merge(d: Drawing, keep: str, gone: str) -> None:
@@ -77,7 +86,17 @@ def settle(d: Drawing) -> list[Drawing]:
         d.notes.append(f"{pair[1]} and {pair[0]} share two pins: they are one body")
     _drop_what_is_rigid(d)
     _drop_what_dangles(d)
-    return _parts(d)
+    return [part for part in _parts(d) if _can_move(d, part)]
+
+
+def _can_move(d: Drawing, part: Drawing) -> bool:
+    """Give a part the inputs that determine its motion; one that cannot move is left out."""
+    if part.spare:
+        _fit_inputs(part)
+    if not part.drives:
+        d.notes += part.notes
+        d.leave(", ".join(name for name in part.bodies if name != GROUND), "no joint there can move")
+    return bool(part.drives)
 
 
 def _drop_what_is_rigid(d: Drawing) -> None:
@@ -86,7 +105,7 @@ def _drop_what_is_rigid(d: Drawing) -> None:
         d.leave(f"slide at {s.point}", "both sides are one body")
     for m in [m for m in d.meshes if len({m.a, m.b, m.arm}) < 3]:
         d.meshes.remove(m)
-        d.leave(f"gears {m.a}, {m.b}", "they are one body, or one is its own arm")
+        d.leave(f"gears {m.a}, {m.b}", "they are one body, or one of them is the arm")
     slides = list(map(id, d.slides))
     for r in list(d.racks):
         # a wheel in a slot may roll along a rack
@@ -113,7 +132,7 @@ def _drop_what_dangles(d: Drawing) -> None:
             return
         for name in gone:
             d.bodies.pop(name)
-            alone = "one joint alone holds it, and nothing drives it"
+            alone = "only one joint holds it, and nothing drives it"
             d.leave(name, alone if holds[name] else "it has no joint")
         d.slides = [s for s in d.slides if {s.link, s.on} <= d.bodies.keys()]
         d.racks = [r for r in d.racks if {r.gear, r.slide.link, r.slide.on} <= d.bodies.keys()]
@@ -156,3 +175,90 @@ def _part(d: Drawing, names: set[str], drives: list[Drive]) -> Drawing:
         loads=[load for load in d.loads if any(name in names for name, _ in load.ends)],
         notes=[],
     )
+
+
+# --- inputs ------------------------------------------------------------------------------------------------------
+class _Speeds:
+    """The linear equations of the bodies' speeds: three columns (vx, vy, ω) for each body; lengths are shares of the drawing's size."""
+
+    def __init__(self, d: Drawing) -> None:
+        self.d = d
+        self.size = d.size() or 1.0
+        self.columns = {name: 3 * k for k, name in enumerate(d.bodies)}
+
+    def at(self, body: str, z: complex) -> complex:
+        """Return where a place of a body stands, a share of the size."""
+        return self.d.bodies[body].world(z) / self.size
+
+    def moves(self, body: str, at: complex) -> Rows:
+        """Return the velocity of a point of a body, (2, columns)."""
+        rows = np.zeros((2, 3 * len(self.columns)))
+        k = self.columns[body]
+        rows[:, k : k + 2] = np.eye(2)
+        rows[:, k + 2] = -at.imag, at.real
+        return rows
+
+    def turns(self, body: str) -> Rows:
+        """Return the angular velocity of a body, (columns,)."""
+        row = np.zeros(3 * len(self.columns))
+        row[self.columns[body] + 2] = 1.0
+        return row
+
+    def along(self, s: Slide, turned: float) -> Rows:
+        """Return the velocity of a slide's point against its guide, along the line turned by `turned`."""
+        way = cmath.rect(1.0, self.d.bodies[s.on].turn + s.angle + turned)
+        at = self.at(s.link, self.d.bodies[s.link].points[s.point])
+        relative = self.moves(s.link, at) - self.moves(s.on, at)
+        return np.asarray(np.array([way.real, way.imag]) @ relative)
+
+    def joints(self) -> Rows:
+        """Return the sums that the ground, pins, slides, gears and racks keep at zero."""
+        d = self.d
+        rows = [np.eye(3, 3 * len(self.columns))]
+        for point, (first, *others) in d.pins().items():
+            at = self.at(first, d.bodies[first].points[point])
+            rows += [self.moves(first, at) - self.moves(other, at) for other in others]
+        for s in d.slides:
+            rows.append(self.along(s, np.pi / 2)[None])
+            if s.turned is not None:
+                rows.append((self.turns(s.link) - self.turns(s.on))[None])
+        for m in d.meshes:
+            a, b, arm = (self.turns(name) for name in (m.a, m.b, m.arm))
+            rows.append((b - arm - m.ratio * (a - arm))[None])
+        for r in d.racks:
+            turned = self.turns(r.gear) - self.turns(r.slide.on)
+            rows.append((self.along(r.slide, 0.0) - r.radius / self.size * turned)[None])
+        return np.concatenate(rows)
+
+    def driven(self, e: Drive) -> Rows:
+        """Return the speed that an input drives."""
+        if e.slide is not None:
+            return self.along(e.slide, 0.0)
+        return self.turns(str(e.link)) - self.turns(e.on)
+
+
+def _fit_inputs(d: Drawing) -> None:
+    """Remove inputs that depend on those before them, and add free joints as inputs until all is driven."""
+    speeds = _Speeds(d)
+    _, s, vt = np.linalg.svd(speeds.joints())
+    free = vt[int(np.sum(s > FOLLOWS * s[0])) :]
+    kept: list[Drive] = []
+    spare = [e for e in d.spare if all(e.moves != other.moves for other in d.drives)]
+    # where the file drives too many, those at the ground stay
+    for e in (*sorted(d.drives, key=lambda e: GROUND not in e.pair), *spare):
+        row = free @ speeds.driven(e)
+        if np.linalg.norm(row) > FOLLOWS:
+            # what the input holds is free no more
+            kept.append(e)
+            free = np.linalg.svd(row[None])[2][1:] @ free
+    _note(
+        d,
+        (e for e in d.drives if e not in kept),
+        "left out as an input: the joints and the other inputs determine its motion",
+    )
+    _note(d, (e for e in kept if e not in d.drives), "taken as an input in addition: it was free to move")
+    d.drives = [e for e in (*d.drives, *spare) if e in kept]
+
+
+def _note(d: Drawing, drives: Iterable[Drive], what: str) -> None:
+    d.notes += [f"{e.pair[0]} against {e.pair[1]}: {what}" for e in drives]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cli.formats.exported import file_bytes
+from cli.formats.export_command import file_bytes
 from tests.four_bars import body, four_bar
 from virtualwork import Mechanism
 

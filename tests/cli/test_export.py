@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from cli.formats.description import described
-from cli.formats.exported import file_bytes
-from cli.formats.programs import read
+from cli.formats.export_command import file_bytes
+from cli.formats.import_command import read
 from cli.formats.settled import settle
 from tests.cli.exported import EXAMPLES, FILES, FOUR_BAR, MASSIVE, PLANETARY, exported, home, moved
 from tests.conftest import Dalembert

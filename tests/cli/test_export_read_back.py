@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cli.formats.skeleton import Joint, Skeleton
+from cli.formats.drawing import Travel
+from cli.formats.robots.skeleton import Joint, Skeleton
 from dalembert.errors import DataError
 from tests.cli.exported import FILES, FOUR_BAR, MASSIVE, exported, home, moved
 from virtualwork import Mechanism
@@ -46,7 +47,7 @@ def test_mujoco_stands_where_we_do_and_its_loops_are_closed(file: Path) -> None:
 
 def accelerations(m: Mechanism, q: float, speed: float) -> Any:
     """The accelerations of the joints' coordinates, in MuJoCo's order."""
-    s, motion = Skeleton(m, (q,)), m.motion(q, speed)
+    s, motion = Skeleton(m, (q,), Travel(m)), m.motion(q, speed)
 
     def alpha(body: str) -> float:
         return float(motion.link(body).alpha[0]) if body in m.links else 0.0
@@ -125,13 +126,13 @@ def test_yourdfpy_stands_where_we_do_in_every_pose(file: Path) -> None:
     for name in m.links:
         held = robot.link_map[name].inertial
         assert (0.0 if held is None else held.mass) == m.rigid[name].mass
-    start = Skeleton(m, home(m))
+    start = Skeleton(m, home(m), Travel(m))
     for share in (0.0, 0.01, -0.02):
         inputs = tuple(
             at + share * (m.size if e.is_slide else 1.0) for at, e in zip(home(m), m.inputs, strict=True)
         )
         try:
-            there = Skeleton(m, inputs)
+            there = Skeleton(m, inputs, Travel(m))
         except DataError:
             continue  # beyond a limit
         way = {j.name: coordinate(there, j) - coordinate(start, j) for j in (b.joint for b in there.walk())}

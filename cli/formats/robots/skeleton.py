@@ -1,4 +1,4 @@
-"""A mechanism as bodies and joints of two bodies each in its start pose: the tree, what closes its loops, the travel of its input.
+"""A mechanism as bodies and joints of two bodies each in its start pose: the tree, what closes its loops, what a format leaves out.
 
 A pin of several bodies becomes joints of two each; a slot becomes a massless block that slides and is pinned.
 """
@@ -6,32 +6,26 @@ A pin of several bodies becomes joints of two each; a slot becomes a massless bl
 from __future__ import annotations
 
 import cmath
-import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cli.formats.description import bodies_of
+from cli.formats.drawing import Travel, bodies_of, start_of
 from cli.formats.drawn import Body, Groups, unused
-from cli.formats.robot import BLOCK
+from cli.formats.robots.robot import BLOCK
 from dalembert.errors import DataError
 from virtualwork.describe.meshes import Mesh
 from virtualwork.describe.parts import GROUND, TorsionSpring
-from virtualwork.drawing import tracers
+from virtualwork.drawing import hull
 from virtualwork.parts_of_motion import SlideMotion
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from virtualwork import Mechanism
-    from virtualwork.motion import Motion
 
-    Array = NDArray[np.float64]
-
-
+# half the thickness of a link's strokes, of the mechanism's size
+THICK = 0.008
 # poses between the guess and the start
 FOLLOWED = 181
 # a rate of nothing, for an input's of one
@@ -84,24 +78,16 @@ class Branching:
 class Skeleton:
     """The bodies, the joints, the tree and the loops of a mechanism at some inputs."""
 
-    def __init__(
-        self, m: Mechanism, inputs: tuple[float, ...], limits: tuple[float, float] | None = None
-    ) -> None:
-        self.m, self.inputs = m, inputs
-        rates = [[e.speed or 0.0 for e in m.inputs]]
-        self.start = m.motion(
-            np.array([inputs]) if len(inputs) > 1 else inputs[0],
-            speed=rates if len(inputs) > 1 else rates[0][0],
-        )
-        if not self.start.assembled[0]:
-            raise DataError("it cannot be assembled at that input: nothing is exported")
+    def __init__(self, m: Mechanism, inputs: tuple[float, ...], travel: Travel) -> None:
+        self.m, self.inputs, self.travel = m, inputs, travel
+        self.start = start_of(m, inputs)
         self.bodies = bodies_of(m, self.start)
         self.joints: list[Joint] = []
         self._pins()
         self._guides()
         self._indirect_inputs()
         for joint in self.joints:
-            joint.limits = limits if joint.input is not None else None
+            joint.limits = travel.limits if joint.input is not None else None
         self._branch()
 
     # --- joints -----------------------------------------------------------------------------------------------
@@ -227,7 +213,9 @@ class Skeleton:
                 waiting.append(child)
         lost = [name for name in self.bodies if name not in self.path]
         if lost:
-            raise DataError(f"{', '.join(lost)}: no pin or guide leads there from the ground: not exported")
+            raise DataError(
+                f"{', '.join(lost)}: no chain of pins and guides joins it to the ground: not exported"
+            )
 
     def world(self, body: str, z: complex) -> complex:
         """Return where a place of a body stands, m."""
@@ -261,12 +249,20 @@ class Skeleton:
         return result
 
     def twist(self, spring: TorsionSpring) -> float:
-        """Return how far a torsion spring is wound, rad: within half a turn at the guess, and followed from there."""
+        """Return how far a torsion spring is wound, rad: within half a turn at the guess, and followed from there.
+
+        Where the inputs alone fix both angles they count with their whole turns.
+        """
+        angles = [self.m.assembly.plan.angles[body] for body in spring.links]
+        more = 2 * np.pi * spring.turns - spring.free_angle
+        if all(angle.by_inputs for angle in angles):
+            on, link = (a.const + sum(k * self.inputs[j] for j, k in a.inputs) for a in angles)
+            return float(link - on + more)
         way = np.linspace(self.m.at, self.inputs, FOLLOWED)
         motion = self.m.motion(way if len(self.inputs) > 1 else way[:, 0])
-        on, link = (motion.link(b).angle if b != GROUND else np.zeros(FOLLOWED) for b in spring.links)
-        wound = np.unwrap(link - on) - spring.free_angle
-        return float(wound[-1] - 2 * np.pi * np.round(wound[0] / (2 * np.pi)))
+        first, second = (motion.link(b).angle if b != GROUND else np.zeros(FOLLOWED) for b in spring.links)
+        wound = np.unwrap(second - first)
+        return float(wound[-1] + more - 2 * np.pi * np.round((wound[0] - spring.free_angle) / (2 * np.pi)))
 
     def driven(self, k: int) -> Joint | None:
         """Return the joint whose coordinate is an input; where none is, the one on which its link hangs in the tree."""
@@ -293,6 +289,75 @@ class Skeleton:
         e = self.m.inputs[j]
         return self.terms({str(e.link): 1.0, e.on: -1.0})
 
+    # --- how a link is drawn ------------------------------------------------------------------------------------
+    @property
+    def thickness(self) -> float:
+        """Half the thickness of a link's strokes, m."""
+        return THICK * self.m.size
+
+    def strokes(self, name: str) -> list[tuple[complex, complex]]:
+        """Return what a body looks like: the sides of the hull of its points, in its axes."""
+        ends = hull(self.bodies[name].points.values())
+        return list(zip(ends, ends[1:] + (ends[:1] if len(ends) > 2 else ()), strict=False))
+
+    def boxes(self, name: str) -> Iterator[tuple[complex, float, tuple[float, float, float]]]:
+        """Yield the strokes as boxes: the middle, the direction and the sides of each."""
+        for a, b in self.strokes(name):
+            yield (a + b) / 2, cmath.phase(b - a), (abs(b - a), 2 * self.thickness, 2 * self.thickness)
+
+    # --- what a format leaves out -------------------------------------------------------------------------------
+    def left_out(self, holds: Collection[str], racks: str = "") -> list[str]:
+        """Name what a format cannot hold.
+
+        Parameters
+        ----------
+        holds : collection of str
+            What it holds of springs, torsion springs, gravity, inputs (of any two links), massless (links without mass).
+        racks : str
+            Its own sentence on the racks that it cannot hold; empty where there are none.
+        """
+        m = self.m
+        loads = {
+            "forces": m.forces,
+            "torques": m.torques,
+            "springs": m.springs,
+            "torsion springs": m.torsion_springs,
+            "friction": m.friction,
+        }
+        result = [
+            f"{what} {'is' if what == 'friction' else 'are'} left out: {len(parts)}"
+            for what, parts in loads.items()
+            if parts and what not in holds
+        ]
+        if m.cams:
+            result.append(f"cams are left out: {len(m.cams)}: the format has no such joint")
+        result += [racks] if racks else []
+        light = [name for name, body in self.bodies.items() if body.mass <= 0 and name in m.links]
+        if light and "massless" not in holds:
+            result.append(
+                f"without mass: {', '.join(light)}: the format requires a mass: a millionth of the heaviest is written"
+            )
+        for k, e in enumerate(m.inputs if "inputs" not in holds else ()):
+            j = self.driven(k)
+            if j is None or j.input != k:
+                instead = f": {j.link} is driven against {j.on} instead" if j is not None else ""
+                result.append(f"input {e.name} is left out: no pin joins {e.link} and {e.on}{instead}")
+        for k, e in enumerate(m.inputs):
+            laws = {"acceleration": e.acceleration, "jerk": e.jerk, "table of its motion": e.history}
+            lost = [what for what, law in laws.items() if law]
+            if lost:
+                are = "is" if len(lost) == 1 else "are"
+                result.append(
+                    f"{' and '.join(lost)} of input {e.name} {are} left out: the format has its speed alone"
+                )
+            if k in m.carried:
+                result.append(
+                    f"the motor of input {e.name} is left out: it sits on {m.carrier(k)}, and drives against {e.on}"
+                )
+        if m.gravity and "gravity" not in holds:
+            result.append("gravity is left out: the format has none")
+        return result
+
 
 def _spanning(nodes: Iterable[str], pairs: list[tuple[str, str]]) -> list[int]:
     """Return which of some pairs, the first before the last, join all nodes without a loop (Kruskal).
@@ -302,71 +367,3 @@ def _spanning(nodes: Iterable[str], pairs: list[tuple[str, str]]) -> list[int]:
     """
     groups = Groups(nodes)
     return [k for k, pair in enumerate(pairs) if groups.join(*pair)]
-
-
-# poses over the travel of the input
-SAMPLES = 721
-
-
-class Travel:
-    """One input from one end of its travel to the other, or over a whole period; nothing with several inputs."""
-
-    def __init__(self, m: Mechanism) -> None:
-        self.m = m
-
-    @cached_property
-    def limits(self) -> tuple[float, float] | None:
-        """The ends of the input's travel, rad or m; None where it is not limited on both sides."""
-        result = self.m.check.input_limits
-        return None if result is None or not all(map(math.isfinite, result)) else result
-
-    @cached_property
-    def motion(self) -> Motion | None:
-        """The motion over the travel at the file's speed."""
-        m = self.m
-        if len(m.inputs) != 1:
-            return None
-        track = m.assembly.track
-        low, high = self.limits or (track.start, track.start + (m.assembly.reach.period or track.length))
-        input_limits = self.m.check.input_limits
-        if self.limits is None and input_limits is not None:
-            low, high = (
-                (input_limits[0], input_limits[0] + track.length)
-                if math.isfinite(input_limits[0])
-                else (input_limits[1] - track.length, input_limits[1])
-            )
-        e = m.inputs[0]
-        return m.motion(np.linspace(low, high, SAMPLES), e.speed or 0.0, e.acceleration or 0.0)
-
-    def curve(self, point: str) -> Array:
-        """The places (n, 2) of a point over the travel, m; NaN where it is not assembled."""
-        assert self.motion is not None
-        return self.motion.point(point).position
-
-    @cached_property
-    def traced(self) -> list[str]:
-        """The points whose curves are drawn: those that no joint holds; where there are none, all that move."""
-        return tracers(self.m) or self.moving
-
-    @property
-    def moving(self) -> list[str]:
-        """The points that are not the ground's."""
-        return [p for p in self.m.points if p not in self.m.ground]
-
-    def way(self, guide: int) -> tuple[float, float] | None:
-        """The least and the largest position along a guide, m."""
-        if self.motion is None:
-            return None
-        from virtualwork.parts_of_motion import SlideMotion
-
-        result = SlideMotion(self.motion, guide).position
-        return (float(np.nanmin(result)), float(np.nanmax(result))) if np.isfinite(result).any() else None
-
-    @cached_property
-    def peak(self) -> float | None:
-        """The greatest effort of the input over a whole period, N·m or N; None where it is limited or nothing acts."""
-        if self.motion is None or self.m.check.input_limits is not None:
-            return None
-        effort = np.abs(self.motion.effort)
-        peak = float(effort.max())
-        return peak if math.isfinite(peak) and peak > 0 else None

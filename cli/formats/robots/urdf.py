@@ -8,7 +8,6 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from cli.formats import sdf
 from cli.formats.drawn import GROUND
 from cli.formats.markup import (
     At,
@@ -23,7 +22,8 @@ from cli.formats.markup import (
     spatial,
     stated,
 )
-from cli.formats.robot import (
+from cli.formats.robots import sdf
+from cli.formats.robots.robot import (
     ROWS,
     Array,
     Inertial,
@@ -32,7 +32,6 @@ from cli.formats.robot import (
     Robot,
     RobotJoint,
     RobotLink,
-    boxes,
     pose,
     printed,
     rpy,
@@ -41,7 +40,7 @@ from cli.formats.robot import (
 from dalembert.errors import DataError
 
 if TYPE_CHECKING:
-    from cli.formats.skeleton import Branching, Skeleton, Travel
+    from cli.formats.robots.skeleton import Branching, Skeleton
     from virtualwork.describe.parts import Belt, Gear
 
 KINDS: dict[str, Kind] = {**sdf.KINDS, "spherical": "ball"}
@@ -152,7 +151,7 @@ def _tree(robot: Robot, joints: list[Element]) -> None:
     below = {joint.child for joint in waiting}
     roots = [name for name in robot.links if name not in below]
     if not roots:
-        raise DataError(f"{robot.file}: every link is the child of a joint: expected one that stands still")
+        raise DataError(f"{robot.file}: every link is the child of a joint: expected one that is fixed")
     robot.ground = roots[0]
     there = set(roots)
     closing = []
@@ -220,7 +219,7 @@ def _mimic(robot: Robot, name: str, mimic: Element) -> None:
     )
     robot.couplings.append((name, [(name, 1.0), (other, -factor)]))
     if offset:
-        robot.notes.append(f"{where}: its offset {offset:g} is left out: the drawn pose is that of the file")
+        robot.notes.append(f"{where}: its offset {offset:g} is left out: the pose is that of the file")
 
 
 def _motors(robot: Robot, root: Element) -> None:
@@ -239,8 +238,8 @@ def _motors(robot: Robot, root: Element) -> None:
 
 
 # --- writing ------------------------------------------------------------------------------------------------------
-def write(s: Skeleton, travel: Travel, comment: str) -> bytes:
-    """Return the file of a mechanism."""
+def write(s: Skeleton, comment: str) -> tuple[bytes, list[str]]:
+    """Return the file of a mechanism, and what it leaves out."""
     root = Element("robot", name=s.m.name or "mechanism")
     # where each link's axes begin: at the joint on which it hangs, in its own axes of the mechanism's file
     origin = {GROUND: 0j}
@@ -249,19 +248,20 @@ def write(s: Skeleton, travel: Travel, comment: str) -> bytes:
     for name in s.bodies:
         _add_link(s, root, name, origin[name])
     for b in s.walk():
-        _add_joint(s, root, b, origin, travel)
+        _add_joint(s, root, b, origin)
     for name in s.bodies:
         _add_frames(s, root, name, origin[name])
     gazebo = Element("gazebo")
     for j in s.closing:
         ends = (j.ends[0] - origin[j.on], j.ends[1] - origin[j.link])
-        sdf.add_joint(gazebo, s, replace(j, ends=ends), travel, GROUND)
+        sdf.add_joint(gazebo, s, replace(j, ends=ends), GROUND)
     sdf.add_welds(gazebo, s)
-    _add_gears(s, root, gazebo)
+    racks = _add_gears(s, root, gazebo)
     sdf.add_plugins(gazebo, s)
     if len(gazebo):
         root.append(gazebo)
-    return document(root, comment)
+    lost = f"racks are left out: {racks}: <mimic> ties one joint to one other" if racks else ""
+    return document(root, comment), s.left_out(("massless",), lost)
 
 
 def _add_link(s: Skeleton, root: Element, name: str, origin: complex) -> None:
@@ -272,13 +272,13 @@ def _add_link(s: Skeleton, root: Element, name: str, origin: complex) -> None:
         add(inertial, "mass", value=part.mass)
         # in the plane only izz acts
         add(inertial, "inertia", None, **{n: part.inertia if n[1] == n[2] else 0.0 for n in ROWS})
-    for middle, turn, sides in boxes(part, s.m.size):
+    for middle, turn, sides in s.boxes(name):
         visual = add(link, "visual")
         add(visual, "origin", xyz=spatial(middle - origin), rpy=digits(0.0, 0.0, turn))
         add(add(visual, "geometry"), "box", size=digits(*sides))
 
 
-def _add_joint(s: Skeleton, root: Element, b: Branching, origin: dict[str, complex], travel: Travel) -> None:
+def _add_joint(s: Skeleton, root: Element, b: Branching, origin: dict[str, complex]) -> None:
     j, parent, part = b.joint, s.bodies[b.parent], s.bodies[b.child]
     kind = "prismatic" if j.kind == "slide" else "continuous" if j.limits is None else "revolute"
     made = add(root, "joint", name=j.name, type=kind)
@@ -291,12 +291,12 @@ def _add_joint(s: Skeleton, root: Element, b: Branching, origin: dict[str, compl
         limit = add(made, "limit")
         low, high = (
             j.limits
-            or (j.guide is not None and travel.way(j.guide))
+            or (j.guide is not None and s.travel.way(j.guide))
             or (j.value - s.m.size, j.value + s.m.size)
         )
         if kind != "continuous":
             limit.attrib |= {"lower": digits(low - j.value), "upper": digits(high - j.value)}
-        peak = 0.0 if j.input is None else travel.peak
+        peak = 0.0 if j.input is None else s.travel.peak
         # the format wants both numbers; where nothing limits them they are large
         limit.set("effort", digits(LARGE if peak is None else peak))
         limit.set("velocity", digits(LARGE))
@@ -313,11 +313,15 @@ def _add_frames(s: Skeleton, root: Element, name: str, origin: complex) -> None:
         add(made, "child", link=frame)
 
 
-def _add_gears(s: Skeleton, root: Element, gazebo: Element) -> None:
-    """Write gears, belts and racks of two joints of the tree as `<mimic>`, other gears as gearboxes of the simulator."""
+def _add_gears(s: Skeleton, root: Element, gazebo: Element) -> int:
+    """Write gears, belts and racks of two joints of the tree as `<mimic>`, other gears as gearboxes of the simulator.
+
+    Returns the number of racks that are neither.
+    """
     from virtualwork.describe.parts import Rack
 
     gearboxes: list[Gear | Belt] = []
+    racks = 0
     parts: tuple[Gear | Belt | Rack, ...] = (*s.m.gears, *s.m.belts, *s.m.racks)
     for g, mesh in zip(parts, s.m.meshes, strict=True):
         terms = s.mesh(mesh)
@@ -329,6 +333,9 @@ def _add_gears(s: Skeleton, root: Element, gazebo: Element) -> None:
             # of coordinates that may run against the pins' own sense
             factor = -terms[other] / terms[last[-1]]
             add(joint, "mimic", joint=other, multiplier=factor)
-        elif not isinstance(g, Rack):
+        elif isinstance(g, Rack):
+            racks += 1
+        else:
             gearboxes.append(g)
     sdf.add_gearboxes(gazebo, gearboxes, GROUND)
+    return racks

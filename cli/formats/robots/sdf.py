@@ -10,7 +10,7 @@ import numpy as np
 
 from cli.formats.drawn import GROUND
 from cli.formats.markup import At, add, child, children, digits, document, named, placed, plain, stated, text
-from cli.formats.robot import (
+from cli.formats.robots.robot import (
     LIGHT,
     ROWS,
     WORLD,
@@ -21,15 +21,15 @@ from cli.formats.robot import (
     Robot,
     RobotJoint,
     RobotLink,
-    boxes,
     pose,
     printed,
+    rotation,
     rpy,
 )
 from dalembert.errors import DataError
 
 if TYPE_CHECKING:
-    from cli.formats.skeleton import Joint, Skeleton, Travel
+    from cli.formats.robots.skeleton import Joint, Skeleton
     from virtualwork.describe.parts import Belt, Gear
 
 KINDS: dict[str, Kind] = {
@@ -77,7 +77,7 @@ def read_pose(at: At, element: Element | None) -> Array:
     at = at.inside("pose")
     if element.get("rotation_format") == "quat_xyzw":
         *xyz, x, y, z, w = at.numbers("", element.text, 7)
-        return pose(xyz, at.rotation((w, x, y, z)))
+        return pose(xyz, rotation(at, (w, x, y, z)))
     v = at.numbers("", element.text, 6)
     angles = np.radians(v[3:]) if element.get("degrees") in ("true", "1") else v[3:]
     return pose(v[:3], rpy(*angles))
@@ -102,7 +102,9 @@ class _Model:
         robot, file = self.robot, self.file
         self.at[MODEL] = read_pose(At(file, "model"), child(self.element, "pose"))
         for e in children(self.element, "model", "include"):
-            robot.notes.append(f"<{plain(e)}> in the model: left out: files and models inside are not read")
+            robot.notes.append(
+                f"<{plain(e)}> in the model: left out: nested models and included files are not read"
+            )
         static = text(self.element, "static") in ("true", "1")
         if static:
             robot.notes.append(f"model '{robot.name}' is static: nothing in it moves")
@@ -247,8 +249,8 @@ def driven(file: str, element: Element) -> dict[str, float | None]:
 
 
 # --- writing ------------------------------------------------------------------------------------------------------
-def write(s: Skeleton, travel: Travel, comment: str) -> bytes:
-    """Return the file of a mechanism."""
+def write(s: Skeleton, comment: str) -> tuple[bytes, list[str]]:
+    """Return the file of a mechanism, and what it leaves out."""
     m = s.m
     root = Element("sdf", {"version": "1.9", "xmlns:dalembert": SPACE})
     world = add(root, "world", name="default")
@@ -259,11 +261,12 @@ def write(s: Skeleton, travel: Travel, comment: str) -> bytes:
         if name != GROUND:
             _add_link(s, model, name, light)
     for j in s.joints:
-        add_joint(model, s, j, travel)
+        add_joint(model, s, j)
     add_welds(model, s)
     add_gearboxes(model, (*m.gears, *m.belts), WORLD)
     add_plugins(model, s)
-    return document(root, comment)
+    lost = f"racks are left out: {len(m.racks)}: the format has no such joint" if m.racks else ""
+    return document(root, comment), s.left_out(("gravity",), lost)
 
 
 def add_pose(element: Element, z: complex, turn: float = 0.0) -> None:
@@ -291,7 +294,7 @@ def _add_link(s: Skeleton, model: Element, name: str, light: float) -> None:
     for entry in ROWS:
         # in the plane only izz acts
         add(tensor, entry, digits(inertia if entry[1] == entry[2] else 0.0))
-    for k, (middle, turn, sides) in enumerate(boxes(part, s.m.size), 1):
+    for k, (middle, turn, sides) in enumerate(s.boxes(name), 1):
         visual = add(link, "visual", name=f"stroke {k}")
         add_pose(visual, middle, turn)
         add(add(add(visual, "geometry"), "box"), "size", digits(*sides))
@@ -299,7 +302,7 @@ def _add_link(s: Skeleton, model: Element, name: str, light: float) -> None:
         add_pose(add(model, "frame", name=point, attached_to=name), z)
 
 
-def add_joint(model: Element, s: Skeleton, j: Joint, travel: Travel, ground: str = WORLD) -> None:
+def add_joint(model: Element, s: Skeleton, j: Joint, ground: str = WORLD) -> None:
     """Add a joint; its place is seen from the link, which cannot be the ground."""
     on, link, ends, sense = j.on, j.link, j.ends, 1.0
     if link == GROUND:
@@ -316,7 +319,7 @@ def add_joint(model: Element, s: Skeleton, j: Joint, travel: Travel, ground: str
         for tag, value in zip(("lower", "upper"), j.limits, strict=True):
             # the coordinate is 0 in the start pose
             add(limit, tag, digits(value - j.value))
-    effort = 0.0 if j.input is None else -1.0 if travel.peak is None else travel.peak
+    effort = 0.0 if j.input is None else -1.0 if s.travel.peak is None else s.travel.peak
     add(limit, "effort", digits(effort))
 
 

@@ -11,13 +11,12 @@ import numpy as np
 
 from cli.formats.drawn import GROUND
 from cli.formats.markup import At, add, child, children, digits, document, include, named, spatial
-from cli.formats.mjcf_shapes import Frames, mass_of_shapes
-from cli.formats.robot import (
+from cli.formats.robots.robot import (
     DIAGONAL_FIRST,
     LIGHT,
-    THICK,
     WORLD,
     Array,
+    Frames,
     Inertial,
     Kind,
     Motor,
@@ -25,14 +24,14 @@ from cli.formats.robot import (
     RobotJoint,
     RobotLink,
     Spring,
+    mass_of_shapes,
     pose,
     printed,
-    strokes,
 )
 from dalembert.errors import DataError, quote
 
 if TYPE_CHECKING:
-    from cli.formats.skeleton import Branching, Joint, Skeleton, Travel
+    from cli.formats.robots.skeleton import Branching, Joint, Skeleton
 
 PLURAL = {"gear": "gears", "belt": "belt", "rack": "rack"}
 # MuJoCo takes nothing lighter
@@ -110,9 +109,7 @@ class _Reader:
             elif e.tag == "body":
                 self._body(e, link, base, e.get("childclass", of))
             elif e.tag in ("replicate", "attach", "composite", "flexcomp"):
-                self.robot.notes.append(
-                    f"<{e.tag}> is left out: bodies that are made while reading are not read"
-                )
+                self.robot.notes.append(f"<{e.tag}> is left out: generated bodies are not read")
 
     def _body(self, e: Element, parent: str, base: Array, of: str) -> None:
         robot = self.robot
@@ -121,7 +118,7 @@ class _Reader:
         here = base @ self.frames.pose(where, e.attrib)
         joints = list(children(e, "joint"))
         if child(e, "freejoint") is not None or any(self.whole(j, of).get("type") == "free" for j in joints):
-            robot.notes.append(f"{where}: its free joint is left out: it is taken as fixed")
+            robot.notes.append(f"{where}: its free joint is left out: the body is fixed")
             joints = []
         inertial = child(e, "inertial")
         held = self._inertial(where, inertial)
@@ -208,7 +205,7 @@ class _Reader:
             elif e.tag == "tendon" and "tendon2" not in values:
                 robot.couplings.append((name, self._fixed(named(self.file, e, "tendon1"), at)))
             else:
-                robot.notes.append(f"{where}: left out: <{e.tag}> has no like here")
+                robot.notes.append(f"{where}: left out: <{e.tag}> has no equivalent")
 
     def _connect(self, tag: str, name: str, at: At, values: dict[str, str]) -> None:
         robot = self.robot
@@ -271,7 +268,7 @@ class _Reader:
             ends = [self.sites[s] for s in sites]
         if len(rest) > 1 and rest[0] != rest[-1]:
             self.robot.notes.append(
-                f"{at.where}: it is slack from {rest[0]:g} to {rest[-1]:g}: the first is taken"
+                f"{at.where}: it is slack from {rest[0]:g} to {rest[-1]:g}: the first length is used"
             )
         open_ = "springlength" not in values or (rest[0] == -1.0 and not terms)
         self.robot.springs.append(
@@ -306,7 +303,7 @@ class _Reader:
         result = At(self.file, "key").numbers("qvel", keys[0].get("qvel"))
         if len(result) != len(own):
             return {}
-        # a key frame at rest says of no speed
+        # a key frame at rest has no speed
         return {name: v for name, v in zip(own, result, strict=True) if v != 0}
 
 
@@ -316,8 +313,11 @@ def _leading(at: At, values: Mapping[str, str], *keys: str) -> list[float]:
 
 
 # --- writing ------------------------------------------------------------------------------------------------------
-def write(s: Skeleton, travel: Travel, comment: str) -> bytes:
-    """Return the file of a mechanism."""
+HOLDS = ("springs", "torsion springs", "inputs", "gravity")
+
+
+def write(s: Skeleton, comment: str) -> tuple[bytes, list[str]]:
+    """Return the file of a mechanism, and what it leaves out."""
     m = s.m
     root = Element("mujoco", model=m.name or "mechanism")
     masses = [p.mass for p in s.bodies.values() if p.mass > 0]
@@ -360,11 +360,11 @@ def write(s: Skeleton, travel: Travel, comment: str) -> bytes:
             motor.set("tendon", f"input {e.name}")
         else:
             motor.set("joint", joint.name)
-        if travel.peak is not None:
-            motor.set("ctrlrange", digits(-travel.peak, travel.peak))
+        if s.travel.peak is not None:
+            motor.set("ctrlrange", digits(-s.travel.peak, s.travel.peak))
     root.extend(e for e in (equality, tendon, actuator) if len(e))
     _key(s, add(root, "keyframe"))
-    return document(root, comment)
+    return document(root, comment), s.left_out(HOLDS)
 
 
 def _fixed(tendon: Element, name: str, terms: dict[str, float]) -> Element:
@@ -426,8 +426,8 @@ def _add_contents(s: Skeleton, name: str, body: Element) -> None:
         # a point of several links stands on the first
         if next(holder for holder, other in s.bodies.items() if point in other.points) == name:
             add(body, "site", name=point, pos=spatial(z))
-    for a, b in strokes(part):
-        add(body, "geom", type="capsule", size=THICK * s.m.size, fromto=f"{spatial(a)} {spatial(b)}")
+    for a, b in s.strokes(name):
+        add(body, "geom", type="capsule", size=s.thickness, fromto=f"{spatial(a)} {spatial(b)}")
 
 
 def _close(j: Joint, bodies: dict[str, Element], equality: Element) -> None:

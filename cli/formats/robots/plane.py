@@ -21,10 +21,11 @@ from cli.formats.drawn import (
     Mesh,
     Slide,
     Toothed,
+    pins_of,
     together,
     unused,
 )
-from cli.formats.robot import BLOCK, Motor, Robot, RobotJoint, RobotLink, Spring, plane_of
+from cli.formats.robots.robot import BLOCK, Motor, Robot, RobotJoint, RobotLink, Spring, plane_of
 from dalembert.errors import DataError
 
 # two ends of a joint nearer than this share of the robot's size are one place
@@ -61,17 +62,19 @@ class _Layer:
         places = [self.plane.place(end) for j in moving for end in j.ends]
         places += [self.plane.place(link.pose[:3, 3]) for link in robot.links.values()]
         self.size = max(abs(a - places[0]) for a in places) or 1.0
-        # digits after the point that say something: the rest is rounding of the way through the tree
+        # significant digits after the point: the rest is rounding on the way through the tree
         self.digits = 15 - math.ceil(math.log10(self.size))
         self._groups()
         d.posed = all(self._closed(j) for j in moving)
-        self.pins: list[tuple[str, set[tuple[str, complex]]]] = []
         self.slides: dict[str, Slide] = {}
-        for j in moving:
-            if j.kind != "slide":
-                self._pin(j)
+        turning = [
+            (j.name, {name: self._place(z) for name, z in self._sides(j)})
+            for j in moving
+            if j.kind != "slide"
+        ]
+        self.pins = pins_of(turning, SAME * self.size, lambda new, earlier: min(new, earlier, key=len))
         for label, ends in self.pins:
-            for name, z in sorted(ends, key=lambda end: end[0]):
+            for name, z in sorted(ends.items()):
                 d.bodies[name].points[label] = z
         for j in moving:
             if j.kind == "slide":
@@ -84,7 +87,7 @@ class _Layer:
         self._springs(moving)
         for what in dict.fromkeys(what for j in moving for what in j.more):
             names = ", ".join(j.name for j in moving if what in j.more)
-            d.leave(f"{what} of {names}", "it moves as far as its links let it, without friction")
+            d.leave(f"{what} of {names}", "the joint moves without limits and friction")
         if robot.gravity is not None:
             g = self.plane.direction(robot.gravity)
             d.gravity = (g.real, g.imag) if abs(g) > 1e-12 * float(np.linalg.norm(robot.gravity)) else None
@@ -125,7 +128,7 @@ class _Layer:
         if inertia < 0:
             raise DataError(
                 f"{self.robot.file}: link '{links[0].name}', inertia about the plane's normal: found {inertia:g}, "
-                "expected one of zero or more: `dalembert body --check-inertias` says more"
+                "expected zero or more: see `dalembert body --check-inertias`"
             )
         body.mass, body.center, body.inertia = mass, self._place(center), inertia
 
@@ -151,23 +154,11 @@ class _Layer:
             for name, end in zip((self.name(j.parent), self.name(j.child)), j.ends, strict=True)
         ]
 
-    def _pin(self, j: RobotJoint) -> None:
-        """Add a pin; pins at one place of a body are one."""
-        ends = {(name, self._place(z)) for name, z in self._sides(j)}
-        near = SAME * self.size
-        label = j.name
-        for held, others in list(self.pins):
-            if any(name == other and abs(z - w) <= near for name, z in ends for other, w in others):
-                self.pins.remove((held, others))
-                label = min(label, held, key=len)
-                ends = others | {e for e in ends if e[0] not in {name for name, _ in others}}
-        self.pins.append((unused(label, (held for held, _ in self.pins)), ends))
-
     def _slide(self, j: RobotJoint) -> None:
         """Add a prism; its position is the joint's own coordinate."""
         (on, through), (link, z) = self._sides(j)
         sense = 1.0
-        if link == GROUND:
+        if self._carried_by_child(j):
             on, link, through, z, sense = link, on, z, through, -1.0
         a, b = self.d.bodies[on], self.d.bodies[link]
         angle = cmath.phase(self.plane.direction(j.axis) * sense) - a.turn
@@ -179,12 +170,28 @@ class _Layer:
         self.slides[j.name] = Slide(point, link, on, start, _turn(angle), _turn(b.turn - a.turn - angle))
         self.d.slides.append(self.slides[j.name])
 
+    def _carried_by_child(self, j: RobotJoint) -> bool:
+        """Return whether a slide's line is on the child, not the parent: on the ground, under a rack's wheel, away from its point."""
+        pair = self.name(j.parent), self.name(j.child)
+        if GROUND in pair:
+            return pair[1] == GROUND
+        joints, links = self.robot.joints, self.robot.links
+        for _, terms in self.robot.couplings:
+            others = [name for name, _ in terms if name != j.name]
+            if len(terms) != 2 or len(others) != 1 or others[0] not in joints:
+                continue
+            wheel = joints[others[0]]
+            shared = {*pair} & {self.name(wheel.parent), self.name(wheel.child)}
+            if wheel.kind == "turn" and len(shared) == 1:
+                return pair[1] in shared
+        return j.name in links[j.parent].points and j.name not in links[j.child].points
+
     def _slots(self) -> None:
         """Make slots again of the blocks that `dalembert export` made of them, each with one slide and one pin."""
         d = self.d
         for name, s in self.slides.items():
             for block, carrier in ((s.link, s.on), (s.on, s.link)):
-                pins = [label for label, ends in self.pins if block in {body for body, _ in ends}]
+                pins = [label for label, ends in self.pins if block in ends]
                 if not self._is_block(block) or len(pins) != 1:
                     continue
                 riders = [n for n, body in d.bodies.items() if pins[0] in body.points and n != block]
@@ -250,7 +257,7 @@ class _Layer:
     ) -> dict[str, float] | None:
         """Return Σ factor·(joint's coordinate) as a sum of the bodies' angles; None where it holds a slide.
 
-        Of bodies that turn alike the `wanted` one is named, or one that the joints name.
+        Of bodies that turn alike the `wanted` one is named, or one that the joints name; a block only where nothing else turns as it does.
         """
         result: dict[str, float] = {}
         names: dict[str, str] = {}
@@ -265,7 +272,8 @@ class _Layer:
                 body = self.name(link)
                 top = self.alike.of(body)
                 result[top] = result.get(top, 0.0) + c
-                if body == wanted or (top not in names and body in self.d.bodies):
+                first = top not in names and body in self.d.bodies and not body.startswith(BLOCK)
+                if body == wanted or first:
                     names[top] = body
         scale = max(map(abs, result.values()), default=0.0)
         return {
@@ -291,7 +299,7 @@ class _Layer:
             # any of the three may be called the arm
             arm = GROUND if GROUND in shares else (carriers or list(shares))[0]
             if len(shares) == 2:
-                # two that turn alike: whatever carries them
+                # two that turn alike: any other body may be the arm
                 arm = next((body for body in d.bodies if body not in shares), GROUND)
             pair = [body for body in shares if body != arm]
             b, a = pair[:2]
@@ -361,7 +369,7 @@ class _Layer:
             first = ordered[0] if ordered and ordered[0] in here else None
             if first is None:
                 raise DataError(f"{robot.file}: nothing is driven: no actuator, and no joint on the ground")
-            d.notes.append(f"the file says of no actuator: {first.name} is taken as the input")
+            d.notes.append(f"the file has no actuator: {first.name} is taken as the input")
             motors = [Motor(first.name, [(first.name, 1.0)])]
         for m in motors:
             drive = self._drive(m)
@@ -369,6 +377,10 @@ class _Layer:
                 d.leave(f"actuator {m.name}", "it drives neither one slide nor the angle between two links")
             elif all(drive.moves != e.moves for e in d.drives):
                 d.drives.append(drive)
+                if drive.link is not None:
+                    # gears and torsion springs count the whole turns of the input
+                    link, on = d.bodies[drive.link], d.bodies[drive.on]
+                    link.turn += 2 * math.pi * round((drive.at - link.turn + on.turn) / (2 * math.pi))
         spare = [self._drive(Motor(j.name, [(j.name, 1.0)])) for j in ordered]
         d.spare = [e for e in spare if e is not None]
 
@@ -387,8 +399,9 @@ class _Layer:
         if link == GROUND:
             link, on, sense = on, link, -1.0
         turn = d.bodies[link].turn - d.bodies[on].turn
-        value = sense * sum(factor * robot.joints[name].value for name, factor in m.terms) / c
-        # the file's own coordinate may count whole turns
+        # the coordinate of a joint may count whole turns; a sum of several begins anywhere
+        name, factor = m.terms[0]
+        value = sense * factor * robot.joints[name].value / c if len(m.terms) == 1 else 0.0
         at = turn + 2 * math.pi * round((value - turn) / (2 * math.pi)) if value else turn
         return Drive(link, on, at=at, speed=None if m.speed is None else f"{sense * m.speed / c!r} rad/s")
 
