@@ -13,7 +13,8 @@ from tests.virtualwork.judged import judge
 from virtualwork import Guess, Guide, Input, Link, Mechanism, Spring, equilibria
 from virtualwork.formulas.kinematics import Carried
 from virtualwork.study.cycle import Cycle
-from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance
+from virtualwork.textbook.link_states import LinkStates, UnitLoad
+from virtualwork.textbook.power_balance import balance
 
 # --- tables of link states ------------------------------------------------------------------------------------------
 
