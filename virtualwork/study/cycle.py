@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from dalembert.arithmetic.guard import guarded
+from virtualwork.formulas.at_rest import potential
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.loaded_pose import LoadedPose
 from virtualwork.formulas.loads import OWN
@@ -255,14 +256,9 @@ class Cycle(Sweep):
                     total = plus(total, 0.5 * r.inertia * w * w)
             return total
 
-        def potential(pose: LoadedPose) -> Number:
-            total: Number = None
-            for load in scene.loads:
-                total = plus(total, load.potential(pose) if load.stores else None)
-            return total
-
-        moving, stored = scene.over([kinetic, potential], float, sorted(keys))
-        return moving, stored
+        stored = partial(potential, [load for load in scene.loads if load.stores])
+        moving, held = scene.over([kinetic, stored], float, sorted(keys))
+        return moving, held
 
     @property
     def closure(self) -> float | None:
