@@ -8,9 +8,12 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
+from dalembert.arithmetic.doubled_arrays import DoubledArray
 from tests.virtualwork.judged import judge
 from virtualwork import Cycle, Guess, Guide, Input, Link, Mechanism, Torque
+from virtualwork.digits.cycle import Spline
 
 SPEED = 7.0
 
@@ -137,3 +140,44 @@ def test_a_law_over_time() -> None:
     assert abs(cycle.mean - 3) <= errors["mean"] <= 1e-14
     assert abs(cycle.rms - 3) <= errors["rms"] <= 1e-14
     assert abs(cycle.peak - 3) <= errors["peak"] <= 1e-14
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 5, 40])
+@pytest.mark.parametrize("periodic", [False, True])
+def test_the_spline_is_that_of_scipy(n: int, periodic: bool) -> None:
+    rng = np.random.default_rng(n)
+    x, y = np.sort(rng.normal(size=n)), rng.normal(size=n)
+    if periodic:
+        y[-1] = y[0]
+    own = Spline(DoubledArray(x), DoubledArray(y), periodic)
+    other = CubicSpline(x, y, bc_type="periodic" if periodic else "not-a-knot")
+    for at in (x[0], 0.7 * x[0] + 0.3 * x[-1], x[-1]):
+        assert float(own.up_to(at).value) == pytest.approx(float(other.integrate(x[0], at)), abs=1e-13)
+    assert float(own.over_steps().sum()) == pytest.approx(float(other.integrate(x[0], x[-1])), abs=1e-13)
+
+
+def test_a_parallelogram_through_its_change_points() -> None:
+    """A torque of 2 N·m on the rocker, which turns with the crank: the weights' work is none over a turn."""
+    m = Mechanism(
+        {"A": 0j, "D": 3 + 0j},
+        {
+            "crank": Link({"A": 0j, "B": 1}, mass=1, center=0.5, inertia=0.1),
+            "coupler": Link({"B": 0j, "C": 3}, mass=2, center=1.2 + 0.1j, inertia=0.3),
+            "rocker": Link({"D": 0j, "C": 1}, mass=1, center=0.3, inertia=0.1),
+        },
+        inputs=Input("crank"),
+        guess=Guess(1.0, {"coupler": 0.0, "rocker": 1.0}),
+        gravity=-9.81j,
+        torques=[Torque("rocker", 2.0)],
+    )
+    for turns, n in ((1, 361), (-2, 721), (1, 100)):
+        cycle = Cycle(m.motion(np.linspace(0.1, 0.1 + 2 * np.pi * turns, n), 3.0, 0.0))
+        off = abs(cycle.work + 4 * np.pi * turns)
+        assert off <= cycle.error_estimate()["work"] + 1e-15 <= 1.5 * off + 2e-15
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_a_cycle_of_few_poses(n: int) -> None:
+    m = slider_crank(0.3, 1.0, 0.1, 1.0, 2.0)
+    errors = Cycle(m.motion(np.linspace(0.2, 1.0, n), SPEED, 0.0)).error_estimate()
+    assert all(np.isfinite(error) for error in errors.values())

@@ -114,10 +114,17 @@ class Spline:
     def __init__(self, place: DoubledArray, values: DoubledArray, periodic: bool = False) -> None:
         self.place, self.values = place, values
         self.step, self.rise = np.diff(place), np.diff(values) / np.diff(place)
-        lower, middle, upper, right = self._cyclic() if periodic else self._not_a_knot()
-        self.slopes = _solved(lower, middle, upper, right)
         if periodic:
-            self.slopes = np.concatenate([self.slopes, self.slopes[:1]])
+            slopes = _solved(*self._cyclic())
+            self.slopes = np.concatenate([slopes, slopes[:1]])
+        elif len(self.step) > 2:
+            self.slopes = _solved(*self._not_a_knot())
+        else:
+            # a parabola, or a straight line
+            h, d = self.step, self.rise
+            bend = (d[-1] - d[0]) / (place[-1] - place[0])
+            inner = d[:-1] + h[:-1] * bend
+            self.slopes = np.concatenate([d[:1] - h[:1] * bend, inner, d[-1:] + h[-1:] * bend])
 
     def _cyclic(self) -> tuple[Any, Any, Any, Any]:
         """The equations of the slopes: of the slope before, of its own, of the one behind it, and the right sides."""

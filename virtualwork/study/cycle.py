@@ -168,7 +168,8 @@ class Cycle(Sweep):
         turns = self.turns if self.is_periodic else None
         run = CycleRun(self.motion.dynamics, self.place, self.is_even, turns)
         pace, span = np.asarray(self._pace, dtype=float), abs(self.span)
-        effort, more = run.effort, run.more * np.abs(pace)
+        # where the input stands an effort without a digit does no work
+        effort, more = run.effort, np.abs(pace) * np.where(pace == 0, 0.0, run.more)
         total = run.integral(effort)
         square = run.integral(effort * effort) / run.span
         stored = run.between((effort - total / run.span) * pace, *self.stored[1:])
