@@ -6,7 +6,7 @@ digits until neither changes; where statics is redundant, the unknown forces are
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Any, cast
 
@@ -45,10 +45,9 @@ class ForceErrors:
         self._poses = cast(Lanes, dynamics.poses)
         self.estimates = Estimates(self._poses, self._values)
 
-    @property
-    def by_key(self) -> Mapping[str, Joint]:
-        """The joints by their keys."""
-        return self.dynamics.by_key
+    def of(self, key: Quantity) -> Reals:
+        """Of a force by its key, (n,): the length of the error of a vector."""
+        return self.estimates.of(key)
 
     def _values(self, keys: Sequence[Quantity]) -> list[Any]:
         """The forces as they were handed out."""
