@@ -20,7 +20,6 @@ from virtualwork.formulas.forces import (
     AppliedMoment,
     Contact,
     Effort,
-    Generalized,
     JointForce,
     JointMoment,
     NewtonEuler,
@@ -72,7 +71,7 @@ class ForceErrors:
             return True
         return joint.guide is not None and self.mechanism.guides[joint.guide].is_slider
 
-    def _each(self, kind: type[Effort | Generalized | NewtonEuler]) -> Reals:
+    def _each(self, kind: type[Effort | NewtonEuler]) -> Reals:
         """Of a quantity of every input, (n, k)."""
         keys = [kind(j) for j in range(len(self.mechanism.inputs))]
         self.estimates.together(keys)
@@ -82,11 +81,6 @@ class ForceErrors:
     def effort(self) -> Reals:
         """Of `Dynamics.effort`, (n, k)."""
         return self._each(Effort)
-
-    @cached_property
-    def generalized(self) -> Reals:
-        """Of the generalized forces Σ F·K_j, (n, k): the effort, but for motors that sit on another body than `on`."""
-        return self._each(Generalized)
 
     @cached_property
     def newton_euler(self) -> Reals:
@@ -108,8 +102,6 @@ class ForceErrors:
     def reaction(self, joint: str, on: str) -> Reals:
         """Of `Dynamics.reaction`, (n,): the length of the error."""
         return self.estimates.of(Reaction(joint, on))
-
-    at_joint = reaction
 
     @cached_property
     def shaking(self) -> tuple[Reals, Reals]:
