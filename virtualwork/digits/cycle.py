@@ -1,12 +1,10 @@
-"""The integrals of a cycle in 32 digits: the effort of every pose goes through the sum, or through the spline, once more.
-
-The slopes of the spline are refined: what floats leave of its equations in 32 digits says what they are off by (N. J. Higham,
-Accuracy and Stability of Numerical Algorithms, 2nd ed., §12.1).
-"""
+"""The integrals of a cycle in 32 digits: the effort of every pose goes through the sum, or through the spline, once more."""
 
 from __future__ import annotations
 
+from decimal import Context, Decimal, localcontext
 from functools import cached_property
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -14,13 +12,12 @@ import numpy as np
 from dalembert.arithmetic.doubled_arrays import DoubledArray
 from dalembert.arithmetic.engines.doubled import TURN
 from dalembert.arithmetic.guard import guarded
+from dalembert.arithmetic.splines import DIGITS, periodic, rates
 from virtualwork.digits.forces import ForceErrors
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.forces import Effort
 from virtualwork.formulas.numbers import Reals
 
-# steps of refinement
-STEPS = 2
 # of an estimate: what the second run leaves of it is its own rounding
 LEFT = 1e-3
 
@@ -88,15 +85,14 @@ class CycleRun:
             return values[:-1].sum() / float(len(values) - 1) * self.span
         if len(values) < 4:
             return (np.diff(self.place) * (values[:-1] + values[1:]) / 2.0).sum()
-        return Spline(self.place, values).over_steps().sum()
+        return Spline(self.place, values).up_to(self.place.high[-1])
 
     def between(self, values: Any, low: float, high: float) -> Any:
         """∫ values from one place to another one, of the spline alone."""
-        forward = slice(None, None, -1 if self.place.high[-1] < self.place.high[0] else 1)
         if self.turns is not None:
             values[-1] = values[0]
-        spline = Spline(self.place[forward], values[forward], self.turns is not None)
-        return spline.up_to(high) - spline.up_to(low)
+        spline = Spline(self.place, values, self.turns is not None)
+        return abs(spline.up_to(high) - spline.up_to(low))
 
     def most(self, each: Reals) -> float:
         """What errors of the poses come to in an integral, at the most."""
@@ -109,74 +105,46 @@ class CycleRun:
 
 
 class Spline:
-    """A cubic spline in 32 digits through values at rising places, (n,) each, as scipy's `CubicSpline` is one."""
+    """The cubic spline through values at rising or falling places, (n,) each, as scipy's `CubicSpline` is one."""
 
-    def __init__(self, place: DoubledArray, values: DoubledArray, periodic: bool = False) -> None:
-        self.place, self.values = place, values
-        self.step, self.rise = np.diff(place), np.diff(values) / np.diff(place)
-        if periodic:
-            slopes = _solved(*self._cyclic())
-            self.slopes = np.concatenate([slopes, slopes[:1]])
-        elif len(self.step) > 2:
-            self.slopes = _solved(*self._not_a_knot())
-        else:
-            # a parabola, or a straight line
-            h, d = self.step, self.rise
-            bend = (d[-1] - d[0]) / (place[-1] - place[0])
-            inner = d[:-1] + h[:-1] * bend
-            self.slopes = np.concatenate([d[:1] - h[:1] * bend, inner, d[-1:] + h[-1:] * bend])
+    def __init__(self, place: DoubledArray, values: DoubledArray, is_periodic: bool = False) -> None:
+        self.places = place.high
+        self.place, self.values = x, y = _decimals(place), _decimals(values)
+        with localcontext(Context(prec=DIGITS)):
+            # its second derivatives
+            if is_periodic:
+                self.bends = periodic(x, y)
+                self.bends.append(self.bends[0])
+            elif len(x) > 3:
+                _, self.bends = rates(x, y)
+            else:
+                # a parabola, or a straight line
+                first, last = ((y[k + 1] - y[k]) / (x[k + 1] - x[k]) for k in (0, len(x) - 2))
+                self.bends = [2 * (last - first) / (x[-1] - x[0])] * len(x)
+            steps = range(len(x) - 1)
+            self.integrals = [*accumulate((self._within(i, x[i + 1]) for i in steps), initial=Decimal(0))]
 
-    def _cyclic(self) -> tuple[Any, Any, Any, Any]:
-        """The equations of the slopes: of the slope before, of its own, of the one behind it, and the right sides."""
-        h, d = self.step, self.rise
-        before, rise = h[np.arange(-1, len(h) - 1)], d[np.arange(-1, len(h) - 1)]
-        return h, 2.0 * (before + h), before, 3.0 * (h * rise + before * d)
+    def _within(self, i: int, at: Decimal) -> Decimal:
+        """The integral from a place to one within the step behind it."""
+        h, t = self.place[i + 1] - self.place[i], at - self.place[i]
+        y, bend, further = self.values[i], self.bends[i], self.bends[i + 1]
+        slope = (self.values[i + 1] - y) / h - h * (2 * bend + further) / 6
+        return t * (y + t * (slope / 2 + t * (bend / 6 + t * (further - bend) / (24 * h))))
 
-    def _not_a_knot(self) -> tuple[Any, Any, Any, Any]:
-        """The same with one cubic through the first three places, and one through the last three."""
-        h, d = self.step, self.rise
-        first, last = h[0] + h[1], h[-2] + h[-1]
-        begin = ((h[0] + 2.0 * first) * h[1] * d[0] + h[0] * h[0] * d[1]) / first
-        end = (h[-1] * h[-1] * d[-2] + (2.0 * last + h[-1]) * h[-2] * d[-1]) / last
-        inner = 3.0 * (h[1:] * d[:-1] + h[:-1] * d[1:])
-        none = DoubledArray([0.0])
-
-        def row(a: Any, b: Any, c: Any) -> Any:
-            return np.concatenate([a.reshape(1), b, c.reshape(1)])
-
-        lower, middle = row(none, h[1:], last), row(h[1], 2.0 * (h[:-1] + h[1:]), h[-2])
-        return lower, middle, row(first, h[:-1], none), row(begin, inner, end)
-
-    def over_steps(self) -> Any:
-        """The integral over each step, (n − 1,)."""
-        h, f, s = self.step, self.values, self.slopes
-        return h * (f[:-1] + f[1:]) / 2.0 + h * h * (s[:-1] - s[1:]) / 12.0
-
-    def up_to(self, at: float) -> Any:
-        """The integral from the first place to another one."""
-        i = int(np.clip(np.searchsorted(self.place.high, at, "right") - 1, 0, len(self.step) - 1))
-        h, f, s = self.step[i], self.values[i : i + 2], self.slopes[i : i + 2]
-        u = (at - self.place[i]) / h
-        cube, fourth = u * u * u, u * u * u * u / 4.0
-        inside = f[0] * (u - cube + 2.0 * fourth) + f[1] * (cube - 2.0 * fourth)
-        turned = s[0] * (u * u / 2.0 - 2.0 * cube / 3.0 + fourth) + s[1] * (fourth - cube / 3.0)
-        rest = h * inside + h * h * turned
-        return self.over_steps()[:i].sum() + rest if i else rest
+    def up_to(self, at: float) -> DoubledArray:
+        """The integral from the first place to another one, of which the last float is the last place."""
+        with localcontext(Context(prec=DIGITS)):
+            if at == self.places[-1]:
+                total = self.integrals[-1]
+            else:
+                way = -1 if self.places[-1] < self.places[0] else 1
+                i = int(
+                    np.clip(np.searchsorted(way * self.places, way * at, "right") - 1, 0, len(self.place) - 2)
+                )
+                total = self.integrals[i] + self._within(i, Decimal(at))
+            return DoubledArray(float(total), float(total - Decimal(float(total))))
 
 
-def _solved(lower: Any, middle: Any, upper: Any, right: Any) -> Any:
-    """Solve lower·x of the row before + middle·x + upper·x of the row behind = right; the first row is behind the last."""
-    from scipy.sparse import csc_array
-    from scipy.sparse.linalg import splu
-
-    n = len(right)
-    row = np.arange(n)
-    before, behind = np.roll(row, 1), np.roll(row, -1)
-    entries = np.concatenate([lower.high, middle.high, upper.high])
-    places = np.tile(row, 3), np.concatenate([before, row, behind])
-    inverse = splu(csc_array((entries, places), shape=(n, n)))
-    x = DoubledArray(inverse.solve(right.value))
-    for _ in range(STEPS):
-        rest = right - lower * x[before] - middle * x - upper * x[behind]
-        x = x + inverse.solve(rest.value)
-    return x
+def _decimals(x: DoubledArray) -> list[Decimal]:
+    with localcontext(Context(prec=DIGITS)):
+        return [Decimal(a) + Decimal(b) for a, b in zip(x.high.tolist(), x.low.tolist(), strict=True)]
