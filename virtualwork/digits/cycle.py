@@ -67,8 +67,9 @@ class CycleRun:
         """The effort, (n,)."""
         ((found,),) = self.errors.estimates.second.doubled([Effort(0)]).values()
         exact = DoubledArray.of(found) + np.zeros(len(self._values))
-        # close to a change point another run than this one knows the effort
-        others = ~(exact.off(self._values) <= 2 * self.errors.effort[:, 0])
+        # close to a change point another run than this one knows the effort, at a limit none
+        off = exact.off(self._values)
+        others = ~((off <= 2 * self.errors.effort[:, 0]) & np.isfinite(off))
         exact[others] = self._values[others]
         return exact
 
@@ -77,7 +78,7 @@ class CycleRun:
         """By how much more the effort may be off than that tells, (n,)."""
         estimate = self.errors.effort[:, 0]
         more = estimate - self.effort.off(self._values)
-        return np.where(more > LEFT * estimate, more, 0.0)
+        return np.where(more >= LEFT * estimate, more, 0.0)
 
     def integral(self, values: Any) -> Any:
         """∫ values over the sweep."""

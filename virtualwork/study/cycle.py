@@ -174,16 +174,11 @@ class Cycle(Sweep):
         square = run.integral(effort * effort) / run.span
         stored = run.between((effort - total / run.span) * pace, *self.stored[1:])
         peak, peak_at = self._top(self.between.effort, self.largest_effort)
-        slope = (
-            np.ravel(self.between.at(np.array([self.largest_effort[0]])).rates[0][0])[0]
-            if self.timed and self.between.defined
-            else 1.0
-        )
         return {
             "work": run.off(run.integral(effort * pace), self.work, more),
             "mean": run.off(total / run.span, self.mean, run.more / span),
             "peak": peak,
-            "peak_at": peak_at * abs(slope),
+            "peak_at": peak_at,
             # Minkowski: the root mean square of a sum is no more than the sum of those of its parts
             "rms": run.off(np.sqrt(np.abs(square)), self.rms) + np.sqrt(run.most(run.more**2) / span),
             "peak_power": self._top(self.between.power, self.largest_power, power=True)[0],
@@ -193,7 +188,7 @@ class Cycle(Sweep):
     def _top(
         self, of: Callable[[Reals], Reals], largest: tuple[float, float], power: bool = False
     ) -> tuple[float, float]:
-        """The error of a largest size, and of its place: how far from it the top of the parabola beside it lies."""
+        """The error of a largest size, and of the input there: how far from it the top of the parabola beside it lies."""
         at, size = largest
         error, speed = self._at_place(at)
         if power:
@@ -203,29 +198,29 @@ class Cycle(Sweep):
             return error, 0.0
         h = min(BESIDE * (high - low), (at - low) / 2, (high - at) / 2)
         far, before, here, behind, farther = np.abs(of(at + h * AROUND)).tolist()
-        bend = 2 * here - before - behind
+        bend, noise = 2 * here - before - behind, error + EPS * size
         if 2 * here - far - farther < KINK * bend:
-            return self._kink(of, largest, 0.01 * h, error)
-        noise = error + EPS * size
-        if not bend > noise:
-            return error, high - low
-        return error + NEAR * (behind - before) ** 2 / (8 * bend), h * (
-            NEAR * abs(behind - before) / 2 + noise
-        ) / bend
+            more, off = self._kink(of, largest, 0.01 * h)
+        elif bend > noise:
+            more = NEAR * (behind - before) ** 2 / (8 * bend)
+            off = h * (NEAR * abs(behind - before) / 2 + noise) / bend
+        else:
+            more, off = 0.0, high - low
+        return error + more, off * (abs(speed) if self.timed else 1.0)
 
     def _kink(
-        self, of: Callable[[Reals], Reals], largest: tuple[float, float], h: float, error: float
+        self, of: Callable[[Reals], Reals], largest: tuple[float, float], h: float
     ) -> tuple[float, float]:
-        """The same where two curves cross, at a row of a table: by the straight lines on both sides."""
+        """How much larger than the largest the top is, and how far away, at a row of a table: by straight lines on both sides."""
         at, size = largest
         far, before, here, behind, farther = np.abs(of(at + h * AROUND)).tolist()
         rise, fall = before - far, behind - farther
         if not (rise > 0 and fall > 0):
-            return error + ALIKE * size, h
+            return ALIKE * size, h
         share = (2 * behind - farther - 2 * before + far) / (rise + fall)
         rest = min(abs(2 * before - far + rise * share - here), ALIKE * size)
         off = min(abs(share) * h, ALIKE * size * h / min(rise, fall))
-        return error + NEAR * rest + EPS * size, NEAR * off + 4 * EPS * abs(at)
+        return NEAR * rest + EPS * size, NEAR * off + 4 * EPS * abs(at)
 
     def _at_place(self, place: float) -> tuple[float, float]:
         """The error of the effort at one place, and the speed of the input there."""
