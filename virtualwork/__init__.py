@@ -41,8 +41,9 @@ if TYPE_CHECKING:
         second_point,
         sense,
     )
-    from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance
+    from virtualwork.textbook.link_states import LinkStates, UnitLoad
     from virtualwork.textbook.newton import newton
+    from virtualwork.textbook.power_balance import balance
 
 __all__ = [
     "GROUND",
@@ -104,7 +105,8 @@ _ROOMS = {
     "virtualwork.study.cycle": "Cycle",
     "virtualwork.study.equilibrium": "Equilibria Equilibrium",
     "virtualwork.textbook.combinations": "block_on_bar crank_rod_piston on_incline on_moving_ramp rotation second_point sense",
-    "virtualwork.textbook.link_states": "LinkStates UnitLoad balance",
+    "virtualwork.textbook.link_states": "LinkStates UnitLoad",
+    "virtualwork.textbook.power_balance": "balance",
     "virtualwork.textbook.newton": "newton",
 }
 

@@ -243,7 +243,6 @@ def moving_page(
     title: str,
     series: Sequence[Series],
     time: str = "",
-    plots: Sequence[str] = (),
     computed: Callable[[], tuple[str, dict[str, Any]]] | None = None,
     note: str = "",
 ) -> Page:
@@ -255,8 +254,6 @@ def moving_page(
         The first is drawn in full, the others as ghosts.
     time : str
         The column of the poses' own times, s; without it a turn of the input takes some seconds.
-    plots : sequence of str
-        The columns that are plotted at first.
     computed : callable
         Returns the script that computes the first series anew, and the data that it reads.
     note : str
@@ -274,14 +271,13 @@ def moving_page(
     slide = m.inputs[0].is_slide
     rate = "m/s" if documents[0]["timed"] else f"m for each {'m' if slide else 'rad'} of the input"
     span = float(np.ptp(first.poses.inputs[:, 0])) if first.poses.n else 0.0
-    shown = [first.columns[name].header for name in plots] or _first_plots(first)
     # a motion in time begins anew, wherever it ended
     wraps = bool(time) or (first.poses.n > 1 and all(_comes_back(first, name) for name in m.links))
     rest: dict[str, Any] = {
         "units": {"v": rate, "a": "m/s²", "f": "N"},
         "lasts": TURN if slide or len(m.inputs) > 1 else TURN * max(span / (2 * np.pi), 0.25),
         "wraps": wraps,
-        "plots": [columns.index(header) for header in shown],
+        "plots": [columns.index(header) for header in _first_plots(first)],
     }
     if time:
         rest["clock"] = documents[0]["over"][0]

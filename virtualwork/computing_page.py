@@ -404,7 +404,7 @@ def computing_page(
     return moving_page(m.name, [series, *others], computed=computed)
 
 
-def page_of(poses: Poses, drawing: Drawing, forces: Forces | None = None, over: Sequence[float] = ()) -> Page:
+def page_of(poses: Poses, drawing: Drawing, forces: Forces | None = None) -> Page:
     """Return the page of one motion: it computes itself where its formulas can be written down, else it replays and says why.
 
     Parameters
@@ -413,8 +413,6 @@ def page_of(poses: Poses, drawing: Drawing, forces: Forces | None = None, over: 
         What a page that replays draws.
     forces : Forces, optional
         Those of the motion, where they are to be there too.
-    over : sequence of float
-        The input of the pose that is shown at first.
     """
     m = poses.mechanism
     named = places(m, ORDERS)
@@ -436,7 +434,7 @@ def page_of(poses: Poses, drawing: Drawing, forces: Forces | None = None, over: 
         columns[header] = j, Shown((), header, 1.0 if entry.is_slide else degree)
     for each in listed:
         columns[each.header] = each, Shown((), each.header, degree if each.in_degrees else 1.0)
-    made = computing_page(poses, columns, named, arrows, first=over or None)
+    made = computing_page(poses, columns, named, arrows)
     if isinstance(made, Page):
         return made
     from virtualwork.animation import of_motion

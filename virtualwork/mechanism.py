@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
-from virtualwork.describe.description import Description
+from virtualwork.describe.numbered import Numbered
 from virtualwork.describe.reader import read, read_text
 from virtualwork.motion import Motion
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from dalembert.page import Page
-    from virtualwork.describe.dimensions import Dimension
     from virtualwork.evaluator import Evaluator
     from virtualwork.family.design import Design
     from virtualwork.family.fitted import Fit
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
     from virtualwork.study.newton_table import AllAtOnce
 
 
-class Mechanism(Description):
+class Mechanism(Numbered):
     """A planar mechanism: its links and joints, its inputs and its loads.
 
     Parameters
@@ -222,56 +221,6 @@ class Mechanism(Description):
         from virtualwork.evaluator import Evaluator
 
         return Evaluator(self.assembly, *wanted)
-
-    @property
-    def dimensions(self) -> dict[str, Dimension]:
-        """Every number of the description by its path in the file, `links.crank.B.x`, with its kind and unit."""
-        from virtualwork.describe.dimensions import dimensions
-
-        return dimensions(self)
-
-    def value(self, path: str) -> float | complex:
-        """Return the number at a path, SI; x + iy of a point; 0 for a rate of an input that the file does not give.
-
-        Raises
-        ------
-        DescriptionError
-            Where the path names no number.
-
-        Examples
-        --------
-        >>> from virtualwork import Input, Link
-        >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j, "P": (3, 4)}, mass=2)}, inputs=Input("arm"))
-        >>> arm.value("links.arm.mass"), arm.value("links.arm.P")
-        (2.0, (3+4j))
-        """
-        from virtualwork.describe.dimensions import value
-
-        return value(self, path)
-
-    def changed(self, numbers: Mapping[str, complex | tuple[float, float]]) -> Mechanism:
-        """Return this mechanism with other numbers at some paths.
-
-        Parameters
-        ----------
-        numbers : mapping of path to number
-            SI; a point's own path takes x + iy or (x, y).
-
-        Raises
-        ------
-        DescriptionError
-            Where a path names no number, or the mechanism cannot be so.
-
-        Examples
-        --------
-        >>> from virtualwork import Input, Link
-        >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j, "P": (3, 4)}, mass=2)}, inputs=Input("arm"))
-        >>> arm.changed({"links.arm.mass": 5.0, "links.arm.P.x": 1.0}).value("links.arm.P")
-        (1+4j)
-        """
-        from virtualwork.describe.dimensions import changed
-
-        return changed(self, numbers)
 
     def vary(self, numbers: Mapping[str, ArrayLike]) -> Variants:
         """Return a family of variants of this mechanism, with other numbers at the paths of some dimensions.

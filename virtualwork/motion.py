@@ -20,18 +20,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.guard import Lock, guarded, unlocked
 from dalembert.arithmetic.records import alike
-from dalembert.hints import choices
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
-from virtualwork.describe.parts import Point, as_point
 from virtualwork.formulas.forces import Effort, Force, Reaction, Shaking, ShakingMoment
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.one_pose import one_pose
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.motion_views import MotionViews
-from virtualwork.parts_of_motion import LinkMotion, PointMotion, SlideMotion
+from virtualwork.parts_of_motion import LinkMotion, NamedParts, PointMotion, SlideMotion
 from virtualwork.plan.steps import Step
 
 if TYPE_CHECKING:
@@ -48,7 +46,7 @@ ENDS = 10
 
 
 @guarded
-class Motion(MotionViews):
+class Motion(NamedParts[PointMotion, LinkMotion, SlideMotion], MotionViews):
     """Position, velocity, acceleration, jerk and forces at given inputs, each computed on request.
 
     `Mechanism.motion` makes one. See there for the parameters.
@@ -58,6 +56,8 @@ class Motion(MotionViews):
     assembly : Assembly
         Which assembly moves.
     """
+
+    kinds = PointMotion, LinkMotion, SlideMotion
 
     def __init__(
         self,
@@ -151,48 +151,6 @@ class Motion(MotionViews):
 
     # --- what moves -----------------------------------------------------------------------------------------------
     @unlocked
-    def point(self, name: str) -> PointMotion:
-        """Return the motion of a named point.
-
-        Raises
-        ------
-        DescriptionError
-            Where no body has a point of that name.
-        """
-        place = self.assembly.mechanism.points.get(name)
-        if place is None:
-            raise DescriptionError(f"no point is named '{name}'{choices(str(name), self.mechanism.points)}")
-        return PointMotion(self, *place, name)
-
-    @unlocked
-    def at(self, link: str, point: Point | str) -> PointMotion:
-        """Return the motion of any point of a link: a name, or coordinates in the link's own axes."""
-        if isinstance(point, str):
-            return PointMotion(self, link, self.mechanism.bodies[link][point], point)
-        return PointMotion(self, link, point if isinstance(point, complex) else as_point(point))
-
-    @unlocked
-    def link(self, name: str) -> LinkMotion:
-        """Return the motion of a link.
-
-        Raises
-        ------
-        DescriptionError
-            Where there is no link of that name.
-        """
-        if name not in self.assembly.mechanism.links:
-            raise DescriptionError(f"no link is named '{name}'{choices(str(name), self.mechanism.links)}")
-        return LinkMotion(self, name)
-
-    @unlocked
-    def slide(self, name: str) -> SlideMotion:
-        """Return the motion along the guide in which the named point runs."""
-        for i, guide in enumerate(self.mechanism.guides):
-            if guide.point == name:
-                return SlideMotion(self, i)
-        raise DescriptionError(f"no slot or slider runs at a point named '{name}'")
-
-    @unlocked
     def values(self, keys: Sequence[Quantity]) -> list[Any]:
         """Return several quantities by their keys, (n,) each."""
         return self._values(tuple(keys))
@@ -264,7 +222,7 @@ class Motion(MotionViews):
         if joints:
             errors = self.dynamics.error_estimate()
             errors.together(joints.values())
-            estimates |= {name: key.read(errors) for name, key in joints.items()}
+            estimates |= {name: errors.of(key) for name, key in joints.items()}
         return {name: estimates[name] for name in keys}
 
     # --- forces -----------------------------------------------------------------------------------------------

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
+from dalembert.hints import choices
+from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
+from virtualwork.describe.parts import Point as Place
+from virtualwork.describe.parts import as_point
 from virtualwork.formulas.kinematics import Angle, AnglePartial, Point, PointPartial, Slide
 from virtualwork.formulas.numbers import Complexes, Reals, xy
 from virtualwork.formulas.quantity import Quantity
@@ -258,3 +262,79 @@ class SlideMotion(OfOneMechanism, SlideRates):
 
     def __repr__(self) -> str:
         return f"SlideMotion({self.motion.mechanism.guides[self.guide].point}, {self.motion.n} poses)"
+
+
+P = TypeVar("P", bound=PointRates)
+L = TypeVar("L", bound=LinkRates)
+S = TypeVar("S", bound=SlideRates)
+
+
+class NamedParts(Generic[P, L, S]):
+    """A motion whose points, links and slides have names; `kinds` are what the motion of each of these is."""
+
+    kinds: tuple[type[P], type[L], type[S]]
+
+    @property
+    def mechanism(self) -> Description:
+        """What moves."""
+        raise NotImplementedError
+
+    def value(self, key: Quantity) -> Any:
+        """Return a quantity."""
+        raise NotImplementedError
+
+    def vector(self, key: Quantity) -> Reals:
+        """Return a vector, its parts along the last axis."""
+        raise NotImplementedError
+
+    def point(self, name: str) -> P:
+        """Return the motion of a named point.
+
+        Raises
+        ------
+        DescriptionError
+            Where no body has a point of that name.
+        """
+        points = self.mechanism.points
+        if name not in points:
+            raise DescriptionError(f"no point is named '{name}'{choices(str(name), points)}")
+        return self.kinds[0](self, *points[name], name)
+
+    def at(self, link: str, point: Place | str) -> P:
+        """Return the motion of any point of a link: a name, or coordinates in the link's own axes.
+
+        Raises
+        ------
+        DescriptionError
+            Where there is no link of that name, or it has no point of that name.
+        """
+        places = self.mechanism.bodies.get(link)
+        if places is None:
+            raise self._no_link(link)
+        if not isinstance(point, str):
+            return self.kinds[0](self, link, point if isinstance(point, complex) else as_point(point))
+        if point not in places:
+            raise DescriptionError(f"link '{link}' has no point named '{point}'{choices(point, places)}")
+        return self.kinds[0](self, link, places[point], point)
+
+    def link(self, name: str) -> L:
+        """Return the motion of a link.
+
+        Raises
+        ------
+        DescriptionError
+            Where there is no link of that name.
+        """
+        if name not in self.mechanism.links:
+            raise self._no_link(name)
+        return self.kinds[1](self, name)
+
+    def _no_link(self, name: str) -> DescriptionError:
+        return DescriptionError(f"no link is named '{name}'{choices(str(name), self.mechanism.links)}")
+
+    def slide(self, name: str) -> S:
+        """Return the motion along the guide in which the named point runs."""
+        for i, guide in enumerate(self.mechanism.guides):
+            if guide.point == name:
+                return self.kinds[2](self, i)
+        raise DescriptionError(f"no slot or slider runs at a point named '{name}'")

@@ -10,7 +10,8 @@ from balancing.engine import reciprocating_forces
 from benchmarks.stress.pairs import Pairs, noise, pairs
 from benchmarks.truth.machines import even_marks, shaking, turning_moments
 from benchmarks.truth.machines import once_per_turn as once_per_turn_truth
-from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance
+from virtualwork.textbook.link_states import LinkStates, UnitLoad
+from virtualwork.textbook.power_balance import balance
 
 ORDERS = 6
 

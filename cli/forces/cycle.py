@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from cli.cases.study import PoseCase, PoseStudy
 from cli.read.options import bad
 from dalembert.angles import degrees, in_turn
+from dalembert.arithmetic.exact import EPS
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table, names, number
@@ -179,19 +180,32 @@ def cycle_of(analysis: Analysis, coefficient: float | None) -> tuple[Table, str]
     if not reason and not np.isfinite(c.effort).all():
         reason = "the effort is not finite at every pose between those of the sweep"
     effort, place = ("force", "length") if slide else ("torque", "angle")
-    quantities: dict[str, tuple[str, Callable[[], float | None]]] = {
-        f"mean_{effort}": (effort, lambda: c.mean),
-        f"peak_{effort}": (effort, lambda: c.peak),
-        "peak_at": (place, lambda: c.peak_at if slide else _in_turns(c.peak_at, c.turns)),
-        f"rms_{effort}": (effort, lambda: c.rms),
-        "peak_power": ("power", lambda: c.peak_power),
-        "work": ("energy", lambda: c.work),
-        "energy_closure": ("energy", lambda: c.closure),
+    quantities: dict[str, tuple[str, str, Callable[[], float | None]]] = {
+        f"mean_{effort}": (effort, "mean", lambda: c.mean),
+        f"peak_{effort}": (effort, "peak", lambda: c.peak),
+        "peak_at": (place, "peak_at", lambda: c.peak_at if slide else _in_turns(c.peak_at, c.turns)),
+        f"rms_{effort}": (effort, "rms", lambda: c.rms),
+        "peak_power": ("power", "peak_power", lambda: c.peak_power),
+        "work": ("energy", "work", lambda: c.work),
+        "energy_closure": ("energy", "", lambda: c.closure),
     }
-    values = {name: None if reason else value() for name, (_, value) in quantities.items()}
+
+    @cache
+    def errors() -> dict[str, float]:
+        known = c.error_estimate()
+        known["peak_at"] = known["peak_at"] if slide else math.degrees(known["peak_at"])
+        # the inertia of a flywheel is in proportion to it
+        known["share"] = known["fluctuation"] / c.fluctuation + 8 * EPS if c.fluctuation else math.inf
+        return known
+
+    def column(name: str, dimension: str, of: str, value: float | None) -> Column:
+        computed = np.array([value], dtype=float)
+        error = (lambda: [errors()[of]]) if of and value is not None else None
+        return number(name, dimension, computed, error=error)
+
     columns = [
-        number(name, dimension, np.array([values[name]], dtype=float))
-        for name, (dimension, _) in quantities.items()
+        column(name, dimension, of, None if reason else value())
+        for name, (dimension, of, value) in quantities.items()
     ]
     wheel = math.nan
     if coefficient is not None and not reason:
@@ -203,7 +217,10 @@ def cycle_of(analysis: Analysis, coefficient: float | None) -> tuple[Table, str]
             raise DataError(f"{analysis.file}: --flywheel: {error}") from None
     flywheel = [number("flywheel_inertia", "inertia", [wheel])]
     if coefficient is not None and not reason:
-        columns += [*flywheel, number("energy_fluctuation", "energy", [c.fluctuation])]
+        columns += [
+            number("flywheel_inertia", "inertia", [wheel], error=lambda: [wheel * errors()["share"]]),
+            column("energy_fluctuation", "energy", "fluctuation", c.fluctuation),
+        ]
         flywheel = []
     if reason:
         return Table([], place="cycle", documented=[*columns, *flywheel]), reason

@@ -18,7 +18,7 @@ from cli.cases.analysis import Analysis
 from cli.cases.poses import bound, bounds_of, cells, cells_of, column, keys_of, pose_keys, solved
 from dalembert.results.columns import Table
 from virtualwork.formulas.forces import Applied, AppliedMoment
-from virtualwork.formulas.kinematics import Angle, Point, Slide, Turn
+from virtualwork.formulas.kinematics import Angle, Carried, Point
 from virtualwork.quantities import FORCE, LINK, POINT, links, vector
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def table(analysis: Analysis) -> Table:
         center = motion.mechanism.rigid[link].center
         if name in ("fvx_m_s", "fvy_m_s"):
             assert guide is not None
-            return bounds_of(_guided(along, guide, link))
+            return bounds_of(_guided(motion, guide, link, field))
         key: Quantity = Applied(link) if name in FORCE else AppliedMoment(link)
         if name in LINK:
             key = Angle(link, LINK.index(name))
@@ -188,14 +188,6 @@ def _marks(motion: Motion, field: int | None) -> list[Mark]:
     m, n = motion.mechanism, motion.n
     marks: list[Mark] = []
 
-    def turning(link: str) -> NDArray[np.float64]:
-        of = motion.link(link)
-        return of.omega if field is None else of.coefficient(field)
-
-    def velocity(link: str, point: complex | str) -> NDArray[np.complex128]:
-        of = motion.at(link, point)
-        return of.complex(1) if field is None else of.coefficient(field)
-
     for j, entry in enumerate(m.inputs):
         name = f"?{entry.name}"
         if not entry.is_slide:
@@ -203,22 +195,16 @@ def _marks(motion: Motion, field: int | None) -> list[Mark]:
             plain = len(m.inputs) == 1 and reacts == GROUND
             for link, mark in ((str(entry.link), "?" if plain else name), (reacts, f"{name}*-1")):
                 if link != GROUND:
-                    effort = {"torque_N_m": [mark] * n, "omega_rad_s": cells(turning(link))}
+                    effort = {"torque_N_m": [mark] * n, "omega_rad_s": cells(_turning(motion, link, field))}
                     marks.append(Mark(link, effort))
             continue
         i = next(i for i, g in enumerate(m.guides) if g.point == entry.slider)
         g = m.guides[i]
-        forces = motion.dynamics
-        (rail,) = forces.scene.over([partial(forces.reactions.rail, guide=i)], complex)
-        through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
-        slide = motion.slide(g.point).position
+        rail = _rail(motion, i)
         for link, sign in ((g.link, 1.0), (g.on, -1.0)):
             if link == GROUND:
                 continue
-            if sign > 0:
-                at = velocity(link, g.point)
-            else:
-                at = velocity(link, through) + 1j * turning(link) * slide * rail
+            at = _velocity(motion, link, g.point, field) if sign > 0 else _carried(motion, i, field)
             share: Part = {**_vector(("fvx_m_s", "fvy_m_s"), at)}
             share["fx_N"] = [_share(name, sign * float(c)) for c in rail.real]
             share["fy_N"] = [_share(name, sign * float(c)) for c in rail.imag]
@@ -233,13 +219,38 @@ def _share(name: str, factor: float) -> str:
     return name if factor == 1.0 else f"{name}*{factor!r}"
 
 
-def _guided(motion: Motion, guide: int, link: str) -> NDArray[np.float64]:
-    """Bound the error of the velocity of the point at which a driven slider's force acts on a link."""
-    m, r = motion.mechanism, motion.rounding
-    g = m.guides[guide]
+def _turning(motion: Motion, link: str, field: int | None) -> NDArray[np.float64]:
+    of = motion.link(link)
+    return of.omega if field is None else of.coefficient(field)
+
+
+def _velocity(motion: Motion, link: str, point: complex | str, field: int | None) -> NDArray[np.complex128]:
+    of = motion.at(link, point)
+    return of.complex(1) if field is None else of.coefficient(field)
+
+
+def _rail(motion: Motion, guide: int) -> NDArray[np.complex128]:
+    """Return the direction of a guide."""
+    forces = motion.dynamics
+    (rail,) = forces.scene.over([partial(forces.reactions.rail, guide=guide)], complex)
+    return np.asarray(rail)
+
+
+def _carried(motion: Motion, guide: int, field: int | None) -> NDArray[np.complex128]:
+    """Return the velocity of the point of a guide's body at which its slide stands, in one field (None: the motion's own)."""
+    g = motion.mechanism.guides[guide]
+    base = _velocity(motion, g.on, motion.mechanism.through(g), field)
+    slide = motion.slide(g.point).position
+    return np.asarray(base + 1j * _turning(motion, g.on, field) * slide * _rail(motion, guide))
+
+
+def _guided(motion: Motion, guide: int, link: str, field: int | None) -> NDArray[np.float64]:
+    """Return the error of the velocity of the point at which a driven slider's force acts on a link."""
+    from virtualwork.digits.estimates import Estimates
+
+    along = motion if field is None else motion.unit(field)
+    g = motion.mechanism.guides[guide]
     if link == g.link:
-        return motion.at(link, g.point).error_estimate(1)
-    slide, omega = np.abs(motion.value(Slide(guide, 0))), np.abs(motion.link(link).omega)
-    carried = motion.at(link, m.through(g)).error_estimate(1)
-    turned = slide * (r.of(Angle(link, 1)) + omega * r.of(Turn(link))) + omega * r.of(Slide(guide, 0))
-    return np.asarray(carried + turned)
+        return along.at(link, g.point).error_estimate(1)
+    value = _carried(motion, guide, field)
+    return Estimates(along.poses, lambda _: [value]).of(Carried(guide, 1))

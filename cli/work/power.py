@@ -14,7 +14,8 @@ from cli.work.states import Cell, Real, StateTable, Unknown
 from dalembert.arithmetic.doubled import Doubled
 from dalembert.errors import DataError
 from dalembert.results.columns import finite
-from virtualwork.textbook.link_states import KINDS, Again, Balance, LinkStates, UnitLoad, balance
+from virtualwork.textbook.link_states import KINDS, LinkStates, UnitLoad
+from virtualwork.textbook.power_balance import Again, Balance, balance
 
 
 def _unit_load(x: Any, y: Any, torque: Any) -> UnitLoad:

@@ -26,6 +26,7 @@ from dalembert.arithmetic.doubled_functions import (
     rint,
     root,
 )
+from dalembert.arithmetic.doubled_operations import chosen, compared, cross, power, product, running
 from dalembert.arithmetic.doubled_vectors import OWN, Vectors, total
 
 Array = NDArray[np.float64]
@@ -343,57 +344,6 @@ def _of(function: Callable[..., Doubled]) -> Callable[..., DoubledArray]:
     return work
 
 
-def _compared(ufunc: Any) -> Callable[..., Any]:
-    """A comparison, by the sign of the difference."""
-
-    def work(a: DoubledArray, b: DoubledArray) -> Any:
-        same = a.high == b.high
-        return ufunc(np.where(same, a.low, a.high), np.where(same, b.low, b.high))
-
-    return work
-
-
-def _chosen(a: DoubledArray, b: DoubledArray, first: Any) -> DoubledArray:
-    return DoubledArray(np.where(first, a.high, b.high), np.where(first, a.low, b.low))
-
-
-def _power(x: DoubledArray, y: DoubledArray) -> DoubledArray:
-    """Whole powers, by squares."""
-    left = np.abs(y.high).astype(np.int64)
-    result: DoubledArray = x * 0.0 + np.ones(np.shape(left))
-    square = x
-    while left.any():
-        result = _chosen(result * square, result, left % 2 > 0)
-        square, left = square * square, left // 2
-    return _chosen(1.0 / result, result, y.high < 0) if (y.high < 0).any() else result
-
-
-def _running(step: Callable[[DoubledArray, DoubledArray], DoubledArray], x: DoubledArray) -> DoubledArray:
-    """The running sums or products along the first axis: of 1, 2, 4 … numbers before each."""
-    apart = 1
-    while apart < len(x):
-        x = _each(np.concatenate, [x[:apart], step(x[apart:], x[:-apart])])
-        apart *= 2
-    return x
-
-
-def _product(a: DoubledArray, b: DoubledArray) -> Any:
-    """The product of matrices and vectors."""
-    rows, columns = (a[None, :] if a.ndim == 1 else a), (b[:, None] if b.ndim == 1 else b)
-    result = (rows[..., :, :, None] * columns[..., None, :, :]).sum(axis=-2)
-    if b.ndim == 1:
-        result = result[..., 0]
-    if a.ndim == 1:
-        result = result[..., 0, :] if b.ndim > 1 else result[..., 0]
-    return result
-
-
-def _cross(a: Any, b: Any) -> Any:
-    a, b = _entering(a), _entering(b)
-    (x, y, z), (X, Y, Z) = ([v[..., i] for i in range(3)] for v in (a, b))
-    return np.stack([y * Z - z * Y, z * X - x * Z, x * Y - y * X], axis=-1)
-
-
 def _zeros(like: DoubledArray, dtype: Any = float, shape: Any = None) -> Any:
     shape = like.shape if shape is None else shape
     real, imag = (DoubledArray(np.zeros(shape), np.zeros(shape)) for _ in range(2))
@@ -408,16 +358,16 @@ _UFUNCS: dict[Any, Callable[..., Any]] = {
     np.negative: lambda x: DoubledArray(-x.high, -x.low),
     np.absolute: _of(abs),
     np.square: _of(lambda x: x * x),
-    np.power: _power,
+    np.power: power,
     np.sqrt: _of(root),
     np.hypot: _of(hypot),
     np.sin: _of(DOUBLED.sin),
     np.cos: _of(DOUBLED.cos),
     np.arctan2: _of(direction),
     np.arctan: _of(lambda x: direction(x, Doubled(1.0 + 0.0 * x.high))),
-    np.copysign: lambda x, y: _chosen(x, -x, np.signbit(x.high) == np.signbit(y.high)),
-    np.minimum: lambda a, b: _chosen(a, b, a < b),
-    np.maximum: lambda a, b: _chosen(a, b, a > b),
+    np.copysign: lambda x, y: chosen(x, -x, np.signbit(x.high) == np.signbit(y.high)),
+    np.minimum: lambda a, b: chosen(a, b, a < b),
+    np.maximum: lambda a, b: chosen(a, b, a > b),
     np.exp: _of(exponential),
     np.log: _of(logarithm),
     np.arcsinh: lambda x: np.copysign(np.log(np.abs(x) + np.sqrt(x * x + 1.0)), x),
@@ -431,9 +381,9 @@ _UFUNCS: dict[Any, Callable[..., Any]] = {
     np.isfinite: lambda x: np.isfinite(x.high),
     np.isinf: lambda x: np.isinf(x.high),
     np.isnan: lambda x: np.isnan(x.high),
-    np.matmul: _product,
+    np.matmul: product,
     **{
-        each: _compared(each)
+        each: compared(each)
         for each in (np.less, np.less_equal, np.greater, np.greater_equal, np.equal, np.not_equal)
     },
 }
@@ -460,13 +410,13 @@ _PLACES: dict[Any, Iterable[int]] = {
 }
 
 _OWN: dict[Any, Callable[..., Any]] = {
-    np.cross: _cross,
+    np.cross: cross,
     np.sum: lambda x, axis=-1, **_: x.sum(axis),
     np.empty_like: _zeros,
     np.zeros_like: _zeros,
     np.diff: lambda x: x[1:] - x[:-1],
-    np.cumsum: lambda x: _running(lambda a, b: a + b, x),
-    np.cumprod: lambda x: _running(lambda a, b: a * b, x),
+    np.cumsum: lambda x: running(lambda a, b: a + b, x),
+    np.cumprod: lambda x: running(lambda a, b: a * b, x),
     np.shape: lambda x: x.shape,
     np.ndim: lambda x: x.ndim,
 }

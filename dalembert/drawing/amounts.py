@@ -18,17 +18,17 @@ NOISE = 1e-12
 """A value below this share of the scale of its kind is the rounding of zero."""
 
 
-def prefixed(largest: float, unit: str, at_most: float = 1e4) -> tuple[float, str]:
+def prefixed(largest: float, unit: str) -> tuple[float, str]:
     """Return by what to multiply numbers up to `largest` in a unit, and the unit they are then in.
 
-    Numbers from 0.01 up to `at_most` stay in the unit they have. A unit that takes no prefix goes by powers of ten.
+    Numbers from 0.01 up to 10 000 stay in the unit they have. A unit that takes no prefix goes by powers of ten.
 
     >>> prefixed(2.5e6, "W"), prefixed(0.4, "N·m"), prefixed(2e5, "g·mm"), prefixed(3e5, "rad/s²")
     ((1e-06, 'MW'), (1, 'N·m'), (0.001, 'kg·mm'), (0.001, '10³ rad/s²'))
     >>> prefixed(1.2e6, "g·mm")
     (1e-06, 'kg·m')
     """
-    if not np.isfinite(largest) or largest <= 0 or 0.01 <= largest < at_most:
+    if not np.isfinite(largest) or largest <= 0 or 0.01 <= largest < 1e4:
         return 1, unit
     steps = int(np.floor(np.log10(largest) / 3)) * 3
     parts = re.fullmatch(rf"([{''.join(PREFIXES.values())}]?)({'|'.join(LADDERS)})((?![A-Za-z]).*)", unit)

@@ -190,12 +190,12 @@ def vector(
     return [Column(f"{name}_{axis}", own, si[:, i], errors(i), f"{key}.{i}") for i, axis in enumerate(axes)]
 
 
-def read_number(name: str, dimension: str, values: ArrayLike, unit: str, place: str | None = "") -> Column:
+def read_number(name: str, dimension: str, values: ArrayLike, unit: str) -> Column:
     """A quantity that is a number of the unit shown, such as a mass rounded to a step; JSON has it in SI."""
     import numpy as np
 
     own, array = document_unit(dimension), np.asarray(values, dtype=float)
-    key = None if place is None else f"{place or name}_{own}".rstrip("_")
+    key = f"{name}_{own}".rstrip("_")
     stored = array if unit == own else from_si(to_si(array, dimension, unit), dimension, own)
     return Column(name, unit, array, None, key, stored)
 

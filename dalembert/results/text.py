@@ -136,10 +136,10 @@ def transposed(rows: Sequence[Mapping[str, Cell]]) -> dict[str, list[Cell]]:
     return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
 
 
-def with_uncertainty(value: float, uncertainty: float | None, figures: int = 4) -> str:
+def with_uncertainty(value: float, uncertainty: float | None) -> str:
     """Write a number as people do: to the place of its uncertainty, which has two figures below 3, else one.
 
-    Without one: this number of figures.
+    Without one: four figures.
 
     >>> with_uncertainty(95.1234, 0.913), with_uncertainty(95.1234, 0.123), with_uncertainty(12345.6, 230.0)
     ('95.1 ± 0.9', '95.12 ± 0.12', '12350 ± 230')
@@ -149,7 +149,7 @@ def with_uncertainty(value: float, uncertainty: float | None, figures: int = 4) 
     from math import floor, isfinite, log10
 
     if uncertainty is None or not isfinite(uncertainty) or uncertainty <= 0:
-        return f"{value:.{figures}g}"
+        return f"{value:.4g}"
     place = floor(log10(uncertainty))
     two = float(f"{uncertainty / 10**place:.2g}") < 3
     last = place - two

@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance
+from virtualwork.textbook.link_states import LinkStates, UnitLoad
+from virtualwork.textbook.power_balance import balance
 
 
 def slider_crank(r: float, length: float, theta: float, omega: float) -> tuple[float, float]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from virtualwork import Guess, Guide, Input, Link, Mechanism
+from virtualwork.study.counterweights import pivot
 
 SWEEP = np.linspace(0, 2 * np.pi, 361)
 
@@ -40,3 +41,29 @@ def slider_crank(r: float = 0.1, length: float = 0.3, **given: Any) -> Mechanism
         guess=Guess(at=(1.0,), angles={"rod": -0.3}),
         **given,
     )
+
+
+def berkof_lowen(mechanism: Mechanism, crank: str, coupler: str, rocker: str) -> dict[str, complex]:
+    """Return the counterweights on crank and rocker that balance a four-bar's shaking force completely.
+
+    R. S. Berkof and G. G. Lowen (J. Eng. Ind. 91, 1969, 21): the common centre of mass rests where, by the loop
+    closure, the coupler's mass is shared between its two pins, m₃ (1 − z₃/l₃) at the crank's and m₃ z₃/l₃ at the
+    rocker's (complex shares, z₃ in the coupler's axes along its pins), and each turning link is balanced with its share.
+    Mass times radius, complex kg·m, in the link's axes from its pivot.
+    """
+    links = mechanism.links
+
+    def shared(a: str, b: str) -> str:
+        common = [p for p in links[a].points if p in links[b].points]
+        assert len(common) == 1
+        return common[0]
+
+    b, c = shared(crank, coupler), shared(coupler, rocker)
+    body = links[coupler]
+    share = (body.center - body.points[b]) / (body.points[c] - body.points[b])
+    result = {}
+    for link, point, part in ((crank, b, 1 - share), (rocker, c, share)):
+        base = pivot(mechanism, link)
+        own = links[link].mass * (links[link].center - base)
+        result[link] = -(own + body.mass * part * (links[link].points[point] - base))
+    return result

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from tests.virtualwork.mechanisms import berkof_lowen
 from virtualwork import (
     DescriptionError,
     Friction,
@@ -19,7 +20,7 @@ from virtualwork import (
     Torque,
     TorsionSpring,
 )
-from virtualwork.study.counterweights import berkof_lowen, least_squares
+from virtualwork.study.counterweights import least_squares
 from virtualwork.study.cycle import Cycle
 
 G = 9.81

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from virtualwork.textbook.link_states import KINDS, LinkStates, UnitLoad, balance
+from virtualwork.textbook.link_states import KINDS, LinkStates, UnitLoad
+from virtualwork.textbook.power_balance import balance
 
 numbers = st.floats(-1e3, 1e3).filter(lambda x: x == 0 or abs(x) > 1e-3)
 pair = st.tuples(numbers, numbers)

@@ -27,6 +27,7 @@ from virtualwork.describe.dimensions import value as number_at
 from virtualwork.describe.reader import read_text
 from virtualwork.describe.text import toml_text
 from virtualwork.drawing import Circle, Line, draw
+from virtualwork.formulas.forces import Generalized
 
 R = 0.03
 
@@ -65,7 +66,7 @@ def test_a_pinion_moves_its_rack_by_its_radius(radius: float, angle: float) -> N
     tooth = 2.0 * radius * 10.0 * along
     assert np.allclose(motion.reaction("O", on="pinion"), [tooth.real, tooth.imag], rtol=1e-14, atol=1e-16)
     assert np.allclose(motion.reaction("R", on="rack"), 0.0, atol=1e-15)
-    assert motion.effort == pytest.approx(motion.dynamics.generalized[:, 0])
+    assert motion.effort == pytest.approx(motion.dynamics.value(Generalized(0)))
 
 
 def test_a_rack_on_an_arm_that_is_driven_on_another_stands_at_its_guess() -> None:

@@ -122,3 +122,13 @@ def test_times_that_are_no_numbers(times):
             of.simulate(times)
     with pytest.raises(ValueError, match="speed: expected real numbers, found 'fast'"):
         m.simulate([0, 1], speed="fast")
+
+
+def test_a_point_of_a_link_that_is_not_there():
+    """Of a motion, and of one of variants: the message names what is missing."""
+    m = Mechanism({"O": 0j}, ARM, inputs=Input("arm"))
+    for motion in (m.motion(0.3), m.vary({"links.arm.mass": [1.0, 2.0]}).motion(0.3)):
+        with pytest.raises(DescriptionError, match="link 'arm' has no point named 'Q': expected one of O, P"):
+            motion.at("arm", "Q")
+        with pytest.raises(DescriptionError, match="no link is named 'arn'; did you mean 'arm'"):
+            motion.at("arn", 1j)

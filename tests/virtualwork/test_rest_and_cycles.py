@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.virtualwork.mechanisms import SWEEP, four_bar, slider_crank
+from tests.virtualwork.mechanisms import SWEEP, berkof_lowen, four_bar, slider_crank
 from virtualwork import Force, Guess, Guide, Input, Link, Mechanism, Spring, Torque, equilibria
 from virtualwork.describe import DescriptionError
-from virtualwork.study.counterweights import berkof_lowen, least_squares
+from virtualwork.study.counterweights import least_squares
 from virtualwork.study.cycle import Cycle
 
 # -- equilibrium ------------------------------------------------------------------------------------------------

@@ -11,8 +11,10 @@ import numpy as np
 from benchmarks.stress.groups import compare
 from tests.virtualwork.judged import judge
 from virtualwork import Guess, Guide, Input, Link, Mechanism, Spring, equilibria
+from virtualwork.formulas.kinematics import Carried
 from virtualwork.study.cycle import Cycle
-from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance
+from virtualwork.textbook.link_states import LinkStates, UnitLoad
+from virtualwork.textbook.power_balance import balance
 
 # --- tables of link states ------------------------------------------------------------------------------------------
 
@@ -139,3 +141,24 @@ def test_a_guide_that_turns() -> None:
         guess=Guess(at=1.0, angles={"bar": 2.0}),
     )
     judge([p for q in (1.0, 1.2, 2.0) for p in compare(m.motion(q, 2.0, -1.0))])
+
+
+def test_the_point_of_a_rail_at_which_a_slide_stands() -> None:
+    """Its velocity i·ω·(T + s·e^{iδ})·e^{iθ}, without that along the rail: of a driven slide on a turning arm."""
+    rng, pairs = np.random.default_rng(3), []
+    for _ in range(50):
+        at, turned = complex(*rng.normal(size=2)), float(rng.uniform(-3, 3))
+        m = Mechanism(
+            {"A": 0j},
+            {"arm": Link({"A": 0j, "T": at}), "block": Link({"B": 0j})},
+            guides=[Guide("B", "block", on="arm", through="T", angle=turned, turned=0.0)],
+            inputs=[Input(link="arm"), Input(slider="B")],
+            guess=Guess([0.3, 0.4]),
+        )
+        q, s, speed = rng.normal(size=3)
+        motion = m.motion([[q, s]], [[speed, 0.7]])
+        with mp.workdps(40):
+            place = (mp.mpc(at) + mp.mpf(s) * mp.expj(mp.mpf(turned))) * mp.expj(mp.mpf(q))
+            off = abs(1j * mp.mpf(speed) * place - mp.mpc(complex(motion.value(Carried(0, 1))[0])))
+        pairs.append((float(off), float(motion.rounding.of(Carried(0, 1))[0])))
+    judge(pairs)

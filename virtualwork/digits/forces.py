@@ -6,7 +6,7 @@ digits until neither changes; where statics is redundant, the unknown forces are
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Any, cast
 
@@ -20,7 +20,6 @@ from virtualwork.formulas.forces import (
     AppliedMoment,
     Contact,
     Effort,
-    Generalized,
     JointForce,
     JointMoment,
     NewtonEuler,
@@ -45,10 +44,9 @@ class ForceErrors:
         self._poses = cast(Lanes, dynamics.poses)
         self.estimates = Estimates(self._poses, self._values)
 
-    @property
-    def by_key(self) -> Mapping[str, Joint]:
-        """The joints by their keys."""
-        return self.dynamics.by_key
+    def of(self, key: Quantity) -> Reals:
+        """Of a force by its key, (n,): the length of the error of a vector."""
+        return self.estimates.of(key)
 
     def _values(self, keys: Sequence[Quantity]) -> list[Any]:
         """The forces as they were handed out."""
@@ -73,7 +71,7 @@ class ForceErrors:
             return True
         return joint.guide is not None and self.mechanism.guides[joint.guide].is_slider
 
-    def _each(self, kind: type[Effort | Generalized | NewtonEuler]) -> Reals:
+    def _each(self, kind: type[Effort | NewtonEuler]) -> Reals:
         """Of a quantity of every input, (n, k)."""
         keys = [kind(j) for j in range(len(self.mechanism.inputs))]
         self.estimates.together(keys)
@@ -83,11 +81,6 @@ class ForceErrors:
     def effort(self) -> Reals:
         """Of `Dynamics.effort`, (n, k)."""
         return self._each(Effort)
-
-    @cached_property
-    def generalized(self) -> Reals:
-        """Of the generalized forces Σ F·K_j, (n, k): the effort, but for motors that sit on another body than `on`."""
-        return self._each(Generalized)
 
     @cached_property
     def newton_euler(self) -> Reals:
@@ -109,8 +102,6 @@ class ForceErrors:
     def reaction(self, joint: str, on: str) -> Reals:
         """Of `Dynamics.reaction`, (n,): the length of the error."""
         return self.estimates.of(Reaction(joint, on))
-
-    at_joint = reaction
 
     @cached_property
     def shaking(self) -> tuple[Reals, Reals]:

@@ -25,19 +25,17 @@ from numpy.typing import ArrayLike, NDArray
 from dalembert.arithmetic.engines import as_part
 from dalembert.arithmetic.guard import Lock, guarded, own_lock
 from dalembert.arithmetic.parts import in_parts
-from dalembert.hints import choices
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, by_path, changed, dimensions, named, value
-from virtualwork.describe.parts import Point, as_point
 from virtualwork.family.part import ASSEMBLED, LANES, Part, room
 from virtualwork.family.solver_cache import answer, forget
 from virtualwork.formulas.forces import Effort, Reaction
 from virtualwork.formulas.numbers import Number, Reals, real_array, xy
 from virtualwork.formulas.poses import as_inputs, check_rate
 from virtualwork.formulas.quantity import Quantity
-from virtualwork.parts_of_motion import LinkRates, PointRates, SlideRates
+from virtualwork.parts_of_motion import LinkRates, NamedParts, PointRates, SlideRates
 from virtualwork.plan.steps import joints
 
 if TYPE_CHECKING:
@@ -197,7 +195,7 @@ class LinkOfFamily(LinkRates):
 
 
 @guarded
-class FamilyMotion:
+class FamilyMotion(NamedParts[PointOfFamily, LinkOfFamily, SlideRates]):
     """Position, rates and forces of all variants over given inputs, on demand; `Family.motion` makes one.
 
     Attributes
@@ -206,6 +204,8 @@ class FamilyMotion:
         The variants and the inputs of their poses.
     executor : concurrent.futures.Executor or None
     """
+
+    kinds = PointOfFamily, LinkOfFamily, SlideRates
 
     def __init__(self, part: Part, executor: Executor | None = None) -> None:
         self.part, self.executor = part, executor
@@ -225,6 +225,11 @@ class FamilyMotion:
     def __repr__(self) -> str:
         v, n = self.part.shape
         return f"FamilyMotion({self.part.mechanism.name!r}: {v} variants in {n} poses)"
+
+    @property
+    def mechanism(self) -> Description:
+        """What they are variants of."""
+        return self.part.mechanism
 
     @property
     def inputs(self) -> Reals:
@@ -291,45 +296,6 @@ class FamilyMotion:
         except MechanismError as error:
             return str(error)
         return None if result is None else result.text()
-
-    # --- what moves -----------------------------------------------------------------------------------------------
-    def point(self, name: str) -> PointOfFamily:
-        """Return the motion of a named point.
-
-        Raises
-        ------
-        DescriptionError
-            Where no body has a point of that name.
-        """
-        points = self.part.mechanism.points
-        if name not in points:
-            raise DescriptionError(f"no point is named '{name}'{choices(name, points)}")
-        return PointOfFamily(self, *points[name], name)
-
-    def at(self, link: str, point: Point | str) -> PointOfFamily:
-        """Return the motion of any point of a link: a name, or coordinates in the link's own axes."""
-        if isinstance(point, str):
-            return self.point(point)
-        return PointOfFamily(self, link, as_point(point), None)
-
-    def link(self, name: str) -> LinkOfFamily:
-        """Return the motion of a link.
-
-        Raises
-        ------
-        DescriptionError
-            Where there is no link of that name.
-        """
-        if name not in self.part.mechanism.links:
-            raise DescriptionError(f"no link is named '{name}'{choices(name, self.part.mechanism.links)}")
-        return LinkOfFamily(self, name)
-
-    def slide(self, name: str) -> SlideRates:
-        """Return the motion along the guide in which the named point runs."""
-        for i, guide in enumerate(self.part.mechanism.guides):
-            if guide.point == name:
-                return SlideRates(self, i)
-        raise DescriptionError(f"no slot or slider runs at a point named '{name}'")
 
     # --- forces ---------------------------------------------------------------------------------------------------
     @property

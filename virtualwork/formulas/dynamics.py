@@ -91,7 +91,7 @@ class Dynamics:
         rates = (by.angle.get(body) for group in self.poses.plan.groups for body in group.angles)
         return any(rate and rate[0] is not None and not abs(rate[0]) * reach < FAST for rate in rates)
 
-    def _each(self, kind: type[Effort | Generalized | NewtonEuler]) -> Reals:
+    def _each(self, kind: type[Effort | NewtonEuler]) -> Reals:
         """A quantity of every input, (n, k)."""
         return np.stack(self.values([kind(j) for j in range(len(self.poses.mechanism.inputs))]), axis=1)
 
@@ -121,11 +121,6 @@ class Dynamics:
     def effort(self) -> Reals:
         """The effort at each input by virtual work, (n, k)."""
         return self._each(Effort)
-
-    @property
-    def generalized(self) -> Reals:
-        """What balances the loads at each input, (n, k): the effort, but for motors that sit on another body than `on`."""
-        return self._each(Generalized)
 
     @cached_property
     def reactions(self) -> JointForces:
@@ -162,11 +157,7 @@ class Dynamics:
 
     def reaction(self, joint: str, on: str) -> Reals:
         """The force of all others on a link at a joint, (n, 2): of a pin and of a guide, where both are of that name."""
-        return xy(self.at_joint(joint, on))
-
-    def at_joint(self, joint: str, on: str) -> Complexes:
-        """The same, (n,) complex."""
-        return np.asarray(self.value(Reaction(joint, on)))
+        return xy(np.asarray(self.value(Reaction(joint, on))))
 
     @cached_property
     def shaking(self) -> tuple[Reals, Reals]:

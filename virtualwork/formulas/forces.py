@@ -45,10 +45,6 @@ class Force(Quantity):
         """Its formula over one pose; None is zero."""
         raise NotImplementedError
 
-    def read(self, forces: Any) -> Any:
-        """Its values, (n,), of `dynamics.Dynamics`, or the estimates of their errors."""
-        raise NotImplementedError
-
     @property
     def family(self) -> tuple[type[Quantity], int]:
         return Force, 0
@@ -67,9 +63,6 @@ class Effort(Force, kind="effort"):
     def form(self, forces: PoseForces) -> Number:
         return forces.effort(self.input)
 
-    def read(self, forces: Any) -> Any:
-        return forces.effort[:, self.input]
-
 
 class Generalized(Force, kind="generalized"):
     """The effort as if every motor sat on the body that its angle is measured from."""
@@ -78,9 +71,6 @@ class Generalized(Force, kind="generalized"):
 
     def form(self, forces: PoseForces) -> Number:
         return forces.generalized(self.input)
-
-    def read(self, forces: Any) -> Any:
-        return forces.generalized[:, self.input]
 
 
 class NewtonEuler(Force, kind="newton-euler"):
@@ -91,9 +81,6 @@ class NewtonEuler(Force, kind="newton-euler"):
 
     def form(self, forces: PoseForces) -> Number:
         return forces.newton_euler(self.input)
-
-    def read(self, forces: Any) -> Any:
-        return forces.newton_euler[:, self.input]
 
 
 class JointForce(Force, kind="force"):
@@ -106,9 +93,6 @@ class JointForce(Force, kind="force"):
     def form(self, forces: PoseForces) -> Number:
         return forces.force(self.joint, self.body)
 
-    def read(self, forces: Any) -> Any:
-        return forces.joint_force(forces.by_key[self.joint], self.body)
-
 
 class JointMoment(Force, kind="moment"):
     """The moment of a joint, by its key, on a body about the joint's point, N·m: a guide's, or a pin's friction."""
@@ -119,9 +103,6 @@ class JointMoment(Force, kind="moment"):
 
     def form(self, forces: PoseForces) -> Number:
         return forces.moment(self.joint, self.body)
-
-    def read(self, forces: Any) -> Any:
-        return forces.joint_moment(forces.by_key[self.joint], self.body)
 
 
 class Reaction(Force, kind="reaction"):
@@ -135,9 +116,6 @@ class Reaction(Force, kind="reaction"):
         here = joints_at(forces.joints.joints, self.name, self.body)
         return sum((JointForce(joint.key, self.body).value(forces) for joint in here), 0.0)
 
-    def read(self, forces: Any) -> Any:
-        return forces.at_joint(self.name, self.body)
-
 
 class Contact(Force, kind="contact"):
     """How hard a cam, from 0, presses on its follower, N."""
@@ -146,9 +124,6 @@ class Contact(Force, kind="contact"):
     cam: int
 
     def form(self, forces: PoseForces) -> Number:
-        return forces.contact(self.cam)
-
-    def read(self, forces: Any) -> Any:
         return forces.contact(self.cam)
 
 
@@ -161,10 +136,6 @@ class Shaking(Force, kind="shaking"):
     def form(self, forces: PoseForces) -> Number:
         return forces.shaking()[0]
 
-    def read(self, forces: Any) -> Any:
-        force = forces.shaking[0]
-        return force if force.ndim == 1 else force[:, 0] + 1j * force[:, 1]
-
 
 class ShakingMoment(Force, kind="shaking moment"):
     """The shaking moment about the ground's origin, N·m."""
@@ -173,9 +144,6 @@ class ShakingMoment(Force, kind="shaking moment"):
 
     def form(self, forces: PoseForces) -> Number:
         return forces.shaking()[1]
-
-    def read(self, forces: Any) -> Any:
-        return forces.shaking[1]
 
 
 class Applied(Force, kind="applied"):
@@ -187,9 +155,6 @@ class Applied(Force, kind="applied"):
     def form(self, forces: PoseForces) -> Number:
         return forces.applied(self.link)[0]
 
-    def read(self, forces: Any) -> Any:
-        return forces.applied(self.link)[0]
-
 
 class AppliedMoment(Force, kind="applied moment"):
     """The moment of the same about the centre of mass, N·m."""
@@ -197,9 +162,6 @@ class AppliedMoment(Force, kind="applied moment"):
     link: str
 
     def form(self, forces: PoseForces) -> Number:
-        return forces.applied(self.link)[1]
-
-    def read(self, forces: Any) -> Any:
         return forces.applied(self.link)[1]
 
 

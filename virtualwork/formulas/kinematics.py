@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.numbers import Number
+from virtualwork.formulas.numbers import Number, minus, times
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.quantity import Planned, Quantity, Recording
 from virtualwork.formulas.rates import Rates
@@ -156,6 +156,30 @@ class Slide(Kinematic, kind="slide"):
     @classmethod
     def every(cls, m: Description, order: int) -> Iterator[Quantity]:
         return (cls(guide, order) for guide in range(len(m.guides)))
+
+
+class Carried(Kinematic, kind="carried"):
+    """The velocity of the point of a guide's body at which its slide stands, m/s: without that along the guide."""
+
+    is_vector = True
+    guide: int
+    order: int
+
+    def _slid(self, of: Planned) -> Term:
+        return Term(of.plan.directions[self.guide], of.mechanism.guides[self.guide].on, self.guide)
+
+    def _path(self, of: Planned) -> Path:
+        g = of.mechanism.guides[self.guide]
+        base, terms = of.plan.anchors[g.on]
+        return base, (*terms, Term(of.mechanism.through(g), g.on), self._slid(of))
+
+    def targets(self, of: Planned) -> Iterable[str]:
+        return sorted(path_reads(self._path(of)))
+
+    def rate(self, of: Planned, rates: Rates, k: int) -> Number:
+        slid = self._slid(of)
+        along = times(rates.slide[self.guide][k - 1], slid.z * rates.st.turn[slid.body])
+        return minus(rates.vector(self._path(of), k), along)
 
 
 class OfCam(Kinematic):

@@ -1,7 +1,7 @@
-"""Counterweights that balance the shaking force of a mechanism: completely, or best in the mean square.
+"""Counterweights that balance the shaking force of a mechanism best in the mean square.
 
-On a link that turns about a fixed pivot a counterweight of mass times
-radius u (complex, in the link's axes) adds the shaking force −u·d²(e^{iθ})/dt². The shaking force is linear in u.
+On a link that turns about a fixed pivot a counterweight of mass times radius u (complex, in the link's axes) adds the
+shaking force −u·d²(e^{iθ})/dt². The shaking force is linear in u.
 """
 
 from __future__ import annotations
@@ -94,41 +94,3 @@ def least_squares(motion: Moving, links: Sequence[str]) -> tuple[dict[str, compl
     weights = (vh.conj().T @ ((u.conj().T @ -before[rows]) / s)) / size
     after = before + matrix @ weights
     return dict(zip(links, (complex(w) for w in weights), strict=True)), before, after
-
-
-def berkof_lowen(mechanism: Description, crank: str, coupler: str, rocker: str) -> dict[str, complex]:
-    """Return the counterweights on crank and rocker that balance a four-bar's shaking force completely.
-
-    R. S. Berkof and G. G. Lowen (J. Eng. Ind. 91, 1969, 21): the common centre of mass rests where, by the loop
-    closure, the coupler's mass is shared between its two pins, m₃ (1 − z₃/l₃) at the crank's and m₃ z₃/l₃ at the
-    rocker's (complex shares, z₃ in the coupler's axes along its pins), and each turning link is balanced with its share.
-
-    Returns
-    -------
-    dict of link to mass times radius, complex kg·m, in the link's axes from its pivot; for the crank and the rocker
-
-    Examples
-    --------
-    >>> from virtualwork import Link, Mechanism
-    >>> four = Mechanism({"A": 0j, "D": 4}, {"crank": Link({"A": 0j, "B": 1}, mass=1, center=0.5),
-    ...     "coupler": Link({"B": 0j, "C": 3}, mass=3, center=1), "rocker": Link({"D": 0j, "C": 2}, mass=2, center=1)})
-    >>> berkof_lowen(four, "crank", "coupler", "rocker")
-    {'crank': (-2.5-0j), 'rocker': (-4-0j)}
-    """
-    links = mechanism.links
-
-    def shared(a: str, b: str) -> str:
-        common = [p for p in links[a].points if p in links[b].points]
-        if len(common) != 1:
-            raise DescriptionError(f"counterweights: {a} and {b} are not pinned to each other at one point")
-        return common[0]
-
-    b, c = shared(crank, coupler), shared(coupler, rocker)
-    body = links[coupler]
-    share = (body.center - body.points[b]) / (body.points[c] - body.points[b])
-    result = {}
-    for link, point, part in ((crank, b, 1 - share), (rocker, c, share)):
-        base = pivot(mechanism, link)
-        own = links[link].mass * (links[link].center - base)
-        result[link] = -(own + body.mass * part * (links[link].points[point] - base))
-    return result

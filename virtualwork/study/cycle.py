@@ -4,32 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
-from dalembert.arithmetic.guard import Lock, guarded
-from virtualwork.branch.limits import TURNS
-from virtualwork.digits.forces import ForceErrors
-from virtualwork.formulas.dynamics import Dynamics, Moving
+from dalembert.arithmetic.guard import guarded
+from virtualwork.formulas.at_rest import potential
+from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.loaded_pose import LoadedPose
 from virtualwork.formulas.loads import OWN
-from virtualwork.formulas.numbers import Number, Reals, minus, plus
-from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.numbers import EPS, Number, Reals, minus, plus
 from virtualwork.plan.steps import path_reads
-from virtualwork.study.between import Between, largest
+from virtualwork.study.between import ALIKE, largest
+from virtualwork.study.sweep import FINE, SAME, Sweep
 
-# the fewest poses of a turn, or of a law of motion, from which mean, work and energy are formed
-FINE = 1440
-# whole turns, and a law that ends where it begins, as tables have them in six decimals; loads that repeat themselves
-ROUNDED, SAME = 1e-6, 1e-9
-# poses at which loads are compared with those some turns later
-COMPARED = 16
+# of the sweep: how far from its largest value the effort is compared; what falls less than so many times as much twice as far
+# away has a kink
+BESIDE, KINK = 1e-6, 3.0
+# what a parabola leaves out of a top
+NEAR = 1.05
+AROUND = np.arange(-2.0, 3.0)
 
 
 @guarded
 @dataclass(frozen=True)
-class Cycle:
+class Cycle(Sweep):
     """A sweep as a cycle of work: mean, peak, energy balance, flywheel.
 
     Attributes
@@ -39,156 +38,6 @@ class Cycle:
         of power; else over the input, which must rise or fall throughout. Over a whole turn in equal steps integrals
         are by the trapezoidal rule, which then converges faster than any power of the step; else by a cubic spline.
     """
-
-    motion: Moving
-
-    @property
-    def lock(self) -> Lock:
-        """That of the poses."""
-        return self.motion.dynamics.lock
-
-    @property
-    def poses(self) -> Poses:
-        """The poses of the sweep."""
-        return self.motion.dynamics.poses
-
-    @cached_property
-    def between(self) -> Between:
-        """The same motion between the poses."""
-        return Between(self.poses)
-
-    @cached_property
-    def input(self) -> Reals:
-        """The input, (n,)."""
-        return self.poses.inputs[:, 0]
-
-    @property
-    def timed(self) -> bool:
-        """Whether the cycle is over time."""
-        return self.poses.time is not None
-
-    @cached_property
-    def place(self) -> Reals:
-        """What the cycle is over, (n,): the time, s, or the input, rad or m."""
-        return self.between.place
-
-    @cached_property
-    def effort(self) -> Reals:
-        """The effort by virtual work, (n,)."""
-        return self.motion.dynamics.effort[:, 0]
-
-    @cached_property
-    def speed(self) -> Number:
-        """The input's speed, one or (n,)."""
-        return self.poses.rates[0][0]
-
-    # --- whether it is one ------------------------------------------------------------------------------------------
-    @cached_property
-    def turns(self) -> int | None:
-        """How many whole turns of the input the sweep is; None where it is not a whole number of them, or a slide.
-
-        A law over time that comes back is no turn: 0.
-        """
-        span = float(self.input[-1] - self.input[0])
-        if self.poses.mechanism.inputs[0].is_slide:
-            return 0 if self.timed and abs(span) <= ROUNDED * float(np.ptp(self.input)) else None
-        turns = round(span / (2 * np.pi))
-        within = ROUNDED * max(abs(span), float(np.ptp(self.input)))
-        return turns if abs(span - 2 * np.pi * turns) <= within else None
-
-    @cached_property
-    def whole(self) -> bool:
-        """Whether the sweep is a whole cycle, after which pose and loads come back to themselves."""
-        return self.reason is None
-
-    @cached_property
-    def reason(self) -> str | None:
-        """Why the sweep is no whole cycle, and which would be one; None where it is one."""
-        entry = self.poses.mechanism.inputs[0]
-        if self.poses.n < 2:
-            return "one pose is no cycle: give a sweep over whole turns of the input, 0deg:360deg:1deg"
-        if self.timed:
-            if self.turns is None:
-                return (
-                    f"the law of motion does not end where it begins ({self._shown(self.input[0])}, then "
-                    f"{self._shown(self.input[-1])}): a cycle over time ends in its first pose"
-                )
-        elif not self._one_way:
-            return (
-                f"the input {entry.name} does not rise or fall throughout: a cycle that dwells or returns needs a "
-                "column time_s with a time for each row"
-            )
-        elif entry.is_slide:
-            return (
-                f"one stroke of the slide {entry.name} is no cycle: give its motion there and back as a table over "
-                "time (--cases with a column time_s)"
-            )
-        if self.turns and self._repeats(self.turns):
-            return None
-        if self.timed and self.turns == 0:
-            return None
-        return self._turns_needed()
-
-    @property
-    def _one_way(self) -> bool:
-        steps = np.diff(self.input)
-        return bool((steps > 0).all() or (steps < 0).all())
-
-    def _shown(self, q: float) -> str:
-        slide = self.poses.mechanism.inputs[0].is_slide
-        return f"{q:.6g} m" if slide else f"{np.degrees(q):.6g} deg"
-
-    def _turns_needed(self) -> str:
-        """Why a sweep of angles is no whole cycle: it is a part of one, or not one turn brings the loads back."""
-        name = self.poses.mechanism.inputs[0].name
-        sense = -1 if self.input[-1] < self.input[0] else 1
-        covered = self._shown(abs(float(self.input[-1] - self.input[0])))
-        turn = self._steady(np.linspace(self.input[0], self.input[0] + sense * 2 * np.pi, FINE + 1))
-        if not np.isfinite(turn).all():
-            return (
-                f"the sweep covers {covered}, and the input {name} cannot turn a whole turn: give its motion "
-                "there and back as a table over time (--cases with a column time_s)"
-            )
-        for turns in range(1, TURNS + 1):
-            if self._alike(self._after(sense * turns)):
-                start = float(np.degrees(self.input[0]))
-                end = start + sense * 360 * turns
-                return (
-                    f"the sweep covers {covered} of the input {name}, and a whole cycle is {360 * turns} deg: "
-                    f"sweep from {start:.10g}deg to {end:.10g}deg"
-                )
-        return f"the loads do not come back to themselves within {TURNS} turns of the input {name}"
-
-    def _repeats(self, turns: int) -> bool:
-        return self._alike(self._after(turns))
-
-    @cached_property
-    def _compared(self) -> Reals:
-        """Some inputs over the sweep, in uneven steps."""
-        share = (np.arange(COMPARED) + 0.5) / COMPARED
-        return np.asarray(self.input.min() + np.ptp(self.input) * share**1.5)
-
-    def _steady(self, q: Reals) -> Reals:
-        """The effort at other inputs, of a law over time at its mean speed."""
-        rates = self.poses.rates
-        if any(np.ndim(rate) for of in rates for rate in of):
-            rates = [[float(np.abs(self.speed).mean())], [0.0], [0.0]]
-        poses = self.poses.again(q[:, None], rates)
-        if self.timed:
-            poses.time = np.full(len(q), self.place[0])
-        return Dynamics(poses).effort[:, 0]
-
-    @cached_property
-    def _before(self) -> Reals:
-        return self._steady(self._compared)
-
-    def _after(self, turns: int) -> Reals:
-        """The effort some turns later."""
-        return self._steady(self._compared + 2 * np.pi * turns)
-
-    def _alike(self, after: Reals) -> bool:
-        size = float(np.abs(self._before).max())
-        return bool(np.abs(after - self._before).max() <= SAME * size)
 
     def refined(self) -> Cycle:
         """The same cycle with so many poses that its mean, work and energy do not depend on the sweep's own steps.
@@ -200,7 +49,7 @@ class Cycle:
         times = -(-least // steps)
         if times == 1 or not self.between.defined:
             return self
-        if self._even:
+        if self.is_even:
             place = np.linspace(self.place[0], self.place[-1], times * steps + 1)
         else:
             share = np.arange(times) / times
@@ -210,13 +59,13 @@ class Cycle:
 
     # --- its numbers --------------------------------------------------------------------------------------------------
     @cached_property
-    def _even(self) -> bool:
+    def is_even(self) -> bool:
         """Whether the steps are equal."""
         steps = np.diff(self.place)
         return bool(np.abs(steps - steps.mean()).max() <= SAME * abs(steps.mean()))
 
     @cached_property
-    def _periodic(self) -> bool:
+    def is_periodic(self) -> bool:
         """Whether it is a whole number of turns over the input in equal steps, over which the effort comes back."""
         q = self.input
         turns = (q[-1] - q[0]) / (2 * np.pi)
@@ -226,25 +75,25 @@ class Cycle:
             and not self.poses.mechanism.inputs[0].is_slide
             and abs(turns - round(turns)) < SAME
             and round(turns) != 0
-            and self._even
+            and self.is_even
             and back
         )
 
     def integral(self, values: Reals) -> float:
         """∫ values over the sweep: dt over time, else dq."""
-        if self._periodic:
+        if self.is_periodic:
             return float(np.mean(values[:-1]) * self.span)
         if len(values) < 4:
             return float(np.trapezoid(values, self.place))
         from scipy.interpolate import CubicSpline
 
-        forward = self._forward
+        forward = self.forward
         return float(
             CubicSpline(self.place[forward], values[forward]).integrate(self.place[0], self.place[-1])
         )
 
     @property
-    def _forward(self) -> slice:
+    def forward(self) -> slice:
         """The poses in a rising order, as splines want them."""
         return slice(None, None, -1 if self.place[-1] < self.place[0] else 1)
 
@@ -271,22 +120,28 @@ class Cycle:
     @property
     def peak(self) -> float:
         """The largest size of the effort, also between the poses where the motion is defined there."""
-        return self._peak[1]
+        return self.largest_effort[1]
 
     @property
     def peak_at(self) -> float:
         """The input at the first largest effort, rad or m."""
-        at = self._peak[0]
+        at = self.largest_effort[0]
         return float(self.between.at(np.array([at])).inputs[0, 0]) if self.between.defined else at
 
-    @cached_property
+    @property
     def peak_power(self) -> float:
         """The largest size of the power of the input, W, also between the poses."""
-        power = np.asarray(self.effort * self.speed)
-        return self._largest(self.between.power, power)[1] if np.any(power) else 0.0
+        return self.largest_power[1]
 
     @cached_property
-    def _peak(self) -> tuple[float, float]:
+    def largest_power(self) -> tuple[float, float]:
+        """Where the power is largest (where no motion is defined between the poses: the input there), and its size."""
+        power = np.asarray(self.effort * self.speed)
+        return self._largest(self.between.power, power) if np.any(power) else (float(self.place[0]), 0.0)
+
+    @cached_property
+    def largest_effort(self) -> tuple[float, float]:
+        """The same of the effort."""
         return self._largest(self.between.effort, self.effort)
 
     def _largest(self, of: Callable[[Reals], Reals], values: Reals) -> tuple[float, float]:
@@ -294,7 +149,7 @@ class Cycle:
         if not self.between.defined or not np.isfinite(values).all():
             i = int(np.argmax(np.abs(values)))
             return float(self.input[i]), float(np.abs(values)[i])
-        forward = self._forward
+        forward = self.forward
         return largest(of, self.place[forward], values[forward])
 
     @property
@@ -303,27 +158,81 @@ class Cycle:
         return float(np.sqrt(self.integral(self.effort**2) / self.span))
 
     def error_estimate(self) -> dict[str, float]:
-        """Return bounds of the rounding errors of `work`, `mean`, `peak`, `rms` and `fluctuation`.
+        """Return the rounding errors of `work`, `mean`, `peak`, `peak_at`, `rms`, `peak_power` and `fluctuation`.
 
-        They follow from those of the effort at the poses; what the sum or spline between the poses leaves out of an
-        integral is no rounding, and not among them.
+        They are by what the same in 32 digits differs. What the sum or spline between the poses leaves out of an integral is
+        no rounding, and not among them.
         """
-        error, size = ForceErrors(self.motion.dynamics).effort[:, 0], np.abs(self.effort)
-        # of a pairwise sum
-        last = float(np.finfo(float).eps) * (2 + np.log2(len(size)))
-        q = np.abs(self.place - self.place[0])
-        # the weights of a spline exceed those of the trapezoidal rule by less than a half
-        total = 1.5 * float(np.trapezoid(error + last * size, q))
-        work = 1.5 * float(np.trapezoid((error + last * size) * np.abs(self._pace), q))
-        span = abs(self.span)
+        from virtualwork.digits.cycle import CycleRun
+
+        turns = self.turns if self.is_periodic else None
+        run = CycleRun(self.motion.dynamics, self.place, self.is_even, turns)
+        pace, span = np.asarray(self._pace, dtype=float), abs(self.span)
+        # where the input stands an effort without a digit does no work
+        effort, more = run.effort, np.abs(pace) * np.where(pace == 0, 0.0, run.more)
+        total = run.integral(effort)
+        square = run.integral(effort * effort) / run.span
+        stored = run.between((effort - total / run.span) * pace, *self.stored[1:])
+        peak, peak_at = self._top(self.between.effort, self.largest_effort)
         return {
-            "work": work,
-            "mean": total / span,
-            "peak": float(error.max()),
+            "work": run.off(run.integral(effort * pace), self.work, more),
+            "mean": run.off(total / run.span, self.mean, run.more / span),
+            "peak": peak,
+            "peak_at": peak_at,
             # Minkowski: the root mean square of a sum is no more than the sum of those of its parts
-            "rms": 1.5 * float(np.sqrt(np.trapezoid((error + last * size) ** 2, q) / span)),
-            "fluctuation": 4 * work,
+            "rms": run.off(np.sqrt(np.abs(square)), self.rms) + np.sqrt(run.most(run.more**2) / span),
+            "peak_power": self._top(self.between.power, self.largest_power, power=True)[0],
+            "fluctuation": run.off(stored, self.fluctuation, 4 * more),
         }
+
+    def _top(
+        self, of: Callable[[Reals], Reals], largest: tuple[float, float], power: bool = False
+    ) -> tuple[float, float]:
+        """The error of a largest size, and of the input there: how far from it the top of the parabola beside it lies."""
+        at, size = largest
+        error, speed = self._at_place(at)
+        if power:
+            error = error * abs(speed) + 0.5 * EPS * size
+        low, high = float(self.place.min()), float(self.place.max())
+        if not self.between.defined or at in (low, high) or not size:
+            return error, 0.0
+        h = min(BESIDE * (high - low), (at - low) / 2, (high - at) / 2)
+        far, before, here, behind, farther = np.abs(of(at + h * AROUND)).tolist()
+        bend, noise = 2 * here - before - behind, error + EPS * size
+        if 2 * here - far - farther < KINK * bend:
+            more, off = self._kink(of, largest, 0.01 * h)
+        elif bend > noise:
+            more = NEAR * (behind - before) ** 2 / (8 * bend)
+            off = h * (NEAR * abs(behind - before) / 2 + noise) / bend
+        else:
+            more, off = 0.0, high - low
+        return error + more, off * (abs(speed) if self.timed else 1.0)
+
+    def _kink(
+        self, of: Callable[[Reals], Reals], largest: tuple[float, float], h: float
+    ) -> tuple[float, float]:
+        """How much larger than the largest the top is, and how far away, at a row of a table: by straight lines on both sides."""
+        at, size = largest
+        far, before, here, behind, farther = np.abs(of(at + h * AROUND)).tolist()
+        rise, fall = before - far, behind - farther
+        if not (rise > 0 and fall > 0):
+            return ALIKE * size, h
+        share = (2 * behind - farther - 2 * before + far) / (rise + fall)
+        rest = min(abs(2 * before - far + rise * share - here), ALIKE * size)
+        off = min(abs(share) * h, ALIKE * size * h / min(rise, fall))
+        return NEAR * rest + EPS * size, NEAR * off + 4 * EPS * abs(at)
+
+    def _at_place(self, place: float) -> tuple[float, float]:
+        """The error of the effort at one place, and the speed of the input there."""
+        from virtualwork.digits.forces import ForceErrors
+
+        if self.between.defined:
+            poses = self.between.at(np.array([place]))
+            return float(ForceErrors(Dynamics(poses)).effort[0, 0]), float(np.ravel(poses.rates[0][0])[0])
+        i = int(np.argmin(np.abs(self.input - place)))
+        return float(ForceErrors(self.motion.dynamics).effort[i, 0]), float(
+            np.broadcast_to(self.speed, len(self.input))[i]
+        )
 
     @cached_property
     def energy(self) -> tuple[Reals, Reals]:
@@ -343,14 +252,9 @@ class Cycle:
                     total = plus(total, 0.5 * r.inertia * w * w)
             return total
 
-        def potential(pose: LoadedPose) -> Number:
-            total: Number = None
-            for load in scene.loads:
-                total = plus(total, load.potential(pose) if load.stores else None)
-            return total
-
-        moving, stored = scene.over([kinetic, potential], float, sorted(keys))
-        return moving, stored
+        stored = partial(potential, [load for load in scene.loads if load.stores])
+        moving, held = scene.over([kinetic, stored], float, sorted(keys))
+        return moving, held
 
     @property
     def closure(self) -> float | None:
@@ -376,26 +280,32 @@ class Cycle:
         gain = (kinetic[-1] - kinetic[0]) + (potential[-1] - potential[0])
         return self.integral(np.asarray(total * self._pace)) - float(gain)
 
-    @cached_property
+    @property
     def fluctuation(self) -> float:
-        """The range of ∫ (τ − mean) dq, J: what a flywheel must store (Norton, Design of Machinery, §11.11).
+        """The range of ∫ (τ − mean) dq, J: what a flywheel must store (Norton, Design of Machinery, §11.11)."""
+        return self.stored[0]
 
-        The extremes lie where τ crosses its mean, between the poses: found on the cubic spline through them.
+    @cached_property
+    def stored(self) -> tuple[float, float, float]:
+        """`fluctuation`, and the places of the least and of the largest ∫ (τ − mean) dq.
+
+        They lie where τ crosses its mean, between the poses: found on the cubic spline through them.
         """
         from scipy.interpolate import CubicSpline
 
         values = np.asarray((self.effort - self.mean) * self._pace)
-        if self._periodic:
+        if self.is_periodic:
             values[-1] = values[0]
-        forward = self._forward
+        forward = self.forward
         spline = CubicSpline(
-            self.place[forward], values[forward], bc_type="periodic" if self._periodic else "not-a-knot"
+            self.place[forward], values[forward], bc_type="periodic" if self.is_periodic else "not-a-knot"
         )
         stored = spline.antiderivative()
         crossings = spline.roots(extrapolate=False)
         at = np.concatenate([self.place[[0, -1]], crossings[np.isfinite(crossings)]])
         levels = stored(at)
-        return float(levels.max() - levels.min())
+        low, high = at[[np.argmin(levels), np.argmax(levels)]].tolist()
+        return float(levels.max() - levels.min()), low, high
 
     def flywheel(self, coefficient: float) -> float:
         """The inertia that keeps (ω_max − ω_min)/ω_mean at `coefficient`: ΔE/(coefficient·ω²), kg·m².
