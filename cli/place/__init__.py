@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 
 EXAMPLE = "blades"
+FIRST, FLAT = "0deg", "180deg"
+"""The defaults of --first and --drill-point."""
 OPTIONS = """
 Arguments:
   corrections MASS@ANGLE ...  Corrections to ADD, such as 83.5g@308.87deg; or a FILE that dalembert field wrote (CSV, JSON, workbook).
@@ -58,7 +60,7 @@ def run(
     plane: str | None = None,
     positions: str | None = None,
     blades: Annotated[int | None, typer.Option(min=1, max=options.PLACES)] = None,
-    first: str = "0deg",
+    first: str = FIRST,
     numbering: Literal["with", "against"] = "with",
     max_mass: str | None = None,
     stock: str | None = None,
@@ -71,7 +73,7 @@ def run(
     to_z: str | None = None,
     drill: str | None = None,
     density: str | None = None,
-    drill_point: str = "180deg",
+    drill_point: str = FLAT,
     max_depth: str | None = None,
     remove: bool = False,
     *,
@@ -103,6 +105,10 @@ def run(
         turned = "does not go with --weights, which have a mass of their own and stand at any angle"
         options.refuse(turned, positions=positions, blades=blades, stock=stock, max_mass=max_mass)
         options.refuse(turned, max_pieces=max_pieces, drill=drill, remove=remove)
+    if in_stock is None:
+        options.refuse("goes with --stock", pieces=pieces > 1, max_pieces=max_pieces)
+    if blades is None and first != FIRST:
+        raise options.bad("--first", "goes with --blades")
     moved = _planes(at_z, to_z)
     chosen = options.places(positions, blades, first, numbering)
     if in_stock is not None and chosen is None:
@@ -170,6 +176,8 @@ def _drill(drill: str | None, density: str | None, drill_point: str, max_depth: 
     deepest = options.quantity("--max-depth", max_depth, "length", positive=True)
     if deepest is not None and diameter is None:
         raise options.bad("--max-depth", "is for --drill")
+    if drill_point != FLAT and diameter is None:
+        raise options.bad("--drill-point", "is for --drill")
     point = options.needed("--drill-point", drill_point, "angle", positive=True)
     if point > math.pi * (1 + 1e-15):
         raise options.bad("--drill-point", "expected at most 180deg")

@@ -96,6 +96,8 @@ def run(
 
         rotation, solution = search(rotation, *sought)
         turning = rotation.body
+    if rotation.exact and integrator is not Integrator.dop853:
+        raise options.bad("--integrator", "expected --method integrate too: this rotation has a closed form")
     rotation.states  # noqa: B018  faults of the data are errors before anything is shown
 
     def moving() -> bytes:
