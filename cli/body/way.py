@@ -246,7 +246,7 @@ def find(
         return MovingBody(bodies[0], moved)
 
     choices = {**_motions(table, request), **_cells(table, request)}
-    vectors = ", with .x, .y, .z or .size behind a vector"
+    vectors = ", with .x, .y, .z or .size behind a vector, and .1, .2 or .3 behind principal"
     change, solution = root_search.solve(
         choices, name, wanted, "bearing1_dynamic.x=20N", lambda change: numbers_of(body(change)), vectors
     )

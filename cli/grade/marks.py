@@ -176,6 +176,8 @@ def _same(ask: Ask, key: str, cell: str) -> bool:
 
 SHARES = {"right": Fraction(1), "carried": Fraction(1), "rounding": Fraction(1, 2), "figures": Fraction(1, 2)}
 """Of the points, by verdict."""
+MOST_POWER = 60
+"""No answer has a larger power of ten, up or down."""
 RANK = ("right", "rounding", "figures", "carried", "wrong")
 TURNS = {"deg": Decimal(360), "rad": Decimal("6.28318530717958647692528676655900576839")}
 JOINED = {"Nm": "N*m", "kNm": "kN*m", "Nmm": "N*mm", "mNm": "mN*m", "kgm": "kg*m", "gmm": "g*mm", "kgmm": "kg*mm", "kgm2": "kg*m2",
@@ -263,6 +265,8 @@ class Judge:
         numbers = typed(text)
         if not numbers:
             return Mark(student, answer, text, "wrong", f"{quote(text)} is no number"), None
+        if any(abs(number.value.adjusted()) > MOST_POWER for number in numbers):
+            return Mark(student, answer, text, "wrong"), None
         readings = []
         for number in numbers:
             scale = scale_of(number.unit or unit or answer.unit, answer.unit)
