@@ -304,6 +304,26 @@ class Balancing:
         """Return the rows of a rotor's planes."""
         return slice(self.start[rotor], self.start[rotor] + self.count[rotor])
 
+    def masses_of(self, rotor: int) -> NDArray[np.intp]:
+        """Return the rows of a rotor's masses."""
+        return np.flatnonzero(self.rotors.rotor == rotor)
+
+    def mass_names(self, rotor: int) -> list[str]:
+        """Return the names of a rotor's masses, else their numbers in the table."""
+        every = self.rotors.table.texts.get("name") or [str(k + 1) for k in range(self.rotors.table.rows)]
+        return [every[k] for k in self.masses_of(rotor)]
+
+    def modal_of(self, rotor: int) -> tuple[ModalCorrection, int]:
+        """Return the modal corrections that have those of a rotor, and its place there."""
+        group, _, fix = next(each for each in self.modal if rotor in each[0])
+        return fix, int(np.flatnonzero(group == rotor)[0])
+
+    def conditions_at_masses(self, rotor: int) -> Real:
+        """Return the conditions of the modes at a rotor's masses, (q, m)."""
+        assert self.request.modes is not None
+        assert self.rotors.z is not None
+        return self.request.modes.at(self.rotors.z[self.masses_of(rotor)], "a mass")
+
     def verdicts(self, rotor: int) -> list[Verdict]:
         """Return the tolerance planes of a rotor; none where no tolerance is asked for."""
         tolerance = self.request.tolerance

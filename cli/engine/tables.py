@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cli.engine.cylinders import Complex, Engine, Real
+    from cli.engine.cylinders import Complex, Real
 
 
 METHOD = (

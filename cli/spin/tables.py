@@ -24,7 +24,7 @@ from rigidbody3d.picture.rotation import rotation as draw_rotation
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.spin.rotation import Array, Rotation
+    from cli.spin.rotation import Array
 
 
 METHOD = (
