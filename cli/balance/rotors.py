@@ -35,7 +35,7 @@ DIMENSIONS = {
     "angle": "angle",
     "z": "length",
 }
-"""Of the columns of a table of masses."""
+"""The dimensions of the columns of a table of masses."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -130,12 +130,12 @@ class Request:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Carried:
-    """Two bearings that carry the rotor at a speed: what acts in them is asked for."""
+    """Two bearings that carry the rotor at a speed, to show their forces."""
 
     bearings: tuple[float, float]
     speed: float
     mass: float | None
-    """Of the rotor, kg; None where its weight is not known."""
+    """Mass of the rotor, kg; None: unknown."""
 
 
 @dataclass(eq=False, repr=False)
@@ -147,7 +147,7 @@ class Balancing:
     request: Request
     executor: Executor | None = None
     solved: list[tuple[NDArray[np.intp], NDArray[np.intp], Correction]] = field(default_factory=list)
-    """Of rotors of like size their numbers, the rows of their planes, their corrections."""
+    """For rotors of equal size: their numbers, the rows of their planes, their corrections."""
 
     def __post_init__(self) -> None:
         rotors, planes, request = self.rotors, self.planes, self.request
@@ -325,7 +325,7 @@ class Balancing:
         return self.request.modes.at(self.rotors.z[self.masses_of(rotor)], "a mass")
 
     def verdicts(self, rotor: int) -> list[Verdict]:
-        """Return the tolerance planes of a rotor; none where no tolerance is asked for."""
+        """Return the tolerance planes of a rotor; none without a tolerance."""
         tolerance = self.request.tolerance
         if tolerance is None:
             return []

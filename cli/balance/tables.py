@@ -245,7 +245,7 @@ def verdicts(b: Balancing) -> Table:
 
 
 def warnings(b: Balancing) -> list[str]:
-    """What a reader of the corrections has to know."""
+    """Warnings about planes, bearings and tolerance."""
     near = np.flatnonzero(b.growth > NEAR)
     why = "hardly tell the modes apart" if b.modal else "are close to each other and far from the masses"
     lines = [

@@ -48,7 +48,7 @@ class Scale:
 
 
 def way(b: Balancing) -> list[Topic]:
-    """The topics of every rotor, one after the other."""
+    """The worked solution of every rotor."""
     every: list[tuple[int, list[Topic]]] = []
     topics_of: Callable[..., list[Topic]] = _modal if b.modal else _of_rotor
     for group, rows, fix in b.modal or b.solved:
@@ -190,7 +190,7 @@ def _two_planes(
 def _many_planes(
     b: Balancing, rows: list[int], planes: list[str], z: list[float], made: Any, scale: Scale, fix: Correction, i: int
 ) -> list[Topic]:  # fmt: skip
-    """Of three planes and more the corrections of least norm."""
+    """Corrections of least norm, in three planes or more."""
     square = sum((p - q) ** 2 for k, p in enumerate(z) for q in z[k + 1 :])
     moments = [complex(np.ravel(fix.couple(fix.planes[..., k]))[i]) for k in range(len(z))]
     topics = []
@@ -268,11 +268,11 @@ def _plane_topic(
 
 
 SHOWN = 6
-"""So many terms of a sum are written."""
+"""The largest number of terms of a sum in the text."""
 
 
 def _modal(b: Balancing, rotor: int, rows: list[int], fix: ModalCorrection, i: int) -> list[Topic]:
-    """The topics of a rotor."""
+    """The worked solution of a rotor with modes."""
     scale = Scale(b)
     shapes = b.request.modes
     assert shapes is not None

@@ -175,7 +175,7 @@ def _same(ask: Ask, key: str, cell: str) -> bool:
 
 
 SHARES = {"right": Fraction(1), "carried": Fraction(1), "rounding": Fraction(1, 2), "figures": Fraction(1, 2)}
-"""Of the points, by verdict."""
+"""Share of the points, by verdict."""
 MOST_POWER = 60
 """No answer has a larger power of ten, up or down."""
 RANK = ("right", "rounding", "figures", "carried", "wrong")
@@ -207,17 +207,17 @@ class _Reading:
 
     number: Typed
     scale: Fraction
-    """Of its unit in the unit asked for."""
+    """Its unit in the unit of the question."""
     verdict: str
 
     @property
     def value(self) -> float:
-        """In the unit asked for."""
+        """In the unit of the question."""
         return float(Fraction(self.number.value) * self.scale)
 
     @property
     def half(self) -> float:
-        """Half a unit of its last figure, in the unit asked for."""
+        """Half a unit of its last figure, in the unit of the question."""
         return float(Fraction(self.number.half_unit) * abs(self.scale))
 
 

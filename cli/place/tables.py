@@ -296,7 +296,7 @@ def draw(placing: Placing) -> Figure:
 
 
 def way(p: Placing, name: str = "") -> list[Topic]:
-    """The topics of one correction; `name` of its rotor and plane, where there are several."""
+    """The worked solution of one correction; `name` tells it apart from others."""
     head = {"of": name} if name else {}
     lead = f"{name}: " if name else ""
     vectors = np.array(p.vectors)

@@ -154,7 +154,7 @@ def draw(w: WorkBalance) -> Figure:
 
 
 def way(w: WorkBalance) -> list[Topic]:
-    """The topics."""
+    """The worked solution."""
     steps = [([names("step", [step.name])], list(entries(w, i))) for i, step in enumerate(w.states.steps)]
     return [ledger_topic("steps[]", steps, _equations(w, [instants for _, instants in steps]))]
 
