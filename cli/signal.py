@@ -83,19 +83,22 @@ def read_recording(path: str, pulses: int) -> Recording:
     from dalembert.tables.sources import open_source
     from dalembert.tables.table import read
 
-    header = [each.name for each in open_source(path, {}, None).headings]
+    # below lines of a title the header is the line with these
+    expected = {"t": "time", "time": "time", **dict.fromkeys(MARKS, "number")}
+    source = open_source(path, expected, ())
+    file, header = source.file, [each.name for each in source.headings]
     marks = sorted((name.lower() for name in header if name.lower() in MARKS), key=MARKS.index)
     if not marks:
         raise DataError(
-            f"{path}: no column mark (or {', '.join(MARKS[1:])}); the header is: {', '.join(header)}"
+            f"{file}: no column mark (or {', '.join(MARKS[1:])}); the header is: {', '.join(header)}"
         )
     mark, *others = marks
     if len(others) > 1:
-        raise DataError(f"{path}: the columns {', '.join(marks)}: expected a mark and one tacho")
+        raise DataError(f"{file}: the columns {', '.join(marks)}: expected a mark and one tacho")
     if others and pulses > 1:
-        raise bad("--pulses", f"{path} has a mark and a tacho: the pulses of a turn are counted")
+        raise bad("--pulses", f"{file} has a mark and a tacho: the pulses of a turn are counted")
     time = "time" if any(name.lower().startswith("time_") for name in header) else "t"
-    units = _vibration(path, header, (time, *marks))
+    units = _vibration(file, header, (time, *marks))
     unit = next(iter(units.values()))
     table = read(
         path, numbers={time: "time", **dict.fromkeys(marks, "number"), **dict.fromkeys(units, "amplitude")}
@@ -128,7 +131,7 @@ def read_recording(path: str, pulses: int) -> Recording:
     return Recording(sensors, unit, result, table.warnings, exact)
 
 
-def _vibration(path: str, header: list[str], others: tuple[str, ...]) -> dict[str, str]:
+def _vibration(file: str, header: list[str], others: tuple[str, ...]) -> dict[str, str]:
     """The columns of vibration: name -> unit, one unit for all."""
     from dalembert.units import amplitude_kind, find_unit
 
@@ -142,17 +145,17 @@ def _vibration(path: str, header: list[str], others: tuple[str, ...]) -> dict[st
                 break
     if not units:
         raise DataError(
-            f"{path}: no column of vibration, such as A_um or acceleration_g; the header is: {', '.join(header)}"
+            f"{file}: no column of vibration, such as A_um or acceleration_g; the header is: {', '.join(header)}"
         )
     if len(set(units.values())) > 1:
         raise DataError(
-            f"{path}: the vibration is in {', '.join(sorted(set(units.values())))}: expected one unit"
+            f"{file}: the vibration is in {', '.join(sorted(set(units.values())))}: expected one unit"
         )
     unit = next(iter(units.values()))
     tag = amplitude_kind(unit)[1]
     if tag in ("_pp", "_rms"):
         raise DataError(
-            f"{path}: the vibration is in {unit}: samples are values of an instant, and the amplitude "
+            f"{file}: the vibration is in {unit}: samples are values of an instant, and the amplitude "
             f"that comes out is a peak: expected a unit without {tag}"
         )
     return units
