@@ -35,6 +35,13 @@ if TYPE_CHECKING:
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+LARGEST = 1e140
+"""The squares of larger numbers, and of the reciprocals of smaller ones than 1/LARGEST, overflow."""
+OUT_OF_RANGE = (
+    f"influence, initial and their quotients must be zero or between {1 / LARGEST:.0e} and {LARGEST:.0e} in size: "
+    "choose other units"
+)
+
 
 @record
 @dataclass(frozen=True, eq=False, repr=False)
@@ -233,6 +240,8 @@ class Balance:
         return Problem(*data, self.corrections, self.weights, floats)
 
     def _found(self, problem: Problem, ridge: Doubled | None = None) -> tuple[Vectors | None, str]:
+        if not _in_range(self.influence, self.initial):
+            return None, "the numbers are too large or too small for a second run in 32 digits"
         if self._free:
             from balancing.rounding import least_squares_again
 
@@ -321,6 +330,7 @@ def least_squares(
             raise ValueError("ridge does not go with limits: the limits damp already")
         if alpha.ndim != 2 or v.ndim != 1:
             raise ValueError("limits are for one rotor at a time: expected influence (s, p), initial (s,)")
+        _require_size(alpha, v)
         limit, ceiling = (
             _limits("max_mass", max_mass, alpha.shape[1]),
             _limits("max_residual", max_residual, len(v)),
@@ -329,7 +339,10 @@ def least_squares(
         capped, held = _given(limit), _given(ceiling)
         return _warned(Balance(alpha, v, corrections, w, bound, gap, max_mass=capped, max_residual=held))
     a, b = (alpha, v) if root is None else (alpha * root[..., None], v * root)
-    solution, sigma = smallest_squares(a, b, ridge)
+    with np.errstate(over="ignore", invalid="ignore"):
+        solution, sigma = smallest_squares(a, b, ridge)
+    if not np.isfinite(solution).all():
+        raise ValueError(OUT_OF_RANGE)
     return Balance(alpha, v, solution, w, ridge=ridge, singular_values=None if ridge else sigma)
 
 
@@ -386,6 +399,7 @@ def minimax(
         raise ValueError(
             f"one rotor at a time: expected influence (s, p), initial (s,), found {alpha.shape}, {v.shape}"
         )
+    _require_size(alpha, v)
     w = None if weights is None else np.asarray(weights, dtype=float)
     a, b = (alpha, v) if w is None else (alpha * w[:, None], v * w)
     limit = _limits("max_mass", max_mass, alpha.shape[1])
@@ -421,6 +435,21 @@ def checked(
     if not ((w >= 0) & (w < np.inf)).all() or not (w > 0).any():
         raise ValueError("weights must not be negative, and not all zero")
     return alpha, v, np.sqrt(w)
+
+
+def _in_range(alpha: Complex, v: Complex) -> bool:
+    """Whether the squares of the numbers and of their quotients are numbers too."""
+    coefficient, vibration = np.abs(alpha).max(axis=-2), np.abs(v).max(axis=-1)[..., None]
+    with np.errstate(all="ignore"):
+        quotient = np.where(coefficient > 0, vibration / coefficient, 0.0)
+    sizes = np.concatenate([x.ravel() for x in (coefficient, vibration, quotient)])
+    sizes = sizes[sizes > 0]
+    return bool(((sizes >= 1 / LARGEST) & (sizes <= LARGEST)).all())
+
+
+def _require_size(alpha: Complex, v: Complex) -> None:
+    if not _in_range(alpha, v):
+        raise ValueError(OUT_OF_RANGE)
 
 
 def _warned(fix: Balance) -> Balance:

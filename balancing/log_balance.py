@@ -159,8 +159,13 @@ class LogBalance:
     def residual(self) -> Complex:
         """The fitted vibration with the corrections on, (..., s); 0 within rounding."""
         left = self.fit.fitted(self.corrections[..., None, :])[..., 0, :]
+        return np.asarray(np.where(np.abs(left) > self._rounding, left, 0.0))
+
+    @property
+    def _rounding(self) -> Real:
+        """The possible rounding of `residual`, (..., s)."""
         noise = np.abs(self.fit.initial) + np.matvec(np.abs(self.fit.influence), np.abs(self.corrections))
-        return np.asarray(np.where(np.abs(left) > 1e-15 * noise, left, 0.0))
+        return np.asarray(1e-15 * noise)
 
     def _by_channel(self) -> tuple[Complex, Real, Real]:
         """Direction and deviations of the readings of each channel, (..., s, r) each."""
@@ -371,7 +376,7 @@ class LogBalance:
             np.square(np.where(matters, np.abs(self.residual), 0.0)),
         )
         within = chndtr(square[0][..., None] / true, 2.0, square[1][..., None] / true)
-        sure = (np.abs(self.residual) <= ceiling).astype(float)
+        sure = (np.abs(self.residual) <= ceiling + self._rounding).astype(float)
         probability = np.where(matters, within @ share, sure)
         return np.asarray(np.where(nu > 0, probability, np.nan))
 

@@ -77,7 +77,7 @@ class Marks(NamedTuple):
     at: Any
     """(n,), s."""
     resolution: Any
-    """The possible common shift of all of them, s."""
+    """The possible common shift of all of them, to either side, s."""
 
 
 def marks(t: ArrayLike, mark: ArrayLike) -> Marks:
@@ -101,10 +101,12 @@ def marks(t: ArrayLike, mark: ArrayLike) -> Marks:
         falls = np.flatnonzero((nearest[:-1] >= float(half)) & (nearest[1:] < float(half))) + 1
         whole = rises[rises < falls[-1:].max(initial=0)]
         pulses = falls[np.searchsorted(falls, whole, side="right")] - whole
+        first = 1.0
         if nearest[0] >= float(half) and len(pulses) and falls[0] >= pulses.min():
-            # the recording begins with a whole pulse
+            # the recording begins with a whole pulse; shorter than others, it may lack its first sample
             rises = np.concatenate([[0], rises])
-        before = np.concatenate([2 * time[:1] - time[1:2], time[:-1]])
+            first += float(falls[0] < pulses.max())
+        before = np.concatenate([time[:1] - (time[1:2] - time[:1]) * first, time[:-1]])
         return _even(before[rises], time[rises])
     share = (half - level[rises]) / (level[rises + 1] - level[rises])
     return Marks(time[rises] + share * (time[rises + 1] - time[rises]), 0.0)
@@ -130,8 +132,25 @@ def _even(low: Any, high: Any) -> Marks:
     first, last = below[below.argmax()], above[above.argmin()]
     if not first < last:
         return each
-    half = (last - first) / 2
-    return Marks((first + last) / 2 + slope * k, half if is_doubled(half) else float(half))
+    middle = (first + last) / 2
+    # other slopes leave other places for the middle of the marks
+    sides = middle - _envelope(k, low), -_envelope(k, -high) - middle
+    shift = sides[int(float(sides[1]) > float(sides[0]))]
+    return Marks(middle + slope * k, shift if is_doubled(shift) else float(shift))
+
+
+def _envelope(k: Any, y: Any) -> Any:
+    """Return the height over k = 0 of the upper hull of points (k, y): no line above all of them passes lower."""
+    height = _floats(y)
+    left, right = 0, len(k) - 1
+    for _ in k:
+        slope = (height[right] - height[left]) / (k[right] - k[left])
+        top = int((height - slope * k).argmax())
+        # a point above the line through two of them takes the place of the one on its side
+        if top in (left, right) or not height[top] - slope * k[top] > height[left] - slope * k[left]:
+            break
+        left, right = (top, right) if k[top] <= 0 else (left, top)
+    return (y[left] * k[right] - y[right] * k[left]) / (k[right] - k[left])
 
 
 def _roomiest(k: Any, low: Any, high: Any, least: float, most: float) -> Any:

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from cli.show.result import Result
     from dalembert.arithmetic.doubled import Doubled
     from dalembert.results.columns import Table
-    from dalembert.results.way import Topic
 
 
 RULE = "centrifugal force a tenth of the static load of each plane: m r ω² = 0.1 (M/planes) g"
@@ -87,7 +86,7 @@ def run(
 
 
 def way(mass: float, omega: float, arm: float, planes: int, unbalance: float) -> list[Topic]:
-    """The one topic; all in SI."""
+    """The worked solution: one topic, in SI."""
     load = mass / planes * G0
     text = [
         "A tenth of the static load of each plane as centrifugal force: m·r·ω² = 0.1·(M/planes)·g",

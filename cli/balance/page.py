@@ -1,4 +1,4 @@
-"""The picture of a balancing, masses, their resultant and the correction on a dial for each plane; its page, which computes."""
+"""The picture of a balancing, dials and closed polygons; its page, which computes."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ import numpy as np
 from balancing import correct
 from balancing.picture import MOST, KnownMasses, known_masses
 from cli.balance.rotors import DIMENSIONS, Balancing
-from cli.balance.tables import labels
-from cli.balance.way import polygons_below, shares
 from cli.show.picture import blank
 from dalembert.errors import DataError
 from dalembert.page.typed import spelled, units
@@ -28,7 +26,7 @@ def draw(balancing: Balancing, *, polygons: bool = False) -> Figure:
     """Draw the first rotors below each other, their planes beside each other; with --steps the closed polygons too."""
     figure = blank()
     if polygons:
-        polygons_below(balancing, figure, lambda part: _dials(balancing, part))
+        _polygons_below(balancing, figure)
     else:
         _dials(balancing, figure)
     return figure
@@ -42,23 +40,75 @@ def _dials(balancing: Balancing, figure: FigureBase) -> None:
 def _rotors(balancing: Balancing) -> Iterator[KnownMasses]:
     rotors, planes = balancing.rotors, balancing.planes
     for r, name in enumerate(rotors.names[:MOST]):
-        mine = np.flatnonzero(rotors.rotor == r)
+        mine = balancing.masses_of(r)
         rows = balancing.rows_of(r)
         here = balancing.plane_of_row[rows]
         at = rotors.z[mine, None] if rotors.z is not None else np.zeros((len(mine), 1))
         plane_z = planes.z[here] if planes.z is not None else np.zeros(len(here))
         # each mass alone, carried to the planes as they will balance it
         if balancing.modal:
-            carried = shares(balancing, r)
+            carried = _shares(balancing, r)
         else:
             carried = -correct(rotors.moment[mine, None], at, plane_z).unbalance
         yield KnownMasses(
             name if len(rotors.names) > 1 else "",
-            labels(balancing, mine),
+            balancing.mass_names(r),
             [planes.name[p] for p in here],
             from_si(carried, "unbalance", rotors.unbalance_unit),
             from_si(balancing.made[rows], "unbalance", rotors.unbalance_unit),
         )
+
+
+def _shares(b: Balancing, rotor: int) -> Any:
+    """Return what each unbalance alone asks of the planes, with its sign turned, (m, p)."""
+    from balancing import modal_corrections
+
+    fix, i = b.modal_of(rotor)
+    moment = np.diag(b.rotors.moment[b.masses_of(rotor)])
+    return -modal_corrections(moment, b.conditions_at_masses(rotor), fix.at_planes[i]).unbalance
+
+
+def _polygons_below(b: Balancing, figure: Figure) -> None:
+    """Draw the dials, and below them the closed polygons of each rotor that has a dial."""
+    rotors = range(min(len(b.rotors.names), MOST))
+    planes = max(len(range(b.rows_of(r).start, b.rows_of(r).stop)) for r in rotors)
+    above, each = 4.5 * len(rotors) + 0.8, 4.8
+    figure.set_size_inches(max(4.3 * planes, 9.6), above + each * len(rotors))
+    figure.set_layout_engine("constrained")
+    heights = [above, *[each] * len(rotors)]
+    top, *parts = figure.subfigures(1 + len(rotors), 1, height_ratios=heights, squeeze=False)[:, 0]
+    _dials(b, top)
+    for r, part in zip(rotors, parts, strict=True):
+        polygons(b, r, part)
+
+
+def polygons(b: Balancing, rotor: int, figure: FigureBase) -> None:
+    """Draw the closed polygon of forces, with several planes that of moments about the first; of modes one for each condition."""
+    from balancing.polygons import Polygon, closed
+
+    mine, rows = b.masses_of(rotor), b.rows_of(rotor)
+    here, named = b.plane_of_row[rows], b.mass_names(rotor)
+    planes = [b.planes.name[p] for p in here]
+    moments, made = b.rotors.moment[mine], b.ideal[rows]
+
+    def polygon(
+        title: str, first: int = 0, masses: Any = 1.0, at: Any = 1.0, moment: bool = False
+    ) -> Polygon:
+        unit, dimension = (b.couple_unit, "inertia") if moment else (b.rotors.unbalance_unit, "unbalance")
+        last = from_si((made * at)[first:], dimension, unit)
+        return Polygon(title, named, from_si(moments * masses, dimension, unit), planes[first:], last, unit)
+
+    if b.request.modes is not None:
+        fix, i = b.modal_of(rotor)
+        each = zip(b.request.modes.conditions, b.conditions_at_masses(rotor), fix.at_planes[i], strict=True)
+        every = [polygon(f"{name}: U·φ", 0, masses, at) for name, masses, at in each]
+    else:
+        every = [polygon("forces")]
+        if b.rotors.z is not None and b.planes.z is not None and len(planes) > 1:
+            z = b.planes.z[here]
+            arms = b.rotors.z[mine] - z[0], z - z[0]
+            every.append(polygon(f"moments about plane {planes[0]}", 1, *arms, moment=True))
+    closed(every, f"rotor {b.rotors.names[rotor]}: " if len(b.rotors.names) > 1 else "", figure)
 
 
 OF_PAGE = 50
@@ -122,7 +172,7 @@ def sheet(b: Balancing) -> Page:
             }
         documents.append(document)
         mine: list[str] = []
-        for i in np.flatnonzero(rotors.rotor == r).tolist():
+        for i in b.masses_of(r).tolist():
             name = named[i] if named else ""
             name = name if name and name not in mine else str(len(mine) + 1)
             mine.append(name)

@@ -34,7 +34,7 @@ DIMENSIONS = {
     "angle": "angle",
     "z": "length",
 }
-"""Of the columns of a table of masses."""
+"""The dimensions of the columns of a table of masses."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -129,12 +129,12 @@ class Request:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Carried:
-    """Two bearings that carry the rotor at a speed: what acts in them is asked for."""
+    """Two bearings that carry the rotor at a speed, to show their forces."""
 
     bearings: tuple[float, float]
     speed: float
     mass: float | None
-    """Of the rotor, kg; None where its weight is not known."""
+    """Mass of the rotor, kg; None: unknown."""
 
 
 @dataclass(eq=False, repr=False)
@@ -146,7 +146,7 @@ class Balancing:
     request: Request
     executor: Executor | None = None
     solved: list[tuple[NDArray[np.intp], NDArray[np.intp], Correction]] = field(default_factory=list)
-    """Of rotors of like size their numbers, the rows of their planes, their corrections."""
+    """For rotors of equal size: their numbers, the rows of their planes, their corrections."""
 
     def __post_init__(self) -> None:
         rotors, planes, request = self.rotors, self.planes, self.request
@@ -303,8 +303,28 @@ class Balancing:
         """Return the rows of a rotor's planes."""
         return slice(self.start[rotor], self.start[rotor] + self.count[rotor])
 
+    def masses_of(self, rotor: int) -> NDArray[np.intp]:
+        """Return the rows of a rotor's masses."""
+        return np.flatnonzero(self.rotors.rotor == rotor)
+
+    def mass_names(self, rotor: int) -> list[str]:
+        """Return the names of a rotor's masses, else their numbers in the table."""
+        every = self.rotors.table.texts.get("name") or [str(k + 1) for k in range(self.rotors.table.rows)]
+        return [every[k] for k in self.masses_of(rotor)]
+
+    def modal_of(self, rotor: int) -> tuple[ModalCorrection, int]:
+        """Return the modal corrections that have those of a rotor, and its place there."""
+        group, _, fix = next(each for each in self.modal if rotor in each[0])
+        return fix, int(np.flatnonzero(group == rotor)[0])
+
+    def conditions_at_masses(self, rotor: int) -> Real:
+        """Return the conditions of the modes at a rotor's masses, (q, m)."""
+        assert self.request.modes is not None
+        assert self.rotors.z is not None
+        return self.request.modes.at(self.rotors.z[self.masses_of(rotor)], "a mass")
+
     def verdicts(self, rotor: int) -> list[Verdict]:
-        """Return the tolerance planes of a rotor; none where no tolerance is asked for."""
+        """Return the tolerance planes of a rotor; none without a tolerance."""
         tolerance = self.request.tolerance
         if tolerance is None:
             return []

@@ -8,27 +8,47 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.balance.rotors import Balancing
-from cli.balance.tables import Scale, labels, plane_topic
-from dalembert.angles import degrees
+from dalembert.angles import degrees, in_turn
 from dalembert.results.columns import Column, Table, names, number
 from dalembert.results.way import Topic, figures
 from dalembert.units import from_si
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
-    from matplotlib.figure import Figure, FigureBase
+    from matplotlib.figure import Figure
 
     from balancing import Correction, ModalCorrection
-    from balancing.polygons import Polygon
-    from cli.balance.rotors import Balancing
 
 
 COMPONENTS = ("x", "y", "zx", "zy")
 
 
+class Scale:
+    """How the equations show an unbalance: as the document does, W·r in N·mm where the table has weights."""
+
+    def __init__(self, b: Balancing) -> None:
+        unit = b.rotors.unbalance_unit
+        self.length = b.length_unit
+        self.letter = "m"
+        if b.rotors.weights:
+            self.letter = "W"
+            length = self.length if self.length in ("mm", "m", "in") else "mm"
+            self.length, self.name = length, f"N·{length}"
+            self.factor = b.request.gravity * float(from_si(1.0, "length", length))
+        else:
+            self.name, self.factor = unit.replace("_", "·"), float(from_si(1.0, "unbalance", unit))
+        self.reach = float(from_si(1.0, "length", self.length))
+
+    def of(self, value: float) -> str:
+        return figures(value * self.factor)
+
+    def moment(self, value: float) -> str:
+        return figures(value * self.factor * self.reach)
+
+
 def way(b: Balancing) -> list[Topic]:
-    """The topics of every rotor, one after the other."""
+    """The worked solution of every rotor."""
     every: list[tuple[int, list[Topic]]] = []
     topics_of: Callable[..., list[Topic]] = _modal if b.modal else _of_rotor
     for group, rows, fix in b.modal or b.solved:
@@ -54,12 +74,12 @@ def _headed(b: Balancing, rotor: int, topic: Topic) -> Topic:
 def _of_rotor(b: Balancing, rotor: int, rows: list[int], fix: Correction, i: int) -> list[Topic]:
     scale = Scale(b)
     planes = [b.planes.name[b.plane_of_row[row]] for row in rows]
-    mine = np.flatnonzero(b.rotors.rotor == rotor)
+    mine = b.masses_of(rotor)
     has_z = b.rotors.z is not None and b.planes.z is not None
     z_plane = [float(b.planes.z[b.plane_of_row[row]]) for row in rows] if b.planes.z is not None else []
     about = z_plane[0] if has_z else None
     made = b.ideal[rows]
-    topics = [_components(b, mine, about, planes[0], scale)]
+    topics = [_components(b, rotor, about, planes[0], scale)]
     masses = _masses(b, mine)
     if len(planes) == 1 or not has_z:
         static = complex(fix.static[i]) if fix.static.ndim else complex(fix.static)
@@ -68,7 +88,7 @@ def _of_rotor(b: Balancing, rotor: int, rows: list[int], fix: Correction, i: int
             f"  {_sum_of(scale, masses, 'x')} + x = 0,  x = {scale.of(-static.real)} {scale.name}",
             f"  {_sum_of(scale, masses, 'y')} + y = 0,  y = {scale.of(-static.imag)} {scale.name}",
         ]
-        topics.append(plane_topic(b, rows[0], planes[0], complex(made[0]), text, scale))
+        topics.append(_plane_topic(b, rows[0], planes[0], complex(made[0]), text, scale))
     elif len(planes) == 2:
         topics += _two_planes(b, rows, planes, z_plane, made, masses, scale, fix, i)
     else:
@@ -80,7 +100,8 @@ def _masses(b: Balancing, mine: Any) -> list[complex]:
     return [complex(u) for u in b.rotors.moment[mine]]
 
 
-def _components(b: Balancing, mine: Any, about: float | None, plane: str, scale: Scale) -> Topic:
+def _components(b: Balancing, rotor: int, about: float | None, plane: str, scale: Scale) -> Topic:
+    mine = b.masses_of(rotor)
     rotors = b.rotors
     u = rotors.moment[mine]
     z = rotors.z[mine] if rotors.z is not None else np.full(len(mine), np.nan)
@@ -96,7 +117,7 @@ def _components(b: Balancing, mine: Any, about: float | None, plane: str, scale:
 
     shown = [c for c in COMPONENTS if about is not None or len(c) == 1]
     columns = [
-        names("name", labels(b, mine)),
+        names("name", b.mass_names(rotor)),
         number("unbalance", "unbalance", np.abs(u), unit),
         number("angle", "angle", angle),
         *([number("z", "length", z, length)] if rotors.z is not None else []),
@@ -137,7 +158,7 @@ def _two_planes(
     scale: Scale, fix: Correction, i: int,
 ) -> list[Topic]:  # fmt: skip
     first, second = planes
-    mine = np.flatnonzero(b.rotors.rotor == b.rotor_of_row[rows[0]])
+    mine = b.masses_of(int(b.rotor_of_row[rows[0]]))
     assert b.rotors.z is not None
     levers = [float(v) - z[0] for v in b.rotors.z[mine]]
     apart = figures((z[1] - z[0]) * scale.reach)
@@ -154,20 +175,22 @@ def _two_planes(
         text.append(
             f"  {mark} = −{_sum_of(scale, masses, axis, levers)}/{apart} = −({scale.moment(total)})/{apart} = {scale.of(value)} {scale.name}"
         )
-    topics = [plane_topic(b, rows[1], second, c, text, scale, f"Plane {second}: moments about plane {first}")]
+    topics = [
+        _plane_topic(b, rows[1], second, c, text, scale, f"Plane {second}: moments about plane {first}")
+    ]
     d = complex(made[0])
     text = [f"ΣF = 0: Σ {w}·r + {w}_{second}·r_{second} + {w}_{first}·r_{first} = 0 (Riul, eqs. 12, 20, 21):"]
     for axis, mark, other, value in (("x", "d1", c.real, d.real), ("y", "d2", c.imag, d.imag)):
         text.append(
             f"  {mark} = −({scale.of(other)} + {_sum_of(scale, masses, axis)}) = {scale.of(value)} {scale.name}"
         )
-    return [*topics, plane_topic(b, rows[0], first, d, text, scale, f"Plane {first}: forces")]
+    return [*topics, _plane_topic(b, rows[0], first, d, text, scale, f"Plane {first}: forces")]
 
 
 def _many_planes(
     b: Balancing, rows: list[int], planes: list[str], z: list[float], made: Any, scale: Scale, fix: Correction, i: int
 ) -> list[Topic]:  # fmt: skip
-    """Of three planes and more the corrections of least norm."""
+    """Corrections of least norm, in three planes or more."""
     square = sum((p - q) ** 2 for k, p in enumerate(z) for q in z[k + 1 :])
     moments = [complex(np.ravel(fix.couple(fix.planes[..., k]))[i]) for k in range(len(z))]
     topics = []
@@ -184,80 +207,83 @@ def _many_planes(
             text.append(
                 f"  {mark} = −({terms})/{figures(square * scale.reach**2)} = {scale.of(getattr(complex(value), part))} {scale.name}"
             )
-        topics.append(plane_topic(b, rows[k], name, complex(value), text, scale))
+        topics.append(_plane_topic(b, rows[k], name, complex(value), text, scale))
     return topics
 
 
-def _figure(b: Balancing, rotor: int) -> Figure:
-    from cli.show.picture import blank
+def quadrant(x: float, y: float) -> int | None:
+    """Return the quadrant of a vector, an axis with the quadrant that it begins; None of nothing.
 
-    figure = blank()
-    polygons(b, rotor, figure)
-    return figure
-
-
-def polygons_below(b: Balancing, figure: Figure, dials: Callable[[FigureBase], None]) -> None:
-    """Draw the dials, and below them the closed polygons of each rotor that has a dial."""
-    from balancing.picture import MOST
-
-    rotors = range(min(len(b.rotors.names), MOST))
-    planes = max(len(range(b.rows_of(r).start, b.rows_of(r).stop)) for r in rotors)
-    above, each = 4.5 * len(rotors) + 0.8, 4.8
-    figure.set_size_inches(max(4.3 * planes, 9.6), above + each * len(rotors))
-    figure.set_layout_engine("constrained")
-    heights = [above, *[each] * len(rotors)]
-    top, *parts = figure.subfigures(1 + len(rotors), 1, height_ratios=heights, squeeze=False)[:, 0]
-    dials(top)
-    for r, part in zip(rotors, parts, strict=True):
-        polygons(b, r, part)
+    >>> [quadrant(*v) for v in ((1, 0), (0, 1), (-1, 0), (0, -1), (-328.3, -1402.0))], quadrant(0, 0)
+    ([1, 2, 3, 4, 3], None)
+    """
+    if x == 0 and y == 0:
+        return None
+    if y >= 0:
+        return 1 if x > 0 else 2 if y > 0 else 3
+    return 4 if x >= 0 else 3
 
 
-def polygons(b: Balancing, rotor: int, figure: FigureBase) -> None:
-    """Draw the closed polygon of forces, with several planes that of moments about the first; of modes one for each condition."""
-    from balancing.polygons import Polygon, closed
-
-    mine, rows = np.flatnonzero(b.rotors.rotor == rotor), b.rows_of(rotor)
-    here, named = b.plane_of_row[rows], labels(b, mine)
-    planes = [b.planes.name[p] for p in here]
-    moments, made = b.rotors.moment[mine], b.ideal[rows]
-
-    def polygon(
-        title: str, first: int = 0, masses: Any = 1.0, at: Any = 1.0, moment: bool = False
-    ) -> Polygon:
-        unit, dimension = (b.couple_unit, "inertia") if moment else (b.rotors.unbalance_unit, "unbalance")
-        last = from_si((made * at)[first:], dimension, unit)
-        return Polygon(title, named, from_si(moments * masses, dimension, unit), planes[first:], last, unit)
-
-    if b.request.modes is not None:
-        fix, i = _modal_fix(b, rotor)
-        each = zip(b.request.modes.conditions, _at_masses(b, rotor), fix.at_planes[i], strict=True)
-        every = [polygon(f"{name}: U·φ", 0, masses, at) for name, masses, at in each]
-    else:
-        every = [polygon("forces")]
-        if b.rotors.z is not None and b.planes.z is not None and len(planes) > 1:
-            z = b.planes.z[here]
-            arms = b.rotors.z[mine] - z[0], z - z[0]
-            every.append(polygon(f"moments about plane {planes[0]}", 1, *arms, moment=True))
-    closed(every, f"rotor {b.rotors.names[rotor]}: " if len(b.rotors.names) > 1 else "", figure)
+def _plane_topic(
+    b: Balancing, row: int, name: str, made: complex, text: Sequence[str], scale: Scale, heading: str = ""
+) -> Topic:
+    """The topic of a correction: its equations, its size, its mass and the quadrant of its angle."""
+    radius = float(b.radius[row])
+    mass = abs(made) / radius if radius else 0.0
+    x, y = (value + 0.0 for value in (made.real, made.imag))
+    q = quadrant(x, y)
+    angle = float(degrees(np.array([made]))[0])
+    amount = (
+        f"W = {figures(mass * b.request.gravity)} N"
+        if b.rotors.weights
+        else f"m = {figures(float(from_si(mass, 'mass', b.rotors.mass_unit)))} {b.rotors.mass_unit}"
+    )
+    length = b.length_unit
+    lines = [
+        *text,
+        f"  √(x² + y²) = {scale.of(abs(made))} {scale.name}; at r = {figures(float(from_si(radius, 'length', length)))} {length}: {amount}",
+    ]
+    if q is not None:
+        signs = (
+            f"x {'<' if x < 0 else '>' if x > 0 else '='} 0, y {'<' if y < 0 else '>' if y > 0 else '='} 0"
+        )
+        lines.append(f"  tan θ = y/x; {signs}: quadrant {q}, θ = {figures(angle)}°")
+    if b.request.remove:
+        lines.append(f"  to remove instead: on the other side, at {figures(in_turn(angle + 180.0))}°")
+    unit = b.rotors.unbalance_unit
+    table = Table(
+        [],
+        (),
+        "",
+        documented=[
+            number("x", "unbalance", [x], unit),
+            number("y", "unbalance", [y], unit),
+            names("quadrant", [q]),
+            number("unbalance", "unbalance", [abs(made)], unit),
+            number("mass", "mass", [mass], b.rotors.mass_unit),
+            number("angle", "angle", [angle]),
+        ],
+    )
+    return Topic(f"plane {name}", [*lines, table], heading)
 
 
 SHOWN = 6
-"""So many terms of a sum are written."""
+"""The largest number of terms of a sum in the text."""
 
 
 def _modal(b: Balancing, rotor: int, rows: list[int], fix: ModalCorrection, i: int) -> list[Topic]:
-    """The topics of a rotor."""
+    """The worked solution of a rotor with modes."""
     scale = Scale(b)
     shapes = b.request.modes
     assert shapes is not None
-    mine = np.flatnonzero(b.rotors.rotor == rotor)
-    u, phi = b.rotors.moment[mine], _at_masses(b, rotor)
+    mine = b.masses_of(rotor)
+    u, phi = b.rotors.moment[mine], b.conditions_at_masses(rotor)
     made, at_planes = b.ideal[rows], fix.at_planes[i]
     planes = [b.planes.name[b.plane_of_row[row]] for row in rows]
     conditions, unit = shapes.conditions, b.rotors.unbalance_unit
     signs = [_sign(name) for name in conditions]
     sums = fix.modal[i]
-    columns = [names("name", labels(b, mine)), number("unbalance_x", "unbalance", u.real, unit)]
+    columns = [names("name", b.mass_names(rotor)), number("unbalance_x", "unbalance", u.real, unit)]
     columns.append(number("unbalance_y", "unbalance", u.imag, unit))
     columns += [
         number(f"phi {name}", "number", row, place=f"phi.{name}")
@@ -296,7 +322,7 @@ def _modal(b: Balancing, rotor: int, rows: list[int], fix: ModalCorrection, i: i
             f"  {axis} = {scale.of(part)} {scale.name}"
             for axis, part in (("x", value.real), ("y", value.imag))
         ]
-        topics.append(plane_topic(b, row, name, complex(value), ["From the system:", *lines], scale))
+        topics.append(_plane_topic(b, row, name, complex(value), ["From the system:", *lines], scale))
     topics.append(_check(conditions, signs, planes, at_planes, sums, made, scale, unit))
     return topics
 
@@ -366,23 +392,10 @@ def _sign(condition: str) -> str:
     return {"force": "F", "couple": "M"}.get(condition, f"s_{condition.removeprefix('mode ')}")
 
 
-def _at_masses(b: Balancing, rotor: int) -> Any:
-    """The conditions' rows at the masses, (q, m)."""
-    assert b.request.modes is not None
-    assert b.rotors.z is not None
-    return b.request.modes.at(b.rotors.z[b.rotors.rotor == rotor], "a mass")
+def _figure(b: Balancing, rotor: int) -> Figure:
+    from cli.balance.page import polygons
+    from cli.show.picture import blank
 
-
-def _modal_fix(b: Balancing, rotor: int) -> tuple[ModalCorrection, int]:
-    """The corrections among which a rotor's stand, and its place there."""
-    group, _, fix = next(each for each in b.modal if rotor in each[0])
-    return fix, int(np.flatnonzero(group == rotor)[0])
-
-
-def shares(b: Balancing, rotor: int) -> Any:
-    """Return what each unbalance alone asks of the planes, with its sign turned, (m, p)."""
-    from balancing import modal_corrections
-
-    fix, i = _modal_fix(b, rotor)
-    moment = np.diag(b.rotors.moment[b.rotors.rotor == rotor])
-    return -modal_corrections(moment, _at_masses(b, rotor), fix.at_planes[i]).unbalance
+    figure = blank()
+    polygons(b, rotor, figure)
+    return figure

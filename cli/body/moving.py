@@ -40,7 +40,7 @@ class ShaftRequest:
 
 @dataclass(frozen=True)
 class Request:
-    """What was asked for, in SI."""
+    """The options of the motion, in SI."""
 
     omega: Vector | None = None
     alpha: Vector | None = None
@@ -74,7 +74,7 @@ class MovingBody:
 
     @cached_property
     def second(self) -> MovingBody:
-        """The same to 32 digits."""
+        """The same body in 32 digits."""
         return replace(self, doubled=True)
 
     @property
@@ -137,7 +137,7 @@ class MovingBody:
 
     @property
     def moving(self) -> bool:
-        """Whether any motion was asked about."""
+        """Whether the options give a motion."""
         w = self.request
         return w.shaft is not None or any(
             x is not None for x in (w.omega, w.alpha, w.velocity, w.acceleration)

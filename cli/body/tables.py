@@ -29,7 +29,7 @@ METHOD = (
 
 Bodies: TypeAlias = Sequence[MovingBody]
 DRAWN = 4
-"""So many of several bodies are drawn."""
+"""The largest number of bodies in a picture."""
 
 
 class Entry(NamedTuple):
@@ -327,7 +327,7 @@ def corrections(b: MovingBody) -> Table:
 
 
 def warnings(bodies: Bodies) -> list[str]:
-    """What a reader of the tables has to know."""
+    """Warnings about parts and motion."""
     lines = []
     for b in bodies:
         of = f"body {b.parts.body}: " if b.parts.several else ""

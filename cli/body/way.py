@@ -1,4 +1,4 @@
-"""What else is asked of a body: the worked solution, of parts and tensor, H, its rate, principal axes, the angle of H to ω, bearings; `--find`."""
+"""The worked solution of a body: parts and tensor, H, its rate, principal axes, the angle of H to ω, bearings; and `--find`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def way(bodies: Sequence[MovingBody]) -> list[Topic]:
-    """The topics of every body, one after the other."""
+    """The worked solution of every body."""
     if not bodies[0].parts.several:
         return _of_body(bodies[0])
     return [
@@ -39,7 +39,7 @@ def way(bodies: Sequence[MovingBody]) -> list[Topic]:
 
 
 def _of_body(b: MovingBody) -> list[Topic]:
-    """The topics of a body, of its motion where it has one, and of the shaft that it may be."""
+    """The worked solution of a body, with its motion, or as a shaft."""
     result = [_inertia(b)]
     if b.moving:
         result += [_momentum(b), _rate(b)]
@@ -246,7 +246,7 @@ def find(
         return MovingBody(bodies[0], moved)
 
     choices = {**_motions(table, request), **_cells(table, request)}
-    vectors = ", with .x, .y, .z or .size behind a vector"
+    vectors = ", with .x, .y, .z or .size behind a vector, and .1, .2 or .3 behind principal"
     change, solution = root_search.solve(
         choices, name, wanted, "bearing1_dynamic.x=20N", lambda change: numbers_of(body(change)), vectors
     )

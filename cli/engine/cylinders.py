@@ -56,7 +56,7 @@ class Cylinders:
 
     @property
     def in_32_digits(self) -> Cylinders:
-        """The same cylinders with the decimals of the table as they are written."""
+        """The cylinders in 32 digits, with the decimals of the table exact."""
         from cli.read.exact import as_written
         from dalembert.arithmetic.shapes import in_32_digits
 
@@ -189,7 +189,7 @@ class Engine:
 
     @cached_property
     def second(self) -> Engine:
-        """The same engine in numbers of 32 digits, with the decimals of the table and of the options as they are written."""
+        """The engine in 32 digits, with the decimals of the table and of the options exact."""
         from cli.read.exact import array, rates
 
         numbers: dict[str, Any] = {
@@ -207,7 +207,7 @@ class Engine:
 
     @cached_property
     def reciprocating(self) -> Forces:
-        """Of each cylinder."""
+        """The forces of the reciprocating mass of each cylinder."""
         c = self.cylinders
         return reciprocating_forces(
             c.crank, c.bank, c.z, c.throw, c.rod, c.reciprocating, self.speed, self.highest
@@ -237,7 +237,7 @@ class Engine:
 
     @cached_property
     def on_the_crank(self) -> Forces:
-        """Of the cylinders, the rotating masses and the counterweights."""
+        """The forces of the cylinders, the rotating masses and the counterweights."""
         forces = self.reciprocating.joined(
             turning_force(self.rotating, self.cylinders.z, self.speed, self.highest)
         )
@@ -248,7 +248,7 @@ class Engine:
 
     @cached_property
     def shaft_unbalances(self) -> Complex:
-        """Of each shaft at θ = 0, kg·m."""
+        """The unbalance of each shaft at θ = 0, kg·m."""
         result = np.zeros_like(self.cylinders.z, dtype=complex, shape=len(self.shafts))
         for order, against in {(s.order, s.against) for s in self.shafts}:
             alike = [i for i, s in enumerate(self.shafts) if (s.order, s.against) == (order, against)]

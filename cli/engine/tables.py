@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cli.engine.cylinders import Complex, Engine, Real
+    from cli.engine.cylinders import Complex, Real
 
 
 METHOD = (
@@ -202,7 +202,7 @@ def locomotive(e: Engine) -> Table:
 
 
 def warnings(e: Engine) -> list[str]:
-    """What a reader of the orders has to know."""
+    """Warnings about shafts and masses."""
     lines = [
         text
         for shaft, unbalance in zip(e.shafts, e.shaft_unbalances, strict=True)
@@ -216,9 +216,9 @@ def warnings(e: Engine) -> list[str]:
 
 
 ROWS = 3
-"""So many orders are drawn, the lowest of those with forces."""
+"""The largest number of orders in the picture: the lowest with forces."""
 NAMED = 12
-"""So many cylinders are named."""
+"""The largest number of cylinders with their names in the picture."""
 
 
 def draw(e: Engine) -> Figure:
@@ -322,7 +322,7 @@ SHOWN = 1e-12
 
 
 def way(e: Engine) -> list[Topic]:
-    """The topics."""
+    """The worked solution."""
     c, names_of = e.cylinders, e.cylinders.names
     ratios = (c.throw / c.rod).tolist()
     orders = np.array([piston_orders(ratio, e.highest) for ratio in ratios])

@@ -32,7 +32,7 @@ KEYS = ("command", "title", "text", "figure", "source", "draw", "ask")
 ASK = ("quantity", "where", "figures", "points", "unit", "label")
 MOST_FIGURES = 12
 LISTED = 10_000
-"""So many steps a draw may have."""
+"""The largest number of values of a draw."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class Exercise:
 
     @property
     def points(self) -> Fraction:
-        """Of all questions together."""
+        """The points of all questions together."""
         return sum((ask.points for ask in self.asks), Fraction(0))
 
 

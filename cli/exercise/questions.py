@@ -17,7 +17,7 @@ from cli.exercise.variants import Variant
 from dalembert.figures import rounded
 
 FEEDBACKS = 30
-"""So many likely mistakes of a question have their feedback."""
+"""The largest number of likely mistakes of a question with a feedback."""
 
 
 def moodle(

@@ -22,10 +22,10 @@ from dalembert.quantities import is_number
 from dalembert.units import parted, unit_name
 
 MOST = 160
-"""So many slips are tried."""
+"""The largest number of slips that are tried."""
 TIMES = {"ten times too large": Decimal(10), "ten times too small": Decimal("0.1")}
 LIKELY = 12
-"""Of so many slips, the likeliest, any two are tried together."""
+"""The number of likeliest slips of which any two are tried together."""
 RESULTS = ("kg_m2_s", "J", "W", "rad_s3", "m_s3")
 
 

@@ -88,7 +88,10 @@ class Workshop:
         if name not in self.sheets:
             path = str(self.exercise.folder / name)
             source = open_source(path, {}, None)
-            self.sheets[name] = Sheet(name, list(source.header), [list(cells) for _, cells in source.rows()])
+            header = list(source.header)
+            # cells that a short row lacks are blank
+            rows = [[*cells, *[""] * (len(header) - len(cells))] for _, cells in source.rows()]
+            self.sheets[name] = Sheet(name, header, rows)
         return self.sheets[name]
 
     @cached_property

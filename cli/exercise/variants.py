@@ -18,14 +18,14 @@ from dalembert.figures import Right
 from dalembert.units import unit_name
 
 MOST_CONDITION = 25.0
-"""Of the constraint Jacobian with lengths divided by the mechanism's size."""
+"""Largest condition number of the constraint Jacobian, with lengths divided by the mechanism's size."""
 MOST_GROWTH = 60.0
 """An answer changes by at most so many times the share that a datum does."""
 STEP = Decimal("1e-6")
 NEAR_TIE = Decimal("0.02")
 """An answer lies at least this share of a unit of its last figure away from where the rounding turns."""
 TRIES = 400
-"""So many variants are tried for each that is wanted."""
+"""The largest number of variants that are tried for each variant."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -24,7 +24,12 @@ def warnings(b: FieldBalancing) -> list[str]:
     groups = [_Group(b, solved) for solved in b.solved]
     sentences = (sentence for group in groups for sentence in group.warnings())
     fits = (sentence for group in groups for sentence in group.of_fit()) if b.runs.fitted else ()
-    return [*dict.fromkeys([*b.runs.warnings, *_not_turned(b), *b.warnings, *sentences]), *fits]
+    return [
+        *dict.fromkeys(
+            [*b.runs.warnings, *_not_turned(b), *b.warnings, *_without_trials(groups), *sentences]
+        ),
+        *fits,
+    ]
 
 
 def _not_turned(b: FieldBalancing) -> Iterator[str]:
@@ -41,6 +46,22 @@ def _not_turned(b: FieldBalancing) -> Iterator[str]:
         )
 
 
+def _without_trials(groups: list[_Group]) -> Iterator[str]:
+    """Warn of rotors without a trial run in a plane where a rotor with the same other planes has one."""
+    for group in groups:
+        own = set(group.planes)
+        others = {plane: None for other in groups if own < set(other.planes) for plane in other.planes}
+        missing = [plane for plane in others if plane not in own]
+        named = f"plane{'s' * (len(missing) > 1)} {' and '.join(missing)}"
+        yield from group.each(
+            np.full(len(group.group.rotors), bool(missing)),
+            lambda _, named=named: (  # type: ignore[misc]
+                f"no trial run in {named}, where other rotors have one: the corrections are for its other planes alone"
+            ),
+            f"no trial run in {named}",
+        )
+
+
 class _Group:
     """The warnings about a group of rotors."""
 
@@ -48,7 +69,7 @@ class _Group:
         self.b, self.solved, self.group, self.planes = b, solved, solved.group, solved.planes
         self.unit = b.runs.amplitude_unit
 
-    def _each(self, where: ArrayLike, sentence: Callable[[int], str], more: str = "") -> Iterator[str]:
+    def each(self, where: ArrayLike, sentence: Callable[[int], str], more: str = "") -> Iterator[str]:
         """Yield a sentence about each rotor where something holds, of the first ones; `more` of so many others."""
         rotors = np.flatnonzero(where)
         for i in rotors[:SHOWN].tolist():
@@ -59,7 +80,7 @@ class _Group:
     def warnings(self) -> Iterator[str]:
         """Yield those about the corrections."""
         b, solved, request = self.b, self.solved, self.b.request
-        yield from self._each(
+        yield from self.each(
             ~np.abs(solved.initial).any(axis=1),
             lambda _: "no vibration in the initial run: nothing to correct",
             "no vibration in the initial run",
@@ -71,7 +92,7 @@ class _Group:
         yield from self._alternatives()
         if request.tolerance is not None and solved.unbalance is not None:
             unknown = np.isnan(solved.unbalance)
-            yield from self._each(
+            yield from self.each(
                 unknown.any(axis=1),
                 lambda i: self._undetermined(
                     [p for p, no in zip(self.planes, unknown[i], strict=True) if no]
@@ -80,7 +101,7 @@ class _Group:
             )
             # from here on means with the trial masses that were left on the rotor
             size = b.in_kg_m(solved.unbalance + solved.start)
-            yield from self._each(
+            yield from self.each(
                 (size <= request.tolerance.shares(len(self.planes))).all(axis=1),
                 lambda _: (
                     "already within the permissible residual unbalance in every plane: stop, no correction is needed"
@@ -88,7 +109,7 @@ class _Group:
                 "already within the permissible residual unbalance",
             )
         if b.ceiling is not None:
-            yield from self._each(
+            yield from self.each(
                 (np.abs(solved.initial) <= b.ceiling).all(axis=1),
                 lambda _: "the initial vibration is within --max-residual already",
                 "initial vibration within --max-residual already",
@@ -124,7 +145,7 @@ class _Group:
                 "one out, or damp with --ridge"
             )
 
-        yield from self._each(weak.any(axis=1), sentence, "planes nearly dependent")
+        yield from self.each(weak.any(axis=1), sentence, "planes nearly dependent")
 
     def _alternatives(self) -> Iterator[str]:
         """Yield the other corrections that fit amplitudes as well."""
@@ -160,7 +181,7 @@ class _Group:
             most, turn = np.max(effect.amplitude, axis=1), np.degrees(np.max(effect.phase, axis=1))
             little = ~((effect.amplitude >= 0.3) | (effect.phase >= np.radians(30))).any(axis=1)
             run = group.lines.runs(0)[j]
-            yield from self._each(
+            yield from self.each(
                 bare & (before >= 0) & little,
                 lambda i, j=j, most=most, turn=turn: (  # type: ignore[misc]
                     f"run {group.lines.runs(i)[j]}: the trial mass changed the vibration by {most[i]:.0%} and {turn[i]:.0f}° "
@@ -242,7 +263,7 @@ class _Group:
                 "another time"
             )
 
-        yield from self._each(of_time.probability < LEVEL, sentence)
+        yield from self.each(of_time.probability < LEVEL, sentence)
 
     def _scatter(self) -> Iterator[str]:
         """Where the residuals are larger than the errors stated, by χ²."""
@@ -253,7 +274,7 @@ class _Group:
         mean = square.sum(axis=(1, 2)) / fit.present.sum(axis=(1, 2))
         nu = fit.degrees_of_freedom
         ratio = fit.sum_of_squares / np.where(mean > 0, mean, np.inf)
-        yield from self._each(
+        yield from self.each(
             (nu > 0) & (gammaincc(np.maximum(nu, 1), ratio) < LEVEL),
             lambda i: (
                 f"the residuals scatter by {fit.residual_sd[i]:.4g} {self.unit} (standard "

@@ -49,7 +49,7 @@ class Flywheel:
 
     @cached_property
     def second(self) -> Flywheel:
-        """The same in numbers of 32 digits, with the decimals of the table and of the options as they are written."""
+        """The flywheel in 32 digits, with the decimals of the table and of the options exact."""
         from cli.read.exact import array, as_written, rates
 
         angle, torque = (self.table.numbers[name] for name in ("angle", "torque"))
@@ -70,7 +70,7 @@ class Flywheel:
 
     @property
     def inertia(self) -> float:
-        """Of the flywheel, kg·m²."""
+        """Moment of inertia of the flywheel, kg·m²."""
         return self.cycle.inertia(self.speed, self.coefficient)
 
     @property
@@ -198,7 +198,7 @@ def energy(wheel: Flywheel) -> Table:
 
 
 def warnings(wheel: Flywheel) -> list[str]:
-    """What a reader of the result has to know."""
+    """Warnings about the torque."""
     lines = []
     if wheel.constant:
         lines.append("the torque does not vary: there is nothing for a flywheel to store")
@@ -250,7 +250,7 @@ def draw(wheel: Flywheel) -> Figure:
 
 
 def way(wheel: Flywheel) -> list[Topic]:
-    """The topics."""
+    """The worked solution."""
     cycle = wheel.cycle
     span = float(np.radians(wheel.angle[-1] - wheel.angle[0]))
     mean = [

@@ -175,7 +175,9 @@ def _same(ask: Ask, key: str, cell: str) -> bool:
 
 
 SHARES = {"right": Fraction(1), "carried": Fraction(1), "rounding": Fraction(1, 2), "figures": Fraction(1, 2)}
-"""Of the points, by verdict."""
+"""Share of the points, by verdict."""
+MOST_POWER = 60
+"""No answer has a larger power of ten, up or down."""
 RANK = ("right", "rounding", "figures", "carried", "wrong")
 TURNS = {"deg": Decimal(360), "rad": Decimal("6.28318530717958647692528676655900576839")}
 JOINED = {"Nm": "N*m", "kNm": "kN*m", "Nmm": "N*mm", "mNm": "mN*m", "kgm": "kg*m", "gmm": "g*mm", "kgmm": "kg*mm", "kgm2": "kg*m2",
@@ -205,17 +207,17 @@ class _Reading:
 
     number: Typed
     scale: Fraction
-    """Of its unit in the unit asked for."""
+    """Its unit in the unit of the question."""
     verdict: str
 
     @property
     def value(self) -> float:
-        """In the unit asked for."""
+        """In the unit of the question."""
         return float(Fraction(self.number.value) * self.scale)
 
     @property
     def half(self) -> float:
-        """Half a unit of its last figure, in the unit asked for."""
+        """Half a unit of its last figure, in the unit of the question."""
         return float(Fraction(self.number.half_unit) * abs(self.scale))
 
 
@@ -263,6 +265,8 @@ class Judge:
         numbers = typed(text)
         if not numbers:
             return Mark(student, answer, text, "wrong", f"{quote(text)} is no number"), None
+        if any(abs(number.value.adjusted()) > MOST_POWER for number in numbers):
+            return Mark(student, answer, text, "wrong"), None
         readings = []
         for number in numbers:
             scale = scale_of(number.unit or unit or answer.unit, answer.unit)

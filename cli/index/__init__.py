@@ -28,8 +28,7 @@ def run(readings: str, phase_lag: bool = False) -> Result:
     angle_*, or amplitude_* and phase_deg; * is a unit. Each reading is mandrel + rotor·e^{i·turned}. All angles are
     counted in one common sense from the mandrel's zero mark; the rotor's angle is that of its position turned = 0.
     """
-    from cli.index.readings import read_positions
-    from cli.index.tables import METHOD, draw, tables, warnings, way
+    from cli.index.positions import METHOD, draw, read_positions, tables, warnings, way
     from cli.show.result import Result
 
     positions = read_positions(readings, phase_lag)

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from cli.place.corrections import (
-    Request,
-    read_corrections,
-    read_drill,
-    read_planes,
-    read_radii,
-)
 from cli.read import options
 from cli.show.commands import ShowOptions
 from cli.show.output import command
@@ -20,11 +14,14 @@ from cli.show.output import command
 if TYPE_CHECKING:
     from fractions import Fraction
 
+    from cli.place.placing import Drill
     from cli.show.result import Result
     from dalembert.results.way import Topic
 
 
 EXAMPLE = "blades"
+FIRST, FLAT = "0deg", "180deg"
+"""The defaults of --first and --drill-point."""
 OPTIONS = """
 Arguments:
   corrections MASS@ANGLE ...  Corrections to ADD, such as 83.5g@308.87deg; or a FILE that dalembert field wrote (CSV, JSON, workbook).
@@ -63,7 +60,7 @@ def run(
     plane: str | None = None,
     positions: str | None = None,
     blades: Annotated[int | None, typer.Option(min=1, max=options.PLACES)] = None,
-    first: str = "0deg",
+    first: str = FIRST,
     numbering: Literal["with", "against"] = "with",
     max_mass: str | None = None,
     stock: str | None = None,
@@ -76,7 +73,7 @@ def run(
     to_z: str | None = None,
     drill: str | None = None,
     density: str | None = None,
-    drill_point: str = "180deg",
+    drill_point: str = FLAT,
     max_depth: str | None = None,
     remove: bool = False,
     *,
@@ -87,6 +84,11 @@ def run(
     Several corrections are added as vectors first. Without --positions or --blades the result is one mass. In a FILE
     each plane of each rotor is placed on its own.
     """
+    from cli.place.placing import Placing, Request, read_corrections
+    from cli.place.tables import METHOD, draw, tables, way
+    from cli.show.result import Result, Section, Sheet
+    from dalembert.results.text import heading
+
     every = read_corrections(corrections, rotor, plane)
     stated = (
         []
@@ -94,8 +96,8 @@ def run(
         else [f"{corrections[0]}: its corrections are material to remove"]
     )
     remove = remove or every[0].removed
-    radii = read_radii(at_radius, to_radius)
-    drilled = read_drill(drill, density, drill_point, max_depth)
+    radii = _radii(at_radius, to_radius)
+    drilled = _drill(drill, density, drill_point, max_depth)
     in_stock, fixed = options.weights("--stock", stock), options.weights("--weights", weights)
     if in_stock is not None and drilled is not None:
         raise options.bad("--stock", "weights from stock are not drilled: expected --stock or --drill")
@@ -103,15 +105,15 @@ def run(
         turned = "does not go with --weights, which have a mass of their own and stand at any angle"
         options.refuse(turned, positions=positions, blades=blades, stock=stock, max_mass=max_mass)
         options.refuse(turned, max_pieces=max_pieces, drill=drill, remove=remove)
-    moved = read_planes(at_z, to_z)
+    if in_stock is None:
+        options.refuse("goes with --stock", pieces=pieces > 1, max_pieces=max_pieces)
+    if blades is None and first != FIRST:
+        raise options.bad("--first", "goes with --blades")
+    moved = _planes(at_z, to_z)
     chosen = options.places(positions, blades, first, numbering)
     if in_stock is not None and chosen is None:
         raise options.bad("--stock", "expected --positions or --blades for the weights to go to")
     limit = options.quantity("--max-mass", max_mass, "mass", positive=True)
-    from cli.place.placing import Placing
-    from cli.place.tables import METHOD, draw, tables
-    from cli.show.result import Result, Section, Sheet
-    from dalembert.results.text import heading
 
     def exact_places() -> list[Fraction]:
         return options.exact_places(positions, blades, first, numbering)
@@ -127,15 +129,13 @@ def run(
     def sheet(placing: Placing) -> Sheet:
         parts = {name: table() for name, table in tables([placing]).items()}
         sections = [Section(heading(name), [table.above, table]) for name, table in parts.items()]
-        return Sheet(placing.of.name, sections, lambda: draw(placing))
+        return Sheet(placing.correction.name, sections, lambda: draw(placing))
 
-    def way() -> list[Topic]:
-        from cli.place.tables import way
-
-        return [topic for each in placings for topic in way(each, "" if alone else each.of.name)]
+    def topics() -> list[Topic]:
+        return [topic for each in placings for topic in way(each, "" if alone else each.correction.name)]
 
     return Result(
-        way=way,
+        way=topics,
         tables=tables(placings),
         figure=(lambda: draw(placings[0])) if alone else None,
         method=METHOD,
@@ -143,8 +143,60 @@ def run(
         about={"title": "Placement of a correction"},
         warnings=stated
         + [
-            text if alone else f"{placing.of.name}: {text}"
+            text if alone else f"{placing.correction.name}: {text}"
             for placing in placings
             for text in placing.warnings
         ],
     )
+
+
+def _both(one: str, value: object, other: str, second: object) -> None:
+    """Refuse one of two options without the other."""
+    if (value is None) != (second is None):
+        raise options.bad(one if value is None else other, f"expected both {one} and {other}")
+
+
+def _radii(at_radius: str | None, to_radius: str | None) -> tuple[float, float] | None:
+    """Read --at-radius and --to-radius."""
+    at = options.quantity("--at-radius", at_radius, "length", positive=True)
+    to = options.quantity("--to-radius", to_radius, "length", positive=True)
+    _both("--at-radius", at, "--to-radius", to)
+    return None if at is None or to is None else (at, to)
+
+
+def _drill(drill: str | None, density: str | None, drill_point: str, max_depth: str | None) -> Drill | None:
+    """Read --drill and what goes with it."""
+    from fractions import Fraction
+
+    from cli.place.placing import Drill
+
+    diameter = options.quantity("--drill", drill, "length", positive=True)
+    rho = options.quantity("--density", density, "density", positive=True)
+    _both("--drill", diameter, "--density", rho)
+    deepest = options.quantity("--max-depth", max_depth, "length", positive=True)
+    if deepest is not None and diameter is None:
+        raise options.bad("--max-depth", "is for --drill")
+    if drill_point != FLAT and diameter is None:
+        raise options.bad("--drill-point", "is for --drill")
+    point = options.needed("--drill-point", drill_point, "angle", positive=True)
+    if point > math.pi * (1 + 1e-15):
+        raise options.bad("--drill-point", "expected at most 180deg")
+    if diameter is None or rho is None:
+        return None
+    return Drill(
+        diameter, rho, min(point, math.pi), deepest, min(options.exact_degrees(drill_point), Fraction(180))
+    )
+
+
+def _planes(at_z: str | None, to_z: str | None) -> tuple[float, list[float]] | None:
+    """Read --at-z and --to-z."""
+    at = options.quantity("--at-z", at_z, "length")
+    _both("--at-z", at, "--to-z", to_z)
+    if at is None or to_z is None:
+        return None
+    planes = [options.needed("--to-z", part, "length") for part in to_z.split(":")]
+    if len(planes) < 2:
+        raise options.bad("--to-z", f"'{to_z}': expected two planes or more, such as 0mm:90mm")
+    if len(set(planes)) < len(planes):
+        raise options.bad("--to-z", f"'{to_z}': two planes lie at the same place")
+    return at, planes

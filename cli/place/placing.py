@@ -1,9 +1,12 @@
-"""From corrections and the places where masses can go to the masses, and the holes that remove as much."""
+"""Corrections, from vectors or from a file, put where masses can go; the holes that remove as much."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -19,18 +22,187 @@ from balancing import (
     transfer,
 )
 from balancing.stock import ENOUGH
-from cli.place.corrections import Correction, Drill, Request
+from cli.read import options
 from dalembert.angles import degrees, in_turn, phasor
-from dalembert.errors import DataError
+from dalembert.errors import DataError, quote
+from dalembert.tables.files import SUFFIXES, read_bytes, remember, split_sheet
 from dalembert.units import from_si, to_si
 
 Real = NDArray[np.float64]
 HOLES = 10_000  # more at one place are refused
 
 
+class Vector(NamedTuple):
+    """A mass at an angle, in the units of the input."""
+
+    mass: float
+    mass_unit: str
+    angle: float
+    angle_unit: str
+
+    @property
+    def in_si(self) -> complex:
+        """m·e^{iθ}, kg."""
+        mass = np.array(to_si(self.mass, "mass", self.mass_unit))
+        return complex(phasor(mass, np.array(self.angle), self.angle_unit))
+
+
+class Drill(NamedTuple):
+    """The drill that removes material, in SI."""
+
+    diameter: float
+    density: float
+    point: float
+    """Point angle, rad."""
+    max_depth: float | None
+    exact_point: Fraction
+    """Point angle as written, degrees."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """Where masses can go, and how; angles in degrees, the rest in SI."""
+
+    places: list[float] | None
+    limit: float | None
+    """Largest mass of a place."""
+    stock: list[float] | None
+    weights: list[float] | None
+    """Weights of fixed mass, at any angle."""
+    pieces: int
+    max_pieces: int | None
+    radii: tuple[float, float] | None
+    """Radius of the corrections, radius of the places."""
+    drill: Drill | None
+    planes: tuple[float, list[float]] | None
+    """Axial position of the corrections, axial positions of the new planes."""
+    remove: bool
+    exact_places: Callable[[], list[Fraction]]
+    """The angles of the places as written, degrees."""
+
+    @property
+    def ratio(self) -> float:
+        """Radius of the corrections over that of the places."""
+        return 1.0 if self.radii is None else self.radii[0] / self.radii[1]
+
+    @property
+    def removes(self) -> bool:
+        """Whether the masses are material to remove."""
+        return self.remove or self.drill is not None
+
+
+class Correction(NamedTuple):
+    """A correction: the sum of vectors, or that of one plane of one rotor in a file."""
+
+    rotor: str
+    plane: str
+    vectors: list[Vector]
+    removed: bool = False
+    """Whether the file has it as material to remove."""
+
+    @property
+    def unit(self) -> str:
+        """The unit of the masses in the result."""
+        return self.vectors[0].mass_unit
+
+    @property
+    def name(self) -> str:
+        """Rotor and plane, to name it among several corrections."""
+        return f"rotor {self.rotor}, plane {self.plane}"
+
+
+def read_corrections(words: list[str], rotor: str | None, plane: str | None) -> list[Correction]:
+    """Read MASS@ANGLE ..., or one file, with the rotor and the plane to choose from it."""
+    file = words[0]
+    if not _is_file(file):
+        options.refuse("chooses among the corrections of a file: expected a file", rotor=rotor, plane=plane)
+        return [Correction("1", "1", [read_vector(word) for word in words])]
+    if len(words) > 1:
+        raise options.bad("MASS@ANGLE", f"'{words[1]}': expected nothing in addition to a file")
+    corrections = _from_json(file) if file.lower().endswith(".json") else _from_table(file)
+    for noun, wanted, field in (("rotor", rotor, 0), ("plane", plane, 1)):
+        if wanted is None:
+            continue
+        names = dict.fromkeys(str(each[field]) for each in corrections)
+        corrections = [each for each in corrections if each[field] == wanted]
+        if not corrections:
+            raise DataError(f"{file}: no {noun} {quote(wanted)}: expected one of {', '.join(names)}")
+    return corrections
+
+
+def _is_file(text: str) -> bool:
+    """Whether an argument is a file, not a MASS@ANGLE."""
+    path, _ = split_sheet(text)
+    suffix = Path(path).suffix.lower() in (".csv", ".txt", ".json", *SUFFIXES)
+    return text == "-" or suffix or ("@" not in text and Path(path).is_file())
+
+
+def _from_table(path: str) -> list[Correction]:
+    from dalembert.tables.table import read
+
+    # columns of a table of corrections that are not used here: no warning
+    further = {"mass_uncertainty": "mass", "angle_uncertainty": "angle", "z": "length", "radius": "length"}
+    further |= {"trim_mass": "mass", "trim_angle": "angle"}
+    table = read(
+        path,
+        numbers={"mass": "mass", "angle": "angle", "unbalance": "unbalance", "weight": "force", **further},
+        texts=["rotor", "plane"],
+        blank=list(further),
+    )
+    if "mass" not in table.numbers and "unbalance" in table.numbers:
+        raise DataError(
+            f"{table.file}: corrections as unbalances: expected masses, as trial masses in the runs give them"
+        )
+    mass, angle = table.require("mass", "mass"), table.require("angle", "angle")
+    table.reject(mass.values < 0, "mass", "a mass that is not negative")
+    names = [table.named(name) for name in ("rotor", "plane")]
+    return [
+        Correction(rotor, plane, [Vector(m, mass.unit, a, angle.unit)])
+        for rotor, plane, m, a in zip(*names, mass.values.tolist(), angle.values.tolist(), strict=True)
+    ]
+
+
+def _from_json(path: str) -> list[Correction]:
+    import json
+
+    remember(path)
+    file, data = read_bytes(path)
+    try:
+        document = json.loads(data)
+    except (ValueError, RecursionError) as error:
+        raise DataError(f"{file}: no valid JSON: {error}") from None
+    try:
+        removed = document.get("correction") == "remove"
+        corrections = [
+            Correction(str(rotor["rotor"]), str(one["plane"]), [_vector(one)], removed)
+            for rotor in document["rotors"]
+            for one in rotor["corrections"]
+        ]
+    except (AttributeError, KeyError, TypeError, ValueError):
+        corrections = []
+    if not corrections:
+        raise DataError(
+            f"{file}: no corrections with plane, mass_kg and angle_deg below rotors: expected the JSON of dalembert field"
+        )
+    return corrections
+
+
+def _vector(one: Mapping[str, str | float]) -> Vector:
+    mass, angle = float(one["mass_kg"]), float(one["angle_deg"])
+    if not (0 <= mass <= 1e60 and abs(angle) <= 1e60):
+        raise ValueError
+    return Vector(mass, "kg", angle, "deg")
+
+
+def read_vector(spec: str) -> Vector:
+    """Read `83.5g@308.87deg`."""
+    expected = f"'{spec}': expected a mass and an angle, such as 83.5g@308.87deg"
+    return Vector(*options.mass_at("MASS@ANGLE", spec, spec, "mass", expected))
+
+
 @dataclass(frozen=True)
 class Share:
-    """What goes into one plane."""
+    """The correction of one plane, and the masses that make it."""
 
     z: float | None
     goal: complex
@@ -39,13 +211,13 @@ class Share:
 
     @property
     def error(self) -> complex:
-        """What is missed; below the rounding of the goal nothing is."""
+        """The error of the masses; zero where it is rounding."""
         error = self.placed.error
         return error if abs(error) > 1e-14 * abs(self.goal) else 0j
 
 
 class Placed(NamedTuple):
-    """A mass on a place, and the holes that remove it."""
+    """A mass on a place (its number from 0), and the holes that remove it."""
 
     share: Share
     place: int
@@ -56,28 +228,25 @@ class Placed(NamedTuple):
 
 
 class Placing:
-    """Corrections combined and placed."""
+    """A correction placed on request: a share for each plane, the masses, what to warn of."""
 
-    def __init__(self, of: Correction, request: Request) -> None:
-        self.of, self.request = of, request
+    def __init__(self, correction: Correction, request: Request) -> None:
+        self.correction, self.request = correction, request
         self.warnings: list[str] = []
-        self._sizes = [to_si(v.mass, "mass", v.mass_unit) for v in of.vectors]
-        self._largest = max(self._sizes)
-        each = zip(self._sizes, of.vectors, strict=True)
-        turned = (phasor(np.array(size), np.array(v.angle), v.angle_unit) for size, v in each)
-        self.target = sum(map(complex, turned), 0j)
-        if abs(self.target) <= 1e-15 * self._largest:
-            self.target = 0j  # what rounding leaves of corrections that cancel
-        self.opposite = opposite = request.drill is not None and not request.remove
-        self._goal = -self.target * request.ratio if opposite else self.target * request.ratio
+        self.vectors = [v.in_si for v in correction.vectors]
+        self.target = sum(self.vectors, 0j)
+        if abs(self.target) <= 1e-15 * max(map(abs, self.vectors)):
+            self.target = 0j  # the rest of corrections that cancel is rounding
+        self.opposite = request.drill is not None and not request.remove
+        goal = -self.target * request.ratio if self.opposite else self.target * request.ratio
         if self.target == 0:
             self.warnings.append("the corrections add up to nothing: there is nothing to place")
-        goals: list[tuple[float | None, complex]] = [(None, self._goal)]
+        goals: list[tuple[float | None, complex]] = [(None, goal)]
         if request.planes is not None:
             at, planes = request.planes
-            goals = list(zip(planes, transfer([self._goal], [at], planes).tolist(), strict=True))
+            goals = list(zip(planes, transfer([goal], [at], planes).tolist(), strict=True))
         self.shares = [Share(z, goal, *self._place(goal)) for z, goal in goals]
-        if opposite:
+        if self.opposite:
             self.warnings.append("material is drilled out opposite (+180°) to the mass that would be added")
         self.masses = [
             Placed(share, i, float(mass), in_turn(share.places[i]), *_drilled(float(mass), request.drill))
@@ -85,28 +254,28 @@ class Placing:
             for i, mass in enumerate(share.placed.masses)
             if mass > 0
         ]
-        # of several planes the largest error
+        # the largest of the planes
         self.error = max((share.error for share in self.shares), key=abs)
 
     @property
     def action(self) -> str:
-        """What is done with material on the places: `add` or `remove`."""
+        """Whether material is added or removed: `add` or `remove`."""
         return "remove" if self.request.removes else "add"
 
     def text(self, mass: float) -> str:
-        """Return a mass in the unit it is shown in."""
-        return f"{from_si(mass, 'mass', self.of.unit):.4g} {self.of.unit}"
+        """Return a mass as text, in the unit of the result."""
+        return f"{from_si(mass, 'mass', self.correction.unit):.4g} {self.correction.unit}"
 
     def _place(self, goal: complex) -> tuple[list[float], Placement]:
-        """Place what goes into one plane: the places, and what is on them."""
+        """Place the correction of one plane: the angles of the places in degrees, and the masses on them."""
         request = self.request
         if request.weights is not None:
-            return self._turned(goal, request.weights)
+            return self._at_any_angle(goal, request.weights)
         if request.places is None:
             if request.limit is not None and abs(goal) > request.limit * (1 + 1e-12):
                 raise DataError(
                     f"the correction of {self.text(abs(goal))} is beyond --max-mass {self.text(request.limit)}, and "
-                    "there is one place only: expected --positions or --blades to spread it over"
+                    "there is only one place: expected --positions or --blades, to divide it among several places"
                 )
             alone = Placement(goal, np.array([np.angle(goal)]), np.array([abs(goal)]))
             return [degrees(goal)], alone
@@ -117,33 +286,34 @@ class Placing:
         if abs(placed.error) > 1e-9 * abs(goal):
             limited = " with this --max-mass" if request.limit else ""
             self.warnings.append(
-                f"the correction cannot be reached from these places{limited}: an error of "
-                f"{self.text(abs(placed.error))} is left, the least there is"
+                f"the correction cannot be reached from these places{limited}: the least possible error is "
+                f"{self.text(abs(placed.error))}"
             )
         return request.places, placed
 
     def _from_stock(self, goal: complex, stock: list[float], angles: Real) -> Placement:
         request = self.request
-
         try:
             if request.max_pieces is None:
-                placed = self._few(goal, angles, stock)
+                placed = self._fewest(goal, angles, stock)
             else:
                 most = request.max_pieces
                 placed = place_from_stock(
                     goal, angles, stock, request.limit, pieces=request.pieces, max_pieces=most
                 )
-                self._far(f"at most {most} weight{'s' * (most != 1)} leave{'s' * (most == 1)}", placed)
+                self._warn_of_error(
+                    f"at most {most} weight{'s' * (most != 1)} leave{'s' * (most == 1)}", placed
+                )
         except ValueError as error:
             raise DataError(f"--stock: {error}") from None
         if len(angles) > 2 and placed.bound == 0 and abs(placed.error) > 1e-12 * abs(goal):
             self.warnings.append(
-                "too many choices to search them all: the places nearest to the correction were used"
+                "too many choices to compare all of them: only the places nearest to the correction were used"
             )
         return placed
 
-    def _few(self, goal: complex, angles: Real, stock: list[float]) -> Placement:
-        """Take the fewest weights that come near enough, and say what one more would leave."""
+    def _fewest(self, goal: complex, angles: Real, stock: list[float]) -> Placement:
+        """Use the fewest weights with a small error; the warning gives the error with one more."""
         request = self.request
         choice = fewest_from_stock(goal, angles, stock, request.limit, pieces=request.pieces)
         placed, used, more = choice.placed, choice.used, choice.tried + 1
@@ -153,24 +323,24 @@ class Placing:
         weights = f"{used} weight{'s' * (used != 1)} leave{'s' * (used == 1)}"
         if goal and abs(further) < abs(placed.error) - 1e-12 * abs(goal):
             self.warnings.append(
-                f"{weights} {self._missed(placed)}; with {more} it would be {self.text(abs(further))} (--max-pieces {more})"
+                f"{weights} {self._error_text(placed)}; with {more} it would be {self.text(abs(further))} (--max-pieces {more})"
             )
         else:
-            self._far(weights, placed, "; one more leaves no less")
+            self._warn_of_error(weights, placed, "; one more does not make it smaller")
         return placed
 
-    def _missed(self, placed: Placement) -> str:
-        """The error of weights from stock, and its share of the correction."""
+    def _error_text(self, placed: Placement) -> str:
+        """The error of weights from stock, as mass and in percent of the correction."""
         error = abs(placed.error)
         return f"an error of {self.text(error)} ({error / abs(placed.target):.2%})"
 
-    def _far(self, weights: str, placed: Placement, more: str = "") -> None:
-        """Warn where weights from stock do not come near the correction."""
+    def _warn_of_error(self, weights: str, placed: Placement, more: str = "") -> None:
+        """Warn of an error of weights from stock that is large."""
         if abs(placed.error) > ENOUGH * abs(placed.target):
-            self.warnings.append(f"{weights} {self._missed(placed)}{more}")
+            self.warnings.append(f"{weights} {self._error_text(placed)}{more}")
 
-    def _turned(self, goal: complex, weights: list[float]) -> tuple[list[float], Placement]:
-        """Turn weights of fixed mass: their angles, and what they are together."""
+    def _at_any_angle(self, goal: complex, weights: list[float]) -> tuple[list[float], Placement]:
+        """Find the angles of weights of fixed mass, in degrees."""
         placed = place_weights(goal, weights)
         if placed.bound:
             whole = sum(weights)
@@ -180,7 +350,7 @@ class Placing:
                 else f"{self.text(abs(placed.total))} at least"
             )
             self.warnings.append(
-                f"the weights together come to {reach}: the correction of {self.text(abs(goal))} is missed by "
+                f"the weights together make {reach}: the correction of {self.text(abs(goal))} is missed by "
                 f"{self.text(placed.bound)}"
             )
         return np.degrees(placed.angles).tolist(), placed
@@ -192,9 +362,9 @@ def _drilled(mass: float, drill: Drill | None) -> tuple[float | None, int | None
         return None, None
     holes = 1
     depth = float(drill_depth(mass, drill.diameter, drill.density, drill.point))
-    while drill.deepest is not None and depth > drill.deepest * (1 + 1e-12):
-        # one hole's worth at a time; the first guess is close, the point takes a little more
-        holes = max(holes + 1, math.ceil(holes * depth / drill.deepest * (1 - 1e-9)) - 1)
+    while drill.max_depth is not None and depth > drill.max_depth * (1 + 1e-12):
+        # the depth falls a little less than the number of holes rises, because of the drill's point
+        holes = max(holes + 1, math.ceil(holes * depth / drill.max_depth * (1 - 1e-9)) - 1)
         if holes > HOLES:
             raise DataError(f"--max-depth: more than {HOLES} holes: expected a larger drill or deeper holes")
         depth = float(drill_depth(mass / holes, drill.diameter, drill.density, drill.point))

@@ -1,26 +1,24 @@
-"""Results of a placement: masses on their places, corrections and errors, planes; the picture, the worked solution."""
+"""Results of a placement: masses on their places, corrections and errors, planes; their digits, picture, worked solution."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import cache
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from balancing.picture import Places, places
-from cli.place.placing import Placing
+from cli.place.placing import Drill, Placed, Placing, Share
 from cli.show.picture import blank
 from dalembert.angles import degrees, phasor
 from dalembert.results.columns import Column, Table, names, number
 from dalembert.results.way import Topic, figures, vector_text
-from dalembert.units import from_si, to_si
+from dalembert.units import from_si
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.place.digits import Made, SecondRun
-    from cli.place.placing import Placing
     from dalembert.arithmetic.doubled import Doubled
     from dalembert.arithmetic.doubled_vectors import Vectors
 
@@ -41,7 +39,7 @@ def tables(placings: Sequence[Placing]) -> dict[str, Callable[[], Table]]:
 
 
 def _named(placings: Sequence[Placing], numbers: Iterable[int]) -> tuple[list[Column], list[Column]]:
-    """Rotor and plane of each row, where there are several corrections; behind them which correction it is.
+    """Columns of rotor and plane, where there are several corrections; and the number of the correction, which is not shown.
 
     A file may have two corrections for one plane of one rotor.
     """
@@ -49,8 +47,8 @@ def _named(placings: Sequence[Placing], numbers: Iterable[int]) -> tuple[list[Co
     if len(placings) == 1:
         return [], []
     shown = [
-        names("rotor", [placings[k].of.rotor for k in rows]),
-        names("plane", [placings[k].of.plane for k in rows]),
+        names("rotor", [placings[k].correction.rotor for k in rows]),
+        names("plane", [placings[k].correction.plane for k in rows]),
     ]
     return shown, [names("correction", rows, place=None)]
 
@@ -63,7 +61,7 @@ def _vector(
     at: tuple[str, str] = ("", ""),
     exact: Callable[[], Vectors] | None = None,
 ) -> list[Column]:
-    """Masses and their angles."""
+    """Columns of masses and their angles."""
     size = None if exact is None else lambda: exact().size
     turn = None if exact is None else lambda: exact().turned(vectors)
     return [
@@ -72,33 +70,15 @@ def _vector(
     ]
 
 
-def second_runs(placings: Sequence[Placing]) -> Callable[[], list[SecondRun]]:
-    """The second runs of placements, worked out on the first request."""
-
-    @cache
-    def runs() -> list[SecondRun]:
-        from cli.place.digits import SecondRun
-
-        return [SecondRun(placing) for placing in placings]
-
-    return runs
-
-
 def masses(placings: Sequence[Placing]) -> Table:
-    """A row for each mass of each correction; of one alone without rotor and plane."""
-    unit, request = placings[0].of.unit, placings[0].request
+    """A row for each mass of each correction."""
+    unit, request = placings[0].correction.unit, placings[0].request
     every = [(k, mass) for k, placing in enumerate(placings) for mass in placing.masses]
     named, hidden = _named(placings, [k for k, _ in every])
-
-    runs = second_runs(placings)
+    runs = [SecondRun(placing) for placing in placings]
 
     def exact(of: Callable[[Made], Doubled]) -> Callable[[], Doubled]:
-        def again() -> Doubled:
-            from cli.place.digits import column
-
-            return column(runs(), of)
-
-        return again
+        return lambda: _joined(of(made) for run in runs for made in run.made)
 
     columns = [
         *named,
@@ -125,17 +105,15 @@ def masses(placings: Sequence[Placing]) -> Table:
 
 
 def corrections(placings: Sequence[Placing]) -> Table:
-    """A row for each correction: what is to be placed, and what the masses miss of it."""
-    unit, request = placings[0].of.unit, placings[0].request
+    """A row for each correction: its mass and angle, and the error of the placed masses."""
+    unit, request = placings[0].correction.unit, placings[0].request
     named, hidden = _named(placings, range(len(placings)))
     target, error = [each.target for each in placings], [each.error for each in placings]
     whole = [max(abs(share.goal) for share in placing.shares) for placing in placings]
     missed = [abs(left) / size if size else 0.0 for left, size in zip(error, whole, strict=True)]
 
     def targets() -> Vectors:
-        from cli.place.digits import goals
-
-        return goals(second_runs(placings)(), lambda run: [run.target])
+        return _one_after_another(SecondRun(placing).target for placing in placings)
 
     columns = [
         *named,
@@ -154,30 +132,154 @@ def corrections(placings: Sequence[Placing]) -> Table:
 
 
 def planes(placings: Sequence[Placing]) -> Table:
-    """A row for each plane that a correction is carried over to: what belongs there, and what is missed."""
-    unit = placings[0].of.unit
+    """A row for each new plane of each correction: the correction there, and the error of the placed masses."""
+    unit = placings[0].correction.unit
     every = [(k, share) for k, placing in enumerate(placings) for share in placing.shares]
     named, _ = _named(placings, [k for k, _ in every])
 
-    def goals_again() -> Vectors:
-        from cli.place.digits import goals
-
-        return goals(second_runs(placings)(), lambda run: run.goals)
+    def goals() -> Vectors:
+        return _one_after_another(goal for placing in placings for goal in SecondRun(placing).goals)
 
     columns = [
         *named,
         number("z", "length", [share.z or 0.0 for _, share in every], "mm"),
         *_vector(
-            "correction_mass", "correction_angle", [share.goal for _, share in every], unit, exact=goals_again
+            "correction_mass", "correction_angle", [share.goal for _, share in every], unit, exact=goals
         ),
         *_vector("error", "error_angle", [share.error for _, share in every], unit),
     ]
     return Table(columns, [column.name for column in named])
 
 
+class Made(NamedTuple):
+    """A mass, its angle in degrees and the depth of its hole, in 32 digits."""
+
+    mass: Doubled
+    angle: Doubled
+    depth: Doubled
+
+
+class SecondRun:
+    """A placement in 32 digits, with the decimals of the input exact."""
+
+    def __init__(self, placing: Placing) -> None:
+        self.placing, self.request = placing, placing.request
+
+    @cached_property
+    def target(self) -> Vectors:
+        """The sum of the corrections."""
+        from cli.read.exact import vectors
+        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.tables.table import Numbers
+
+        total = Vectors.of(np.zeros(()))
+        for v in self.placing.correction.vectors:
+            (size,), angle = (
+                Numbers("", v.mass_unit, np.array([v.mass]), "mass").exact,
+                Numbers("", v.angle_unit, np.array([v.angle]), "angle"),
+            )
+            total = total + vectors([size], angle)[0]
+        return total
+
+    @cached_property
+    def goals(self) -> list[Vectors]:
+        """The correction of each plane."""
+        from balancing.second_run import ExactMasses
+        from cli.read.exact import written, writtens
+        from dalembert.arithmetic.doubled import Doubled
+
+        request = self.request
+        goal = self.target
+        if request.radii is not None:
+            of_corrections, of_places = (Doubled.of(written(radius)) for radius in request.radii)
+            goal = goal * (of_corrections / of_places)
+        goal = -goal if self.placing.opposite else goal
+        if request.planes is None:
+            return [goal]
+        at, planes = request.planes
+        shares = -ExactMasses(goal[None], writtens([at]), writtens(planes)).corrections
+        return [shares[k] for k in range(len(planes))]
+
+    @cached_property
+    def made(self) -> list[Made]:
+        """The placed masses."""
+        of_share = {
+            id(share): self._placed(share, goal)
+            for share, goal in zip(self.placing.shares, self.goals, strict=True)
+        }
+        return [self._made(of_share[id(placed.share)], placed) for placed in self.placing.masses]
+
+    def _made(self, of_share: tuple[Doubled, Doubled], placed: Placed) -> Made:
+        from dalembert.arithmetic.doubled import Doubled
+        from dalembert.arithmetic.doubled_vectors import part
+
+        masses, angles = of_share
+        mass, depth, drill = part(masses, placed.place), Doubled(0.0), self.request.drill
+        if drill is not None and placed.holes:
+            depth = _depth(mass / float(placed.holes), drill)
+        return Made(mass, part(angles, placed.place), depth)
+
+    def _placed(self, share: Share, goal: Vectors) -> tuple[Doubled, Doubled]:
+        """Return the masses of a plane and their angles in degrees, (n,) each."""
+        from balancing.fixed_weights import angles_again
+        from cli.read.exact import writtens
+        from dalembert.arithmetic.doubled import PI, Doubled
+        from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array
+
+        request = self.request
+        if request.weights is not None:
+            masses = writtens(request.weights)
+            return masses, angles_again(share.placed, goal, masses) * 180.0 / PI
+        if request.places is None:
+            return goal.size * np.ones(1), goal[None].degrees
+        places = request.exact_places()
+        angles = doubled_array([place % 360 for place in places], (len(places),))
+        arms = Vectors.polar(Doubled(np.ones(len(places))), places, "deg", (len(places),))
+        masses = writtens(share.placed.masses)
+        if request.stock is None:
+            masses = share.placed.second_run(goal, arms, masses)
+        return masses, angles
+
+
+def _depth(mass: Doubled, drill: Drill) -> Doubled:
+    """The depth of a hole, by the formula of `balancing.drill_depth`."""
+    from cli.read.exact import written
+    from dalembert.arithmetic.doubled import PI, Doubled
+    from dalembert.arithmetic.doubled_functions import DOUBLED
+
+    diameter = Doubled.of(written(drill.diameter))
+    volume, area = mass / Doubled.of(written(drill.density)), PI * diameter * diameter / 4.0
+    if drill.exact_point == 180:
+        return volume / area
+    sine, cosine = DOUBLED.sincos(Doubled.of(drill.exact_point) * PI / 360.0)
+    slope = sine / cosine
+    tip = diameter / 2.0 / slope
+    cone = area * tip / 3.0
+    if float(volume.high) >= float(cone.high):
+        return (volume - cone) / area + tip
+    cube = volume * 3.0 / (PI * slope * slope)
+    root = Doubled(float(np.cbrt(cube.high)))
+    return root - (root * root * root - cube) / (root * root * 3.0)
+
+
+def _joined(numbers: Iterable[Doubled]) -> Doubled:
+    """Numbers as one row."""
+    from dalembert.arithmetic.doubled import Doubled
+
+    pairs = [(float(x.high), float(x.low)) for x in numbers]
+    return Doubled(*(np.array([pair[k] for pair in pairs]) for k in (0, 1)))
+
+
+def _one_after_another(vectors: Iterable[Vectors]) -> Vectors:
+    """Vectors as one row."""
+    from dalembert.arithmetic.doubled_vectors import Vectors
+
+    return Vectors.joined([vector[None] for vector in vectors])
+
+
 def draw(placing: Placing) -> Figure:
     """Draw for each plane its places with their masses on the rim, target and total as vectors."""
-    unit = placing.of.unit
+    unit = placing.correction.unit
     panels = [
         Places(
             "" if share.z is None else f"z = {from_si(share.z, 'length', 'mm'):g} mm: ",
@@ -194,16 +296,11 @@ def draw(placing: Placing) -> Figure:
 
 
 def way(p: Placing, name: str = "") -> list[Topic]:
-    """The topics of one correction; `name` of its rotor and plane, where there are several."""
+    """The worked solution of one correction; `name` tells it apart from others."""
     head = {"of": name} if name else {}
     lead = f"{name}: " if name else ""
-    vectors = np.array(
-        [
-            complex(phasor(np.array(to_si(v.mass, "mass", v.mass_unit)), np.array(v.angle), v.angle_unit))
-            for v in p.of.vectors
-        ]
-    )
-    unit = p.of.unit
+    vectors = np.array(p.vectors)
+    unit = p.correction.unit
     goal = sum((share.goal for share in p.shares), 0j) if len(p.shares) == 1 else p.target
     text: list[str | Table] = ["Each correction in components, x = m·cos θ, y = m·sin θ, and their sum:"]
     text.append(
@@ -243,7 +340,7 @@ def way(p: Placing, name: str = "") -> list[Topic]:
             ("position",),
             "masses[]",
         )
-        total, missed = complex(placed.sum()), complex(share.error)
+        total = complex(placed.sum())
         at = "" if share.z is None else f" in the plane at z = {figures(share.z)} m"
 
         def shown(z: complex) -> str:
@@ -251,9 +348,9 @@ def way(p: Placing, name: str = "") -> list[Topic]:
             return f"{vector_text(scaled.real, scaled.imag)} {unit}"
 
         words: list[str | Table] = [
-            f"Σ m·e^(iθ) of the masses{at} against what is wanted:",
+            f"Σ m·e^(iθ) of the masses{at} and the correction:",
             rows,
-            f"  Σ = {shown(total)}, wanted {shown(share.goal)}, missed by {figures(float(from_si(abs(missed), 'mass', unit)))} {unit}",
+            f"  Σ = {shown(total)}, correction {shown(share.goal)}, error {figures(float(from_si(abs(share.error), 'mass', unit)))} {unit}",
         ]
         where = {} if share.z is None else {"z_m": share.z}
         sums = {"sum_kg": [total.real, total.imag], "wanted_kg": [share.goal.real, share.goal.imag]}

@@ -92,10 +92,10 @@ def run(
     rotation = Rotation(turning, np.array(times), method.value if method else None, integrator.value)
     sought, solution = pair(find, so_that), None
     if sought is not None:
-        from cli.spin.tables import find as search
-
-        rotation, solution = search(rotation, *sought)
+        rotation, solution = tables.find(rotation, *sought)
         turning = rotation.body
+    if rotation.exact and integrator is not Integrator.dop853:
+        raise options.bad("--integrator", "expected --method integrate too: this rotation has a closed form")
     rotation.states  # noqa: B018  faults of the data are errors before anything is shown
 
     def moving() -> bytes:

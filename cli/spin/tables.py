@@ -24,7 +24,7 @@ from rigidbody3d.picture.rotation import rotation as draw_rotation
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.spin.rotation import Array, Rotation
+    from cli.spin.rotation import Array
 
 
 METHOD = (
@@ -98,7 +98,7 @@ def constants(r: Rotation, only: Collection[str] = QUANTITIES) -> Table:
 
 
 def warnings(r: Rotation) -> list[str]:
-    """What a reader of the states has to know."""
+    """Warnings about the method and the precession."""
     lines = []
     if r.body.mgl is not None and r.round_moments is None:
         lines.append("a top whose moments across body z differ has no closed form: it was integrated")
@@ -153,7 +153,7 @@ def _fine(r: Rotation) -> Array:
 
 
 def way(r: Rotation) -> list[Topic]:
-    """The topics."""
+    """The worked solution."""
     g = r.body
     tensor = np.asarray(g.inertia, dtype=float)
     tensor = np.diag(tensor) if tensor.ndim == 1 else tensor

@@ -1,21 +1,30 @@
-"""From the states of links to their unknown loads, by virtual power, and the power of every term."""
+"""Virtual power of link states: their unknown loads and the power of every term; tables, picture and worked solution."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.work.states import Cell, Real, StateTable, Unknown
-from dalembert.arithmetic.doubled import Doubled
+from cli.cases.ledger import Entry, of_link, why_not
+from cli.cases.ledger import ledger as ledger_topic
+from cli.show.picture import blank
+from cli.work.states import COLUMNS, LOADS, Cell, Real, StateTable, Unknown
 from dalembert.errors import DataError
-from dalembert.results.columns import finite
+from dalembert.results.columns import Column, Table, finite, names, number
+from dalembert.results.way import Topic, figures
+from virtualwork.textbook import picture
 from virtualwork.textbook.link_states import KINDS, LinkStates, UnitLoad
 from virtualwork.textbook.power_balance import Again, Balance, balance
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from dalembert.arithmetic.doubled import Doubled
 
 
 def _unit_load(x: Any, y: Any, torque: Any) -> UnitLoad:
@@ -51,11 +60,11 @@ class WorkBalance:
         for index, step in enumerate(self.states.steps):
             sizes.setdefault(len(step.fields), []).append(index)
         for k, members in sizes.items():
-            rows = self._places(members, k)
+            rows = self.states.places(members, k)
             self.places.append((members, rows))
             states = self._link_states(self.states.values, rows)
             with np.errstate(over="ignore", invalid="ignore"):
-                solved = balance(states, [_unit_load(*of) for of in self._patterns(members, rows)])
+                solved = balance(states, [_unit_load(*of) for of in self.states.unit_loads(members, rows)])
             if not (np.isfinite(solved.power).all() and np.isfinite(solved.value[solved.determined]).all()):
                 raise DataError(f"{self.states.table.file}: the powers are too large to be computed with")
             for place, index in enumerate(members):
@@ -88,38 +97,13 @@ class WorkBalance:
             gravity=self.gravity,
         )
 
-    def _places(self, members: list[int], k: int) -> NDArray[np.intp]:
-        """Return the rows of the steps as (steps, fields, links), one field squeezed out; −1 where there is none."""
-        steps = [self.states.steps[index] for index in members]
-        n = max(len(rows) for step in steps for rows in step.fields.values())
-        places = np.full((len(steps), k, n), -1, dtype=np.intp)
-        for i, step in enumerate(steps):
-            for j, rows in enumerate(step.fields.values()):
-                places[i, j, : len(rows)] = rows
-        return places[:, 0] if k == 1 else places
-
-    def _patterns(self, members: list[int], rows: NDArray[np.intp]) -> list[Real]:
-        """Return what each unknown is per unit on the rows of every step: force along x and y, torque, (3, ...)."""
-        k = len(self.states.steps[members[0]].fields)
-        loads = [np.zeros((3, *rows.shape)) for _ in range(k)]
-        for i, index in enumerate(members):
-            place = {row: at for at, row in np.ndenumerate(rows[i]) if row >= 0}
-            by_cell: dict[tuple[str, int], list[int]] = {}
-            for row in place:
-                by_cell.setdefault((self.states.links[row], self.states.occurrence[row]), []).append(row)
-            for unknown, load in zip(self.states.steps[index].unknowns, loads, strict=True):
-                for cell in unknown.cells:
-                    for row in by_cell[cell.link, cell.occurrence]:
-                        load[(("fx", "fy", "torque").index(cell.quantity), i, *place[row])] += cell.factor
-        return loads
-
     def _warn_of_undetermined(self) -> None:
         """Name each unknown that no equation holds; where nothing is determined, that is an error."""
         complaints: list[DataError] = []
         determined = 0
         table = self.states.table
         for index, step in enumerate(self.states.steps):
-            solved, place = self._solved(index)
+            _, solved, place = self.at(index)
             for j, unknown in enumerate(step.unknowns):
                 if solved.determined[place, j]:
                     determined += 1
@@ -145,22 +129,17 @@ class WorkBalance:
         if len(complaints) > 5:
             self.warnings.append(f"… and {len(complaints) - 5} further cells")
 
-    def _solved(self, index: int) -> tuple[Balance, int]:
-        """Return the balance that a step is in, and its place there."""
+    def at(self, index: int) -> tuple[LinkStates, Balance, int]:
+        """Return the states of the group of a step, their balance, and the place of the step there."""
         group, place = self.where[index]
-        return self.groups[group][1], place
-
-    def group(self, index: int) -> tuple[LinkStates, Balance]:
-        """Return the states that a step is among, and what balances them."""
-        return self.groups[self.where[index][0]]
+        return *self.groups[group], place
 
     def terms(self, index: int, *, errors: bool = False) -> Iterator[Term]:
         """Yield the terms of a step, with their rounding errors on request."""
         step = self.states.steps[index]
-        group, place = self.where[index]
-        states, solved = self.groups[group]
+        states, solved, place = self.at(index)
         single = len(step.fields) == 1
-        wrong = self.term_errors[group] if errors else {}
+        wrong = self.term_errors[self.where[index][0]] if errors else {}
 
         def error(kind: str, at: tuple[int, ...]) -> float:
             return float(wrong[kind][at]) if errors else 0.0
@@ -193,7 +172,7 @@ class WorkBalance:
             states = self._link_states(self.states.exact, rows)
             gravity: Any = DoubledComplex(plain(self.gravity.real), plain(self.gravity.imag))
             states = replace(states, gravity=gravity)
-            unknowns = [_unit_load(*map(plain, of)) for of in self._patterns(members, rows)]
+            unknowns = [_unit_load(*map(plain, of)) for of in self.states.unit_loads(members, rows)]
             groups.append((states, solved.second_run((states, unknowns))))
         return groups
 
@@ -221,20 +200,252 @@ class WorkBalance:
 
     def sums(self, index: int) -> list[float]:
         """The sum of the powers of each velocity field of a step, W."""
-        solved, place = self._solved(index)
+        _, solved, place = self.at(index)
         sums: list[float] = solved.sum[place].tolist()
         return sums
 
     def condition(self, index: int) -> float | None:
         """The condition number of a step's equations; None where they do not determine the unknowns."""
-        solved, place = self._solved(index)
+        _, solved, place = self.at(index)
         return finite(solved.condition[place])
 
     def unknowns(self, index: int) -> Iterator[tuple[Unknown, Cell, float | None]]:
         """Yield each cell of a step's unknowns: its load in SI, None where it is not determined."""
-        solved, place = self._solved(index)
+        _, solved, place = self.at(index)
         for unknown, value in zip(
             self.states.steps[index].unknowns, solved.value[place].tolist(), strict=True
         ):
             for cell in unknown.cells:
                 yield unknown, cell, None if value != value else value * cell.factor
+
+
+METHOD = (
+    "Virtual power: the applied forces and the inertia forces −m·a, −I·α together do no work on the given velocities "
+    "(d'Alembert and Lagrange; J. A. Riul, Dinâmica das Máquinas, unit II, eqs. 1–5)."
+)
+
+
+def tables(w: WorkBalance, *, ledger_first: bool = False) -> dict[str, Callable[[], Table]]:
+    """The tables of a result, the CSV's first."""
+    parts = {
+        "unknowns": lambda: unknowns(w),
+        "ledger": lambda: ledger(w),
+        "steps": lambda: steps(w),
+        "terms": lambda: terms(w),
+    }
+    first = "ledger" if ledger_first else "unknowns"
+    return {first: parts.pop(first), **parts}
+
+
+def unknowns(w: WorkBalance) -> Table:
+    """A row for each step and unknown, in the units of the marked columns."""
+    table, instants = w.states.table, w.states.steps
+    cells = [(step.name, *cell) for i, step in enumerate(instants) for cell in w.unknowns(i)]
+    keys = [
+        names("step", [step for step, *_ in cells]),
+        names("link", [cell.link for _, _, cell, _ in cells]),
+    ]
+    if any(unknown.name for _, unknown, *_ in cells):
+        keys.append(names("unknown", [unknown.name or None for _, unknown, *_ in cells], "name"))
+
+    loads = []
+    for load in LOADS:
+        if any(quantity == load for _, quantity in table.marks):
+            si = [np.nan if value is None or cell.quantity != load else value for _, _, cell, value in cells]
+            unit = table.numbers[load].unit
+            loads.append(number(load, COLUMNS[load], si, unit, place=None, exact=w.exact_unknowns))
+    documented = [
+        names("quantity", [LOADS[cell.quantity] for _, _, cell, _ in cells]),
+        names("value", [value for *_, value in cells]),
+    ]
+    return Table([*keys, *loads], [key.name for key in keys], "steps[].unknowns[]", documented=documented)
+
+
+def _terms(w: WorkBalance) -> list[tuple[str, Term]]:
+    return [(step.name, term) for i, step in enumerate(w.states.steps) for term in w.terms(i)]
+
+
+def _named(w: WorkBalance, rows: list[tuple[str, Term]]) -> list[Column]:
+    """Step, field (where a step has several), link and kind of each term."""
+    several = any(len(step.fields) > 1 for step in w.states.steps)
+    return [
+        names("step", [step for step, _ in rows]),
+        *([names("field", [term.field or None for _, term in rows])] if several else []),
+        names("link", [term.link for _, term in rows]),
+        names("kind", [term.kind for _, term in rows]),
+    ]
+
+
+def ledger(w: WorkBalance) -> Table:
+    """A row for each step and term; the power of a load that does no work is 0."""
+    rows = _terms(w)
+
+    def error() -> list[float]:
+        return [term.error for i in range(len(w.states.steps)) for term in w.terms(i, errors=True)]
+
+    named = _named(w, rows)
+    power = number("power", "power", [term.power or 0.0 for _, term in rows], error=error, place=None)
+    return Table([*named, power], [column.name for column in named])
+
+
+def terms(w: WorkBalance) -> Table:
+    """The terms that do work, of the document alone."""
+    rows = [(step, term) for step, term in _terms(w) if term.power is not None]
+    power = names("power_W", [term.power for _, term in rows])
+    return Table([], ("step",), "steps[].terms[]", documented=[*_named(w, rows), power])
+
+
+def steps(w: WorkBalance) -> Table:
+    """A row for each step: the sum of its powers, and the loads that do no work."""
+    instants = w.states.steps
+    sums = [w.sums(i) for i in range(len(instants))]
+    workless = [
+        [
+            f"{term.link}: {term.kind}" + (f" (field {term.field})" if len(step.fields) > 1 else "")
+            for term in w.terms(i)
+            if term.power is None
+        ]
+        for i, step in enumerate(instants)
+    ]
+    columns = [
+        names("step", [step.name for step in instants]),
+        number("sum", "power", [max(each, key=abs) for each in sums]),
+        Column("workless", "", [", ".join(each) for each in workless], place="workless", stored=workless),
+    ]
+    documented = []
+    if any(len(step.fields) > 1 for step in instants):
+        by_field: list[Any] = [
+            dict(zip(step.fields, each, strict=True)) if len(step.fields) > 1 else None
+            for step, each in zip(instants, sums, strict=True)
+        ]
+        condition = [w.condition(i) if len(step.fields) > 1 else None for i, step in enumerate(instants)]
+        columns.insert(2, names("condition", condition))
+        documented.append(Column("sums", "", [None] * len(sums), place="sums_W", stored=by_field))
+    return Table(columns, ("step",), "steps[]", documented=documented)
+
+
+def draw(w: WorkBalance) -> Figure:
+    """Draw the ledger of one step as bars; of several, each unknown against the step."""
+    figure, instants = blank(), w.states.steps
+    if len(instants) == 1:
+        several = len(instants[0].fields) > 1
+        bars = [
+            (term.link, term.kind + (f" ({term.field})" if several else ""), term.power)
+            for term in w.terms(0)
+            if term.power is not None
+        ]
+        picture.ledger(bars, figure)
+        return figure
+    series: dict[tuple[str, str], list[float]] = {}
+    for index in range(len(instants)):
+        for _, cell, value in w.unknowns(index):
+            symbol, unit = LOADS[cell.quantity].split("_", 1)
+            name = f"{symbol} on link {cell.link}", unit.replace("_", "·")
+            series.setdefault(name, [np.nan] * len(instants))[index] = np.nan if value is None else value
+    try:
+        x = np.array([float(step.name) for step in instants])
+    except ValueError:
+        x = np.arange(1.0, len(instants) + 1)
+    picture.over_steps(x, series, figure)
+    return figure
+
+
+def way(w: WorkBalance) -> list[Topic]:
+    """The worked solution."""
+    steps = [([names("step", [step.name])], list(entries(w, i))) for i, step in enumerate(w.states.steps)]
+    return [ledger_topic("steps[]", steps, _equations(w, [instants for _, instants in steps]))]
+
+
+def entries(w: WorkBalance, index: int) -> Iterator[Entry]:
+    """Yield every load of a step, those that do no work too; the unknown's in the end."""
+    step, (states, solved, place) = w.states.steps[index], w.at(index)
+    products = states.products()
+    for f, (of, rows) in enumerate(step.fields.items()):
+        here: tuple[int, ...] = (place,) if len(step.fields) == 1 else (place, f)
+        fast, turning = (float(largest[here][..., 0]) for largest in states.fastest)
+        for kind in KINDS:
+            if kind not in states.terms:
+                continue
+            term = states.terms[kind]
+            load, rate = (_at(each, states.shape, here) for each in products[kind])
+            for i, row in enumerate(rows):
+                if not (term.works[(*here, i)] or term.workless[(*here, i)]):
+                    continue
+                works, power = bool(term.works[(*here, i)]), float(term.power[(*here, i)])
+                link = w.states.links[row]
+                if kind in ("applied torque", "inertia torque"):
+                    value, omega = float(load[i]), float(rate[i])
+                    why = why_not(value, omega, works, turning)
+                    yield Entry(link, kind, torque=value, omega=omega, power=power, workless=why, field=of)
+                else:
+                    force, velocity = complex(load[i]), complex(rate[i])
+                    why = why_not(force, velocity, works, fast)
+                    yield Entry(link, kind, force, velocity, power=power, workless=why, field=of)
+        velocities = _at(states.applied_velocity, states.shape, here)
+        omegas = _at(states.omega, states.shape, here)
+        by_cell = {(w.states.links[row], w.states.occurrence[row]): i for i, row in enumerate(rows)}
+        for unknown, cell, amount in w.unknowns(index):
+            j = step.unknowns.index(unknown)
+            at = by_cell.get((cell.link, cell.occurrence))
+            if amount is None or not solved.determined[place, j] or at is None:
+                continue
+            value, i = amount, at
+            if cell.quantity == "torque":
+                omega = float(omegas[i])
+                yield Entry(
+                    cell.link, "unknown", torque=value, omega=omega, power=value * omega, field=of,
+                    workless=why_not(value, omega, omega != 0, turning),
+                )  # fmt: skip
+            else:
+                force = value * (1.0 if cell.quantity == "fx" else 1j)
+                velocity = complex(velocities[i])
+                power = (force * velocity.conjugate()).real
+                yield Entry(
+                    cell.link, "unknown", force, velocity, power=power, field=of,
+                    workless=why_not(force, velocity, power != 0, fast),
+                )  # fmt: skip
+
+
+def _at(values: object, shape: tuple[int, ...], here: tuple[int, ...]) -> Any:
+    return np.broadcast_to(np.asarray(values), shape)[here]
+
+
+def _equations(w: WorkBalance, steps: list[list[Entry]]) -> list[str]:
+    """The equation in symbols, each product with its numbers, and the solution, of the first step."""
+    step, terms = w.states.steps[0], steps[0]
+    _, solved, at = w.at(0)
+    lines = []
+    if len(steps) > 1:
+        lines.append(f"Step {step.name}; the others in the same way.")
+    idle: dict[str, list[str]] = {}
+    for entry in terms:
+        if entry.workless:
+            idle.setdefault(entry.workless, []).append(f"{entry.symbol} ({entry.kind})")
+    lines += [f"No work, {why}: {', '.join(dict.fromkeys(which))}." for why, which in idle.items()]
+    for place, of in enumerate(step.fields):
+        here = [entry for entry in terms if entry.field == of and not entry.workless]
+        if not here:
+            continue
+        name = f" in the velocity field {of}" if of else ""
+        lines.append(f"ΣF·V + ΣT·ω = 0{name}:")
+        lines.append("  " + " + ".join(f"{e.symbol}·{e.rate}" for e in here) + " = 0")
+        loads = [entry for entry in here if entry.kind != "unknown"]
+        lines += [f"  {entry.equation()}" for entry in loads]
+        power = sum(entry.power for entry in loads)
+        coefficients = solved.coefficient[at, place]
+        left = [
+            f"{figures(float(c))}·{_name(u.cells[0].link, u.cells[0].quantity, u.name)}"
+            for c, u in zip(coefficients, step.unknowns, strict=True)
+            if c
+        ]
+        lines.append(f"  {' + '.join(left)} + ({figures(power)}) = 0" if left else f"  {figures(power)} = 0")
+    for unknown, cell, value in w.unknowns(0):
+        name = _name(cell.link, cell.quantity, unknown.name)
+        unit = "N·m" if cell.quantity == "torque" else "N"
+        lines.append(f"{name} = {'not determined' if value is None else f'{figures(value)} {unit}'}")
+    return lines
+
+
+def _name(link: str, quantity: str, name: str) -> str:
+    """How an equation calls an unknown."""
+    return name or of_link(LOADS[quantity].split("_")[0].replace("torque", "T"), link)

@@ -99,6 +99,31 @@ class StateTable:
         """The link of each row."""
         return self.table.texts["link"]
 
+    def places(self, members: list[int], k: int) -> NDArray[np.intp]:
+        """Return the rows of the steps as (steps, fields, links), one field squeezed out; −1 where there is none."""
+        steps = [self.steps[index] for index in members]
+        n = max(len(rows) for step in steps for rows in step.fields.values())
+        places = np.full((len(steps), k, n), -1, dtype=np.intp)
+        for i, step in enumerate(steps):
+            for j, rows in enumerate(step.fields.values()):
+                places[i, j, : len(rows)] = rows
+        return places[:, 0] if k == 1 else places
+
+    def unit_loads(self, members: list[int], rows: NDArray[np.intp]) -> list[Real]:
+        """Return what each unknown is per unit on the rows of every step: force along x and y, torque, (3, ...)."""
+        k = len(self.steps[members[0]].fields)
+        loads = [np.zeros((3, *rows.shape)) for _ in range(k)]
+        for i, index in enumerate(members):
+            place = {row: at for at, row in np.ndenumerate(rows[i]) if row >= 0}
+            by_cell: dict[tuple[str, int], list[int]] = {}
+            for row in place:
+                by_cell.setdefault((self.links[row], self.occurrence[row]), []).append(row)
+            for unknown, load in zip(self.steps[index].unknowns, loads, strict=True):
+                for cell in unknown.cells:
+                    for row in by_cell[cell.link, cell.occurrence]:
+                        load[(("fx", "fy", "torque").index(cell.quantity), i, *place[row])] += cell.factor
+        return loads
+
 
 def read_states(path: str) -> StateTable:
     """Read the states of links, one row per link, step and velocity field, and find the unknowns."""

@@ -278,6 +278,23 @@ def test_beyond_the_range_of_squares(size: float) -> None:
         least_squares(np.array([[1, 0], [1, 0]]) * size, [size, size])
 
 
+def test_numbers_whose_squares_overflow() -> None:
+    """Least squares without limits has no squares; minimax and limits have, and refuse; so has the second run."""
+    alpha, v = np.array([[3, -2], [5, -2], [5, -3]]), np.array([1, -1, 0])
+    for large in ((alpha, v * 1e160), (alpha * 1e-160, v), (alpha * 1e160, v * 1e160)):
+        with pytest.raises(ValueError, match="choose other units"):
+            minimax(*large)
+        with pytest.raises(ValueError, match="choose other units"):
+            least_squares(*large, max_mass=1.0)
+        free = least_squares(*large)
+        assert np.isfinite(free.corrections).all()
+        assert np.isinf(free.error_estimate()).all()
+        assert "too large or too small" in free.error_reason
+    # the corrections themselves are too large
+    with pytest.raises(ValueError, match="choose other units"):
+        least_squares(alpha * 1e-200, v * 1e200)
+
+
 def test_no_rotor_at_all() -> None:
     """An empty batch is answered by an empty one."""
     influence, initial = np.zeros((0, 3, 2)), np.zeros((0, 3))

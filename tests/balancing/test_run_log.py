@@ -197,6 +197,18 @@ def test_the_probability_of_coming_within_a_limit_is_that_of_draws() -> None:
     assert found.probability_within(limit) == pytest.approx((np.abs(true) <= limit).mean(axis=0), abs=0.005)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("limit", "kept"), [(1e-200, False), (2.9, False), (3.0, True), (3.1, True), (1e200, True)]
+)
+def test_readings_without_scatter_decide_a_limit(limit: float, kept: bool) -> None:
+    """5 + 2 w and 1 − 2 w with w = −1 leave 3 at both sensors."""
+    masses = np.array([[0], [1], [-1], [2]])
+    found = balanced(joint_fit([5, 1] + masses * [2, -2], masses))
+    assert found.residual == pytest.approx([3, 3], rel=1e-14)
+    assert found.probability_within(limit).tolist() == [kept, kept]
+
+
 def test_an_outlier_is_found_with_the_stated_probability_of_error() -> None:
     rng = np.random.default_rng(8)
     masses, _, readings = campaign(rng, 1000, 6, 2, 1, 0.1)

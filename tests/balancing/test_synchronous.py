@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from balancing import once_per_turn
+from balancing.synchronous import marks
 
 
 def test_other_orders_and_an_offset_do_not_leak_into_the_first() -> None:
@@ -121,3 +122,14 @@ def test_pulses_that_cannot_be_counted_are_said() -> None:
         once_per_turn(t, x, mark, pulses=0)
     with pytest.raises(ValueError, match="rises 0 times"):
         once_per_turn(t, x, mark, tacho=0 * tacho)
+
+
+def test_the_true_marks_lie_within_the_resolution() -> None:
+    """Marks of two levels at an even speed, at any place between the samples; recordings may begin in a pulse."""
+    rng = np.random.default_rng(5)
+    for _ in range(300):
+        samples, turns, start = rng.uniform(25, 200), int(rng.choice([3, 8, 20])), rng.random()
+        angle = start + np.arange(int(samples * turns) + 5) / samples
+        found = marks(np.arange(len(angle)), angle % 1 < 0.3)
+        true = (np.rint(start + found.at / samples) - start) * samples
+        assert abs((found.at - true).mean()) <= found.resolution + 1e-9

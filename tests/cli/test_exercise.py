@@ -235,6 +235,14 @@ def test_a_bad_exercise_is_one_line_and_writes_nothing(
     assert {path.name for path in folder.iterdir()} == {"rotor.csv", "e.toml"}
 
 
+def test_a_row_of_the_table_that_is_too_short(dalembert: Dalembert, folder: Path) -> None:
+    (folder / "rotor.csv").write_text(ROTOR.replace("W2,60,50,210,65", "W2,60,50"))
+    done = dalembert("exercise", "e.toml", "-o", "out")
+    assert done.returncode == 1
+    assert "row 2 (line 3), column z_mm: found ''" in done.stderr
+    assert not (folder / "out").exists()
+
+
 def test_wrong_usage_is_status_2(dalembert: Dalembert, folder: Path) -> None:
     assert dalembert("exercise", "e.toml").returncode == 2
     assert dalembert("exercise", "e.toml", "--students", "0", "-o", "out").returncode == 2

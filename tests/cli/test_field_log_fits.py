@@ -121,6 +121,22 @@ def test_limits_minimax_and_a_residual_limit_go_with_a_fit(dalembert: Dalembert)
     assert all(0.5 < p <= 1 for p in within)
 
 
+def test_readings_without_scatter_keep_a_limit_or_do_not(dalembert: Dalembert) -> None:
+    """5 + 2 w at one sensor, 1 − 2 w at the other: w = −1 leaves 3 at both."""
+    rows = [(run, w, 5 + 2 * w, 1 - 2 * w) for run, w in enumerate([0, 1, -1, 2])]
+    lines = ["run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg"]
+    for run, w, *read in rows:
+        mass = f"A,{abs(w)},{180 * (w < 0)}" if w else ",,"
+        lines += [f"{run},{s},{abs(x)},{180 * (x < 0)},{mass}" for s, x in enumerate(read)]
+    text = "\n".join(lines) + "\n"
+    for limit in ("3um", "3.1um", "1e9um"):
+        rotor, _ = found(dalembert("field", "-", "--json", "--max-residual", limit, stdin=text))
+        assert [one["probability_within"] for one in rotor["residual"]] == [1, 1]
+    refused = dalembert("field", "-", "--max-residual", "2.9um", stdin=text)
+    assert refused.returncode == 1
+    assert "the smallest limit that can be met is 3 um" in refused.stderr
+
+
 def test_text_and_report_tell_the_history(dalembert: Dalembert, tmp_path: Any) -> None:
     text = standard(MASSES, ERRORS)
     options = ["--predict", "5g@10", "--robust", "--suggest", "--max-mass", "90g"]

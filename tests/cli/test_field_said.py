@@ -37,6 +37,19 @@ def test_what_is_said_of_doubtful_data(dalembert: Dalembert) -> None:
     assert dalembert("field", "-", *tolerance[:-2], stdin=FAN).returncode == 2
 
 
+def test_a_rotor_without_a_trial_run_that_others_have(dalembert: Dalembert) -> None:
+    """Rotor 2 has no trial run in plane B, rotor 3 has planes of its own."""
+    both = runs("A,1,0,", "B,1,0,", on=[[1, 0], [0, 1]]).splitlines()
+    one = runs("A,1,0,", on=[[1, 0]]).splitlines()
+    own = runs("C,1,0,", on=[[1, 0]]).splitlines()
+    rows = [f"{k},{row}" for k, lines in enumerate((both, one, own), 1) for row in lines[1:]]
+    found = document(dalembert("field", "-", "--json", stdin=table(*rows, head="rotor," + both[0])))
+    missing = [warning for warning in found["warnings"] if "no trial run" in warning]
+    assert missing == [
+        "rotor 2: no trial run in plane B, where other rotors have one: the corrections are for its other planes alone"
+    ]
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [

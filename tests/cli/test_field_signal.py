@@ -69,3 +69,14 @@ def test_a_tacho_with_several_pulses(dalembert: Dalembert, tmp_path: Path) -> No
     assert any("the first of 6 pulses" in warning for warning in found["warnings"])
     assert dalembert("signal", "both.csv", "--pulses", "6").returncode == 2
     assert dalembert("field", "both.csv", "--pulses", "6").returncode == 2
+
+
+def test_the_header_below_a_title(dalembert: Dalembert) -> None:
+    rows = "".join(f"{k / 200},{int(k % 20 < 3)},{k % 7}\n" for k in range(100))
+    plain = dalembert("signal", "-", stdin="t_s,mark,A_um\n" + rows)
+    below = dalembert("signal", "-", stdin="Recorder 7\n\nt_s,mark,A_um\n" + rows)
+    assert plain.returncode == 0
+    assert below.stdout == plain.stdout
+    assert "the header is in line 3" in below.stderr
+    unmarked = dalembert("signal", "-", stdin="t_s,A_um\n0,1\n")
+    assert unmarked.stderr.startswith("dalembert: standard input: no column mark")

@@ -70,6 +70,7 @@ def test_82350_is_answered_by_its_two_slips(dalembert: Dalembert, work: Path) ->
         ("103000 kg", "wrong", "the unit 'kg' does not fit"), ("102800", "wrong", "the inertia torque of link 3 is left out"),
         ("102600", "wrong", "the inertia torque of link 3 has the wrong sign"), ("148000", "wrong", "the inertia force of link 4 is left out"),
         ("102700", "wrong", "the weight of link 3 is left out"), ("102994.3", "right", None),
+        ("1e999", "wrong", None), ("-1e-999", "wrong", None), ("0e999", "wrong", None), ("9" * 400, "wrong", None),
     ],
 )  # fmt: skip
 def test_verdicts(dalembert: Dalembert, work: Path, answer: str, verdict: str, mistake: str | None) -> None:

@@ -169,12 +169,12 @@ def test_other_planes(dalembert: Dalembert, tmp_path: Path) -> None:
     [
         (
             ("--positions", "0deg,90deg"),
-            "2 weights leave an error of 3.586 g (71.72%); one more leaves no less",
+            "2 weights leave an error of 3.586 g (71.72%); one more does not make it smaller",
         ),
         (("--blades", "8", "--max-pieces", "1"), "at most 1 weight leaves an error of 4 g (80.00%)"),
         (
             ("--blades", "8", "--max-mass", "0.5g"),
-            "0 weights leave an error of 5 g (100.00%); one more leaves no less",
+            "0 weights leave an error of 5 g (100.00%); one more does not make it smaller",
         ),
     ],
 )
@@ -184,3 +184,21 @@ def test_weights_from_stock_that_do_not_come_near(
     """The error stood in JSON alone: 1 g on each of 0° and 90° is 1.414 g of 5 g."""
     found = document(dalembert("place", "5g@45deg", "--stock", "1g", *options, "--json"))
     assert found["warnings"] == [warning]
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "other"),
+    [
+        ("--pieces", "2", "--stock"),
+        ("--max-pieces", "2", "--stock"),
+        ("--first", "10deg", "--blades"),
+        ("--drill-point", "118deg", "--drill"),
+    ],
+)
+def test_an_option_without_the_one_that_it_goes_with(
+    option: str, value: str, other: str, dalembert: Dalembert
+) -> None:
+    done = dalembert("place", "6g@30deg", option, value)
+    assert done.returncode == 2
+    assert option in done.stderr
+    assert other in done.stderr

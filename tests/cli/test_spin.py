@@ -157,6 +157,8 @@ def test_bad_bodies_are_one_line(spin, toml: str, words) -> None:
         ("--at", "soon"),
         ("--method", "guess"),
         ("--integrator", "euler"),
+        ("--integrator", "splitting"),
+        ("--method", "exact", "--integrator", "splitting"),
         ("--time", "0:1e12:1e-6"),
     ],
 )

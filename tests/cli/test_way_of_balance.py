@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from cli.balance.tables import quadrant
+from cli.balance.way import quadrant
 
 RIUL = "name,weight_N,radius_mm,angle_deg,z_mm\nW1,90,30,60,20\nW2,60,50,210,65\n"
 PLANES = ("--plane", "A:0mm:20mm", "--plane", "B:90mm:20mm")

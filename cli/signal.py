@@ -1,0 +1,243 @@
+"""`dalembert signal`: amplitude and phase of a recorded vibration, a row for each sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cli.read.options import bad
+from cli.show.output import command
+from dalembert.errors import DataError
+
+if TYPE_CHECKING:
+    from balancing.synchronous import OncePerTurn
+    from cli.show.result import Result
+    from dalembert.results.columns import Table
+    from dalembert.results.way import Topic
+    from dalembert.tables.table import Table as ReadTable
+
+OPTIONS = """
+Arguments:
+  recording FILE  CSV of a recording: t_s, mark (or tacho), A_um …; - is standard input.
+What:
+  pulses N  Number of pulses of the mark in one turn.
+"""
+MARKS = ("mark", "tacho", "keyphasor", "pulse", "trigger")
+
+
+@command(OPTIONS)
+def run(
+    recording: str,
+    pulses: Annotated[int, typer.Option(min=1, max=10000)] = 1,
+) -> Result:
+    """Compute amplitude and phase of a recorded vibration, once per turn.
+
+    FILE has the columns t_*, mark (once per turn; tacho, keyphasor, pulse and trigger are other names) and a column of
+    vibration for each sensor: A_um, B_um, acceleration_m_s2. The rows of the result are readings for dalembert field.
+    """
+    from cli.show.result import Result
+
+    read = read_recording(recording, pulses)
+
+    return Result(
+        way=partial(way, read),
+        tables={"signal": lambda: vectors(read)},
+        head={"amplitude_unit": read.unit},
+        about={"title": "Vibration once per turn"},
+        warnings=read.warnings,
+    )
+
+
+@dataclass(frozen=True)
+class Recording:
+    """The sensors of a recording, and their vibration once per turn."""
+
+    sensors: list[str]
+    unit: str
+    vectors: OncePerTurn
+    warnings: list[str]
+    exact: Callable[[], tuple[Any, ...]]
+    """The recording in 32 digits, with the decimals of the file exact."""
+
+    @cached_property
+    def second(self) -> Any:
+        """The vibration once per turn in 32 digits."""
+        return self.vectors.second_run(self.exact())
+
+
+def read_recording(path: str, pulses: int) -> Recording:
+    """Read the time, a mark, perhaps a tacho, and the vibration of each sensor; compute the vibration once per turn.
+
+    Raises
+    ------
+    DataError
+        A missing column, vibration in several units or in peak-to-peak values, no whole turn.
+    """
+    import numpy as np
+
+    from balancing.synchronous import once_per_turn
+    from dalembert.tables.sources import open_source
+    from dalembert.tables.table import read
+
+    # below lines of a title the header is the line with these
+    expected = {"t": "time", "time": "time", **dict.fromkeys(MARKS, "number")}
+    source = open_source(path, expected, ())
+    file, header = source.file, [each.name for each in source.headings]
+    marks = sorted((name.lower() for name in header if name.lower() in MARKS), key=MARKS.index)
+    if not marks:
+        raise DataError(
+            f"{file}: no column mark (or {', '.join(MARKS[1:])}); the header is: {', '.join(header)}"
+        )
+    mark, *others = marks
+    if len(others) > 1:
+        raise DataError(f"{file}: the columns {', '.join(marks)}: expected a mark and one tacho")
+    if others and pulses > 1:
+        raise bad("--pulses", f"{file} has a mark and a tacho: the pulses of a turn are counted")
+    time = "time" if any(name.lower().startswith("time_") for name in header) else "t"
+    units = _vibration(file, header, (time, *marks))
+    unit = next(iter(units.values()))
+    table = read(
+        path, numbers={time: "time", **dict.fromkeys(marks, "number"), **dict.fromkeys(units, "amplitude")}
+    )
+    t = table.require(time, "time")
+    signal = np.stack([table.numbers[name].values for name in units], axis=1)
+    tacho = others[0] if others else None
+    try:
+        result = once_per_turn(
+            t.si, signal, table.numbers[mark].values, pulses, table.numbers[tacho].values if tacho else None
+        )
+    except ValueError as error:
+        raise DataError(f"{table.file}: {error}") from None
+    written = {name.lower(): name for name in header}
+    sensors = [
+        "1" if name == "amplitude" else written[f"{name}_{of.lower()}"][: len(name)]
+        for name, of in units.items()
+    ]
+    if pulses > 1:
+        table.warnings.append(
+            f"{table.file}: phases count from the first of {pulses} pulses in the recording, and another recording may begin at "
+            "another one: add a column mark, once in a turn, in addition to the tacho"
+        )
+    if result.phase_resolution:
+        table.warnings.append(
+            f"{table.file}: the mark rises between two samples, and the middle is taken: phases hold to "
+            f"± {np.degrees(result.phase_resolution):.2g}°; more samples in each turn reduce this"
+        )
+    exact = partial(_exact, table, (time, mark, tacho), list(units), pulses)
+    return Recording(sensors, unit, result, table.warnings, exact)
+
+
+def _vibration(file: str, header: list[str], others: tuple[str, ...]) -> dict[str, str]:
+    """The columns of vibration: name -> unit, one unit for all."""
+    from dalembert.units import amplitude_kind, find_unit
+
+    units: dict[str, str] = {}
+    for name in header:
+        parts = name.split("_")
+        for k in range(1, len(parts)):
+            unit = find_unit("amplitude", "_".join(parts[k:]))
+            if unit and parts[0].lower() not in others:
+                units["_".join(parts[:k]).lower()] = unit
+                break
+    if not units:
+        raise DataError(
+            f"{file}: no column of vibration, such as A_um or acceleration_g; the header is: {', '.join(header)}"
+        )
+    if len(set(units.values())) > 1:
+        raise DataError(
+            f"{file}: the vibration is in {', '.join(sorted(set(units.values())))}: expected one unit"
+        )
+    unit = next(iter(units.values()))
+    tag = amplitude_kind(unit)[1]
+    if tag in ("_pp", "_rms"):
+        raise DataError(
+            f"{file}: the vibration is in {unit}: samples are values of an instant, and the amplitude "
+            f"that comes out is a peak: expected a unit without {tag}"
+        )
+    return units
+
+
+def _exact(
+    table: ReadTable, names: tuple[str, str, str | None], sensors: list[str], pulses: int
+) -> tuple[Any, ...]:
+    """The recording in 32 digits, as `OncePerTurn.second_run` takes it; `names` of time, mark and tacho."""
+    import numpy as np
+
+    from cli.read.exact import long_column
+    from dalembert.units import UNITS
+
+    t, mark, tacho = (None if name is None else table.numbers[name] for name in names)
+    assert t is not None
+    above, below = UNITS["time"][t.unit]
+    level, other = (None if column is None else long_column(column) for column in (mark, tacho))
+    signals: Any = np.stack([long_column(table.numbers[name]) for name in sensors], axis=1)
+    return long_column(t) * float(above) / float(below), signals, level, pulses, other
+
+
+def vectors(recording: Recording) -> Table:
+    """A row for each sensor."""
+    import numpy as np
+
+    from dalembert.angles import degrees
+    from dalembert.arithmetic.doubled_vectors import off
+    from dalembert.results.columns import Column, Table, names, number
+
+    of, unit = recording.vectors, recording.unit
+    rows = len(recording.sensors)
+    size = np.abs(of.vector)
+
+    def sizes() -> Any:
+        return off(size, recording.second.vector.vectors.size)
+
+    def deviations() -> Any:
+        return off(of.deviation, recording.second.deviation.doubled)
+
+    return Table(
+        [
+            names("sensor", recording.sensors),
+            number("speed", "speed", [of.speed] * rows, "rpm", exact=lambda: recording.second.speed.doubled),
+            Column("amplitude", unit, size, sizes, "amplitude", size),
+            number(
+                "phase", "angle", degrees(of.vector), exact=lambda: recording.second.vector.vectors.degrees
+            ),
+            Column(
+                "amplitude_uncertainty", unit, of.deviation, deviations, "amplitude_uncertainty", of.deviation
+            ),
+            names("turns", [of.turns] * rows),
+        ],
+        keys=("sensor",),
+        place="signal[]",
+        above="amplitude of a·cos(ωt + phase), t = 0 at the mark; the mean of single turns",
+        documented=[
+            number("phase_resolution", "angle", [float(np.degrees(of.phase_resolution))] * rows),
+            number("speed_sd", "speed", [of.speed_deviation] * rows),
+        ],
+    )
+
+
+def way(recording: Recording) -> list[Topic]:
+    """The worked solution: one topic."""
+    import numpy as np
+
+    from dalembert.angles import degrees
+    from dalembert.results.way import Topic, figures
+
+    of = recording.vectors
+    text = [
+        f"Turns between marks: {of.turns}; ω = 2π/T = {figures(float(of.speed))} rad/s.",
+        "In each turn a·cos(ωt + phase) is fitted: x = a·cos(phase) = (2/T)∫ s·cos ωt dt, y = a·sin(phase) = −(2/T)∫ s·sin ωt dt; "
+        "the vectors of all turns are averaged.",
+    ]
+    entries = []
+    for sensor, v in zip(recording.sensors, of.vector.tolist(), strict=True):
+        angle = float(degrees(np.array([v]))[0])
+        text.append(
+            f"  {sensor}: ({figures(v.real)}, {figures(v.imag)}) = {figures(abs(v))} ∠ {figures(angle)}° {recording.unit}"
+        )
+        entries.append({"sensor": sensor, "x": v.real, "y": v.imag, "amplitude": abs(v), "phase_deg": angle})
+    head = {"turns": int(of.turns), "speed_rad_s": float(of.speed), "sensors": entries}
+    return [Topic("vectors", text, "Vectors once per turn", head)]
