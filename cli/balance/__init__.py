@@ -14,7 +14,7 @@ from cli.show.output import command
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.read.planes_and_tolerance import Planes
+    from cli.read.rotor_options import Planes
     from cli.show.result import Result
     from dalembert.results.way import Topic
 
@@ -82,7 +82,7 @@ def run(
     # numpy and all that needs it are loaded only once the command line itself is in order
     from cli.balance.rotors import Balancing, Carried, Request, read_rotors
     from cli.balance.tables import METHOD, MODAL, tables, warnings
-    from cli.read.planes_and_tolerance import from_options, from_table, tolerance_of
+    from cli.read.rotor_options import from_options, from_table, tolerance_of
     from cli.show.result import Result
 
     if (plane is None) == (planes is None):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import CoincidentPlanes, Correction, UnreachedMode, by_size, correct, modal_corrections
-from cli.read.planes_and_tolerance import Planes, Tolerance, Verdict
+from cli.read.rotor_options import Planes, Tolerance, Verdict
 from dalembert.angles import degrees, phasor
 from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError, quote

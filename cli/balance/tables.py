@@ -11,7 +11,7 @@ import numpy as np
 
 from balancing import GRADES
 from cli.balance.rotors import Balancing
-from cli.read.planes_and_tolerance import verdict_table
+from cli.read.rotor_options import verdict_table
 from dalembert.angles import degrees
 from dalembert.results.columns import Column, Table, apart, names, number, read_number, vector
 from dalembert.units import from_si

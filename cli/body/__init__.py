@@ -163,7 +163,7 @@ def _shaft(
     correct: list[str] | None,
 ) -> ShaftRequest | None:
     from cli.body.moving import ShaftRequest
-    from cli.read.planes_and_tolerance import from_options
+    from cli.read.rotor_options import from_options
 
     if shaft is None:
         of_shaft = {

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cli.read.parts import Parts
-from cli.read.planes_and_tolerance import Planes
+from cli.read.rotor_options import Planes
 from dalembert.angles import degrees
 from rigidbody3d import Body, Motion, Shaft
 from rigidbody3d.shaft import shaft_axes

@@ -47,7 +47,7 @@ def run(
     """
     from cli.engine.cylinders import Engine, read_cylinders, read_shafts
     from cli.engine.tables import METHOD, draw, tables, warnings, way
-    from cli.read.planes_and_tolerance import from_options
+    from cli.read.rotor_options import from_options
     from cli.show.result import Result
 
     if speed is None:

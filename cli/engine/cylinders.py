@@ -19,7 +19,7 @@ from balancing.engine import (
     turning_force,
 )
 from cli.read import options
-from cli.read.planes_and_tolerance import Planes
+from cli.read.rotor_options import Planes
 from dalembert.angles import phasor
 from dalembert.arithmetic.shapes import as_array
 from dalembert.errors import DataError, quote

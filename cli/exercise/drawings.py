@@ -184,7 +184,7 @@ def rotor(variant: Variant) -> str:
     import numpy as np
 
     from cli.balance.rotors import read_rotors
-    from cli.read.planes_and_tolerance import from_options, from_table
+    from cli.read.rotor_options import from_options, from_table
 
     words = variant.problem.command
     planes = [words[k + 1] for k, word in enumerate(words[:-1]) if word == "--plane"]

@@ -199,7 +199,7 @@ class Rotor:
 def rotor(variant: Variant, answer: Answer) -> Rotor | None:
     """Return the rotor that a question is about; None with three planes or more, or with rounded corrections."""
     from cli.balance.rotors import read_rotors
-    from cli.read.planes_and_tolerance import from_options, from_table
+    from cli.read.rotor_options import from_options, from_table
 
     words = variant.problem.command
     if any(word in ("--round-mass", "--round-angle") for word in words):

@@ -144,7 +144,7 @@ def run(
 
     from cli.field.field_balancing import FieldBalancing
     from cli.field.fit import Request, measured_groups
-    from cli.read.planes_and_tolerance import tolerance_of
+    from cli.read.rotor_options import tolerance_of
 
     request = Request(
         reading_error=options.reading_error(reading_error),

@@ -20,7 +20,7 @@ from balancing import (
     phase_sense,
 )
 from cli.read import options
-from cli.read.planes_and_tolerance import Tolerance
+from cli.read.rotor_options import Tolerance
 from cli.read.runs.reading import Measured, read_measured
 from cli.read.runs.runs import SHOWN, Before, Complex, Group, Rows, Runs
 from cli.read.stored import Stored, read_runout

@@ -15,7 +15,7 @@ from cli.field.remarks import instrument, sense
 from cli.field.rotor import Rotor, each
 from cli.field.tables import Rows, Tables, amplitude_unit, masses_text
 from cli.read.options import bad
-from cli.read.planes_and_tolerance import verdict_table
+from cli.read.rotor_options import verdict_table
 from cli.read.runs.runs import Complex
 from cli.show.picture import blank
 from cli.show.result import Bar, Bars, Section, Sheet

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from balancing import initial_unbalance
 from cli.field.field_balancing import SINGULAR, FieldBalancing, Solved
-from cli.read.planes_and_tolerance import Verdict
+from cli.read.rotor_options import Verdict
 from cli.read.runs.runs import Channel, Complex, Group, Real
 from dalembert.angles import degrees
 from dalembert.arithmetic.exact import EPS

@@ -430,7 +430,7 @@ def split(b: FieldBalancing, of: Callable[[Rotor], Complex], name: str, *, shown
 
 def tolerance(b: FieldBalancing) -> Table:
     """One row per rotor and plane: what is permissible, what the unbalance was, what is predicted."""
-    from cli.read.planes_and_tolerance import verdict_table
+    from cli.read.rotor_options import verdict_table
 
     limit = b.request.tolerance
     assert limit is not None
