@@ -29,7 +29,7 @@ What:
 MARKS = ("mark", "tacho", "keyphasor", "pulse", "trigger")
 
 
-@command(OPTIONS)
+@command(OPTIONS, without=("plot",))
 def run(
     recording: str,
     pulses: Annotated[int, typer.Option(min=1, max=10000)] = 1,

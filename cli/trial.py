@@ -27,7 +27,7 @@ What:
 """
 
 
-@command(OPTIONS)
+@command(OPTIONS, without=("column", "plot"))
 def run(
     rotor_mass: str,
     speed: str,

@@ -16,7 +16,7 @@ import numpy as np
 from cli.cases.case import Case, Study, blank, emptied, joined, length, like, without_errors
 from cli.cases.cases import naming
 from cli.cases.remarks import Remarks
-from cli.read.options import processes
+from cli.read.options import bad, processes
 from cli.show.result import Result, Written, with_found
 from cli.show.terminal import progress
 from dalembert.dataclass import dataclass, field, replace
@@ -54,6 +54,8 @@ def result(study: Study, options: SimpleNamespace, root: Found | None = None) ->
 
             refuse_long(study.frames * cases.count)
         if cases.varied is not None:
+            if show.plot is not None:
+                raise bad("--plot", "expected one mechanism: several variants are drawn by --page")
             result = _of_variants(loop, warnings)
         elif study.in_blocks:
             result = Result(

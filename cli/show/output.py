@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
@@ -27,14 +27,15 @@ if TYPE_CHECKING:
 
 
 def command(
-    options: str, values: Callable[..., object] | None = None
+    options: str, without: Collection[str] = ()
 ) -> Callable[[Callable[..., Result]], Callable[..., None]]:
     """Make a command of a function that returns its result: it takes the shared options too, and shows the result.
 
-    `options` is what the help says of its own (`told`). Where the function has a parameter `show`, it is given the
-    shared ones; `values` as in `with_options`.
+    `options` is what the help says of its own, `without` the shared ones that mean nothing for it. Where the function has
+    a parameter `show`, it is given the shared ones.
     """
-    return lambda find: with_options(find, options, None, show, values)
+    chosen = [name for name in ShowOptions.__annotations__ if name not in without]
+    return lambda find: with_options(find, options, chosen, show)
 
 
 def declared_command(
@@ -62,6 +63,8 @@ def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
         raise typer.BadParameter(
             f"'{options.output}' has no known suffix: expected {', '.join(FORMS)}", param_hint="-o"
         )
+    if options.plot is not None and result.figure is None:
+        raise typer.BadParameter(f"'{options.plot}': there is no picture of this result", param_hint="--plot")
     if result.blocks is not None:
         check_renamed()
         _stream(result, options, form)
@@ -112,7 +115,8 @@ def _write(result: Result, options: ShowOptions, pages: Mapping[Path, Made]) -> 
     refuse_inputs(names)
     check_folders(names)
     files |= {**result.beside, **pages}
-    if options.plot is not None and result.figure is not None:
+    if options.plot is not None:
+        assert result.figure is not None
         from cli.show.picture import drawn
 
         files[options.plot] = partial(drawn, result.figure, options.plot.suffix.lower()[1:])

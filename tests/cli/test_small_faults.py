@@ -308,3 +308,20 @@ def test_an_option_that_is_no_text_in_utf_8(options: list[str], dalembert: Dalem
     assert done.returncode == 1
     assert "expected text in UTF-8" in done.stderr
     assert not [path for path in tmp_path.iterdir() if path.name[0] in ".rx" and path.name != "rotor.csv"]
+
+
+def test_a_picture_that_cannot_be_drawn_is_refused(dalembert: Dalembert, tmp_path: Path) -> None:
+    """--plot of several variants wrote no file, with status 0; `trial` and `signal` have no picture and list no --plot."""
+    (tmp_path / "crank.toml").write_text(
+        '[ground]\nO = [0, 0]\n[links.crank]\npoints = { O = [0, 0], P = [1, 0] }\n[input]\nlink = "crank"\n'
+    )
+    picture = tmp_path / "p.svg"
+    call = ("mechanism", str(tmp_path / "crank.toml"), "--at", "30deg")
+    done = dalembert(*call, "--over", "links.crank.P.x=1m:2m:1m", "--plot", str(picture))
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "--plot: expected one mechanism" in done.stderr
+    assert not picture.exists()
+    assert dalembert(*call, "--plot", str(picture)).returncode == 0
+    assert picture.exists()
+    for words in (("trial",), ("signal",)):
+        assert "--plot" not in dalembert(*words, "--help").stdout
