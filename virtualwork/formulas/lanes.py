@@ -65,9 +65,10 @@ class Lanes(Solving):
         return taped(self.branch, self.recording, tuple(keys)).cost
 
     def values(self, keys: Sequence[Quantity], forces: Callable[[], Dynamics] | None = None) -> list[Any]:
-        """The quantities, each (n,), real or complex: of many poses from the tape, of one by the formulas on floats.
+        """The quantities, each (n,), real or complex, in arrays of the caller's own.
 
-        One pose that is asked for often comes from the tape too, as a function of floats; its forces from what `forces` gives.
+        Of many poses they come from the tape, of one from the formulas on floats. One pose that is asked for often comes from the
+        tape too, as a function of floats; its forces from what `forces` gives.
         """
         new = tuple(key for key in keys if key not in self._taped)
         if new and not self.many and not wanted():
@@ -79,8 +80,9 @@ class Lanes(Solving):
             # not before: what a table is over is asked for on the way, and may be among these
             self._taped |= dict.fromkeys(new, True)
         # what was handed out once stays as it is, to its last digit
-        alone = self._alone([key for key in keys if not self._taped[key]], forces)
-        return [self.known[key].copy() if self._taped[key] else alone[key] for key in keys]
+        without = [key for key in keys if not self._taped[key]]
+        known = self.known | self._alone(without, forces) if without else self.known
+        return [known[key] if self.once else known[key].copy() for key in keys]
 
     def _foreseen(self, keys: tuple[Quantity, ...]) -> tuple[Quantity, ...]:
         """What a request is answered with: the second of a kind and order over very many poses brings all of them.
@@ -146,14 +148,13 @@ class Lanes(Solving):
         return True
 
     def _run(self, keys: list[Quantity]) -> None:
-        doubts = [key for key in dict.fromkeys(self._doubts(keys)) if key not in self._bad]
-        # what is asked for first may be all: from the second time on, something is kept for those to come
-        kept = dict(self._kept) if self.known and self.n > 1 else None
-        asked, known = (*keys, *doubts), frozenset(kept or ())
-        later = cut(self.branch, self.recording, asked, None if kept is None else known)
+        doubts = [key for key in self._doubts(tuple(keys)) if key not in self._bad]
+        opens = self.branch.may_open
+        kept = self._kept
+        known = frozenset(kept) if self.n > 1 and not self.once else None
+        later = cut(self.branch, self.recording, (*keys, *doubts), known, not self.known)
         given = self.entering(name for name in later.tape.inputs if name not in later.takes)
-        if kept:
-            given |= {name: kept[number] for name, number in later.takes.items()}
+        given |= {name: kept[number] for name, number in later.takes.items()}
         out = run(later.tape, given, pairs=[key.names[0] for key in keys if key.is_vector])
         self._kept.update((number, out[name]) for name, number in later.leaves.items())
         for key in doubts:
@@ -162,7 +163,7 @@ class Lanes(Solving):
         keys = [key for key in keys if key not in self.known]
         for key in keys:
             value = key.of_rows(out, self.n)
-            for nowhere in (self._nowhere, *map(self._bad.get, self._closed(key))):
+            for nowhere in (self._nowhere, *(map(self._bad.get, self._closed(key)) if opens else ())):
                 if nowhere is not None:
                     leave_out(value, nowhere)
             self.known[key] = value
@@ -170,7 +171,7 @@ class Lanes(Solving):
                 leave_out(self.known[key], self.locked)
             if self.enters and isinstance(key, Effort | Generalized):
                 leave_out(self.known[key], self._too_fast(key.input))
-        apart = self._apart_of(keys)
+        apart = self._apart_of(self._singular(keys))
         if apart is not None:
             rows, again = apart
             again._run([key for key in keys if key not in again.known])
