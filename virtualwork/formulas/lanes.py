@@ -44,8 +44,9 @@ class Lanes(Solving):
         self._taped: dict[Quantity, bool] = {}
         # values of operations for later requests, by their numbers
         self._kept: dict[int, Any] = {}
-        # kinds and orders that were requested
-        self._requested: set[tuple[type[Quantity], int]] = set()
+        # what was requested, and of which kinds and orders
+        self.requested: dict[Quantity, None] = {}
+        self._families: set[tuple[type[Quantity], int]] = set()
         self._repeated = False
 
     @property
@@ -70,7 +71,8 @@ class Lanes(Solving):
         Of many poses they come from the tape, of one from the formulas on floats. One pose that is asked for often comes from the
         tape too, as a function of floats; its forces from what `forces` gives.
         """
-        new = tuple(key for key in keys if key not in self._taped)
+        new = tuple([key for key in keys if key not in self._taped])
+        self.requested |= dict.fromkeys(keys)
         if new and not self.many and not wanted():
             self._taped |= dict.fromkeys(new, self._often(new) and self.one(new))
         elif new:
@@ -90,8 +92,8 @@ class Lanes(Solving):
         One tape for all is cheaper than one for each; what nobody asks for twice is not computed.
         """
         kinds = {key.family for key in keys}
-        self._repeated = self._repeated or not kinds.isdisjoint(self._requested)
-        self._requested |= kinds
+        self._repeated = self._repeated or not kinds.isdisjoint(self._families)
+        self._families |= kinds
         if len(kinds) > 1 or not self._repeated or self.n < MANY_POSES:
             return keys
         ((kind, order),) = kinds
