@@ -17,7 +17,7 @@ from dalembert.arithmetic.guard import guarded
 from virtualwork.formulas.forces import Effort, Force, Generalized
 from virtualwork.formulas.numbers import leave_out
 from virtualwork.formulas.quantity import Quantity
-from virtualwork.formulas.solving import Solving
+from virtualwork.formulas.solving import Solving, is_closed
 from virtualwork.formulas.tapes import cut, ready, taped
 from virtualwork.plan.steps import Step
 
@@ -98,6 +98,8 @@ class Lanes(Solving):
             return keys
         ((kind, order),) = kinds
         more = [key for key in kind.every(self.mechanism, order) if key not in self.known]
+        if set(more).issubset(keys):
+            return keys
         spent = self.operations([*keys, *(key for key in self.known if key.family in kinds)])
         if self.operations([*keys, *more]) > WASTE * spent:
             return keys
@@ -150,8 +152,8 @@ class Lanes(Solving):
         return True
 
     def _run(self, keys: list[Quantity]) -> None:
-        doubts = [key for key in self._doubts(tuple(keys)) if key not in self._bad]
-        opens = self.branch.may_open
+        every = self._doubts(tuple(keys))
+        doubts, opens = [key for key in every if key not in self._bad], any(map(is_closed, every))
         kept = self._kept
         known = frozenset(kept) if self.n > 1 and not self.once else None
         later = cut(self.branch, self.recording, (*keys, *doubts), known, not self.known)
@@ -162,7 +164,9 @@ class Lanes(Solving):
         for key in doubts:
             self._bad[key] = self._where_bad(key, out[key.names[0]])
         # what a table is over has been handed out
-        keys = [key for key in keys if key not in self.known]
+        new = [key for key in keys if key not in self.known]
+        if len(new) < len(keys):
+            keys, every = new, self._doubts(tuple(new))
         for key in keys:
             value = key.of_rows(out, self.n)
             for nowhere in (self._nowhere, *(map(self._bad.get, self._closed(key)) if opens else ())):
@@ -173,7 +177,7 @@ class Lanes(Solving):
                 leave_out(self.known[key], self.locked)
             if self.enters and isinstance(key, Effort | Generalized):
                 leave_out(self.known[key], self._too_fast(key.input))
-        apart = self._apart_of(self._singular(keys))
+        apart = self._apart_of([key for key in every if not is_closed(key)])
         if apart is not None:
             rows, again = apart
             again._run([key for key in keys if key not in again.known])

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.engines import as_part
-from dalembert.arithmetic.guard import guarded
+from dalembert.arithmetic.guard import guarded, unlocked
 from virtualwork.formulas.branch import Branch
 from virtualwork.formulas.kinematics import Angle, Kinematic, Partial, Point
 from virtualwork.formulas.numbers import Complexes, Number, Reals, condition, real_array
@@ -191,10 +191,7 @@ class Poses:
     def moves(self) -> tuple[bool, ...]:
         """Whether the inputs have a speed, an acceleration, a jerk that is not zero everywhere."""
 
-        def any_of(rate: Number) -> bool:
-            return bool(rate.any()) if isinstance(rate, np.ndarray) else bool(rate)
-
-        return tuple(any(map(any_of, rates)) for rates in self.rates)
+        return tuple([any(np.any(rate) if np.ndim(rate) else rate for rate in rates) for rates in self.rates])
 
     # --- solving ----------------------------------------------------------------------------------------------
     @property
@@ -223,6 +220,7 @@ class Poses:
         return self._blocks
 
     @property
+    @unlocked
     def many(self) -> bool:
         """Whether these are many poses, or a part of many."""
         return self.n != 1 or self.block_of is not None

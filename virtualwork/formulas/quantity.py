@@ -191,7 +191,7 @@ class Quantity(tuple[Any, ...]):
         """
         of = [name if to is None else f"d({name})/d({to})" for name in self.names]
         value = rows.complex(*of) if self.is_vector else rows.get(of[0], 0.0)
-        return value if np.ndim(value) else np.full(n, value)
+        return value if isinstance(value, np.ndarray) and value.ndim else np.full(n, value)
 
 
 @lru_cache(maxsize=4096)

@@ -44,6 +44,11 @@ if TYPE_CHECKING:
     from virtualwork.formulas.statics import Statics
 
 
+def is_closed(doubt: Quantity) -> bool:
+    """Whether a doubt is about the assembly of a group, not about a singular one."""
+    return isinstance(doubt, Closed)
+
+
 @guarded
 class Solving(Poses):
     """Poses of an assembly, with what their tapes need."""
@@ -146,7 +151,7 @@ class Solving(Poses):
 
     def _singular(self, keys: Sequence[Quantity]) -> list[Quantity]:
         """What tells where a group is singular that quantities depend on."""
-        return [key for key in self._doubts(tuple(keys)) if not isinstance(key, Closed)]
+        return [key for key in self._doubts(tuple(keys)) if not is_closed(key)]
 
     def _raw(self, keys: Sequence[Quantity], friction: Reals | None = None) -> list[Any]:
         """Quantities as the tape has them, with another friction; not kept."""
@@ -264,7 +269,7 @@ class Solving(Poses):
 
     def _where_bad(self, key: Quantity, found: Any) -> NDArray[np.bool_] | None:
         """The poses that a doubt is right about; None where it is right about none."""
-        if isinstance(key, Closed):
+        if is_closed(key):
             bad = ~np.isfinite(found)
         else:
             least = NEAR if isinstance(key, Margin) else SINGULAR
