@@ -43,21 +43,20 @@ def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> tuple[Comple
         norms = damping_norms(scaled)
         scaled = np.concatenate([scaled, ridge * norms[..., None] * np.eye(planes)], axis=-2)
         b = np.concatenate([b, np.zeros((*b.shape[:-1], planes))], axis=-1)
-    order = np.argsort(-np.abs(scaled).max(axis=-1), axis=-1, kind="stable")
+    order = (-np.abs(scaled).max(axis=-1)).argsort(axis=-1, kind="stable")
+    # of [a, b] R has Qᴴb in its last column
     if scaled.ndim == 2 and b.ndim == 1:
-        scaled, b = scaled[order], b[order]
+        rows = np.concatenate([scaled, b[:, None]], axis=1)[order]
     else:
         lead = np.broadcast_shapes(scaled.shape[:-2], b.shape[:-1])
-        scaled = np.broadcast_to(scaled, lead + scaled.shape[-2:])
-        b = np.broadcast_to(b, lead + b.shape[-1:])
+        parts = scaled, b[..., None]
+        rows = np.concatenate([np.broadcast_to(x, lead + x.shape[-2:]) for x in parts], axis=-1)
         order = np.broadcast_to(order, lead + order.shape[-1:])
-        scaled = np.take_along_axis(scaled, order[..., None], axis=-2)
-        b = np.take_along_axis(b, order, axis=-1)
-    readings = scaled.shape[-2]
+        rows = np.take_along_axis(rows, order[..., None], axis=-2)
+    readings = rows.shape[-2]
     if readings < planes:
-        require_independent(scaled, scale, readings, planes, "readings", DependentPlanes)
-    # of [a, b] R has Qᴴb in its last column
-    r = triangle(np.concatenate([scaled, b[..., None]], axis=-1))[..., :planes, :]
+        require_independent(rows[..., :planes], scale, readings, planes, "readings", DependentPlanes)
+    r = triangle(rows)[..., :planes, :]
     sigma = require_independent(r[..., :planes], scale, readings, planes, "readings", DependentPlanes)
     x = np.linalg.solve(r[..., :planes], -r[..., planes:])[..., 0]
     return np.asarray(x * scale + 0.0, dtype=complex), sigma

@@ -381,11 +381,13 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _scaled(factor: Array, vectors: Array, sign: float = 1.0) -> Array:
-    """A factor (...) times vectors (..., 3); many in blocks, since numpy goes through each column by itself."""
+    """A factor (...) times vectors (..., 3); of many each column by itself, in blocks: numpy takes twice as long for rows of three."""
     if is_doubled(vectors) or vectors.ndim != 2 or factor.shape != vectors.shape[:1] or len(vectors) <= BLOCK:
         return (sign * factor)[..., None] * vectors
     out = np.empty_like(vectors)
     for s in range(0, len(vectors), BLOCK):
         part = slice(s, s + BLOCK)
-        np.multiply((sign * factor[part])[:, None], vectors[part], out=out[part])
+        signed = sign * factor[part]
+        for k in range(3):
+            np.multiply(signed, vectors[part, k], out=out[part, k])
     return out

@@ -50,6 +50,8 @@ class Evaluator:
         self.wanted, self.keys = tuple(name for name, _, _ in of), tuple(key for _, key, _ in of)
         # of vectors of which one component is requested
         self._components = {name: int(imaginary) for name, _, imaginary in of if imaginary is not None}
+        # what is requested under two names is in two arrays
+        self._once = len(set(self.keys)) == len(self.keys)
         self._ready: dict[tuple[bool, ...], Ready | None] = {}
 
     def __repr__(self) -> str:
@@ -89,7 +91,8 @@ class Evaluator:
                             for name, value in zip(self.wanted, values, strict=True)
                         }
                     )
-        numbers = Lanes(self.assembly, angle, speed, acceleration, jerk).values(self.keys)
+        poses = Lanes(self.assembly, angle, speed, acceleration, jerk, once=self._once)
+        numbers = poses.values(self.keys)
         shown = {
             name: xy(value) if key.is_vector else value
             for name, key, value in zip(self.wanted, self.keys, numbers, strict=True)

@@ -12,7 +12,7 @@ array([2., 2., 2.])
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     from virtualwork.study.cycle import Cycle
 
 EFFORT = Effort(0)
+# what a loop asks of each pose is made once
+_reaction = lru_cache(maxsize=1024)(Reaction)
 # poses at each end of a motion that a notebook shows
 ENDS = 10
 
@@ -256,7 +258,7 @@ class Motion(NamedParts[PointMotion, LinkMotion, SlideMotion], MotionViews):
         on : str
             A link that the joint holds.
         """
-        return self.vector(Reaction(joint, on))
+        return self.vector(_reaction(joint, on))
 
     def applied(self, link: str) -> tuple[Complexes, Reals]:
         """Return the applied loads of a link without weight and inertia, at its centre of mass: (n,) complex N, (n,) N·m."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from dalembert.hints import choices
@@ -15,6 +16,10 @@ from virtualwork.formulas.quantity import Quantity
 
 if TYPE_CHECKING:
     from virtualwork.digits.estimates import Estimates
+
+
+# what a loop asks of each pose is made once
+_point = lru_cache(maxsize=1024)(Point)
 
 
 class AnyMotion(Protocol):
@@ -97,7 +102,7 @@ class PointRates(PartOfMotion):
         return self.motion.value(self.key(order))  # type: ignore[no-any-return]
 
     def key(self, order: int = 0) -> Quantity:
-        return Point(self.body, self._where, self.node, order)
+        return _point(self.body, self._where, self.node, order)
 
 
 class LinkRates(PartOfMotion):

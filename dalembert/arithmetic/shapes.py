@@ -100,8 +100,12 @@ def common_shape(**shapes: Shape) -> Shape:
     ...
     ValueError: shapes do not fit: inertia (4,), omega (3,)
     """
+    different = {*shapes.values()} - {()}
+    if len(different) < 2:
+        # mostly one: numpy takes longer than some sums do
+        return different.pop() if different else ()
     try:
-        return np.broadcast_shapes(*shapes.values())
+        return np.broadcast_shapes(*different)
     except ValueError:
         pairs = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
         raise ValueError(f"shapes do not fit: {pairs}") from None

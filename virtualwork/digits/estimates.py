@@ -26,8 +26,8 @@ from dalembert.arithmetic.doubled import Doubled
 from dalembert.arithmetic.engines.doubled import OWN, estimated
 from dalembert.arithmetic.guard import guarded
 from virtualwork.digits.second_run import Found, SecondRun, answer, apart, parts
-from virtualwork.formulas.kinematics import Turn
-from virtualwork.formulas.lanes import Lanes
+from virtualwork.formulas.kinematics import Angle, Point, Slide, Turn
+from virtualwork.formulas.lanes import MANY_POSES, Lanes
 from virtualwork.formulas.loops import Margin
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.quantity import Quantity
@@ -38,6 +38,8 @@ NEAR, DOUBTED = 1e-12, 0.1
 NODES, FARTHER = 24, (8.0, 5.0)
 # of the radicand: where branches are no farther apart they meet
 MEETING = 1e-18
+# quantities whose estimates are asked for one after the other
+ASKED = (Point, Angle, Slide)
 
 Values = Callable[[Sequence[Quantity]], Sequence[Any]]
 
@@ -69,6 +71,10 @@ class Estimates:
     def together(self, keys: Iterable[Quantity]) -> None:
         """Form the estimates of several quantities, which have most of the second run in common; `of` gives them out."""
         new = [key for key in dict.fromkeys(keys) if key not in self._known]
+        if new and self._known and self.n >= MANY_POSES and all(isinstance(key, ASKED) for key in new):
+            # who asks again for an estimate will ask for those of all that he has: a second run has most of it in common
+            asked = (key for key in self.poses.requested if isinstance(key, ASKED) and key not in self._known)
+            new = list(dict.fromkeys((*new, *asked)))
         values = dict(zip(new, self._values(new), strict=True)) if new else {}
         for key in filter(self._lost, new):
             value = values.pop(key)

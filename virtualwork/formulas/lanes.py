@@ -17,7 +17,7 @@ from dalembert.arithmetic.guard import guarded
 from virtualwork.formulas.forces import Effort, Force, Generalized
 from virtualwork.formulas.numbers import leave_out
 from virtualwork.formulas.quantity import Quantity
-from virtualwork.formulas.solving import Solving
+from virtualwork.formulas.solving import Solving, is_closed
 from virtualwork.formulas.tapes import cut, ready, taped
 from virtualwork.plan.steps import Step
 
@@ -44,8 +44,9 @@ class Lanes(Solving):
         self._taped: dict[Quantity, bool] = {}
         # values of operations for later requests, by their numbers
         self._kept: dict[int, Any] = {}
-        # kinds and orders that were requested
-        self._requested: set[tuple[type[Quantity], int]] = set()
+        # what was requested, and of which kinds and orders
+        self.requested: dict[Quantity, None] = {}
+        self._families: set[tuple[type[Quantity], int]] = set()
         self._repeated = False
 
     @property
@@ -65,11 +66,13 @@ class Lanes(Solving):
         return taped(self.branch, self.recording, tuple(keys)).cost
 
     def values(self, keys: Sequence[Quantity], forces: Callable[[], Dynamics] | None = None) -> list[Any]:
-        """The quantities, each (n,), real or complex: of many poses from the tape, of one by the formulas on floats.
+        """The quantities, each (n,), real or complex, in arrays of the caller's own.
 
-        One pose that is asked for often comes from the tape too, as a function of floats; its forces from what `forces` gives.
+        Of many poses they come from the tape, of one from the formulas on floats. One pose that is asked for often comes from the
+        tape too, as a function of floats; its forces from what `forces` gives.
         """
-        new = tuple(key for key in keys if key not in self._taped)
+        new = tuple([key for key in keys if key not in self._taped])
+        self.requested |= dict.fromkeys(keys)
         if new and not self.many and not wanted():
             self._taped |= dict.fromkeys(new, self._often(new) and self.one(new))
         elif new:
@@ -79,8 +82,9 @@ class Lanes(Solving):
             # not before: what a table is over is asked for on the way, and may be among these
             self._taped |= dict.fromkeys(new, True)
         # what was handed out once stays as it is, to its last digit
-        alone = self._alone([key for key in keys if not self._taped[key]], forces)
-        return [self.known[key].copy() if self._taped[key] else alone[key] for key in keys]
+        without = [key for key in keys if not self._taped[key]]
+        known = self.known | self._alone(without, forces) if without else self.known
+        return [known[key] if self.once else known[key].copy() for key in keys]
 
     def _foreseen(self, keys: tuple[Quantity, ...]) -> tuple[Quantity, ...]:
         """What a request is answered with: the second of a kind and order over very many poses brings all of them.
@@ -88,12 +92,14 @@ class Lanes(Solving):
         One tape for all is cheaper than one for each; what nobody asks for twice is not computed.
         """
         kinds = {key.family for key in keys}
-        self._repeated = self._repeated or not kinds.isdisjoint(self._requested)
-        self._requested |= kinds
+        self._repeated = self._repeated or not kinds.isdisjoint(self._families)
+        self._families |= kinds
         if len(kinds) > 1 or not self._repeated or self.n < MANY_POSES:
             return keys
         ((kind, order),) = kinds
         more = [key for key in kind.every(self.mechanism, order) if key not in self.known]
+        if set(more).issubset(keys):
+            return keys
         spent = self.operations([*keys, *(key for key in self.known if key.family in kinds)])
         if self.operations([*keys, *more]) > WASTE * spent:
             return keys
@@ -146,23 +152,24 @@ class Lanes(Solving):
         return True
 
     def _run(self, keys: list[Quantity]) -> None:
-        doubts = [key for key in dict.fromkeys(self._doubts(keys)) if key not in self._bad]
-        # what is asked for first may be all: from the second time on, something is kept for those to come
-        kept = dict(self._kept) if self.known and self.n > 1 else None
-        asked, known = (*keys, *doubts), frozenset(kept or ())
-        later = cut(self.branch, self.recording, asked, None if kept is None else known)
+        every = self._doubts(tuple(keys))
+        doubts, opens = [key for key in every if key not in self._bad], any(map(is_closed, every))
+        kept = self._kept
+        known = frozenset(kept) if self.n > 1 and not self.once else None
+        later = cut(self.branch, self.recording, (*keys, *doubts), known, not self.known)
         given = self.entering(name for name in later.tape.inputs if name not in later.takes)
-        if kept:
-            given |= {name: kept[number] for name, number in later.takes.items()}
+        given |= {name: kept[number] for name, number in later.takes.items()}
         out = run(later.tape, given, pairs=[key.names[0] for key in keys if key.is_vector])
         self._kept.update((number, out[name]) for name, number in later.leaves.items())
         for key in doubts:
             self._bad[key] = self._where_bad(key, out[key.names[0]])
         # what a table is over has been handed out
-        keys = [key for key in keys if key not in self.known]
+        new = [key for key in keys if key not in self.known]
+        if len(new) < len(keys):
+            keys, every = new, self._doubts(tuple(new))
         for key in keys:
             value = key.of_rows(out, self.n)
-            for nowhere in (self._nowhere, *map(self._bad.get, self._closed(key))):
+            for nowhere in (self._nowhere, *(map(self._bad.get, self._closed(key)) if opens else ())):
                 if nowhere is not None:
                     leave_out(value, nowhere)
             self.known[key] = value
@@ -170,7 +177,7 @@ class Lanes(Solving):
                 leave_out(self.known[key], self.locked)
             if self.enters and isinstance(key, Effort | Generalized):
                 leave_out(self.known[key], self._too_fast(key.input))
-        apart = self._apart_of(keys)
+        apart = self._apart_of([key for key in every if not is_closed(key)])
         if apart is not None:
             rows, again = apart
             again._run([key for key in keys if key not in again.known])

@@ -76,17 +76,18 @@ def leave_out(values: NDArray[Any], which: NDArray[np.bool_]) -> None:
     values[which] = complex(np.nan, np.nan) if values.dtype.kind == "c" else np.nan
 
 
-def real_array(name: str, value: ArrayLike) -> Reals:
+def real_array(name: str, value: ArrayLike, once: bool = False) -> Reals:
     """Read real numbers as an array of its own; ValueError names what holds something else.
 
-    A motion is solved when it is first asked for: what the caller does to his array in between does not change it.
+    A motion is solved when it is first asked for: what the caller does to his array in between does not change it. What is
+    solved at `once` may read the caller's own.
 
     >>> real_array("angle", "abc")
     Traceback (most recent call last):
     ValueError: angle: expected real numbers, found 'abc'
     """
     try:
-        return np.array(value, dtype=float)
+        return np.asarray(value, dtype=float) if once else np.array(value, dtype=float)
     except (TypeError, ValueError):
         text = repr(value)
         text = text if len(text) <= 60 else f"{text[:60]} …"

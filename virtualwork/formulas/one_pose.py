@@ -47,17 +47,20 @@ class OnePose:
 
     def value(self, key: Quantity) -> Any:
         """A quantity, (1,); None where a function of floats has not been made of it, or fails."""
-        known = self.known
-        if key not in known and not self._work_out((key,)):
-            return None
-        return array([known[key]])
+        value = self.known.get(key)
+        if value is None:
+            if not self._work_out((key,)):
+                return None
+            value = self.known[key]
+        return array([value])
 
     def vector(self, key: Quantity) -> Reals | None:
         """A vector, (1, 2); None as above."""
-        known = self.known
-        if key not in known and not self._work_out((key,)):
-            return None
-        value = known[key]
+        value = self.known.get(key)
+        if value is None:
+            if not self._work_out((key,)):
+                return None
+            value = self.known[key]
         # twice as fast as an array of a list
         result = empty((1, 2))
         result[0, 0], result[0, 1] = value.real, value.imag
@@ -72,37 +75,42 @@ class OnePose:
         return [array([known[key]]) for key in keys]
 
     def _work_out(self, keys: tuple[Quantity, ...]) -> bool:
-        _, speed, acceleration, jerk = self.numbers
+        """Work out quantities; False where a function of floats has not been made of them, or fails."""
+        branch, numbers = self.branch, self.numbers
+        _, speed, acceleration, jerk = numbers
         moves = speed != 0.0, acceleration != 0.0, jerk != 0.0
-        first, every = self._first, self.branch.together
-        if first is None:
-            first = every.get((moves, keys))
-            if first is not None:
-                self._first = first
-                return self._run(*first.brought)
-        recordings = self.branch.recordings
-        made: Ready | None = recordings.get(("ready", moves, keys))
-        if made is None:
+        first = self._first
+        together = branch.together.get((moves, keys)) if first is None else None
+        if together is None:
+            made: Ready | None = branch.recordings.get(("ready", moves, keys))
+            if made is None:
+                return False
+            function: Ready = made
+            if first is None:
+                together = branch.together.setdefault((moves, keys), Together((function, keys)))
+            else:
+                self._note(first, moves, keys)
+        if together is not None:
+            self._first = together
+            function, keys = together.brought
+        try:
+            result = function(*numbers)
+        except (ZeroDivisionError, ValueError, OverflowError):
             return False
-        if first is None:
-            self._first = every.setdefault((moves, keys), Together((made, keys)))
-            return self._run(made, keys)
+        # what another thread has put there meanwhile has the same bits
+        known = self.known
+        for key, value in zip(keys, result, strict=True):
+            known[key] = value
+        return True
+
+    def _note(self, first: Together, moves: tuple[bool, ...], keys: tuple[Quantity, ...]) -> None:
+        """Count a request that came later than a first one; if it comes often, the first brings it from then on."""
         count = first.later[keys] = first.later.get(keys, 0) + 1
         if count == OFTEN:
             wanted = tuple(dict.fromkeys((*first.brought[1], *keys)))
             together = ready(self.branch, moves, wanted)
             if together is not None:
                 first.brought = together, wanted
-        return self._run(made, keys)
-
-    def _run(self, made: Ready, keys: tuple[Quantity, ...]) -> bool:
-        try:
-            result = made(*self.numbers)
-        except (ZeroDivisionError, ValueError, OverflowError):
-            return False
-        # what another thread has put there meanwhile has the same bits
-        self.known.update(zip(keys, result, strict=True))
-        return True
 
 
 def one_pose(branch: Branch, angle: Any, speed: Any, acceleration: Any, jerk: Any) -> OnePose | None:

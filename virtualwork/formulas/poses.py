@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.engines import as_part
-from dalembert.arithmetic.guard import guarded
+from dalembert.arithmetic.guard import guarded, unlocked
 from virtualwork.formulas.branch import Branch
 from virtualwork.formulas.kinematics import Angle, Kinematic, Partial, Point
 from virtualwork.formulas.numbers import Complexes, Number, Reals, condition, real_array
@@ -26,8 +26,8 @@ from virtualwork.formulas.rates import Rates, chain_rule
 from virtualwork.plan.steps import Step
 
 
-def as_inputs(angle: ArrayLike, k: int) -> Reals:
-    """Inputs as an array (n, k), from a number or an array (n,) where k is 1, from (k,) or (n, k).
+def as_inputs(angle: ArrayLike, k: int, once: bool = False) -> Reals:
+    """Inputs as an array (n, k), from a number or an array (n,) where k is 1, from (k,) or (n, k); see `real_array`.
 
     >>> as_inputs([0.0, 0.5], 1).shape, as_inputs([0.0, 0.5], 2).shape
     ((2, 1), (1, 2))
@@ -36,7 +36,7 @@ def as_inputs(angle: ArrayLike, k: int) -> Reals:
     ------
     ValueError
     """
-    q = real_array("angle", angle)
+    q = real_array("angle", angle, once)
     if k == 1 and q.ndim < 2:
         return q.reshape(-1, 1)
     if k > 1 and q.shape == (k,):
@@ -70,6 +70,8 @@ class Poses:
     inputs : array (n, k)
     block_of : int, optional
         The number of poses of which these are a part: they have the digits that all have together.
+    once : bool
+        Whether one request alone is made, at once: then no array is copied, or kept for later ones.
     input_error : float or array (n, k)
         Bound of the inputs' own errors, for the estimates of rounding errors: 0 where they are exact as given.
     input_rest : float or array (n, k), or a function that gives them, optional
@@ -84,8 +86,9 @@ class Poses:
         acceleration: ArrayLike | None = None,
         jerk: ArrayLike | None = None,
         block_of: int | None = None,
+        once: bool = False,
     ) -> None:
-        self.block_of = block_of
+        self.block_of, self.once = block_of, once
         self._known_steps, self._plain, self._close = branch.known_steps, branch.plain, branch.close
         self.branch, self.plan, self.lock = branch, branch.plan, branch.lock
         self.mechanism = m = branch.mechanism
@@ -94,7 +97,7 @@ class Poses:
             given = [e.value for e in m.inputs]
             angle = [a if v is None else v for v, a in zip(given, m.at, strict=True)]
             angle = angle if k == 1 else [angle]
-        self.inputs = q = as_inputs(angle, k)
+        self.inputs = q = as_inputs(angle, k, once)
         self.n = len(q)
         self.rates = [
             self._given(name, value, [getattr(e, name) for e in m.inputs])
@@ -121,7 +124,7 @@ class Poses:
         k = len(own)
         if value is None:
             return [v or 0.0 for v in own]
-        v = real_array(name, value)
+        v = real_array(name, value, self.once)
         if v.ndim == 0:
             return [float(v)] * k
         check_rate(name, v, self.n, k)
@@ -188,10 +191,7 @@ class Poses:
     def moves(self) -> tuple[bool, ...]:
         """Whether the inputs have a speed, an acceleration, a jerk that is not zero everywhere."""
 
-        def any_of(rate: Number) -> bool:
-            return bool(rate.any()) if isinstance(rate, np.ndarray) else bool(rate)
-
-        return tuple(any(map(any_of, rates)) for rates in self.rates)
+        return tuple([any(np.any(rate) if np.ndim(rate) else rate for rate in rates) for rates in self.rates])
 
     # --- solving ----------------------------------------------------------------------------------------------
     @property
@@ -220,6 +220,7 @@ class Poses:
         return self._blocks
 
     @property
+    @unlocked
     def many(self) -> bool:
         """Whether these are many poses, or a part of many."""
         return self.n != 1 or self.block_of is not None

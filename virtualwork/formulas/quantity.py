@@ -13,6 +13,7 @@ and joints. A new one is a new class, of which its fields are declared and its f
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import lru_cache
 from inspect import get_annotations
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, dataclass_transform
@@ -146,8 +147,7 @@ class Quantity(tuple[Any, ...]):
         >>> JointForce("pin:B", "coupler").names
         ('force pin:B coupler x', 'force pin:B coupler y')
         """
-        text = " ".join(repr(part) if isinstance(part, complex) else str(part) for part in self)
-        return (f"{text} x", f"{text} y") if self.is_vector else (text,)
+        return _names(self)
 
     def of_order(self, order: int) -> Self:
         """The same differentiated so often; the order is its last field."""
@@ -191,7 +191,13 @@ class Quantity(tuple[Any, ...]):
         """
         of = [name if to is None else f"d({name})/d({to})" for name in self.names]
         value = rows.complex(*of) if self.is_vector else rows.get(of[0], 0.0)
-        return value if np.ndim(value) else np.full(n, value)
+        return value if isinstance(value, np.ndarray) and value.ndim else np.full(n, value)
+
+
+@lru_cache(maxsize=4096)
+def _names(of: Quantity) -> tuple[str, ...]:
+    text = " ".join(repr(part) if isinstance(part, complex) else str(part) for part in of)
+    return (f"{text} x", f"{text} y") if of.is_vector else (text,)
 
 
 NOTHING = Quantity()

@@ -110,6 +110,8 @@ class Recording:
         # what is solved, to which order
         self._solved: dict[str, int] = {}
         self._values: dict[Quantity, Number] = {}
+        # what tells where quantities cannot be had, by these and by whether loops may open
+        self.doubts: dict[tuple[tuple[Quantity, ...], bool], tuple[Quantity, ...]] = {}
         # tapes of what studies make of the pose
         self.forms: dict[str, Tape] = {}
         self._forces: PoseForces | None = None

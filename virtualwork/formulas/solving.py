@@ -44,6 +44,11 @@ if TYPE_CHECKING:
     from virtualwork.formulas.statics import Statics
 
 
+def is_closed(doubt: Quantity) -> bool:
+    """Whether a doubt is about the assembly of a group, not about a singular one."""
+    return isinstance(doubt, Closed)
+
+
 @guarded
 class Solving(Poses):
     """Poses of an assembly, with what their tapes need."""
@@ -98,7 +103,7 @@ class Solving(Poses):
             to.real = rows.get(f"{i} x", 0.0)
             if kind is complex:
                 to.imag = rows.get(f"{i} y", 0.0)
-        apart = self._apart_of([Effort(0)])
+        apart = self._apart_of(doubts)
         if apart is not None:
             for to, value in zip(result, apart[1].formed(forms, kind, wanted, order, name), strict=True):
                 to[apart[0]] = value
@@ -125,18 +130,18 @@ class Solving(Poses):
             outputs |= {f"{i} x": value.real, f"{i} y": value.imag}
         return recording.recorder.tape(outputs)
 
-    def _apart_of(self, keys: Sequence[Quantity]) -> tuple[NDArray[np.bool_], Self] | None:
-        """The poses whose derivatives enter: which, and these alone; None where there are none."""
+    def _apart_of(self, doubts: Sequence[Quantity]) -> tuple[NDArray[np.bool_], Self] | None:
+        """The poses whose derivatives enter, by what tells where groups are singular: which, and these alone; None where there are none."""
         if self.enters:
             return None
-        rows, doubts = self._careful, self._singular(keys)
         new = [key for key in doubts if key not in self._bad]
         self._bad |= {
             key: self._where_bad(key, value) for key, value in zip(new, self._raw(new), strict=True)
         }
+        rows = self._careful
         for bad in map(self._bad.get, doubts):
-            rows = rows if bad is None else rows | bad
-        if not rows.any():
+            rows = bad if rows is None else rows if bad is None else rows | bad
+        if rows is None:
             return None
         name = rows.tobytes()
         if name not in self._apart:
@@ -144,9 +149,9 @@ class Solving(Poses):
             self._apart[name]._enter = True
         return rows, self._apart[name]
 
-    def _singular(self, keys: Iterable[Quantity]) -> list[Quantity]:
+    def _singular(self, keys: Sequence[Quantity]) -> list[Quantity]:
         """What tells where a group is singular that quantities depend on."""
-        return [key for key in dict.fromkeys(self._doubts(keys)) if not isinstance(key, Closed)]
+        return [key for key in self._doubts(tuple(keys)) if not is_closed(key)]
 
     def _raw(self, keys: Sequence[Quantity], friction: Reals | None = None) -> list[Any]:
         """Quantities as the tape has them, with another friction; not kept."""
@@ -192,7 +197,7 @@ class Solving(Poses):
         rows = run(tape, self.entering(tape.inputs))
         self._doubted(doubts, rows)
         arms, free, per = read(rows, c, self.n, bears)
-        apart = self._apart_of([Effort(0)])
+        apart = self._apart_of(doubts)
         if apart is not None:
             arms[:, apart[0]] = np.nan
         friction, count = settled(arms, free, per, bears)
@@ -228,29 +233,33 @@ class Solving(Poses):
         forces = self.recording.forces
         keys = [Entry(*place) for place in forces.system]
         entries = dict(zip(forces.system, self._raw(keys, friction), strict=True))
-        apart = self._apart_of(keys) if friction is None else None
+        apart = self._apart_of(self._singular(keys)) if friction is None else None
         if apart is not None:
             for value, again in zip(entries.values(), apart[1]._raw(keys), strict=True):
                 value[apart[0]] = again
         return Statics(forces.joints, entries, self.n, self.lock)
 
-    def _doubts(self, keys: Iterable[Quantity]) -> Iterator[Quantity]:
+    def _doubts(self, keys: tuple[Quantity, ...]) -> tuple[Quantity, ...]:
         """What tells where quantities cannot be had, or not from the tape."""
         # what opens is known once the inputs are looked over
-        forces, enters = False, self.enters
-        for key in keys:
+        enters, recording = self.enters, self.recording
+        name = keys, self.branch.may_open
+        if name not in recording.doubts:
+            recording.doubts[name] = tuple(dict.fromkeys(self._each_doubt(*name, enters)))
+        return recording.doubts[name]
+
+    def _each_doubt(self, keys: tuple[Quantity, ...], opens: bool, enters: bool) -> Iterator[Quantity]:
+        groups, forces = self.branch.plan.groups, any(key.is_force for key in keys)
+        for key in keys if opens else ():
             yield from self._closed(key)
-            if enters:
-                continue
-            forces = forces or key.is_force
-            if key.is_force or key.order:
-                yield from (Regularity(g.name) for g in self.branch.plan.groups if g.kind == "Newton")
-        if forces:
-            yield from (Margin(g.name) for g in self.branch.plan.groups if g.kind not in ("Newton", "PRP"))
+        if not enters and (forces or any(key.order for key in keys)):
+            yield from (Regularity(g.name) for g in groups if g.kind == "Newton")
+        if not enters and forces:
+            yield from (Margin(g.name) for g in groups if g.kind not in ("Newton", "PRP"))
 
     def _closed(self, key: Quantity) -> list[Quantity]:
         """What tells where the groups that a quantity depends on are not assembled."""
-        return [Closed((group,)) for group in key.groups(self.recording)] if self.branch.may_open else []
+        return [Closed((group,)) for group in key.groups(self.recording)]
 
     def _doubted(self, doubts: Iterable[Quantity], rows: Outputs) -> None:
         """Note where doubts are right, by a run that has them."""
@@ -260,22 +269,31 @@ class Solving(Poses):
 
     def _where_bad(self, key: Quantity, found: Any) -> NDArray[np.bool_] | None:
         """The poses that a doubt is right about; None where it is right about none."""
-        if isinstance(key, Closed):
+        if is_closed(key):
             bad = ~np.isfinite(found)
         else:
-            bad = np.abs(found) < (NEAR if isinstance(key, Margin) else SINGULAR)
+            least = NEAR if isinstance(key, Margin) else SINGULAR
+            # mostly of no pose: that takes one pass
+            if np.size(found) and np.min(found) >= least:
+                return None
+            bad = np.abs(found) < least
         return np.broadcast_to(bad, self.n) if np.any(bad) else None
 
     @cached_property
     def _nowhere(self) -> NDArray[np.bool_] | None:
         """The poses whose input is no number; None where there are none."""
+        # the sum of squares is finite where all of them are; else each is looked at
+        with np.errstate(over="ignore"):
+            if np.isfinite(np.vdot(self.inputs, self.inputs)):
+                return None
         finite = np.isfinite(self.inputs)
         return None if finite.all() else np.asarray(~finite.all(axis=1))
 
     @cached_property
-    def _careful(self) -> NDArray[np.bool_]:
-        """The poses close to a change point."""
-        return self.branch.close_to_change(self.inputs[:, 0])
+    def _careful(self) -> NDArray[np.bool_] | None:
+        """The poses close to a change point; None where there are none."""
+        close = self.branch.close_to_change(self.inputs[:, 0]) if self.branch.change_points else None
+        return close if close is not None and close.any() else None
 
     def entering(self, inputs: Iterable[str], friction: Reals | None = None) -> dict[str, Any]:
         """The inputs of a tape, by their names; the friction (c, n) where it is not that of the poses."""

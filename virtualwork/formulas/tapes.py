@@ -69,18 +69,23 @@ def taped(branch: Branch, recording: Recording, keys: tuple[Quantity, ...]) -> T
 
 
 def cut(
-    branch: Branch, recording: Recording, keys: tuple[Quantity, ...], known: frozenset[int] | None
+    branch: Branch,
+    recording: Recording,
+    keys: tuple[Quantity, ...],
+    known: frozenset[int] | None,
+    first: bool,
 ) -> Later:
-    """The tape of quantities, from what is known on; None where nothing is, nor to be left."""
-    if known is None:
-        return Later(taped(branch, recording, keys), {}, {})
+    """The tape of quantities, from what is known on (see `later`); None where nothing is to be left for later requests."""
     with branch.lock:
         made = branch.recordings.setdefault("later", {})
-        key = recording, keys, known
+        key = recording, keys, known, first
         if key not in made:
             if len(made) >= MANY:
                 del made[next(iter(made))]
-            made[key] = later(recording, keys, known)
+            if known is None:
+                made[key] = Later(taped(branch, recording, keys), {}, {})
+            else:
+                made[key] = later(recording, keys, known, first)
         result: Later = made[key]
         return result
 
@@ -128,8 +133,11 @@ class Later:
     leaves: dict[str, int]
 
 
-def later(recording: Recording, keys: Sequence[Quantity], formed: Container[int]) -> Later:
-    """The tape of quantities from the values of operations that are known, and what it leaves besides."""
+def later(recording: Recording, keys: Sequence[Quantity], formed: Container[int], first: bool) -> Later:
+    """The tape of quantities from the values of operations that are known, and what it leaves besides.
+
+    What is requested first may be all: it leaves the sines and cosines alone, which cost as much as all else of a position.
+    """
     recorder = recording.recorder
     with recording.lock:
         outputs = recorder.numbers(recording.outputs(keys))
@@ -142,7 +150,10 @@ def later(recording: Recording, keys: Sequence[Quantity], formed: Container[int]
         operations = [("neg", signs[k]) if k in signs else of for k, of in enumerate(operations)]
         below = reached(operations, (number for _, number in outputs), formed)
     takes = {number: f"kept {k}" for k, number in enumerate(number for number in below if number in formed)}
-    worth = _worth_keeping(recording, operations) if len(operations) <= LONGEST else set()
+    if first:
+        worth = {number for number in below if operations[number][0] in ("sin", "cos")}
+    else:
+        worth = _worth_keeping(recording, operations) if len(operations) <= LONGEST else set()
     known = set(below)
     others = (number for number in worth - known if number not in formed)
     near = {number for number in others if _is_near(operations, number, known)}

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dalembert.arithmetic.choice import checked, wanted
 from dalembert.arithmetic.engines import blocks, floats
-from dalembert.arithmetic.tape import Tape
+from dalembert.arithmetic.tape import EMPTY, Tape
 
 R = TypeVar("R")
 Reals = NDArray[np.float64]
@@ -37,22 +37,23 @@ class Outputs(Mapping[str, Any]):
     ----------
     tape : Tape
     table : the row of each output, (lanes,), or a number where every input was one
+    pairs : mapping of a row to the complex numbers of which it and the next one are the parts, (lanes,)
     """
 
-    __slots__ = ("table", "tape")
+    __slots__ = ("pairs", "table", "tape")
 
-    def __init__(self, tape: Tape, table: Any) -> None:
-        self.tape, self.table = tape, table
+    def __init__(self, tape: Tape, table: Any, pairs: Mapping[int, NDArray[np.complex128]] = EMPTY) -> None:
+        self.tape, self.table, self.pairs = tape, table, pairs
 
     def __getitem__(self, name: str) -> Any:
         return self.table[self.tape.rows[name]]
 
     def complex(self, real: str, imaginary: str) -> Any:
         """Two outputs as one complex number: without a copy where the run was told that they are `pairs`."""
+        row = self.tape.rows.get(real, -1)
+        if row in self.pairs and self.tape.rows.get(imaginary) == row + 1:
+            return self.pairs[row]
         x, y = self.get(real, 0.0), self.get(imaginary, 0.0)
-        if np.ndim(x) and np.ndim(y) and x.strides == (16,) and y.ctypes.data == x.ctypes.data + 8:
-            start = (x.ctypes.data - x.base.ctypes.data) // 8
-            return x.base[start : start + 2 * len(x)].view(complex)
         value = np.empty(np.broadcast_shapes(np.shape(x), np.shape(y)), complex)
         value.real, value.imag = x, y
         return value
@@ -114,26 +115,23 @@ def run(
         raise ValueError(f"inputs of different lengths: {', '.join(map(str, sorted(lengths)))}")
     n = lengths.pop() if lengths else 1
     engine = checked(engine or chosen(tape, n))
-    table = _table(len(tape.outputs), n, frozenset(tape.rows[name] for name in pairs))
+    table, both = _table(len(tape.outputs), n, [tape.rows[name] for name in pairs])
     _lanes(tape, columns, table, n, engine)
-    return Outputs(
-        tape, table if any(column.ndim for column in columns) else np.array([row[0] for row in table])
-    )
+    if any(column.ndim for column in columns):
+        return Outputs(tape, table, both)
+    return Outputs(tape, np.array([row[0] for row in table]))
 
 
-def _table(rows: int, n: int, pairs: frozenset[int]) -> Rows:
-    """The rows of a run, one after the other in memory; a pair takes the room of two, its numbers in turn."""
-    room = np.empty(rows * n)
-    if not pairs:
-        return room.reshape(rows, n)
-    result: list[Reals] = []
-    for row in range(rows):
-        if row in pairs:
-            both = room[row * n : (row + 2) * n]
-            result += [both[::2], both[1::2]]
-        elif row - 1 not in pairs:
-            result.append(room[row * n : (row + 1) * n])
-    return result
+def _table(rows: int, n: int, pairs: Iterable[int]) -> tuple[Rows, dict[int, NDArray[np.complex128]]]:
+    """The rows of a run, one after the other in memory, and by its first row each pair, whose numbers lie in turn."""
+    table = np.empty((rows, n))
+    both = {row: table[row : row + 2].reshape(-1).view(complex) for row in pairs}
+    if not both:
+        return table, both
+    result = list(table)
+    for row, numbers in both.items():
+        result[row], result[row + 1] = numbers.real, numbers.imag
+    return result, both
 
 
 def run_grid(
