@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
     from cli.cases.case import Together
     from cli.cases.cases import Rows
-    from cli.read.root_search import Found
     from cli.show.result import Form, Part
     from dalembert.results.columns import Document
     from dalembert.results.way import Topic
@@ -40,8 +39,8 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
 
 
-def result(study: Study, options: SimpleNamespace, root: Found | None = None) -> Result:
-    """Return the result of a study of all its cases, in the requested forms; `root`: the number that --find seeks."""
+def result(study: Study, options: SimpleNamespace) -> Result:
+    """Return the result of a study of all its cases, in the requested forms."""
     cases, show = study.cases, study.show
     values = vars(options)
     page = values.get("page")
@@ -69,8 +68,8 @@ def result(study: Study, options: SimpleNamespace, root: Found | None = None) ->
             result.warnings = [*warnings, *result.warnings]
     if page is not None:
         result.beside = {**result.beside, page: lambda: study.page(loop.by_name(), show.units)}
-    if root is not None:
-        result = with_found(result, root)
+    if cases.found is not None:
+        result = with_found(result, cases.found)
     if show.steps:
         result.way = lambda: _way(loop)
     result.about = {"title": cases.mechanism.name or "Mechanism", **cases.about}

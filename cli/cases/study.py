@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, ClassVar
@@ -12,30 +11,20 @@ import numpy as np
 from cli.cases import poses, remarks
 from cli.cases.analysis import Analysis
 from cli.cases.case import Case, Study, like
-from cli.cases.cases import Cases, naming
 from cli.show.result import Result, Section, Sheet
 from cli.show.terminal import progress
 from dalembert.dataclass import dataclass, field, replace
-from dalembert.errors import DataError
 from dalembert.results.columns import Table
 from dalembert.results.columns import document as result_document
 from dalembert.results.text import heading
-from dalembert.units import UNITS, from_si, written
-from virtualwork import MechanismError
 from virtualwork.formulas.positions import BLOCK
 
 if TYPE_CHECKING:
-    from types import SimpleNamespace
-
     from numpy.typing import NDArray
 
     from cli.cases.case import Together
     from cli.cases.cases import Rows
-    from cli.cases.inputs import Varied
-    from cli.read.root_search import Found
     from dalembert.results.columns import Document
-    from virtualwork import Mechanism
-    from virtualwork.quantities import Component
 
 METHOD = (
     "Assur groups one after the other, two-link groups in closed form (Chace), larger ones by Newton-Raphson; rates by the "
@@ -240,81 +229,3 @@ class PoseStudy(Study):
 
         analyses = [(name, case.analysis) for name, case in cases if isinstance(case, PoseCase)]
         return page(analyses, units, self.cases.bare)
-
-
-# --- --find NAME --so-that QUANTITY=VALUE -----------------------------------------------------------------------------
-def with_root(cases: Cases, options: SimpleNamespace) -> tuple[Cases, Found | None]:
-    """Return the cases with the number that --find seeks, and that number: the nearest to the file's own.
-
-    Raises
-    ------
-    typer.BadParameter
-        A name or a value means nothing.
-    DataError
-        No number in reach gives the value.
-    """
-    if options.find is None and options.so_that is None:
-        return cases, None
-    from cli.cases.axes import dimension_named
-    from cli.cases.inputs import of_one, with_numbers
-    from cli.read import root_search
-    from cli.read.options import bad
-
-    if cases.varied is not None or cases.poses > 1:
-        raise bad("--find", "expected one pose of one mechanism, such as --at 60deg")
-    m, bare = cases.mechanism, cases.bare
-    with naming(cases.request.file):
-        pair = root_search.pair(options.find, options.so_that)
-        assert pair is not None
-        name, wanted = pair
-        dimension = dimension_named(m, name, name, "--find")
-        word, text = root_search.quantity_and_value(wanted, "B.vx=3m_s")
-        request = cases.request._replace(only=[word], order=None)
-
-        def analysis(mechanism: Mechanism) -> Analysis:
-            return Analysis(request, mechanism, of_one(mechanism, cases.moved))
-
-        nominal = analysis(m)
-        nominal.check_names()
-        components = [each for each in nominal.tabled if word in each.names]
-        if len(components) != 1:
-            names = ", ".join(dict.fromkeys(n for each in nominal.tabled for n in each.names[:1]))
-            raise bad("--so-that", f"'{word}': expected one number: {names}")
-        (component,) = components
-        target, unit = _target(component, text, bare)
-
-        def value(x: float) -> float | None:
-            try:
-                return poses.number_at(analysis(with_numbers(m, [dimension.of], [x])), component)
-            except (MechanismError, DataError):
-                return None
-
-        own = float(m.value(dimension.label).real)
-        start = 0.0 if own != own else math.degrees(own) if dimension.unit == "deg" else own
-        sought = root_search.Sought(dimension.of.header, dimension.unit, start)
-        root = root_search.search(
-            name, sought, root_search.Goal(word, unit, target, bool(component.link)), value
-        )
-        solved = with_numbers(m, [dimension.of], [root])
-    text = f"{name} = {_in_unit_of_file(dimension, root, bare)} gives {word} = {root_search.amount(target, unit)}"
-    return replace(cases, mechanism=solved), root_search.Found(sought.header, root, text)
-
-
-def _in_unit_of_file(dimension: Varied, shown: float, bare: Mapping[str, str]) -> str:
-    """Return a number in the file's own unit."""
-    unit = bare.get("length", dimension.unit) if dimension.kind == "length" else dimension.unit
-    if dimension.kind == "length" and unit in UNITS["length"]:
-        return f"{float(from_si(shown, 'length', unit)):.10g} {written(unit)}"
-    if dimension.unit == "deg":
-        return f"{shown:.10g}°"
-    return f"{shown:.10g} {written(dimension.unit)}".rstrip()
-
-
-def _target(component: Component, text: str, bare: Mapping[str, str]) -> tuple[float, str]:
-    """Return the value that --so-that names, in the unit that the quantity is shown in, and that unit."""
-    from cli.cases.axes import place_or_angle
-    from cli.read.root_search import value_in
-
-    unit = poses.column(component.header, []).unit
-    kind = {"deg": "angle", "m": "length"}.get(unit)
-    return (value_in(unit, text) if kind is None else place_or_angle(text, kind, "--so-that", bare)), unit

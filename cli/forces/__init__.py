@@ -37,17 +37,15 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     from cli.cases.analysis import names
     from cli.cases.cases import Cases
     from cli.cases.loop import result
-    from cli.cases.study import with_root
     from cli.forces.cycle import Forces
 
     weights = names(options.counterweights, "--counterweights", "names of links, such as crank, rocker")
-    cases, root = with_root(Cases.of(options, forces=True), options)
     study = Forces(
-        cases,
+        Cases.of(options, forces=True),
         show,
         flywheel=options.flywheel,
         counterweights=weights,
         states=options.states,
     )
     study.check_options()
-    return result(study, options, root)
+    return result(study, options)

@@ -48,8 +48,6 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """
     from cli.cases.cases import Cases
     from cli.cases.loop import result
-    from cli.cases.study import with_root
     from cli.mechanism.newton import Poses
 
-    cases, root = with_root(Cases.of(options), options)
-    return result(Poses(cases, show, newton=options.newton), options, root)
+    return result(Poses(Cases.of(options), show, newton=options.newton), options)
