@@ -85,7 +85,6 @@ def _of_variants(loop: Loop, warnings: list[str]) -> Result:
             document=lambda: {"name": name},
             blocks=partial(loop.blocks, json=show.streams_json),
             blocks_name="variants",
-            shared=loop.workers > 1,
             warnings=warnings,
             late_warnings=loop.remarks.lines,
             failed=loop.remarks.failed,
