@@ -166,13 +166,14 @@ class Cases:
             if options.set:
                 mechanism = assigned(mechanism, bare, options.set)
             varied, moved = grids(mechanism, options.at, options.over, options.cases, bare, warnings)
-            cases = cls(request, mechanism, bare, varied, moved, warnings, about)
-            wanted = vars(options)
+            found, wanted = None, vars(options)
             if wanted.get("find") is not None or wanted.get("so_that") is not None:
                 from cli.cases.find import with_root
 
-                cases = with_root(cases, options.find, options.so_that)
-        return cases
+                mechanism, found = with_root(
+                    mechanism, request, bare, (varied, moved), options.find, options.so_that
+                )
+        return cls(request, mechanism, bare, varied, moved, warnings, about, found)
 
     # --- the whole ------------------------------------------------------------------------------------------------
     @property

@@ -12,20 +12,28 @@ from cli.cases.inputs import of_one, with_numbers
 from cli.cases.poses import cells_of, column, keys_of, solved
 from cli.read import root_search
 from cli.read.options import bad
-from dalembert.dataclass import replace
 from dalembert.errors import DataError
 from dalembert.units import UNITS, from_si, written
 from virtualwork import MechanismError
 
 if TYPE_CHECKING:
-    from cli.cases.cases import Cases
-    from cli.cases.inputs import Varied
+    from cli.cases.analysis import Request
+    from cli.cases.inputs import Grid, Varied
     from virtualwork import Mechanism
     from virtualwork.quantities import Component
 
 
-def with_root(cases: Cases, find: str | None, so_that: str | None) -> Cases:
-    """Return the cases with the number that --find seeks, and that number: the nearest to the file's own.
+def with_root(
+    m: Mechanism,
+    request: Request,
+    bare: Mapping[str, str],
+    grids: tuple[Grid | None, Grid | None],
+    find: str | None,
+    so_that: str | None,
+) -> tuple[Mechanism, root_search.Found]:
+    """Return the mechanism with the number that --find seeks, and that number: the nearest to the file's own.
+
+    `bare`: the file's units of bare numbers; `grids`: the variants, and the inputs that they go through.
 
     Raises
     ------
@@ -34,18 +42,18 @@ def with_root(cases: Cases, find: str | None, so_that: str | None) -> Cases:
     DataError
         No number in reach gives the value.
     """
-    if cases.varied is not None or cases.poses > 1:
+    varied, moved = grids
+    if varied is not None or (moved is not None and moved.n > 1):
         raise bad("--find", "expected one pose of one mechanism, such as --at 60deg")
     pair = root_search.pair(find, so_that)
     assert pair is not None
     name, wanted = pair
-    m, bare = cases.mechanism, cases.bare
     dimension = dimension_named(m, name, name, "--find")
     word, text = root_search.quantity_and_value(wanted, "B.vx=3m_s")
-    request = cases.request._replace(only=[word], order=None)
+    request = request._replace(only=[word], order=None)
 
     def analysis(mechanism: Mechanism) -> Analysis:
-        return Analysis(request, mechanism, of_one(mechanism, cases.moved))
+        return Analysis(request, mechanism, of_one(mechanism, moved))
 
     component = _quantity(analysis(m), word)
     target, unit = _target(component, text, bare)
@@ -62,11 +70,7 @@ def with_root(cases: Cases, find: str | None, so_that: str | None) -> Cases:
     goal = root_search.Goal(word, unit, target, bool(component.link))
     root = root_search.search(name, sought, goal, value)
     sentence = f"{name} = {_in_unit_of_file(dimension, root, bare)} gives {word} = {root_search.amount(target, unit)}"
-    return replace(
-        cases,
-        mechanism=with_numbers(m, [dimension.of], [root]),
-        found=root_search.Found(sought.header, root, sentence),
-    )
+    return with_numbers(m, [dimension.of], [root]), root_search.Found(sought.header, root, sentence)
 
 
 def _quantity(nominal: Analysis, word: str) -> Component:
