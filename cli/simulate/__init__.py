@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 EXAMPLE = "double-pendulum"
 OPTIONS = f"""
 {FILE}{CASES}{BRANCH}{WORKERS}
-What:
+Time and accuracy:
+  time START:STOP:STEP  Times in seconds: 0:10:0.01 or 0:10/1000; required.
+  accuracy NUMBER  Error of the inputs to aim at (default 1e-9).
+  until INPUT=VALUE  Stop where an input reaches a value: crank=90deg.
+Quantities:
   only NAME,...  Show these quantities in addition: H.x,coupler.omega; H is all of H.
   forces  Show the joint forces in addition.
-How:
-  time START:STOP:STEP  Times in seconds: 0:10:0.01 or 0:10/1000; required.
-  accuracy NUMBER  Wanted error of the inputs (default 1e-9).
-  until INPUT=VALUE  Stop where an input reaches a value: crank=90deg.
 Output:
   page FILE(.html)  Write a page that replays the motion.
 """
