@@ -37,7 +37,7 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     from cli.cases.cases import Cases
     from cli.cases.loop import result
     from cli.read.options import bad
-    from cli.simulate.motion import Simulation, times_and_accuracy
+    from cli.simulate.motion import Simulation
 
     if options.time is None:
         raise bad("--time", "expected the times, such as --time 0:10:0.01")
@@ -47,3 +47,16 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     cases = Cases.of(options, 2, forces=options.forces).at_start()
     study = Simulation(cases, show, times=times, accuracy=accuracy, until=options.until)
     return result(study, options)
+
+
+def times_and_accuracy(time: str, accuracy: float | None) -> tuple[list[float], float]:
+    """Read the times and the accuracy."""
+    from cli.read.options import bad, time_range
+
+    times = time_range("--time", time)
+    if len(times) > 1 and times[1] < times[0]:
+        raise bad("--time", f"'{time}': expected rising times")
+    value = 1e-9 if accuracy is None else accuracy
+    if not 0 < value < 1:
+        raise bad("--accuracy", f"{accuracy}: expected a number between 0 and 1, such as 1e-9")
+    return times, value
