@@ -48,6 +48,6 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """
     from cli.cases.cases import Cases
     from cli.cases.loop import result
-    from cli.mechanism.newton import Poses
+    from cli.mechanism.solution import Poses
 
     return result(Poses(Cases.of(options), show, newton=options.newton), options)

@@ -15,7 +15,7 @@ from cli.cases.axes import grids
 from cli.cases.cases import Cases
 from cli.cases.inputs import Grid, Varied, listed
 from cli.cases.loop import Loop, unchanged
-from cli.mechanism.newton import Poses
+from cli.mechanism.solution import Poses
 from cli.show.commands import ShowOptions
 from dalembert.errors import DataError
 from virtualwork import Mechanism
