@@ -13,7 +13,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import typer
 
-from cli.show.result import Written, finished
+from cli.show.result import Written, chosen_units, finished
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError, needs
 from dalembert.results.columns import Table
@@ -23,6 +23,7 @@ from dalembert.tables.files import is_input
 if TYPE_CHECKING:
     import pyarrow
 
+    from cli.show.commands import ShowOptions
     from cli.show.result import Part, Result
     from dalembert.results.columns import Column, Table, Values
 
@@ -266,8 +267,8 @@ class Form:
         return np.asarray(column.values, dtype=float)
 
 
-def stream(result: Result, suffix: str, output: Path | None, units: str | None, digits: bool) -> int:
-    """Write a table that comes in parts, to standard output where no file is given.
+def stream(result: Result, suffix: str, options: ShowOptions) -> int:
+    """Write a table that comes in parts, to standard output where no file is given; before it the files beside it.
 
     Returns
     -------
@@ -275,7 +276,12 @@ def stream(result: Result, suffix: str, output: Path | None, units: str | None, 
         Of how many numbers --digits knows no digit.
     """
     assert result.blocks is not None
-    unknown = 0
+    output, unknown = options.output, 0
+    if options.units is not None:
+        # a bad unit is an error before anything is worked out
+        chosen_units(options.units)
+    refuse_inputs(path for path in (output, *result.beside) if path is not None)
+    write_all(result.beside)
 
     def made(form: Form, blocks: Callable[[Form], Iterator[Written]]) -> Iterator[bytes | Part]:
         nonlocal unknown
@@ -285,7 +291,7 @@ def stream(result: Result, suffix: str, output: Path | None, units: str | None, 
                 unknown += without
                 yield data
 
-    parts_written = made(Form(suffix, units, digits), result.blocks)
+    parts_written = made(Form(suffix, options.units, options.digits), result.blocks)
     if suffix in (".csv", ".json"):
         data = (data for data in parts_written if isinstance(data, bytes))
         text = _document(result, data) if suffix == ".json" else data
