@@ -380,7 +380,8 @@ def _paths(axes: Axes, tolerances: Tolerances, points: list[Point]) -> None:
     scale, unit = (1e3, "mm") if analysis.mechanism.size < 2 else (1.0, "m")
     sizes = np.array(list(tolerances.limits.values()))
     paths = {key: analysis.motions[0].point(str(key.node)).complex(0) * scale for key in points}
-    width = max((np.nanmax(abs(z - np.nanmean(z)), initial=0.0) for z in paths.values()), default=1.0) or 1.0
+    parts = [z[np.isfinite(z)] for z in paths.values()]
+    width = max((abs(z - z.mean()).max() for z in parts if len(z)), default=1.0) or 1.0
     bands = {}
     for key, z in paths.items():
         slopes = np.array(tolerances.slopes[key]) * scale
