@@ -31,7 +31,7 @@ def command(
 ) -> Callable[[Callable[..., Result]], Callable[..., None]]:
     """Make a command of a function that returns its result: it takes the shared options too, and shows the result.
 
-    `options` is what the help says of its own (`told`). Where the function has a parameter `show`, it is given the
+    `options` is what the help says of its own. Where the function has a parameter `show`, it is given the
     shared ones; `values` as in `with_options`.
     """
     return lambda find: with_options(find, options, None, show, values)
