@@ -361,7 +361,8 @@ class Mechanism(Numbered):
         Parameters
         ----------
         spans : array (k, 2), optional
-            The range of each input, rad or m. Default: a whole turn; for a slide, two sizes of the mechanism either way.
+            The range of each input, rad or m. Default, also of an input whose row is NaN: a whole turn; for a slide, two
+            sizes of the mechanism either way.
         samples : int
             The number of samples of one input's range.
 

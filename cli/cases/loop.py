@@ -90,6 +90,8 @@ def _of_variants(loop: Loop, warnings: list[str]) -> Result:
             failed=loop.remarks.failed,
         )
     loop.study.check_size(loop.study.cases.count)
+    if show.plot is not None:
+        warnings = [*warnings, "--plot: no picture, which shows one mechanism; --set NAME=VALUE makes one"]
     # the document has the warnings too: all is computed before them
     _ = (show.as_json and loop.documents), (show.needs_table and loop.table)
     return Result(
