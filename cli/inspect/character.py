@@ -52,7 +52,7 @@ class Character(Case):
         return quantities(self.check, self.analysis.unit)
 
     def document(self) -> dict[str, Any]:
-        """Return the quantities; a key is where the table stands that has it first."""
+        """Return the quantities; strokes and swings are one list."""
         check: dict[str, Any] = {}
         for table in self.quantities.values():
             # lists do not name rows of further tables
