@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     )
     from virtualwork.family.keep import Bound
     from virtualwork.family.target import Target
-    from virtualwork.mechanism import Mechanism, equilibria
+    from virtualwork.mechanism import Mechanism
     from virtualwork.motion import Motion
     from virtualwork.study import counterweights
     from virtualwork.study.check import Check, grashof_class
@@ -80,7 +80,6 @@ __all__ = [
     "block_on_bar",
     "counterweights",
     "crank_rod_piston",
-    "equilibria",
     "grashof_class",
     "ledger",
     "newton",
@@ -96,7 +95,7 @@ _ROOMS = {
     "virtualwork.describe": "AssemblyError DescriptionError MechanismError MobilityError",
     "virtualwork.describe.parts": "GROUND Belt Cam Force Friction Gear Guess Guide Input Link Motor Rack Segment Spring Torque TorsionSpring",
     "virtualwork.study.ledger": "ledger",
-    "virtualwork.mechanism": "Mechanism equilibria",
+    "virtualwork.mechanism": "Mechanism",
     "virtualwork.motion": "Motion",
     "virtualwork.study": "counterweights",
     "virtualwork.family.keep": "Bound",

@@ -361,9 +361,14 @@ class Mechanism(Numbered):
         Parameters
         ----------
         spans : array (k, 2), optional
-            The range of each input, rad or m. Default: a whole turn; for a slide, two sizes of the mechanism either way.
+            The range of each input, rad or m. Default, also of an input whose row is NaN: a whole turn; for a slide, two
+            sizes of the mechanism either way.
         samples : int
             The number of samples of one input's range.
+
+        Notes
+        -----
+        Q = Σ F·K + Σ T κ = 0 (J. A. Riul, Dinâmica das Máquinas, unit II, eq. 3); stable where V″ > 0 (Lagrange, Dirichlet).
 
         Examples
         --------
@@ -391,33 +396,3 @@ class Mechanism(Numbered):
 
         with self.assembly.lock:
             return all_assemblies(self.assembly)
-
-
-def equilibria(mechanism: Mechanism, spans: ArrayLike | None = None, samples: int = 1440) -> Equilibria:
-    """Return every position in which a mechanism rests under its loads without effort.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-    spans : array (k, 2), optional
-        The range of each input, rad or m. Default: a whole turn; for a slide, two sizes of the mechanism either way.
-    samples : int
-        The number of samples of one input's range.
-
-    Returns
-    -------
-    Equilibria
-        As by `Mechanism.equilibria`.
-
-    Notes
-    -----
-    Q = Σ F·K + Σ T κ = 0 (J. A. Riul, Dinâmica das Máquinas, unit II, eq. 3); stable where V″ > 0 (Lagrange, Dirichlet).
-
-    Examples
-    --------
-    >>> from virtualwork import Input, Link
-    >>> bob = Link({"O": 0j}, mass=2, center=0.5)
-    >>> equilibria(Mechanism({"O": 0j}, {"bob": bob}, inputs=Input(link="bob"), gravity=-9.81j))
-    Equilibria(1.5708 unstable, 4.71239 stable)
-    """
-    return mechanism.equilibria(spans, samples)

@@ -301,9 +301,10 @@ class NamedParts(Generic[P, L, S]):
             Where no body has a point of that name.
         """
         points = self.mechanism.points
-        if name not in points:
+        place = points.get(name)
+        if place is None:
             raise DescriptionError(f"no point is named '{name}'{choices(str(name), points)}")
-        return self.kinds[0](self, *points[name], name)
+        return self.kinds[0](self, *place, name)
 
     def at(self, link: str, point: Place | str) -> P:
         """Return the motion of any point of a link: a name, or coordinates in the link's own axes.

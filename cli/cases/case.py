@@ -111,6 +111,7 @@ class Case:
             figure=self.figure if self.is_drawn else None,
             method=self.study.method,
             warnings=self.warnings(),
+            failed=lambda: not self.assembled(),
         )
 
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from cli.read.root_search import Found
     from virtualwork import Mechanism
     from virtualwork.describe.dimensions import Dimension
     from virtualwork.family.part import Part
@@ -143,6 +144,8 @@ class Cases:
         Warnings of the files.
     about : dict
         The entries of the file for the head of a report.
+    found : Found, optional
+        The number that --find has found.
     """
 
     request: Request
@@ -152,6 +155,7 @@ class Cases:
     moved: Grid | None = None
     warnings: list[str] = field(default_factory=list)
     about: dict[str, str] = field(default_factory=dict)
+    found: Found | None = None
 
     @classmethod
     def of(cls, options: SimpleNamespace, order: int | None = None, *, forces: bool = False) -> Cases:
@@ -162,7 +166,14 @@ class Cases:
             if options.set:
                 mechanism = assigned(mechanism, bare, options.set)
             varied, moved = grids(mechanism, options.at, options.over, options.cases, bare, warnings)
-        return cls(request, mechanism, bare, varied, moved, warnings, about)
+            found, wanted = None, vars(options)
+            if wanted.get("find") is not None or wanted.get("so_that") is not None:
+                from cli.cases.find import with_root
+
+                mechanism, found = with_root(
+                    mechanism, request, bare, (varied, moved), options.find, options.so_that
+                )
+        return cls(request, mechanism, bare, varied, moved, warnings, about, found)
 
     # --- the whole ------------------------------------------------------------------------------------------------
     @property

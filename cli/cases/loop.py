@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
     from cli.cases.case import Together
     from cli.cases.cases import Rows
-    from cli.read.root_search import Found
     from cli.show.result import Form, Part
     from dalembert.results.columns import Document
     from dalembert.results.way import Topic
@@ -40,8 +39,8 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
 
 
-def result(study: Study, options: SimpleNamespace, root: Found | None = None) -> Result:
-    """Return the result of a study of all its cases, in the requested forms; `root`: the number that --find seeks."""
+def result(study: Study, options: SimpleNamespace) -> Result:
+    """Return the result of a study of all its cases, in the requested forms."""
     cases, show = study.cases, study.show
     values = vars(options)
     page = values.get("page")
@@ -55,7 +54,10 @@ def result(study: Study, options: SimpleNamespace, root: Found | None = None) ->
             refuse_long(study.frames * cases.count)
         if cases.varied is not None:
             if show.plot is not None:
-                raise bad("--plot", "expected one mechanism: several variants are drawn by --page")
+                raise bad(
+                    "--plot",
+                    "expected one mechanism: --set NAME=VALUE makes one, --page draws several variants",
+                )
             result = _of_variants(loop, warnings)
         elif study.in_blocks:
             result = Result(
@@ -71,8 +73,8 @@ def result(study: Study, options: SimpleNamespace, root: Found | None = None) ->
             result.warnings = [*warnings, *result.warnings]
     if page is not None:
         result.beside = {**result.beside, page: lambda: study.page(loop.by_name(), show.units)}
-    if root is not None:
-        result = with_found(result, root)
+    if cases.found is not None:
+        result = with_found(result, cases.found)
     if show.steps:
         result.way = lambda: _way(loop)
     result.about = {"title": cases.mechanism.name or "Mechanism", **cases.about}
@@ -88,7 +90,6 @@ def _of_variants(loop: Loop, warnings: list[str]) -> Result:
             document=lambda: {"name": name},
             blocks=partial(loop.blocks, json=show.streams_json),
             blocks_name="variants",
-            shared=loop.workers > 1,
             warnings=warnings,
             late_warnings=loop.remarks.lines,
             failed=loop.remarks.failed,

@@ -102,12 +102,6 @@ def cells_of(
     return shown
 
 
-def number_at(analysis: Analysis, component: Component) -> float | None:
-    """Return a quantity of the first pose, as it is shown; None where it has no value."""
-    computed = solved(analysis.motions[0], keys_of([component]))
-    return cells_of([component], computed, analysis.inputs.n, analysis.set_angles)[component][0]
-
-
 def exact_degrees(angle: Reals) -> Reals:
     """Return angles in [0, 360) degrees."""
     reduced = np.mod(angle, 360.0)

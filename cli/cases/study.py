@@ -1,41 +1,39 @@
-"""The study of poses, with their rates or their forces: what `dalembert mechanism` and `dalembert forces` share."""
+"""The study of poses, with their rates or their forces: what `dalembert mechanism` and `dalembert forces` share.
+
+Many variants are solved together; their tables and documents are those of variants that are solved one by one.
+"""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from cli.cases import poses, remarks
 from cli.cases.analysis import Analysis
 from cli.cases.case import Case, Study, like
-from cli.cases.cases import Cases, naming
+from cli.cases.inputs import Inputs
 from cli.show.result import Result, Section, Sheet
 from cli.show.terminal import progress
 from dalembert.dataclass import dataclass, field, replace
-from dalembert.errors import DataError
 from dalembert.results.columns import Table
 from dalembert.results.columns import document as result_document
 from dalembert.results.text import heading
-from dalembert.units import UNITS, from_si, written
-from virtualwork import MechanismError
+from virtualwork.formulas.forces import Effort, NewtonEuler
+from virtualwork.formulas.loops import Column, Margin, Size
+from virtualwork.formulas.numbers import condition
 from virtualwork.formulas.positions import BLOCK
+from virtualwork.formulas.quantity import Quantity
 
 if TYPE_CHECKING:
-    from types import SimpleNamespace
-
     from numpy.typing import NDArray
 
     from cli.cases.case import Together
     from cli.cases.cases import Rows
-    from cli.cases.inputs import Varied
-    from cli.read.root_search import Found
     from dalembert.results.columns import Document
-    from virtualwork import Mechanism
-    from virtualwork.quantities import Component
+    from virtualwork.family.part import Part, Solver
 
 METHOD = (
     "Assur groups one after the other, two-link groups in closed form (Chace), larger ones by Newton-Raphson; rates by the "
@@ -170,7 +168,6 @@ class PoseCase(Case):
         result.expected = (*self.further().values(), lambda: poses.by_link(a))
         result.afterword = self.afterword
         result.sheets = lambda: [Sheet("", _sections(tables), self.figure)]
-        result.failed = lambda: not self.assembled()
         return result
 
 
@@ -212,7 +209,6 @@ class PoseStudy(Study):
 
     def together(self, row: Rows, json: bool) -> Together | None:
         """Return the function that solves many variants at once; None where the formulas do not take all."""
-        from cli.cases.together import Family
         from virtualwork.family.part import Solver
 
         cases = self.cases
@@ -242,79 +238,145 @@ class PoseStudy(Study):
         return page(analyses, units, self.cases.bare)
 
 
-# --- --find NAME --so-that QUANTITY=VALUE -----------------------------------------------------------------------------
-def with_root(cases: Cases, options: SimpleNamespace) -> tuple[Cases, Found | None]:
-    """Return the cases with the number that --find seeks, and that number: the nearest to the file's own.
+# --- many variants together: their dimensions enter the recorded formulas as inputs ------------------------------------
+# a radicand below which a pose may be a limit: such a variant is solved alone, for the marks of its poses
+MARKED = 1e-4
 
-    Raises
-    ------
-    typer.BadParameter
-        A name or a value means nothing.
-    DataError
-        No number in reach gives the value.
+
+class Solved(NamedTuple):
+    """The variants of a part.
+
+    Attributes
+    ----------
+    answer : Table or list of documents
+        One variant after the other, a row or a document for each pose; without meaning where a variant is left alone.
+    assembled : array (v, n)
+    alone : array (v,)
+        The variants that have to be solved one by one.
     """
-    if options.find is None and options.so_that is None:
-        return cases, None
-    from cli.cases.axes import dimension_named
-    from cli.cases.inputs import of_one, with_numbers
-    from cli.read import root_search
-    from cli.read.options import bad
 
-    if cases.varied is not None or cases.poses > 1:
-        raise bad("--find", "expected one pose of one mechanism, such as --at 60deg")
-    m, bare = cases.mechanism, cases.bare
-    with naming(cases.request.file):
-        pair = root_search.pair(options.find, options.so_that)
-        assert pair is not None
-        name, wanted = pair
-        dimension = dimension_named(m, name, name, "--find")
-        word, text = root_search.quantity_and_value(wanted, "B.vx=3m_s")
-        request = cases.request._replace(only=[word], order=None)
-
-        def analysis(mechanism: Mechanism) -> Analysis:
-            return Analysis(request, mechanism, of_one(mechanism, cases.moved))
-
-        nominal = analysis(m)
-        nominal.check_names()
-        components = [each for each in nominal.tabled if word in each.names]
-        if len(components) != 1:
-            names = ", ".join(dict.fromkeys(n for each in nominal.tabled for n in each.names[:1]))
-            raise bad("--so-that", f"'{word}': expected one number: {names}")
-        (component,) = components
-        target, unit = _target(component, text, bare)
-
-        def value(x: float) -> float | None:
-            try:
-                return poses.number_at(analysis(with_numbers(m, [dimension.of], [x])), component)
-            except (MechanismError, DataError):
-                return None
-
-        own = float(m.value(dimension.label).real)
-        start = 0.0 if own != own else math.degrees(own) if dimension.unit == "deg" else own
-        sought = root_search.Sought(dimension.of.header, dimension.unit, start)
-        root = root_search.search(
-            name, sought, root_search.Goal(word, unit, target, bool(component.link)), value
-        )
-        solved = with_numbers(m, [dimension.of], [root])
-    text = f"{name} = {_in_unit_of_file(dimension, root, bare)} gives {word} = {root_search.amount(target, unit)}"
-    return replace(cases, mechanism=solved), root_search.Found(sought.header, root, text)
+    answer: Any
+    assembled: NDArray[np.bool_]
+    alone: NDArray[np.bool_]
 
 
-def _in_unit_of_file(dimension: Varied, shown: float, bare: Mapping[str, str]) -> str:
-    """Return a number in the file's own unit."""
-    unit = bare.get("length", dimension.unit) if dimension.kind == "length" else dimension.unit
-    if dimension.kind == "length" and unit in UNITS["length"]:
-        return f"{float(from_si(shown, 'length', unit)):.10g} {written(unit)}"
-    if dimension.unit == "deg":
-        return f"{shown:.10g}°"
-    return f"{shown:.10g} {written(dimension.unit)}".rstrip()
+SIZE: Quantity = Size()
 
 
-def _target(component: Component, text: str, bare: Mapping[str, str]) -> tuple[float, str]:
-    """Return the value that --so-that names, in the unit that the quantity is shown in, and that unit."""
-    from cli.cases.axes import place_or_angle
-    from cli.read.root_search import value_in
+@dataclass(frozen=True)
+class Family:
+    """A family of variants, and the quantities that are requested of it.
 
-    unit = poses.column(component.header, []).unit
-    kind = {"deg": "angle", "m": "length"}.get(unit)
-    return (value_in(unit, text) if kind is None else place_or_angle(text, kind, "--so-that", bare)), unit
+    Attributes
+    ----------
+    analysis : Analysis
+        The analysis of the mechanism itself.
+    solver : Solver
+        The solver of some variants: its formulas are those of all.
+    json : bool
+        Whether documents are formed, and no table.
+    """
+
+    analysis: Analysis
+    solver: Solver
+    json: bool
+
+    @property
+    def loops(self) -> list[list[Quantity]]:
+        """The entries of the Jacobian of all loops."""
+        written = self.solver.written
+        if written is None or written.recording.loops is None:
+            return []
+        loops = written.recording.loops
+        unknowns = range(len(loops.angles) + len(loops.slides))
+        return [[Column(i, j) for j in unknowns] for i in range(len(loops.closures))]
+
+    @cached_property
+    def keys(self) -> list[Quantity]:
+        """The quantities of the table or the documents."""
+        a = self.analysis
+        keys = poses.keys_of(poses.in_json(a) if self.json else a.tabled)
+        if self.json:
+            assert self.solver.written is not None
+            keys += [Margin(group.name) for group in self.solver.written.closed]
+            keys += [] if a.request.only is not None else [SIZE, *(key for row in self.loops for key in row)]
+        # with --only the requested names alone decide whether a pose is assembled
+        keys += [] if a.whole else a.named
+        return list(dict.fromkeys(keys))
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether the formulas take all that is requested."""
+        if self.solver.written is None:
+            return False
+        if self.analysis.forces and not self.solver.takes([Effort(0), NewtonEuler(0)]):
+            return False
+        return self.solver.takes(self.keys)
+
+    def solved(self, part: Part, shown: Rows) -> Solved:
+        """Solve some variants; `shown`: their inputs as they are shown, (v or 1, n, k)."""
+        # loaded where there are variants
+        from virtualwork.family.part import ASSEMBLED, Solver
+
+        solver = Solver(part, self.solver)
+        v, n = part.shape
+        (closed, *values), alone = solver.lanes([ASSEMBLED, *self.keys])
+        assembled = np.isfinite(closed)
+        # they have a warning
+        alone |= solver.open_at_guess
+        forces = bool(self.analysis.forces)
+        if forces:
+            alone |= self._without_mass(part)
+        for key, lanes in zip(self.keys, values, strict=True):
+            if self.json and isinstance(key, Margin):
+                alone |= (np.abs(lanes) < MARKED).any(axis=1)
+            if forces:
+                alone |= (assembled & ~np.isfinite(lanes)).any(axis=1)
+        flat = {key: lanes.ravel() for key, lanes in zip(self.keys, values, strict=True)}
+        analysis = self.analysis.at(self._inputs(part, shown))
+        whole = assembled.ravel()
+        if not analysis.whole:
+            whole = np.logical_and.reduce([np.isfinite(flat[key]) for key in analysis.named], initial=True)
+        whole = np.broadcast_to(whole, v * n)
+        if not self.json:
+            return Solved(poses.table(analysis, [flat]), whole.reshape(v, n), alone)
+        conditions = self._condition(flat, assembled.ravel()) if analysis.request.only is None else None
+        # no marks: variants that may have one are solved alone
+        marks: list[list[str]] = [[]] * (v * n)
+        branch = analysis.assemblies[0].number
+        listed = poses.poses_of(analysis, branch, flat, whole, conditions, marks)
+        return Solved(list(listed), whole.reshape(v, n), alone)
+
+    def _condition(self, lanes: Mapping[Quantity, Any], assembled: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Return the condition of each pose, (v n,); see `Motion.condition`."""
+        assert self.solver.written is not None
+        loops = self.solver.written.recording.loops
+        if loops is None:
+            return np.where(assembled, 1.0, np.nan)
+        entries = [[lanes[key] for key in row] for row in self.loops]
+        return condition(entries, len(loops.angles), lanes[SIZE], len(assembled))
+
+    def _without_mass(self, part: Part) -> NDArray[np.bool_]:
+        """Return which variants have a link with an inertia and no mass whose centre may move, (v,)."""
+        m, varied = part.mechanism, {d.where: i for i, d in enumerate(part.dimensions)}
+        bodies = np.zeros(part.shape[0], dtype=bool)
+        for name, link in m.links.items():
+            mass, inertia = (
+                part.values[:, varied[where]] if where in varied else np.full(len(bodies), number)
+                for where, number in (
+                    (("links", name, "mass"), link.mass),
+                    (("links", name, "inertia"), link.inertia),
+                )
+            )
+            stays = remarks.pinned(m, name, link.center) and not any(
+                where[:2] == ("links", name) and where[2] not in ("mass", "inertia") for where in varied
+            )
+            if not stays:
+                bodies |= (mass == 0) & (inertia != 0)
+        return bodies
+
+    def _inputs(self, part: Part, shown: Rows) -> Inputs:
+        """Return the inputs of all variants, one after the other."""
+        v, n = part.shape
+        si, cells = (np.broadcast_to(x, (v, n, x.shape[2])).reshape(v * n, -1) for x in (part.inputs, shown))
+        return Inputs(si, cells, steps=list(self.analysis.inputs.whole.steps) * v)

@@ -18,7 +18,7 @@ OPTIONS = f"{FILE}{CASES}{WORKERS}"
 
 @declared_command(OPTIONS, SimpleNamespace)
 def run(options: SimpleNamespace, show: ShowOptions) -> Result:
-    """Find the positions in which a mechanism rests under its loads without effort, and whether stably.
+    """Find the positions in which a mechanism rests under its loads without effort, and their stability.
 
     A stable position has its period of small oscillations, without dampers and friction. --over or --cases of an
     input set the range of the search (default: a whole turn; of a slide two sizes of the mechanism either way).

@@ -50,8 +50,8 @@ class Rest(Case):
         if self.ranged:
             values = self.analysis.inputs.whole.values
             spans = np.stack([values.min(axis=0), values.max(axis=0)], axis=1)
-            if (spans[:, 0] == spans[:, 1]).any():
-                spans = None
+            # an input that is not moved is looked for in its whole range
+            spans[spans[:, 0] == spans[:, 1]] = np.nan
         return self.analysis.mechanism.equilibria(spans)
 
     def table(self) -> Table:

@@ -16,12 +16,12 @@ EXAMPLE = "straight-line-fit"
 OPTIONS = f"""
 {FILE}  target TARGET.csv...  The target: columns H_x_mm, coupler_angle_deg, crank_torque_N_m, optionally input_deg.
 {CASES}{WORKERS}
-What:
+Target and free dimensions:
   want NAME...  Quantity that meets the target: H, coupler.angle, B.position, crank.torque; repeatable.
   free NAME=LOW:HIGH...  Dimension to fit, with its bounds; repeatable.
-  weight NAME=NUMBER...  Weight of a wanted quantity; repeatable.
-  keep QUANTITY>=VALUE...  Constraint over the sweep: transmission>=40deg, H.y<=0.3m; repeatable.
-How:
+  weight NAME=NUMBER...  Weight of a wanted quantity (default 1); repeatable.
+  keep QUANTITY>=VALUE...  Constraint over the range of the input: transmission>=40deg, H.y<=0.3m; repeatable.
+Search:
   starts N  Number of starting points (default 256).
   best N  Number of distinct solutions (default 1).
   seed N=0  Random seed of the starting points.
@@ -32,10 +32,9 @@ How:
 def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Fit dimensions of a mechanism to a target: a path, a function of the input, a guided body, an effort.
 
-    Without a column for the input, the input is free at each row of the target, and the rows keep their order. -o
-    FILE.toml writes the mechanism's
-    file with the fitted numbers. --keep holds from the first to the last input of the target, over a whole turn where
-    the input is free.
+    Where the target has no column for the input, the input is free at each row, and the rows keep their order.
+    --keep holds from the first to the last input of the target, or over a whole turn where the input is free.
+    -o FILE.toml writes the mechanism's file with the fitted numbers.
     """
     from cli.cases.cases import Cases, naming
     from cli.cases.loop import result

@@ -15,12 +15,13 @@ if TYPE_CHECKING:
 EXAMPLE = "door-closer"
 OPTIONS = f"""
 {FILE}{CASES}{BRANCH}{WORKERS}
-What:
+Quantities:
   only NAME,...  Show only these quantities: crank.torque,B.coupler.fx,shaking.fx,H.x.
+  find NAME  Dimension to find at one pose: input.speed, links.crank.B.x.
+  so_that QUANTITY=VALUE  With --find: value that a quantity has then, such as B.vx=3m_s or crank.torque=12.
+Over a whole cycle:
   flywheel NUMBER  Compute the flywheel for this fluctuation of speed, such as 0.02.
   counterweights LINK,...  Compute counterweights on these links for the least shaking force.
-  find NAME  Dimension to find at one pose: input.speed, links.crank.B.x.
-  so_that QUANTITY=VALUE  With --find: value of a quantity, such as B.vx=3m_s or crank.torque=12.
 Output:
   page FILE(.html)  Write a page that computes: the mechanism moves, with its forces as arrows.
   states FILE(.csv)  Write the states of all links, as dalembert work reads them.
@@ -37,17 +38,15 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     from cli.cases.analysis import names
     from cli.cases.cases import Cases
     from cli.cases.loop import result
-    from cli.cases.study import with_root
     from cli.forces.cycle import Forces
 
     weights = names(options.counterweights, "--counterweights", "names of links, such as crank, rocker")
-    cases, root = with_root(Cases.of(options, forces=True), options)
     study = Forces(
-        cases,
+        Cases.of(options, forces=True),
         show,
         flywheel=options.flywheel,
         counterweights=weights,
         states=options.states,
     )
     study.check_options()
-    return result(study, options, root)
+    return result(study, options)

@@ -64,7 +64,7 @@ class ForceCase(PoseCase):
 
     def way(self) -> list[Topic]:
         """Return the ledger of every pose, and free-body diagrams."""
-        from cli.forces.way import way
+        from cli.forces.links import way
 
         return way(self.analysis)
 
@@ -84,7 +84,7 @@ class ForceCase(PoseCase):
 
     def result(self) -> Result:
         """Return the result of this mechanism alone, in every form; the states of all links can be expected."""
-        from cli.forces.states import table
+        from cli.forces.links import table
 
         result = super().result()
         result.expected = (*result.expected, lambda: table(self.states().analysis))
@@ -153,7 +153,7 @@ class Forces(PoseStudy):
 
 def _csv_parts(case: PoseCase, digits: bool) -> Iterator[bytes]:
     """Yield the states of all links as CSV; with `digits` only the digits that hold."""
-    from cli.forces.states import table
+    from cli.forces.links import table
     from dalembert.results.digits import digits_that_hold
     from dalembert.results.text import csv_text
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 EXAMPLE = "watt-six-bar"
 OPTIONS = f"""
 {FILE}{CASES}{WORKERS}
-What:
+Quantities:
   only NAME,...  Count the operations of these quantities in addition: H.x,coupler.omega,crank.torque.
 """
 

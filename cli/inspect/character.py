@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
 
 from cli.cases.analysis import Analysis
 from cli.cases.case import Case, Study
@@ -13,7 +13,8 @@ from cli.cases.poses import keys_of, listed
 from cli.cases.study import METHOD
 from dalembert.angles import in_turn
 from dalembert.dataclass import dataclass, replace
-from dalembert.results.columns import Table, finite, names
+from dalembert.results.columns import ABSENT, Column, Table, document, finite, names
+from dalembert.results.text import as_list
 from dalembert.results.way import Topic, figures
 from virtualwork.formulas.forces import Effort, JointForce
 from virtualwork.formulas.kinematics import Angle, Point
@@ -24,11 +25,12 @@ from virtualwork.study.loops import loops
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from dalembert.results.columns import Cell, Document, Json
+    from cli.show.result import Result
+    from dalembert.results.columns import Cell
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
     from virtualwork.formulas.quantity import Quantity
-    from virtualwork.study.check import Check, FourBar
+    from virtualwork.study.check import Check
     from virtualwork.study.strokes import Stroke
 
 
@@ -45,25 +47,46 @@ class Character(Case):
         return Check(self.analysis.mechanism.assembly)
 
     @cached_property
-    def statements(self) -> list[Statement]:
-        """The statements of the study."""
-        return statements(self.check, self.analysis.unit)
+    def quantities(self) -> dict[str, Table]:
+        """The tables of the study, in the order of JSON."""
+        return quantities(self.check, self.analysis.unit)
 
-    def documented(self) -> list[Table]:
-        """Return the statements for JSON."""
-        return [Table([names(each.name, [each.value]) for each in self.statements], place="check")]
+    def document(self) -> dict[str, Any]:
+        """Return the quantities; strokes and swings are one list."""
+        check: dict[str, Any] = {}
+        for table in self.quantities.values():
+            # lists do not name rows of further tables
+            for key, entry in document([replace(table, keys=())]).items():
+                check[key] = [*check[key], *entry] if key in check else entry  # type: ignore[misc]
+        return {"check": check}
 
     def table(self) -> Table:
-        """Return a row for each number of a statement, named as in JSON."""
-        return listed(("quantity", "of", "value"), [row for each in self.statements for row in each.rows])
+        """Return a row for each quantity, named as in JSON."""
+        rows = [row for table in self.quantities.values() for row in one_below_the_other(table)]
+        return listed(("quantity", "of", "value"), rows)
 
     def further(self) -> dict[str, Callable[[], Table]]:
-        """Return the order of solution, the operations, and the loads that do work."""
+        """Return the tables of several rows, the order of solution, the operations, and the loads that do work."""
+        # the order of solution has the groups
+        several = [name for name, table in self.quantities.items() if table.keys and name != "groups"]
         return {
+            **{name: partial(self._further, name) for name in several},
             "order of solution": lambda: order(self.analysis),
             "operations a pose": lambda: operations(self.analysis),
             "virtual work": lambda: working(self.analysis),
+            "absent loads": lambda: absent(self.analysis),
         }
+
+    def _further(self, name: str) -> Table:
+        table = self.quantities[name]
+        return table if table.length else Table([])
+
+    def result(self) -> Result:
+        """Return the result in every form: a terminal and a report have what is there once as a list."""
+        result = super().result()
+        once = [column for table in self.quantities.values() if not table.keys for column in table.columns]
+        result.screen = lambda: as_list(Table([column for column in once if column.values[0] != ""]))
+        return result
 
     def warnings(self) -> list[str]:
         """Return the warnings of its branches and cams."""
@@ -72,8 +95,7 @@ class Character(Case):
 
     def way(self) -> list[Topic]:
         """Return mobility, loops and four-bars."""
-        four_bars = next(each.value for each in self.statements if each.name == "four_bars")
-        return way(self.analysis.mechanism, self.check, four_bars)
+        return way(self.analysis.mechanism, self.check, self.document()["check"]["four_bars"])
 
     def figure(self) -> Figure:
         """Draw the mechanism in its own pose."""
@@ -95,105 +117,134 @@ class Inspection(Study):
         return Character(self, replace(analysis, inputs=analysis.inputs.part(0, 1)))
 
 
-class Statement(NamedTuple):
-    """A part of the character of a mechanism, as JSON has it and as rows of the table.
-
-    Attributes
-    ----------
-    name : str
-        Its key in JSON.
-    rows : list of (quantity, what it is of, its value)
-    """
-
-    name: str
-    value: Json
-    rows: list[tuple[str, str, Cell]]
-
-
-def statements(check: Check, unit: str) -> list[Statement]:
-    """Return the character of a mechanism; `unit`: of its input, deg or m."""
-    groups, four_bars = list(check.groups), list(map(_four_bar, check.four_bars))
-    strokes = [_stroke(stroke, unit) for stroke in check.strokes]
-    kinds = [("group", " + ".join(g["links"]), f"{g['kind']}, {g['method']}") for g in groups]
-    counts = {"mobility": check.mobility, "mobility_by_rank": check.mobility_by_rank}
-    places = {
+# --- its quantities ---------------------------------------------------------------------------------------------------
+def quantities(check: Check, unit: str) -> dict[str, Table]:
+    """Return the tables of the character of a mechanism; `unit`: of its input, deg or m."""
+    groups, four_bars, strokes = _groups(check), _four_bars(check), check.strokes
+    limits = {
         "input_limits": check.printed_limits,
         "dead_points": check.dead_points,
         "change_points": check.change_points,
     }
-    return [
-        *(Statement(name, count, [(name, "", count)]) for name, count in counts.items()),
-        Statement(
-            "redundant", list(check.redundant), [("redundant", joint, True) for joint in check.redundant]
-        ),
-        Statement("groups", groups, kinds),  # type: ignore[arg-type]
-        *(
-            [Statement("singular", list(check.singular), [("singular", of, True) for of in check.singular])]
-            if check.singular
-            else []
-        ),
-        Statement("four_bars", [of for of, _ in four_bars], [row for _, rows in four_bars for row in rows]),
-        *(_inputs(f"{name}_{unit}", values, unit) for name, values in places.items()),
-        Statement(
-            "strokes",
-            [{"name": name, **numbers} for name, numbers in strokes],
-            [(key, name, value) for name, numbers in strokes for key, value in numbers.items()],
-        ),
-        *([_cams(check)] if check.cams else []),
-    ]
-
-
-def _cams(check: Check) -> Statement:
-    """Return the largest pressure angle, the least radius of the profile and the speed of lift-off of every cam."""
-    entries: list[Document] = []
-    for number, cam in enumerate(check.cams):
-        entry: Document = {
-            "name": cam.name,
-            "pressure_angle_deg": math.degrees(cam.pressure_angle),
-            "pressure_angle_at_deg": math.degrees(cam.pressure_angle_at),
-            "curvature_radius_m": finite(cam.curvature_radius),
-            "curvature_radius_at_deg": math.degrees(cam.curvature_radius_at),
-            "undercut": cam.undercut,
-        }
-        off = check.lift_off(number)
-        if off is not None:
-            entry["lift_off_speed_rad_s"] = finite(off.speed)
-            entry["lift_off_at_deg"] = in_turn(math.degrees(off.at))
-        entries.append(entry)
-    rows = [(key, str(entry["name"]), entry[key]) for entry in entries for key in list(entry)[1:]]
-    return Statement("cams", entries, rows)  # type: ignore[arg-type]
-
-
-def _stroke(stroke: Stroke, unit: str) -> tuple[str, dict[str, float]]:
-    """Return the name of a stroke, and its numbers by their keys."""
-    own = "deg" if stroke.turns else "m"
-    numbers = {"least": (stroke.least, own), "at": (stroke.at, unit)}
-    numbers |= {"most": (stroke.most, own), "most_at": (stroke.most_at, unit)}
-    return stroke.name, {
-        f"{key}_{of}": math.degrees(value) if of == "deg" else value for key, (value, of) in numbers.items()
+    once = [names("mobility", [check.mobility]), names("mobility_by_rank", [check.mobility_by_rank])]
+    tables = {
+        "mobility": Table([*once, _listed_names("redundant", check.redundant)], place=""),
+        "groups": groups,
+        "singular": Table([_listed_names("singular", check.singular)] if check.singular else [], place=""),
+        "four-bars": four_bars,
+        "limits": Table([_inputs(name, values, unit) for name, values in limits.items()], place=""),
+        "strokes": _strokes([each for each in strokes if not each.turns], "length", unit),
+        "swings": _strokes([each for each in strokes if each.turns], "angle", unit),
     }
+    return {**tables, "cams": _cams(check)} if check.cams else tables
 
 
-def _four_bar(four_bar: FourBar) -> tuple[Document, list[tuple[str, str, Cell]]]:
-    """Return the entry of a four-bar in JSON, and its rows."""
-    links, name = list(four_bar.links), ", ".join(four_bar.links)
-    angles = [finite(math.degrees(angle)) for angle in four_bar.transmission]
-    entry: Document = {"links": links, "grashof": four_bar.grashof, "transmission_deg": angles}
-    ends = zip(("least", "largest"), angles, strict=True)
-    return entry, [
-        ("grashof", name, four_bar.grashof),
-        *((f"{end}_transmission_deg", name, angle) for end, angle in ends),
-    ]
+def _listed_names(name: str, values: Sequence[str]) -> Column:
+    """Return several names as one quantity, a list in JSON."""
+    return Column(name, "", [", ".join(values)], place=name, stored=[list(values)])
 
 
-def _inputs(header: str, values: Sequence[float] | None, unit: str) -> Statement:
-    """Return special inputs; an open end of the range is null in JSON."""
+def _inputs(name: str, values: Sequence[float] | None, unit: str) -> Column:
+    """Return special inputs as one quantity, a list in JSON, in which an open end of the range is null."""
     shown = None if values is None else [finite(v if unit == "m" else math.degrees(v)) for v in values]
-    cells: list[Cell] = ["open" if value is None else value for value in shown or ()] or ["none"]
-    several = len(cells) > 1
-    return Statement(
-        header, shown, [(header, str(i) if several else "", cell) for i, cell in enumerate(cells, 1)]
-    )
+    text = ", ".join("open" if v is None else f"{v:.6g}" for v in shown or ())
+    return Column(name, unit, [text or "none"], place=f"{name}_{unit}", stored=[shown])
+
+
+def _groups(check: Check) -> Table:
+    """Return the Assur groups in their order of solution."""
+    links = [each["links"] for each in check.groups]
+    kinds, methods = ([each[key] for each in check.groups] for key in ("kind", "method"))
+    columns = [
+        Column("links", "", [" + ".join(each) for each in links], place="links", stored=links),
+        names("group", [f"{kind}, {method}" for kind, method in zip(kinds, methods, strict=True)], None),
+    ]
+    return Table(columns, ("links",), "groups[]", documented=[names("kind", kinds), names("method", methods)])
+
+
+def _four_bars(check: Check) -> Table:
+    """Return the class and the range of the transmission angle of every four-bar."""
+    links = [list(each.links) for each in check.four_bars]
+    ends = [[math.degrees(angle) for angle in each.transmission] for each in check.four_bars]
+    columns = [
+        Column("links", "", [", ".join(each) for each in links], place="links", stored=links),
+        names("grashof", [each.grashof for each in check.four_bars]),
+        *(
+            Column(
+                f"{end}_transmission", "deg", [angles[i] for angles in ends], place=f"transmission_deg.{i}"
+            )
+            for i, end in enumerate(("least", "largest"))
+        ),
+    ]
+    return Table(columns, ("links",), "four_bars[]")
+
+
+def _strokes(strokes: Sequence[Stroke], dimension: str, unit: str) -> Table:
+    """Return how far slides and points travel, or links swing: the ends, and the inputs there."""
+    own = {"length": "m", "angle": "deg"}[dimension]
+    columns = [
+        _in_unit(name, of, [math.degrees(v) if of == "deg" else v for v in values])
+        for name, of, values in (
+            ("least", own, [each.least for each in strokes]),
+            ("at", unit, [each.at for each in strokes]),
+            ("most", own, [each.most for each in strokes]),
+            ("most_at", unit, [each.most_at for each in strokes]),
+        )
+    ]
+    what = {"length": "slides and points", "angle": "links that do not turn fully"}[dimension]
+    above = f"least and largest place of {what}, with the input there"
+    return Table([names("name", [each.name for each in strokes]), *columns], ("name",), "strokes[]", above)
+
+
+def _cams(check: Check) -> Table:
+    """Return the largest pressure angle, the least radius of the profile and the speed of lift-off of every cam."""
+    cams = check.cams
+    columns = [
+        names("name", [each.name for each in cams]),
+        _in_unit("pressure_angle", "deg", [math.degrees(each.pressure_angle) for each in cams]),
+        _in_unit("pressure_angle_at", "deg", [math.degrees(each.pressure_angle_at) for each in cams]),
+        _in_unit("curvature_radius", "m", [finite(each.curvature_radius) for each in cams]),
+        _in_unit("curvature_radius_at", "deg", [math.degrees(each.curvature_radius_at) for each in cams]),
+        names("undercut", [each.undercut for each in cams]),
+    ]
+    every = [check.lift_off(number) for number in range(len(cams))]
+    if any(every):
+        speeds = [None if off is None else finite(off.speed) for off in every]
+        inputs = [None if off is None else in_turn(math.degrees(off.at)) for off in every]
+        lift_off = [_in_unit("lift_off_speed", "rad_s", speeds), _in_unit("lift_off_at", "deg", inputs)]
+        for column in lift_off:
+            stored = zip(column.values, every, strict=True)
+            column.stored = [ABSENT if off is None else value for value, off in stored]
+        columns += lift_off
+    return Table(columns, ("name",), "cams[]")
+
+
+def _in_unit(name: str, unit: str, values: Sequence[Cell]) -> Column:
+    return Column(name, unit, values, place=f"{name}_{unit}")
+
+
+def one_below_the_other(table: Table) -> Iterator[tuple[str, str, Cell]]:
+    """Yield every quantity of a table, what it is of, and its value; of a list, each element."""
+    columns = table.columns[1:] if table.keys else table.columns
+    for i in range(table.length):
+        of = str(table.columns[0].values[i]) if table.keys else ""
+        for column in columns:
+            # a list is shown as a text
+            value = column.documented[i] if column.stored is not None else column.values[i]
+            if isinstance(value, list) or (value is None and isinstance(column.values[i], str)):
+                yield from _elements(column, value or ())
+            elif value is not ABSENT:
+                yield column.header, of, value
+
+
+def _elements(column: Column, values: Sequence[Any]) -> Iterator[tuple[str, str, Cell]]:
+    """Yield the elements of a list: names by themselves, inputs by their number where there are several."""
+    if not column.unit:
+        yield from ((column.header, name, True) for name in values)
+        return
+    cells = ["open" if value is None else value for value in values] or ["none"]
+    for k, cell in enumerate(cells, 1):
+        yield column.header, str(k) if len(cells) > 1 else "", cell
 
 
 # --- how it is solved -------------------------------------------------------------------------------------------------
@@ -245,21 +296,26 @@ def operations(analysis: Analysis) -> Table:
 
 
 def working(analysis: Analysis) -> Table:
-    """Return whether each load does work at each input, and the kinds of loads that are absent."""
+    """Return whether each load does work at each input."""
     from virtualwork.study.ledger import ledger
 
     motion = analysis.motions[0]
-    if not motion.assembled.all():
-        return Table([])
     rows: list[tuple[Cell, ...]] = []
-    for j, entry in enumerate(analysis.mechanism.inputs):
-        works, workless, absent = ledger(motion.dynamics.scene, j)
+    for j, entry in enumerate(analysis.mechanism.inputs if motion.assembled.all() else ()):
+        works, workless, _ = ledger(motion.dynamics.scene, j)
         rows += [(entry.name, load, "works") for load in works]
         rows += [(entry.name, load, "does no work") for load in workless]
-        if j == 0:
-            missing = [("", line, "absent") for line in absent]
     below = "joint forces, action and reaction, do no work together: none enters the effort"
-    return replace(listed(("input", "load", "work"), [*rows, *missing]), place="", below=below)
+    return replace(listed(("input", "load", "work"), rows), place="", below=below) if rows else Table([])
+
+
+def absent(analysis: Analysis) -> Table:
+    """Return the kinds of loads that are absent."""
+    from virtualwork.study.ledger import ledger
+
+    motion = analysis.motions[0]
+    *_, lines = ledger(motion.dynamics.scene, 0) if motion.assembled.all() else [()]
+    return Table([Column("load", "", lines)] if lines else [], place="")
 
 
 def _angle_text(analysis: Analysis, step: Turn) -> str:

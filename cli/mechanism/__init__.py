@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 EXAMPLE = "klann"
 OPTIONS = f"""
 {FILE}{CASES}{BRANCH}{WORKERS}
-What:
+Quantities:
   only NAME,...  Show only these quantities: H.x,coupler.omega; H is all of H.
   order position|velocity|acceleration|jerk  Highest derivative (default: the highest that the input's rates give).
-  newton  Solve all loops at once by Newton-Raphson, and show the iterates.
   find NAME  Dimension to find at one pose: input.speed, links.crank.B.x.
-  so_that QUANTITY=VALUE  With --find: value of a quantity, such as B.vx=3m_s or crank.torque=12.
+  so_that QUANTITY=VALUE  With --find: value that a quantity has then, such as B.vx=3m_s or crank.torque=12.
 Output:
+  newton  Solve all loops at once by Newton-Raphson too, and show the iterates.
   page FILE(.html)  Write a page that computes: the mechanism moves, and its dimensions can be dragged.
 Further options (docs/commands.md describes them):
   schema  Print the JSON Schema of FILE.toml; no FILE is needed.
@@ -48,8 +48,6 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """
     from cli.cases.cases import Cases
     from cli.cases.loop import result
-    from cli.cases.study import with_root
-    from cli.mechanism.newton import Poses
+    from cli.mechanism.solution import Poses
 
-    cases, root = with_root(Cases.of(options), options)
-    return result(Poses(cases, show, newton=options.newton), options, root)
+    return result(Poses(Cases.of(options), show, newton=options.newton), options)

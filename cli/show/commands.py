@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 SHARED = """
-What:
+Tables:
   column NAME=HEADER  Read the column HEADER of the file as NAME, such as mass_kg=Masse; repeatable.
 Output:
   json  Print one JSON document in SI units with full precision.

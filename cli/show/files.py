@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing
 from itertools import count
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 import typer
 
-from cli.show.result import Written, finished
+from cli.show.result import Written, chosen_units, finished
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError, needs
 from dalembert.results.columns import Table
@@ -24,8 +23,9 @@ from dalembert.tables.files import is_input
 if TYPE_CHECKING:
     import pyarrow
 
+    from cli.show.commands import ShowOptions
     from cli.show.result import Part, Result
-    from dalembert.results.columns import Column, Table
+    from dalembert.results.columns import Column, Table, Values
 
 
 def write_all(files: Mapping[Path, Callable[[], bytes | Iterable[bytes]]]) -> None:
@@ -238,14 +238,11 @@ class Form:
     ----------
     suffix : str
         Of the file; CSV's and JSON's parts are their bytes, others' the tables as they are shown.
-    folder : Path, optional
-        Where each part of Parquet gets a file of its own.
     """
 
     suffix: str
     units: str | None = None
     digits: bool = False
-    folder: Path | None = None
 
     def __call__(self, table: Part, number: int) -> Written:
         """Make it of the part of this number, from 0 on."""
@@ -258,15 +255,20 @@ class Form:
             from dalembert.results.text import csv_text
 
             return Written(csv_text(table.cells, header=number == 0).encode(), unknown)
-        if self.folder is not None:
-            (self.folder / f"part-{number:06d}.parquet").write_bytes(b"".join(parquet([table])))
-            return Written(b"", unknown)
-        # bounds of errors have done their work, and cannot be sent
-        return Written(replace(table, columns=[replace(c, error=None) for c in table.columns]), unknown)
+        # bounds of errors have done their work, and cannot be sent; an array of numbers is soon sent
+        columns = [replace(c, values=self._sent(c), error=None) for c in table.columns]
+        return Written(replace(table, columns=columns), unknown)
+
+    def _sent(self, column: Column) -> Values:
+        if self.suffix != ".parquet" or not column.unit:
+            return column.values
+        import numpy as np
+
+        return np.asarray(column.values, dtype=float)
 
 
-def stream(result: Result, suffix: str, output: Path | None, units: str | None, digits: bool) -> int:
-    """Write a table that comes in parts, to standard output where no file is given.
+def stream(result: Result, suffix: str, options: ShowOptions) -> int:
+    """Write a table that comes in parts, to standard output where no file is given; before it the files beside it.
 
     Returns
     -------
@@ -274,7 +276,12 @@ def stream(result: Result, suffix: str, output: Path | None, units: str | None, 
         Of how many numbers --digits knows no digit.
     """
     assert result.blocks is not None
-    unknown = 0
+    output, unknown = options.output, 0
+    if options.units is not None:
+        # a bad unit is an error before anything is worked out
+        chosen_units(options.units)
+    refuse_inputs(path for path in (output, *result.beside) if path is not None)
+    write_all(result.beside)
 
     def made(form: Form, blocks: Callable[[Form], Iterator[Written]]) -> Iterator[bytes | Part]:
         nonlocal unknown
@@ -284,12 +291,7 @@ def stream(result: Result, suffix: str, output: Path | None, units: str | None, 
                 unknown += without
                 yield data
 
-    if suffix == ".parquet" and result.shared and output is not None:
-        with folder(output) as parts:
-            for _ in made(Form(suffix, units, digits, parts), result.blocks):
-                pass
-        return unknown
-    parts_written = made(Form(suffix, units, digits), result.blocks)
+    parts_written = made(Form(suffix, options.units, options.digits), result.blocks)
     if suffix in (".csv", ".json"):
         data = (data for data in parts_written if isinstance(data, bytes))
         text = _document(result, data) if suffix == ".json" else data
@@ -313,23 +315,3 @@ def _document(result: Result, parts: Iterator[bytes]) -> Iterator[bytes]:
     # what there is to say is known by now
     lines = [*result.warnings, *result.late_warnings()]
     yield f"\n ],{json_members({'warnings': lines})}\n}}\n".encode()
-
-
-@contextmanager
-def folder(path: Path) -> Iterator[Path]:
-    """A folder of Parquet files that stands in its place when all are written, and not before."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        try:
-            if path.is_dir() and any(not each.match("part-*.parquet") for each in path.iterdir()):
-                raise DataError(f"{path}: a folder with other files: expected a name that is free")
-            partial.mkdir()
-            yield partial
-            if path.is_dir():
-                shutil.rmtree(path)
-            path.unlink(missing_ok=True)
-            os.replace(partial, path)
-        finally:
-            shutil.rmtree(partial, ignore_errors=True)
-    except OSError as error:
-        raise DataError(f"{path}: cannot write: {error.strerror or error}") from None

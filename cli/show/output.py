@@ -48,8 +48,7 @@ def declared_command(
 
     The function takes its own options, as attributes of a `values`, and the shared ones.
     """
-    own = parameters(options, eager, complete)
-    return lambda find: with_options(find, options, None, show, values, own)
+    return lambda find: with_options(find, options, None, show, values, parameters(options, eager, complete))
 
 
 def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
@@ -66,8 +65,13 @@ def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
     if options.plot is not None and result.figure is None:
         raise typer.BadParameter(f"'{options.plot}': there is no picture of this result", param_hint="--plot")
     if result.blocks is not None:
+        from cli.show.files import stream
+
         check_renamed()
-        _stream(result, options, form)
+        unknown = stream(result, form, options)
+        _warn([*result.warnings, *result.late_warnings(), *_unknown(unknown)], options)
+        if result.failed():
+            raise typer.Exit(1)
         return
     if options.steps:
         result = _with_way(result)
@@ -254,23 +258,6 @@ def _in_chosen_units(result: Result, units: str | None) -> Result:
         screen=None if result.screen is None else of(result.screen),
         expected=[of(table) for table in result.expected],
     )
-
-
-def _stream(result: Result, options: ShowOptions, form: str) -> None:
-    """Write a table that comes in parts."""
-    from cli.show.files import refuse_inputs, stream, write_all
-
-    if options.units is not None:
-        from cli.show.result import chosen_units
-
-        # a bad unit is an error before anything is worked out
-        chosen_units(options.units)
-    refuse_inputs([path for path in (options.output, *result.beside) if path is not None])
-    write_all(result.beside)
-    unknown = stream(result, form, options.output, options.units, options.digits)
-    _warn([*result.warnings, *result.late_warnings(), *_unknown(unknown)], options)
-    if result.failed():
-        raise typer.Exit(1)
 
 
 def _formed(result: Result, form: str) -> bytes | Iterable[bytes]:

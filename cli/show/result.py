@@ -155,8 +155,6 @@ class Result:
 
     Whoever works a part out, perhaps another process, makes what is written of it too.
     """
-    shared: bool = False
-    """Whether the parts are worked out by several processes."""
     blocks_name: str = "poses"
     """What the table in parts is called, or the list in JSON, which stands behind what else is in the document."""
     within: Callable[[], AbstractContextManager[None]] = nullcontext

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 EXAMPLE = "double-pendulum"
 OPTIONS = f"""
 {FILE}{CASES}{BRANCH}{WORKERS}
-What:
+Time and accuracy:
+  time START:STOP:STEP  Times in seconds: 0:10:0.01 or 0:10/1000; required.
+  accuracy NUMBER  Error of the inputs to aim at (default 1e-9).
+  until INPUT=VALUE  Stop where an input reaches a value: crank=90deg.
+Quantities:
   only NAME,...  Show these quantities in addition: H.x,coupler.omega; H is all of H.
   forces  Show the joint forces in addition.
-How:
-  time START:STOP:STEP  Times in seconds: 0:10:0.01 or 0:10/1000; required.
-  accuracy NUMBER  Wanted error of the inputs (default 1e-9).
-  until INPUT=VALUE  Stop where an input reaches a value: crank=90deg.
 Output:
   page FILE(.html)  Write a page that replays the motion.
 """
@@ -37,7 +37,7 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     from cli.cases.cases import Cases
     from cli.cases.loop import result
     from cli.read.options import bad
-    from cli.simulate.motion import Simulation, times_and_accuracy
+    from cli.simulate.motion import Simulation
 
     if options.time is None:
         raise bad("--time", "expected the times, such as --time 0:10:0.01")
@@ -47,3 +47,16 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     cases = Cases.of(options, 2, forces=options.forces).at_start()
     study = Simulation(cases, show, times=times, accuracy=accuracy, until=options.until)
     return result(study, options)
+
+
+def times_and_accuracy(time: str, accuracy: float | None) -> tuple[list[float], float]:
+    """Read the times and the accuracy."""
+    from cli.read.options import bad, time_range
+
+    times = time_range("--time", time)
+    if len(times) > 1 and times[1] < times[0]:
+        raise bad("--time", f"'{time}': expected rising times")
+    value = 1e-9 if accuracy is None else accuracy
+    if not 0 < value < 1:
+        raise bad("--accuracy", f"{accuracy}: expected a number between 0 and 1, such as 1e-9")
+    return times, value

@@ -22,6 +22,7 @@ from dalembert.arithmetic.engines import anew
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table, document, names, number
+from dalembert.results.way import Topic, figures
 from virtualwork import MechanismError, quantities
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.forces import Shaking
@@ -33,9 +34,9 @@ if TYPE_CHECKING:
 
     from cli.cases.cases import Rows
     from dalembert.results.columns import Document
-    from dalembert.results.way import Topic
     from virtualwork import Mechanism
     from virtualwork.animation import Series
+    from virtualwork.describe.parts import Input
     from virtualwork.intime.run import Run
     from virtualwork.intime.travel import Moved, Travel
 
@@ -53,17 +54,6 @@ METHOD = (
 )
 # variants of a part that are simulated together, and one by one
 TOGETHER, ONE_BY_ONE = 512, 8
-
-
-def times_and_accuracy(time: str, accuracy: float | None) -> tuple[list[float], float]:
-    """Read the times and the accuracy."""
-    times = options.time_range("--time", time)
-    if len(times) > 1 and times[1] < times[0]:
-        raise options.bad("--time", f"'{time}': expected rising times")
-    value = 1e-9 if accuracy is None else accuracy
-    if not 0 < value < 1:
-        raise options.bad("--accuracy", f"{accuracy}: expected a number between 0 and 1, such as 1e-9")
-    return times, value
 
 
 @dataclass(eq=False)
@@ -217,8 +207,6 @@ class Motion(Case):
 
     def way(self) -> list[Topic]:
         """Return the start, and the energy."""
-        from cli.simulate.way import way
-
         return way(self.run, self.analysis.mechanism.inputs)
 
     def figure(self) -> Figure:
@@ -429,3 +417,30 @@ def drift(change: Reals) -> Column:
     """Return the largest change of energy that the work of the loads does not explain, with its sign."""
     finite = change[np.isfinite(change)]
     return number("energy_drift", "energy", [finite[np.argmax(np.abs(finite))] if len(finite) else np.nan])
+
+
+# --- the worked solution ----------------------------------------------------------------------------------------------
+def way(run: Run, inputs: Sequence[Input]) -> list[Topic]:
+    """Return the equation of motion at the start, and the balance of energy."""
+    q, v, a = (np.asarray(each, dtype=float) for each in (run.angle[0], run.speed[0], run.acceleration[0]))
+    law = [
+        "The inputs are free: by d'Alembert's principle M(q)·q̈ + h(q, q̇, t) = 0, the effort at every input being nothing "
+        "(Riul, unit II, eq. 5, solved for the accelerations).",
+    ]
+    for entry, place, speed, rate in zip(inputs, q.tolist(), v.tolist(), a.tolist(), strict=True):
+        unit = "m" if entry.is_slide else "rad"
+        law.append(
+            f"  at t = {figures(float(run.t[0]))} s: {entry.name} = {figures(place)} {unit}, speed {figures(speed)} {unit}/s, "
+            f"acceleration {figures(rate)} {unit}/s²"
+        )
+    energy = np.asarray(run.energy, dtype=float)
+    first, last = float(energy[0]), float(energy[-1])
+    drift = float(np.abs(run.energy_drift).max())
+    balance = [
+        f"E = T + V (gravity, springs): {figures(first)} J at t = {figures(float(run.t[0]))} s, "
+        f"{figures(last)} J at t = {figures(float(run.t[-1]))} s",
+        f"  E_end − E_start = {figures(last - first)} J is the work of applied loads, dampers and friction; unexplained {figures(drift)} J",
+    ]
+    start = {"angle": q.tolist(), "speed": v.tolist(), "acceleration": a.tolist()}
+    head = {"start_J": first, "end_J": last, "energy_drift_J": drift}
+    return [Topic("start", law, "Equation of motion", start), Topic("energy", balance, "Energy", head)]

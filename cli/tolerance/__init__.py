@@ -15,10 +15,11 @@ if TYPE_CHECKING:
 EXAMPLE = "tolerances"
 OPTIONS = f"""
 {FILE}{CASES}{WORKERS}
-What:
+Quantities:
   only NAME,...  Show only these quantities: H.x,coupler.angle,crank.torque; H is all of H.
   order position|velocity|acceleration|jerk  Highest derivative (default: the highest that the input's rates give).
-  draws N  Number of mechanisms drawn within the tolerances.
+Drawn mechanisms:
+  draws N  Number of mechanisms drawn at random within the tolerances.
   seed N=0  With --draws: random seed.
   distribution normal|uniform=normal  With --draws: normal (a limit is three standard deviations) or uniform (a limit is an end).
 """

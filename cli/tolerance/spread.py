@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,8 @@ from cli.cases.study import METHOD
 from cli.read.options import processes
 from dalembert.dataclass import dataclass
 from dalembert.errors import DataError
-from dalembert.results.columns import Column, Table, names
+from dalembert.results.columns import Column, Table, finite, names
+from dalembert.results.way import Topic
 from virtualwork.describe.dimensions import Dimension
 from virtualwork.family.tolerance import Drawn, Spread, drawn, drawn_numbers, limits, spread, summary
 from virtualwork.formulas.kinematics import Point
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.cases.poses import Reals
-    from dalembert.results.way import Topic
 
 # how far a drawn standard deviation may be from the linear one, in its sampling errors and by its size
 SURE, APART = 5.0, 0.02
@@ -246,8 +246,6 @@ class Tolerances(Case):
 
     def way(self) -> list[Topic]:
         """Return the terms of every dimension."""
-        from cli.tolerance.way import way
-
         return way(self.analysis, self.numbers, self.slopes, self.limits)
 
     def figure(self) -> Figure:
@@ -302,6 +300,52 @@ def _sample(sample: Drawn) -> dict[str, Reals]:
 _FIELDS = ("mean", "sd", "quantiles", "errors")
 
 
+# --- the worked solution ----------------------------------------------------------------------------------------------
+def way(
+    analysis: Analysis,
+    shown: Sequence[Component],
+    slopes_of: Mapping[Quantity, Sequence[Any]],
+    limits: Mapping[Dimension, float],
+) -> list[Topic]:
+    """Return the one topic: the terms at the first pose that is assembled."""
+    whole = analysis.motions[0].assembled
+    if not shown or not whole.any():
+        return [
+            Topic("terms", ["None of the numbers shown varies with [tolerances]."], "Terms", {"terms": []})
+        ]
+    i = int(np.argmax(whole))
+    rows: list[tuple[str, str, float, float, float, float]] = []
+    sums: list[tuple[str, float, float]] = []
+    for each in shown:
+        slopes = [float(np.broadcast_to(each.of(slope), len(whole))[i]) for slope in slopes_of[each.key]]
+        terms = [slope * limit for slope, limit in zip(slopes, limits.values(), strict=True)]
+        variance = sum((term / 3) ** 2 for term in terms)
+        for d, slope, limit, term in zip(limits, slopes, limits.values(), terms, strict=True):
+            share = (term / 3) ** 2 / variance if variance else 0.0
+            rows.append((each.header, d.path, slope, limit, term, share))
+        sums.append((each.header, sum(map(abs, terms)), variance**0.5))
+    columns = zip(*((*row[:2], *map(finite, row[2:])) for row in rows), strict=True)
+    titles = ("column", "path", "slope", "limit", "term", "share")
+    table = Table(
+        [names(title, values) for title, values in zip(titles, columns, strict=True)],
+        ("column", "path"),
+        "terms[]",
+    )
+    of_all = zip(*((header, finite(worst), finite(sd)) for header, worst, sd in sums), strict=True)
+    total = Table(
+        [names(title, values) for title, values in zip(("column", "worst", "sd"), of_all, strict=True)],
+        ("column",),
+        "sums[]",
+    )
+    at = f"At {analysis.pose_text(i)}: " if len(whole) > 1 else ""
+    text = (
+        f"{at}Δq = Σ (∂q/∂d)·δd to first order, slopes exact: worst case Σ |∂q/∂d|·limit, "
+        "standard deviation √Σ (∂q/∂d·limit/3)²; limits in SI, slopes in the column's unit per SI unit:"
+    )
+    return [Topic("terms", [text, table, "Sums:", total], "Terms of each dimension")]
+
+
+# --- the picture ------------------------------------------------------------------------------------------------------
 # of the picture's width: a band that is narrower is drawn wider
 SEEN = 0.02
 BARS = 10
@@ -336,7 +380,8 @@ def _paths(axes: Axes, tolerances: Tolerances, points: list[Point]) -> None:
     scale, unit = (1e3, "mm") if analysis.mechanism.size < 2 else (1.0, "m")
     sizes = np.array(list(tolerances.limits.values()))
     paths = {key: analysis.motions[0].point(str(key.node)).complex(0) * scale for key in points}
-    width = max((np.nanmax(abs(z - np.nanmean(z)), initial=0.0) for z in paths.values()), default=1.0) or 1.0
+    parts = [z[np.isfinite(z)] for z in paths.values()]
+    width = max((abs(z - z.mean()).max() for z in parts if len(z)), default=1.0) or 1.0
     bands = {}
     for key, z in paths.items():
         slopes = np.array(tolerances.slopes[key]) * scale

@@ -13,7 +13,7 @@ from cli.cases.cases import Cases
 from cli.cases.inputs import Grid, Varied, listed
 from cli.cases.loop import Loop
 from cli.forces.cycle import Forces
-from cli.mechanism.newton import Poses
+from cli.mechanism.solution import Poses
 from cli.show.commands import ShowOptions
 from virtualwork import Mechanism
 from virtualwork.describe.dimensions import dimensions

@@ -57,7 +57,7 @@ def test_options_stand_in_panels_of_at_most_ten(command: str, dalembert: Dalembe
     assert titles[0] == "Arguments:"
     # in front of what is computed stand, of a mechanism, the poses that it is computed of
     assert titles[1] == ("Which poses, which mechanism:" if command == "mechanism" else "What:")
-    assert "What:" in titles
+    assert "Tables:" in titles
     assert "Output:" in titles
     # every option has a panel, those that the help names only have the last one
     assert "Options:" not in titles

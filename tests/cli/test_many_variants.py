@@ -15,7 +15,7 @@ from cli.cases.axes import grids
 from cli.cases.cases import Cases
 from cli.cases.inputs import Grid, Varied, listed
 from cli.cases.loop import Loop, unchanged
-from cli.mechanism.newton import Poses
+from cli.mechanism.solution import Poses
 from cli.show.commands import ShowOptions
 from dalembert.errors import DataError
 from virtualwork import Mechanism
@@ -109,26 +109,19 @@ def test_no_digit_hangs_on_what_a_process_has_done_before(dalembert, tmp_path):
 
 
 @pytest.mark.slow
-def test_workers_write_parquet_into_a_folder_that_reads_as_one_table(dalembert, tmp_path):
+def test_workers_write_one_file_of_parquet(dalembert, tmp_path):
     (tmp_path / "m.toml").write_text(FOUR_BAR)
     # 4000 variants in 37 poses are three parts
     vary = ("--over", "links.crank.B.x=0.035:0.045/3999", "--over", "0deg:360deg:10deg", "--only", "C")
-    call = ("mechanism", "m.toml", *vary, "--units", "mm,deg")
-    for options in (("-o", "one.parquet"), ("--workers", "2", "-o", "parts.parquet")):
-        done = dalembert(*call, *options)
+    for options in (("-o", "one.parquet"), ("--workers", "2", "-o", "two.parquet")):
+        done = dalembert("mechanism", "m.toml", *vary, "--units", "mm,deg", *options)
         assert (done.returncode, done.stderr) == (0, "")
-    assert len(list((tmp_path / "parts.parquet").iterdir())) == 3
-    one, parts = (pyarrow.parquet.read_table(tmp_path / f"{name}.parquet") for name in ("one", "parts"))
-    assert one.num_rows == 4000 * 37
-    assert "C_x_mm" in one.column_names
-    assert parts.equals(one)
-    # written again in its place, and never over what is not its own
-    assert dalembert(*call, "--workers", "2", "-o", "parts.parquet").returncode == 0
-    (tmp_path / "parts.parquet" / "notes.txt").write_text("mine")
-    refused = dalembert(*call, "--workers", "2", "-o", "parts.parquet")
-    assert refused.returncode == 1
-    assert "a folder with other files" in refused.stderr
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["m.toml", "one.parquet", "parts.parquet"]
+    one, two = (pyarrow.parquet.ParquetFile(tmp_path / f"{name}.parquet") for name in ("one", "two"))
+    assert one.num_row_groups == two.num_row_groups == 3
+    assert one.metadata.num_rows == 4000 * 37
+    assert "C_x_mm" in one.schema_arrow.names
+    assert one.read().equals(two.read())
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["m.toml", "one.parquet", "two.parquet"]
 
 
 def test_json_of_several_workers_is_that_of_one(dalembert, table, tmp_path):

@@ -106,6 +106,20 @@ def test_inspect_shows_the_order_of_solution(dalembert: Dalembert) -> None:
     )
 
 
+def test_inspect_shows_short_tables(dalembert: Dalembert) -> None:
+    """What is there once is a list, and each stroke has one row; CSV has a row for each number."""
+    text = dalembert("inspect", KLANN, "--text").stdout
+    lines = [line.split() for line in text.splitlines()]
+    assert ["mobility", "1"] in lines
+    assert ["grashof", "crank-rocker"] in lines
+    assert ["name", "least_m", "at_deg", "most_m", "most_at_deg"] in lines
+    assert ["B.x", "-0.12", "180", "0.12", "0"] in lines
+    assert ["name", "least_deg", "at_deg", "most_deg", "most_at_deg"] in lines
+    assert sum(line[:1] == ["rocker.angle"] for line in lines) == 1
+    numbers = dalembert("inspect", KLANN).stdout
+    assert all(f"{key}_m,B.x," in numbers for key in ("least", "most"))
+
+
 def test_states_table(dalembert: Dalembert, tmp_path: Path) -> None:
     done = dalembert(
         "forces",

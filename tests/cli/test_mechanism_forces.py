@@ -230,7 +230,8 @@ def test_explain_names_what_is_left_out(dalembert: Dalembert) -> None:
     done = dalembert("inspect", "-", "--text", stdin=text)
     cells = [re.split(r" {2,}", line.strip()) for line in done.stdout.splitlines()]
     assert ["crank", "crank: weight", "does no work"] in cells
-    assert any(row[0].startswith("no inertia loads") and row[-1] == "absent" for row in cells)
+    absent = cells[cells.index(["Absent loads:"]) :]
+    assert any(row[0].startswith("no inertia loads") for row in absent)
     assert "joint forces, action and reaction, do no work together" in done.stdout
 
 

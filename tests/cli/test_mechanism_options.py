@@ -81,3 +81,32 @@ def test_a_file_of_headers_that_is_not_there_is_one_line(dalembert, tmp_path) ->
         "",
         "dalembert: nope.toml: No such file or directory\n",
     )
+
+
+TWO_BARS = """
+gravity = [0, -9.81]
+ground = { O = [0, 0] }
+input = [{ link = "a" }, { link = "b", on = "a" }]
+[links]
+a = { points = { O = [0, 0], A = [1, 0] }, mass = 1, center = [0.5, 0] }
+b = { points = { A = [0, 0] }, mass = 1, center = [0.25, 0] }
+"""
+
+
+@pytest.mark.parametrize(
+    ("ranges", "rests"),
+    [
+        ((), {(90, 0), (90, 180), (270, 0), (270, 180)}),
+        (("a=0deg:100deg:10deg",), {(90, 0), (90, 180)}),
+        (("b=-10deg:100deg:10deg",), {(90, 0), (270, 0)}),
+        (("a=0deg:100deg:10deg", "b=-10deg:100deg:10deg"), {(90, 0)}),
+        (("a=260deg:450deg:10deg", "b=170deg:190deg:1deg"), {(90, 180), (270, 180)}),
+    ],
+)
+def test_rest_lies_in_the_range_of_every_input(dalembert: Dalembert, tmp_path, ranges, rests) -> None:
+    """Two hanging bars rest upright or hanging, each: a range of one input, or of both, leaves the others out."""
+    (tmp_path / "m.toml").write_text(TWO_BARS)
+    words = [word for each in ranges for word in ("--over", each)]
+    lines = dalembert("equilibrium", "m.toml", *words).stdout.splitlines()[1:]
+    found = {tuple(round(float(cell)) % 360 for cell in line.split(",")[:2]) for line in lines}
+    assert found == rests

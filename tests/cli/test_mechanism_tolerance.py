@@ -173,3 +173,10 @@ def test_a_file_without_tolerances_and_options_that_do_not_go_with_it(dalembert,
         ("--check",),
     ):
         assert dalembert("tolerance", "m.toml", *options).returncode == 2
+
+
+def test_a_pose_that_cannot_be_assembled_is_status_1_with_its_picture_too(dalembert, file):
+    done = dalembert("tolerance", file(), "--at", "0deg", "--set", "links.crank.B.x=900", "--plot", "p.svg")
+    assert done.returncode == 1
+    assert "cannot be assembled" in done.stderr
+    assert "RuntimeWarning" not in done.stderr

@@ -10,7 +10,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from virtualwork import Force, Guess, Guide, Input, Link, Mechanism, Spring, Torque, TorsionSpring, equilibria
+from virtualwork import Force, Guess, Guide, Input, Link, Mechanism, Spring, Torque, TorsionSpring
 
 G = 9.81
 
@@ -56,7 +56,7 @@ def test_a_torsion_spring_and_a_torque(first: str) -> None:
         return G * mp.sin(t) + k * (t - free) ** 2 / 2 - torque * t
 
     with mp.workdps(30):
-        found = equilibria(m).found
+        found = m.equilibria().found
         # all sign changes of V' over the turn
         grid = [mp.mpf(i) / 50 for i in range(315)]
         slope = [mp.diff(energy, t) for t in grid]
@@ -85,7 +85,7 @@ def test_springs_between_two_moving_links() -> None:
         return k * stretch**2 / 2 + kt * (rod(t) - t - free) ** 2 / 2 + weight
 
     with mp.workdps(30):
-        found = equilibria(m).found
+        found = m.equilibria().found
         slope = [mp.diff(energy, mp.mpf(i) / 20) for i in range(126)]
         assert len(found) == sum(a * b < 0 for a, b in pairwise(slope)) > 0
         for e in found:
@@ -106,7 +106,7 @@ def test_a_force_that_turns_with_its_link_has_a_stiffness_and_no_potential() -> 
         return push.real * moved[0] + push.imag * moved[1] - 3 * G * fall
 
     with mp.workdps(30):
-        found = equilibria(m).found
+        found = m.equilibria().found
         assert found
         for e in found:
             exact = mp.findroot(work, e.inputs[0])
@@ -118,7 +118,7 @@ def test_a_force_that_turns_with_its_link_has_a_stiffness_and_no_potential() -> 
 def test_a_force_given_by_a_table_counts_its_slope() -> None:
     """F = 5 + 5θ, then 13 − 3θ, upwards at 1 m: Q = (F − m g/2) cos θ, so −Q' where it vanishes is −F' cos θ."""
     m = bar(forces=[Force("bar", 1.0 + 0j, history=((0.0, 5.0j), (1.0, 10.0j), (2.0, 7.0j)))])
-    rising, falling = equilibria(m, [[0.1, 1.5]]).found
+    rising, falling = m.equilibria([[0.1, 1.5]]).found
     exact = (G - 5) / 5, 1 + (10 - G) / 3
     assert (rising.inputs[0], falling.inputs[0]) == pytest.approx(exact, rel=1e-14)
     assert rising.stiffness == pytest.approx(-5 * math.cos(exact[0]), rel=1e-12)
@@ -129,16 +129,16 @@ def test_a_force_given_by_a_table_counts_its_slope() -> None:
 def test_a_torque_that_only_just_balances() -> None:
     """T = m g l: the force touches zero, between two samples, and no second variation tells whether it is stable."""
     m = bar(gravity=G * np.exp(1j * (0.123 - math.pi / 2)), torques=[Torque("bar", G)])
-    (e,) = equilibria(m).found
+    (e,) = m.equilibria().found
     assert e.inputs[0] == pytest.approx(0.123, abs=1e-12)
     assert e.stable is None
-    assert equilibria(bar(torques=[Torque("bar", 1.001 * G)])).found == ()
+    assert bar(torques=[Torque("bar", 1.001 * G)]).equilibria().found == ()
 
 
 def test_a_root_at_both_ends_of_the_turn_counts_once() -> None:
     m = bar(gravity=-G + 0j)
-    assert [e.inputs[0] for e in equilibria(m).found] == pytest.approx([0.0, math.pi], abs=1e-12)
-    assert [e.stable for e in equilibria(m).found] == [False, True]
+    assert [e.inputs[0] for e in m.equilibria().found] == pytest.approx([0.0, math.pi], abs=1e-12)
+    assert [e.stable for e in m.equilibria().found] == [False, True]
 
 
 def test_a_weight_on_a_spring_at_a_slide() -> None:
@@ -153,7 +153,7 @@ def test_a_weight_on_a_spring_at_a_slide() -> None:
         gravity=-G * 1j,
         springs=[Spring((("ground", 0j), ("block", 0j)), k, free)],
     )
-    (e,) = equilibria(m, [[0.05, 0.5]]).found
+    (e,) = m.equilibria([[0.05, 0.5]]).found
     sag = mass * G / k
     assert e.inputs[0] == pytest.approx(free + sag, rel=1e-14)
     assert e.stiffness == pytest.approx(k, rel=1e-12)
@@ -169,7 +169,7 @@ def test_two_inputs_with_torsion_springs() -> None:
         inputs=(Input(link="upper"), Input(link="lower")),
         torsion_springs=[TorsionSpring(("ground", "upper"), k1, a), TorsionSpring(("upper", "lower"), k2, b)],
     )
-    (e,) = equilibria(m).found
+    (e,) = m.equilibria().found
     assert e.inputs == pytest.approx((a, a + b), rel=1e-13)
     half = (k1 + 2 * k2) / 2
     assert e.stiffness == pytest.approx(half - math.sqrt(half**2 - k1 * k2), rel=1e-12)
@@ -208,7 +208,7 @@ def test_a_range_with_gaps_and_a_range_about_zero() -> None:
         ]
         assert exact
         for span in (None, [[0.0, 2 * math.pi]], [[-0.5, 2 * math.pi - 0.5]]):
-            found = equilibria(m, span).found
+            found = m.equilibria(span).found
             assert [e.inputs[0] for e in found] == pytest.approx([float(t) for t in exact], rel=1e-11)
             for e, t in zip(found, exact, strict=True):
                 assert e.stiffness == pytest.approx(float(mp.diff(energy, t, 2)), rel=1e-9)
@@ -216,14 +216,14 @@ def test_a_range_with_gaps_and_a_range_about_zero() -> None:
 
 def test_an_equilibrium_at_the_end_of_the_range_is_found_though_the_end_is_rounded() -> None:
     """sin(−π) and cos(−π/2) are not zero in doubles, and have no other sign beside them."""
-    turned = equilibria(bar(gravity=-G + 0j), [[-math.pi, math.pi]]).found
+    turned = bar(gravity=-G + 0j).equilibria([[-math.pi, math.pi]]).found
     assert [e.inputs[0] for e in turned] == pytest.approx([-math.pi, 0.0], abs=1e-12)
-    hanging, standing = equilibria(bar(), [[-math.pi / 2, 3 * math.pi / 2]]).found
+    hanging, standing = bar().equilibria([[-math.pi / 2, 3 * math.pi / 2]]).found
     assert (hanging.inputs[0], standing.inputs[0]) == pytest.approx((-math.pi / 2, math.pi / 2), abs=1e-12)
     assert (hanging.stable, standing.stable) == (True, False)
-    assert [e.inputs[0] for e in equilibria(bar(), [[0.1, math.pi / 2]]).found] == [math.pi / 2]
+    assert [e.inputs[0] for e in bar().equilibria([[0.1, math.pi / 2]]).found] == [math.pi / 2]
     # half a turn that begins and ends at rest is no whole one: both count
-    half = equilibria(bar(gravity=-G + 0j), [[0.0, math.pi]]).found
+    half = bar(gravity=-G + 0j).equilibria([[0.0, math.pi]]).found
     assert [e.inputs[0] for e in half] == pytest.approx([0.0, math.pi], abs=1e-12)
 
 
@@ -237,8 +237,8 @@ def test_equilibria_in_any_unit(scale: float) -> None:
         gravity=-G * 1j,
         torsion_springs=[TorsionSpring(("ground", "bar"), G / 3 * scale, 0.7)],
     )
-    found = equilibria(m).found
-    one = equilibria(bar(torsion_springs=[TorsionSpring(("ground", "bar"), G / 3, 0.7)])).found
+    found = m.equilibria().found
+    one = bar(torsion_springs=[TorsionSpring(("ground", "bar"), G / 3, 0.7)]).equilibria().found
     assert [e.inputs[0] for e in found] == pytest.approx([e.inputs[0] for e in one], rel=1e-13)
     for e in found:
         bend = -math.sin(e.inputs[0]) + 1 / 3

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.virtualwork.mechanisms import SWEEP, berkof_lowen, four_bar, slider_crank
-from virtualwork import Force, Guess, Guide, Input, Link, Mechanism, Spring, Torque, equilibria
+from virtualwork import Force, Guess, Guide, Input, Link, Mechanism, Spring, Torque
 from virtualwork.describe import DescriptionError
 from virtualwork.study.counterweights import least_squares
 from virtualwork.study.cycle import Cycle
@@ -32,7 +32,7 @@ def test_equilibrium_of_two_bars() -> None:
         gravity=-9.81j,
         forces=[Force("shoe", 0j, -25.0)],
     )
-    found = equilibria(m, [[0.2, 1.5]])
+    found = m.equilibria([[0.2, 1.5]])
     assert [e.inputs[0] for e in found.found] == pytest.approx([math.atan2(98.1, 50.0)], rel=1e-14)
     (e,) = found.found
     theta = e.inputs[0]
@@ -57,7 +57,7 @@ def test_all_equilibria_of_a_spring_pendulum() -> None:
     s = s0 / (1 - mg / (k * h))
     side = math.asin((l * l + h * h - s * s) / (2 * l * h))
     exact = sorted(x % (2 * math.pi) for x in (math.pi / 2, 3 * math.pi / 2, side, math.pi - side))
-    found = equilibria(m).found
+    found = m.equilibria().found
     assert [e.inputs[0] for e in found] == pytest.approx(exact, rel=1e-12)
     for e in found:
         step = 1e-5
@@ -72,8 +72,8 @@ def test_equilibrium_everywhere() -> None:
         {"O": 0j}, {"bar": Link({"O": 0j}, mass=2.0, center=0.3)}, inputs=Input(link="bar"), gravity=-9.81j,
         springs=[Spring((("bar", 0.1 + 0j), ("ground", 0.2j)), 2.0 * 9.81 * 0.3 / (0.1 * 0.2))],
     )  # fmt: skip
-    assert equilibria(m).everywhere
-    assert equilibria(four_bar()).everywhere  # no load at all
+    assert m.equilibria().everywhere
+    assert four_bar().equilibria().everywhere  # no load at all
 
 
 def test_equilibria_of_a_double_pendulum() -> None:
@@ -83,7 +83,7 @@ def test_equilibria_of_a_double_pendulum() -> None:
         inputs=(Input(link="upper"), Input(link="lower")),
         gravity=-9.81j,
     )
-    found = {tuple(round(math.degrees(v)) for v in e.inputs): e for e in equilibria(m).found}
+    found = {tuple(round(math.degrees(v)) for v in e.inputs): e for e in m.equilibria().found}
     assert {key: e.stable for key, e in found.items()} == {
         (90, 90): False, (90, 270): False, (270, 90): False, (270, 270): True,
     }  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.stress.groups import compare
 from tests.virtualwork.judged import judge
-from virtualwork import Guess, Guide, Input, Link, Mechanism, Spring, equilibria
+from virtualwork import Guess, Guide, Input, Link, Mechanism, Spring
 from virtualwork.formulas.kinematics import Carried
 from virtualwork.study.cycle import Cycle
 from virtualwork.textbook.link_states import LinkStates, UnitLoad
@@ -98,7 +98,7 @@ def test_equilibria_against_50_digits() -> None:
         gravity=-9.81j,
         springs=[Spring((("bob", 1 + 0j), ("ground", 1.5 + 0.3j)), 7.0, 0.4)],
     )
-    found = equilibria(m).found
+    found = m.equilibria().found
     assert len(found) >= 2
     with mp.workdps(40):
 

@@ -163,8 +163,8 @@ def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int 
     assembly : Description
         With its gravity, constant and follower forces, torques, springs. Dampers and friction do not act at rest.
     spans : array (k, 2), optional
-        The range of each input, rad or m. Default: a whole turn; for a slide, two sizes of the mechanism either way,
-        where its loops are no farther from their ends.
+        The range of each input, rad or m. Default, also of an input whose row is NaN: a whole turn; for a slide, two
+        sizes of the mechanism either way, where its loops are no farther from their ends.
     samples : int
         How finely the range of one input is looked through for sign changes, more finely where a body turns faster;
         every root is then found to rounding.
@@ -185,17 +185,18 @@ def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int 
     """
     k = len(assembly.mechanism.inputs)
     at = np.asarray(assembly.mechanism.at, dtype=float)
-    if spans is None:
+    given = np.full((k, 2), np.nan) if spans is None else np.asarray(spans, dtype=float).reshape(k, 2)
+    limited = ~np.isnan(given).any(axis=1)
+    ranges = given
+    if not limited.all():
         slide = np.array([e.is_slide for e in assembly.mechanism.inputs])
         size = assembly.track.length if k == 1 else assembly.mechanism.size
         low = np.where(slide, at - 2 * size, 0.0)
         high = np.where(slide, at + 2 * size, 2 * np.pi)
-        ranges = np.stack([low, high], axis=1)
-    else:
-        ranges = np.asarray(spans, dtype=float).reshape(k, 2)
+        ranges = np.where(limited[:, None], given, np.stack([low, high], axis=1))
     # at a limit, and beyond it, a loop has no rates
     with np.errstate(all="ignore"):
-        return _one(assembly, ranges[0], samples) if k == 1 else _many(assembly, ranges)
+        return _one(assembly, ranges[0], samples) if k == 1 else _many(assembly, ranges, limited)
 
 
 def _one(assembly: Assembly, span: Reals, samples: int) -> Equilibria:
@@ -328,8 +329,8 @@ def _judged(assembly: Assembly, inputs: Reals, scale: float) -> Equilibria:
     return Equilibria(tuple(result))
 
 
-def _many(assembly: Assembly, ranges: Reals) -> Equilibria:
-    """Several inputs: Newton on Q from a grid of starts, all at once."""
+def _many(assembly: Assembly, ranges: Reals, limited: NDArray[np.bool_]) -> Equilibria:
+    """Several inputs: Newton on Q from a grid of starts, all at once; of a `limited` input only what lies in its range."""
     k = len(ranges)
     per = max(4, round(4000 ** (1 / k)))
     per = min(per, 40)
@@ -368,6 +369,12 @@ def _many(assembly: Assembly, ranges: Reals) -> Equilibria:
     x = np.where(turning, np.mod(x, 2 * np.pi), x)
     x = np.where(turning & (2 * np.pi - x < 1e-9), 0.0, x)
     unit = np.where(turning, 1.0, assembly.mechanism.size)
+    # Newton's steps lead out of the range too; an angle lies in it up to whole turns
+    slack = 1e-9 * unit
+    off = x - ranges[:, 0] + slack
+    off = np.where(turning, np.mod(off, 2 * np.pi), off)
+    within = (off >= 0) & (off <= ranges[:, 1] - ranges[:, 0] + 2 * slack)
+    x = x[(within | ~limited).all(axis=1)]
     distinct: list[Any] = []
     for row in x[np.lexsort(np.round(x / unit, 7).T[::-1])] if len(x) else []:
         gaps = [(row - other) / unit for other in distinct]

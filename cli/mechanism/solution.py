@@ -1,17 +1,19 @@
-"""The worked solution of `dalembert mechanism`: loops, closed forms with both roots, Newton's iterates, parts of motion."""
+"""The poses of `dalembert mechanism`, the iterates of Newton and Raphson, the worked solution: loops, roots, parts of motion."""
 
 from __future__ import annotations
 
-from functools import partial
+import math
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.cases.poses import over_poses, pose_head
+from cli.cases.poses import column, over_poses, pose_head
+from cli.cases.study import PoseCase, PoseStudy
 from dalembert.angles import in_turn, read_degrees
-from dalembert.results.columns import Column, Table, names
+from dalembert.dataclass import dataclass
+from dalembert.results.columns import Column, Table, finite, names, number
 from dalembert.results.way import Topic, figures, vector_text
-from virtualwork.textbook.combinations import sense
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,6 +24,102 @@ if TYPE_CHECKING:
     from virtualwork.study.loops import GroupAt, Root
     from virtualwork.study.parts import Parts
 
+# radians between the solution from the guess and that of the groups: beyond it they are two assemblies
+SAME = 1e-6
+
+
+@dataclass
+class Solved(PoseCase):
+    """The poses of one mechanism, and Newton's iterates."""
+
+    study: Poses
+
+    @cached_property
+    def extra(self) -> dict[str, Table]:
+        """Newton-Raphson iterates, which --newton shows."""
+        return iterates(self.analysis) if self.study.newton else {}
+
+    def way(self) -> list[Topic]:
+        """Return the loops, the closed forms, Newton's iterates and the parts of the motion."""
+        return way(self.analysis, newton=self.study.newton)
+
+    def figure(self) -> Figure:
+        """Draw the mechanism to scale, with ghosts and paths; or the curves of single quantities."""
+        from cli.cases.picture import curves, drawn, is_by_quantity
+
+        return curves(self.analysis) if is_by_quantity(self.analysis) else drawn(self.analysis)
+
+
+@dataclass(frozen=True)
+class Poses(PoseStudy):
+    """Solve the poses of every case, with their rates.
+
+    Attributes
+    ----------
+    newton : bool
+        Whether all loops are solved at once in addition.
+    """
+
+    newton: bool = False
+
+    kind = Solved
+
+    @property
+    def poses_alone(self) -> bool:
+        """Whether a file of tables has the poses and nothing else."""
+        return not self.newton
+
+    @property
+    def extra_in_json(self) -> bool:
+        """Whether the JSON document of each variant has more than its poses."""
+        return self.newton
+
+
+def iterates(analysis: Analysis) -> dict[str, Table]:
+    """Solve every pose by Newton-Raphson from the guess; return the iterates of the first and the largest difference."""
+    from virtualwork.study.newton_table import all_at_once
+
+    assembly = analysis.assemblies[0]
+    solutions = [all_at_once(assembly, tuple(row)) for row in analysis.inputs.whole.values.tolist()]
+    first = solutions[0]
+    away = [i for i, each in enumerate(solutions) if not each.closed or not each.difference < SAME]
+    for i in away[:3]:
+        why = "did not converge" if not solutions[i].closed else "found another assembly"
+        analysis.warnings.append(f"newton from the guess {why} at step {analysis.inputs.whole.steps[i]}")
+    if len(away) > 3:
+        analysis.warnings.append(
+            f"newton from the guess missed the assembly at {len(away)} of {len(solutions)} poses"
+        )
+    columns = [names("k", [each.k for each in first.iterates])]
+    for i, unknown in enumerate(first.unknowns):
+        values = np.array([each.unknowns[i] for each in first.iterates])
+        turns = i < first.angles
+        columns.append(
+            number(unknown, "angle" if turns else "length", np.degrees(values) if turns else values)
+        )
+        columns[-1].place = (columns[-1].header,)
+    columns.append(number("residual", "length", [each.residual for each in first.iterates]))
+    rows = zip(first.unknowns, np.array(first.jacobian).T.tolist(), strict=True)
+    jacobian = [Column(unknown, "", row, place=str(j)) for j, (unknown, row) in enumerate(rows)]
+    about = [names("unknowns", [list(first.unknowns)]), names("at", ["the guess"])]
+    difference = max(
+        (each.difference for each in solutions if math.isfinite(each.difference)), default=math.nan
+    )
+    return {
+        "newton": Table(
+            columns, ("k",), "iterates[]", above="Newton-Raphson, all loops at once, from the guess"
+        ),
+        "jacobian": Table(jacobian, (), "jacobian.rows[]", above="at the guess, x and y of each loop"),
+        "of the jacobian": Table([], place="jacobian", documented=about),
+        "difference": Table(
+            [Column("newton_difference", "rad", [difference], place="newton_difference_rad")],
+            place="",
+            above="largest, to the assembly solved group by group",
+        ),
+    }
+
+
+# --- the worked solution ----------------------------------------------------------------------------------------------
 Document = dict[str, Any]
 CHACE = {
     1: "case 1, length and direction of one vector: W + (V + s·U)·e^{iφ} = 0",
@@ -29,16 +127,14 @@ CHACE = {
     3: "case 3, two lengths: W + s1·U1 + s2·U2 = 0",
     4: "case 4, two directions: W + V1·e^{iφ1} + V2·e^{iφ2} = 0",
 }
-PARTS = (
-    ("carried velocity", "carried_velocity", "m/s"),
-    ("relative velocity", "relative_velocity", "m/s"),
-    ("base", "base_acceleration", "m/s²"),
-    ("tangential", "tangential", "m/s²"),
-    ("normal", "normal", "m/s²"),
-    ("relative", "relative", "m/s²"),
-    ("Coriolis", "coriolis", "m/s²"),
-    ("sum", "acceleration", "m/s²"),
-)
+VELOCITIES = {
+    "base": "base_velocity",
+    "turning": "turning_velocity",
+    "relative": "relative_velocity",
+    "sum": "velocity",
+}
+ACCELERATIONS = {"base": "base_acceleration"} | {each: each for each in ("tangential", "normal", "relative")}
+ACCELERATIONS |= {"Coriolis": "coriolis", "sum": "acceleration"}
 KEYS = (
     ("base_velocity_m_s", "base_velocity"),
     ("turning_velocity_m_s", "turning_velocity"),
@@ -55,7 +151,6 @@ KEYS = (
 def way(analysis: Analysis, *, newton: bool = False) -> list[Topic]:
     """Return the topics of one mechanism, one assembly after the other."""
     result: list[Topic] = []
-    several = analysis.several
     for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
         topics = [*_loops(analysis, motion), *_groups(analysis, motion)]
         if newton and assembly is analysis.assemblies[0]:
@@ -63,7 +158,7 @@ def way(analysis: Analysis, *, newton: bool = False) -> list[Topic]:
         if any(np.any(rate) for rates in motion.poses.rates[:2] for rate in rates):
             topics.append(_parts(analysis, motion))
         for topic in topics:
-            if several:
+            if analysis.several:
                 topic.head = {"branch": assembly.number, **topic.head}
                 topic.title = f"Assembly {assembly.number}: {topic.heading}"
         result += topics
@@ -189,14 +284,10 @@ def _root_table(analysis: Analysis, m: Any, group: Group, name: str, at: list[Gr
         if instant is not None
         for k, root in enumerate(instant.roots, 1)
     ]
+    shown = analysis.inputs.whole.shown
     inputs = [
-        Column(
-            column.removesuffix(f"_{unit}"),
-            unit,
-            [float(analysis.inputs.whole.shown[i][j]) for i, *_ in rows],
-        )
-        for j, column in enumerate(analysis.input_columns)
-        for unit in (column.rpartition("_")[2],)
+        column(header, [float(shown[i][j]) for i, *_ in rows])
+        for j, header in enumerate(analysis.input_columns)
     ]
     unknowns = [_unknowns(m, group, root) for _, _, root, _ in rows]
     columns = [
@@ -204,10 +295,7 @@ def _root_table(analysis: Analysis, m: Any, group: Group, name: str, at: list[Gr
         Column("root", "", [str(k) for _, k, _, _ in rows]),
         Column(f"{name}_x", "m", [root.point.real for _, _, root, _ in rows]),
         Column(f"{name}_y", "m", [root.point.imag for _, _, root, _ in rows]),
-        *(
-            Column(key.rpartition("_")[0], key.rpartition("_")[2], [each[key] for each in unknowns])
-            for key in (unknowns[0] if unknowns else ())
-        ),
+        *(column(key, [each[key] for each in unknowns]) for key in (unknowns[0] if unknowns else ())),
         names("taken", ["yes" if taken else "no" for *_, taken in rows]),
     ]
     return Table(columns, ("root",))
@@ -228,17 +316,11 @@ def _newton(analysis: Analysis, motion: Motion) -> Topic:
     for i, row in enumerate(motion.inputs.tolist()):
         done = all_at_once(assembly, tuple(row), start=start)
         iterates = worked(assembly, tuple(row), done)
-        keys = [
-            *(f"{n}_deg" for n in done.unknowns[: done.angles]),
-            *(f"{n}_m" for n in done.unknowns[done.angles :]),
-        ]
+        keys = [f"{n}_{'deg' if k < done.angles else 'm'}" for k, n in enumerate(done.unknowns)]
         every = []
         for it in iterates:
-            shown = [
-                *np.degrees(it.unknowns[: done.angles]).tolist(),
-                *it.unknowns[done.angles :].tolist(),
-            ]
-            unknowns = dict(zip(keys, shown, strict=True))
+            turned, slid = np.split(it.unknowns, [done.angles])
+            unknowns = dict(zip(keys, [*np.degrees(turned).tolist(), *slid.tolist()], strict=True))
             every.append(
                 {
                     "k": it.k,
@@ -254,7 +336,7 @@ def _newton(analysis: Analysis, motion: Motion) -> Topic:
                     "k": str(it.k), **unknowns, "f_m": float(np.linalg.norm(it.residual)),
                 }
             )  # fmt: skip
-        difference = done.difference if np.isfinite(done.difference) else None
+        difference = finite(done.difference)
         entries.append(
             {**pose_head(analysis, i), "iterates": every, "closed": done.closed, "difference_rad": difference}
         )
@@ -263,21 +345,13 @@ def _newton(analysis: Analysis, motion: Motion) -> Topic:
         if done.closed:
             start = done.iterates[-1].unknowns
     headers = list(rows[0]) if rows else []
-    table = Table([_column(key, [each[key] for each in rows]) for key in headers], ("k",))
+    text.append(Table([column(key, [each[key] for each in rows]) for key in headers], ("k",)))
     differences = [e["difference_rad"] for e in entries if e["difference_rad"] is not None]
-    text.append(table)
     if differences:
         text.append(
             f"Largest difference to the assembly solved group by group: {figures(max(differences))} rad"
         )
     return Topic("newton", text, "Newton-Raphson (Nicoletti, lecture 7)", {"poses": entries})
-
-
-def _column(key: str, values: list[Any]) -> Column:
-    for unit in ("deg", "m"):
-        if key.endswith(f"_{unit}"):
-            return Column(key.removesuffix(f"_{unit}"), unit, values)
-    return Column(key, "", values)
 
 
 def _finite(values: list[float]) -> list[float | None]:
@@ -339,19 +413,13 @@ def _parts(analysis: Analysis, motion: Motion) -> Topic:
 
 
 def _parts_table(every: list[Parts], i: int, *, velocity: bool) -> Table:
-    unit = "m_s" if velocity else "m_s2"
-    wanted = [
-        ("base", "base_velocity"),
-        ("turning", "turning_velocity"),
-        ("relative", "relative_velocity"),
-        ("sum", "velocity"),
-    ]
-    if not velocity:
-        wanted = [(word, name) for word, name, of in PARTS if of == "m/s²"]
+    from virtualwork.textbook.combinations import sense
+
+    unit, wanted = ("m_s", VELOCITIES) if velocity else ("m_s2", ACCELERATIONS)
     rows = []
     for each in every:
         whole = abs(complex((each.velocity if velocity else each.acceleration)[i]))
-        for word, name in wanted:
+        for word, name in wanted.items():
             value = complex(getattr(each, name)[i])
             # rounding of nothing is shown as nothing
             x, y = (0.0 if abs(part) < 1e-12 * whole else part for part in (value.real, value.imag))
