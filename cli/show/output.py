@@ -63,7 +63,7 @@ def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
             f"'{options.output}' has no known suffix: expected {', '.join(FORMS)}", param_hint="-o"
         )
     if options.plot is not None and result.figure is None:
-        raise typer.BadParameter(f"'{options.plot}': there is no picture of this result", param_hint="--plot")
+        result.warnings.append("--plot: there is no picture of this result")
     if result.blocks is not None:
         from cli.show.files import stream
 
@@ -119,8 +119,7 @@ def _write(result: Result, options: ShowOptions, pages: Mapping[Path, Made]) -> 
     refuse_inputs(names)
     check_folders(names)
     files |= {**result.beside, **pages}
-    if options.plot is not None:
-        assert result.figure is not None
+    if options.plot is not None and result.figure is not None:
         from cli.show.picture import drawn
 
         files[options.plot] = partial(drawn, result.figure, options.plot.suffix.lower()[1:])
