@@ -145,6 +145,10 @@ class Study:
         """Whether the JSON document is formed."""
         return self.show.as_json
 
+    def resolved(self) -> Study:
+        """Return the study with the numbers that it has to find first."""
+        return self
+
     def case(self, analysis: Analysis) -> Case:
         """Return the case of one mechanism at its inputs.
 

@@ -166,14 +166,7 @@ class Cases:
             if options.set:
                 mechanism = assigned(mechanism, bare, options.set)
             varied, moved = grids(mechanism, options.at, options.over, options.cases, bare, warnings)
-            found, wanted = None, vars(options)
-            if wanted.get("find") is not None or wanted.get("so_that") is not None:
-                from cli.cases.find import with_root
-
-                mechanism, found = with_root(
-                    mechanism, request, bare, (varied, moved), options.find, options.so_that
-                )
-        return cls(request, mechanism, bare, varied, moved, warnings, about, found)
+        return cls(request, mechanism, bare, varied, moved, warnings, about)
 
     # --- the whole ------------------------------------------------------------------------------------------------
     @property

@@ -12,28 +12,20 @@ from cli.cases.inputs import of_one, with_numbers
 from cli.cases.poses import cells_of, column, keys_of, solved
 from cli.read import root_search
 from cli.read.options import bad
+from dalembert.dataclass import replace
 from dalembert.errors import DataError
 from dalembert.units import UNITS, from_si, written
 from virtualwork import MechanismError
 
 if TYPE_CHECKING:
-    from cli.cases.analysis import Request
-    from cli.cases.inputs import Grid, Varied
+    from cli.cases.cases import Cases
+    from cli.cases.inputs import Varied
     from virtualwork import Mechanism
     from virtualwork.quantities import Component
 
 
-def with_root(
-    m: Mechanism,
-    request: Request,
-    bare: Mapping[str, str],
-    grids: tuple[Grid | None, Grid | None],
-    find: str | None,
-    so_that: str | None,
-) -> tuple[Mechanism, root_search.Found]:
-    """Return the mechanism with the number that --find seeks, and that number: the nearest to the file's own.
-
-    `bare`: the file's units of bare numbers; `grids`: the variants, and the inputs that they go through.
+def with_root(cases: Cases, find: str | None, so_that: str | None) -> Cases:
+    """Return the cases with the number that --find seeks, the nearest to the file's own.
 
     Raises
     ------
@@ -42,18 +34,18 @@ def with_root(
     DataError
         No number in reach gives the value.
     """
-    varied, moved = grids
-    if varied is not None or (moved is not None and moved.n > 1):
+    if cases.varied is not None or cases.poses > 1:
         raise bad("--find", "expected one pose of one mechanism, such as --at 60deg")
+    m, bare = cases.mechanism, cases.bare
     pair = root_search.pair(find, so_that)
     assert pair is not None
     name, wanted = pair
     dimension = dimension_named(m, name, name, "--find")
     word, text = root_search.quantity_and_value(wanted, "B.vx=3m_s")
-    request = request._replace(only=[word], order=None)
+    request = cases.request._replace(only=[word], order=None)
 
     def analysis(mechanism: Mechanism) -> Analysis:
-        return Analysis(request, mechanism, of_one(mechanism, moved))
+        return Analysis(request, mechanism, of_one(mechanism, cases.moved))
 
     component = _quantity(analysis(m), word)
     target, unit = _target(component, text, bare)
@@ -70,7 +62,8 @@ def with_root(
     goal = root_search.Goal(word, unit, target, bool(component.link))
     root = root_search.search(name, sought, goal, value)
     sentence = f"{name} = {_in_unit_of_file(dimension, root, bare)} gives {word} = {root_search.amount(target, unit)}"
-    return with_numbers(m, [dimension.of], [root]), root_search.Found(sought.header, root, sentence)
+    found = root_search.Found(sought.header, root, sentence)
+    return replace(cases, mechanism=with_numbers(m, [dimension.of], [root]), found=found)
 
 
 def _quantity(nominal: Analysis, word: str) -> Component:

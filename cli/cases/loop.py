@@ -41,10 +41,11 @@ if TYPE_CHECKING:
 
 def result(study: Study, options: SimpleNamespace) -> Result:
     """Return the result of a study of all its cases, in the requested forms."""
-    cases, show = study.cases, study.show
     values = vars(options)
     page = values.get("page")
-    with naming(cases.request.file):
+    with naming(study.cases.request.file):
+        study = study.resolved()
+        cases, show = study.cases, study.show
         cases.nominal.check_names()
         loop = Loop(study, values.get("workers") or 1)
         warnings = [*cases.warnings, *study.warnings()]

@@ -179,7 +179,16 @@ def _sections(tables: Mapping[str, Callable[[], Table]]) -> list[Section]:
 
 @dataclass(frozen=True)
 class PoseStudy(Study):
-    """Solve the poses of every case."""
+    """Solve the poses of every case.
+
+    Attributes
+    ----------
+    find, so_that : str, optional
+        The dimension to find, and the value that a quantity has then.
+    """
+
+    find: str | None = None
+    so_that: str | None = None
 
     kind: ClassVar[type[PoseCase]]
     title = "poses"
@@ -195,6 +204,14 @@ class PoseStudy(Study):
     def extra_in_json(self) -> bool:
         """Whether the JSON document of each variant has more than its poses."""
         return False
+
+    def resolved(self) -> PoseStudy:
+        """Return the study with the number that --find seeks."""
+        if self.find is None and self.so_that is None:
+            return self
+        from cli.cases.find import with_root
+
+        return replace(self, cases=with_root(self.cases, self.find, self.so_that))
 
     def case(self, analysis: Analysis) -> PoseCase:
         """Return the poses of one mechanism."""

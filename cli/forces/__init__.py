@@ -44,6 +44,8 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     study = Forces(
         Cases.of(options, forces=True),
         show,
+        find=options.find,
+        so_that=options.so_that,
         flywheel=options.flywheel,
         counterweights=weights,
         states=options.states,

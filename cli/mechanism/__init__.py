@@ -50,4 +50,5 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     from cli.cases.loop import result
     from cli.mechanism.solution import Poses
 
-    return result(Poses(Cases.of(options), show, newton=options.newton), options)
+    study = Poses(Cases.of(options), show, find=options.find, so_that=options.so_that, newton=options.newton)
+    return result(study, options)
