@@ -110,6 +110,8 @@ def _write(result: Result, options: ShowOptions, pages: Mapping[Path, Made]) -> 
     from cli.show.files import check_folders, refuse_inputs, write_all
 
     output = options.output
+    if options.digits and options.form != ".json":
+        result = _with_further_cut(result)
     files: dict[Path, Made] = {}
     if output is not None and options.holds_one:
         for name in result.companions:
@@ -322,6 +324,15 @@ def _with_digits_that_hold(result: Result) -> Result:
         warnings=[*result.warnings, *_unknown(unknown)],
         screen=None if screen is None else lambda: digits_that_hold(screen())[0],
     )
+
+
+def _with_further_cut(result: Result) -> Result:
+    """Cut the tables below the first, for files that are not JSON, which keeps every digit."""
+    from dalembert.results.digits import digits_that_hold
+
+    first, *others = result.tables.items()
+    cut = {name: lambda of=of: digits_that_hold(of())[0] for name, of in others}
+    return replace(result, tables={**dict([first]), **cut})
 
 
 _taken: list[list[Result]] = []

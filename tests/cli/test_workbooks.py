@@ -15,6 +15,7 @@ from dalembert.tables.old_workbooks import looks
 from tests.conftest import Dalembert
 
 HERE = Path(__file__).parent / "workbooks"
+PRESS = str(Path(__file__).parents[2] / "cli/examples/crank-press/press.toml")
 PLANE = ("--plane", "A:20mm")
 PLAIN = "mass_g,radius_mm,angle_deg\n90.5,30,60\n60,50.25,210\n"
 ROWS = (("mass [g]", "radius (mm)", "Angle, °"), (90.5, 30, 60), (60, 50.25, 210))
@@ -264,3 +265,17 @@ def test_a_hidden_row_of_an_old_workbook_is_named(dalembert: Dalembert, plain: s
     done = dalembert("balance", "m.xls", *PLANE)
     assert done.stdout == plain
     assert done.stderr == "warning: m.xls: sheet 'Massen': the row 3 is hidden and takes part\n"
+
+
+def test_digits_of_further_sheets_are_cut(dalembert: Dalembert, tmp_path: Path) -> None:
+    """The sheet of the cycle too has the right digits alone with --digits; it had all."""
+    sheets = []
+    for options in ((), ("--digits",)):
+        path = tmp_path / f"{len(options)}.xlsx"
+        done = dalembert("forces", PRESS, "--over", "0deg:360deg:1deg", *options, "-o", str(path))
+        assert done.returncode == 0, done.stderr
+        rows = list(openpyxl.load_workbook(path)["cycle"].iter_rows(values_only=True))
+        sheets.append(dict(zip(*rows, strict=True)))
+    whole, cut = sheets
+    assert cut == pytest.approx(whole, rel=1e-9)
+    assert len(repr(cut["peak_power_W"])) < len(repr(whole["peak_power_W"]))
