@@ -46,7 +46,7 @@ def draw(bodies: Sequence[FreeBody], i: int, figure: FigureBase | None = None) -
         ends = [f.at[i] + share * f.force[i] * per_newton for f in body.forces for share in (0, 1)]
         every = np.concatenate([here, [z for z in ends if np.isfinite(z)]])
         spans.append((every.real.min(), every.real.max(), every.imag.min(), every.imag.max()))
-    window = 1.25 * max(max(b - a, d - c) for a, b, c, d in spans)
+    window = 1.25 * (max(max(b - a, d - c) for a, b, c, d in spans) or widest)
     labels = []
     for axes, body, (a, b, c, d) in zip(panels, bodies, spans, strict=False):
         labels.append((axes, _panel(axes, body, i, per_newton, largest)))
