@@ -136,16 +136,19 @@ def parquet(blocks: Iterable[Table]) -> Iterator[bytes]:
 
     with TemporaryFile() as stream:
         writer = None
-        for table in blocks:
-            if writer is None:
-                kinds = [(column.header, _kind(column)) for column in table.columns]
-                writer = ParquetWriter(stream, pyarrow.schema(kinds))
-            arrays = [
-                _array(column, of) for column, of in zip(table.columns, writer.schema.types, strict=True)
-            ]
-            writer.write_table(pyarrow.Table.from_arrays(arrays, schema=writer.schema))
-        if writer is not None:
-            writer.close()
+        try:
+            for table in blocks:
+                if writer is None:
+                    kinds = [(column.header, _kind(column)) for column in table.columns]
+                    writer = ParquetWriter(stream, pyarrow.schema(kinds))
+                arrays = [
+                    _array(column, of) for column, of in zip(table.columns, writer.schema.types, strict=True)
+                ]
+                writer.write_table(pyarrow.Table.from_arrays(arrays, schema=writer.schema))
+        finally:
+            # where it is interrupted too: a writer that outlives its file complains of it on the terminal
+            if writer is not None:
+                writer.close()
         yield from _chunks(stream)
 
 
