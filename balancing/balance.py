@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from balancing.checked_data import OUT_OF_RANGE, checked, is_in_range, limits_of, require_size
 from balancing.dependence import DependentPlanes, condition_number
 from balancing.limited import DOUBTFUL, Doubtful, limited_least_squares, smallest_maximum
 from balancing.phase import angle_of
 from balancing.qr import smallest_squares
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import numbers, record, table
-from dalembert.arithmetic.shapes import as_numbers, common_shape, spread_to
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,13 +34,6 @@ if TYPE_CHECKING:
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-
-LARGEST = 1e140
-"""The squares of larger numbers, and of the reciprocals of smaller ones than 1/LARGEST, overflow."""
-OUT_OF_RANGE = (
-    f"influence, initial and their quotients must be zero or between {1 / LARGEST:.0e} and {LARGEST:.0e} in size: "
-    "choose other units"
-)
 
 
 @record
@@ -240,7 +233,7 @@ class Balance:
         return Problem(*data, self.corrections, self.weights, floats)
 
     def _found(self, problem: Problem, ridge: Doubled | None = None) -> tuple[Vectors | None, str]:
-        if not _in_range(self.influence, self.initial):
+        if not is_in_range(self.influence, self.initial):
             return None, "the numbers are too large or too small for a second run in 32 digits"
         if self._free:
             from balancing.rounding import least_squares_again
@@ -330,10 +323,10 @@ def least_squares(
             raise ValueError("ridge does not go with limits: the limits damp already")
         if alpha.ndim != 2 or v.ndim != 1:
             raise ValueError("limits are for one rotor at a time: expected influence (s, p), initial (s,)")
-        _require_size(alpha, v)
+        require_size(alpha, v)
         limit, ceiling = (
-            _limits("max_mass", max_mass, alpha.shape[1]),
-            _limits("max_residual", max_residual, len(v)),
+            limits_of("max_mass", max_mass, alpha.shape[1]),
+            limits_of("max_residual", max_residual, len(v)),
         )
         corrections, bound, gap = limited_least_squares(alpha, v, root, limit, ceiling)
         capped, held = _given(limit), _given(ceiling)
@@ -399,10 +392,10 @@ def minimax(
         raise ValueError(
             f"one rotor at a time: expected influence (s, p), initial (s,), found {alpha.shape}, {v.shape}"
         )
-    _require_size(alpha, v)
+    require_size(alpha, v)
     w = None if weights is None else np.asarray(weights, dtype=float)
     a, b = (alpha, v) if w is None else (alpha * w[:, None], v * w)
-    limit = _limits("max_mass", max_mass, alpha.shape[1])
+    limit = limits_of("max_mass", max_mass, alpha.shape[1])
     # sensors that no plane moves only set a floor
     moved = np.abs(a).max(axis=1) > 0
     floor = float(np.abs(b[~moved]).max(initial=0.0))
@@ -418,40 +411,6 @@ def minimax(
     return _warned(Balance(alpha, v, corrections, w, bound, gap, True, max_mass=_given(limit)))
 
 
-def checked(
-    influence: ArrayLike, initial: ArrayLike, weights: ArrayLike | None
-) -> tuple[Complex, Complex, Real | None]:
-    """Return α, V and the square roots of the weights, or say what is wrong with them."""
-    alpha, v = as_numbers("influence", influence, complex), as_numbers("initial", initial, complex)
-    if alpha.ndim < 2 or v.ndim < 1 or alpha.shape[-2] != v.shape[-1] or 0 in alpha.shape[-2:]:
-        raise ValueError(f"shapes do not fit: influence {alpha.shape}, initial {v.shape}")
-    common_shape(influence=alpha.shape[:-1], initial=v.shape)
-    if not (np.isfinite(alpha).all() and np.isfinite(v).all()):
-        raise ValueError("influence and initial must be finite")
-    if weights is None:
-        return alpha, v, None
-    w = as_numbers("weights", weights)
-    common_shape(weights=w.shape, influence=alpha.shape[:-1], initial=v.shape)
-    if not ((w >= 0) & (w < np.inf)).all() or not (w > 0).any():
-        raise ValueError("weights must not be negative, and not all zero")
-    return alpha, v, np.sqrt(w)
-
-
-def _in_range(alpha: Complex, v: Complex) -> bool:
-    """Whether the squares of the numbers and of their quotients are numbers too."""
-    coefficient, vibration = np.abs(alpha).max(axis=-2), np.abs(v).max(axis=-1)[..., None]
-    with np.errstate(all="ignore"):
-        quotient = np.where(coefficient > 0, vibration / coefficient, 0.0)
-    sizes = np.concatenate([x.ravel() for x in (coefficient, vibration, quotient)])
-    sizes = sizes[sizes > 0]
-    return bool(((sizes >= 1 / LARGEST) & (sizes <= LARGEST)).all())
-
-
-def _require_size(alpha: Complex, v: Complex) -> None:
-    if not _in_range(alpha, v):
-        raise ValueError(OUT_OF_RANGE)
-
-
 def _warned(fix: Balance) -> Balance:
     if fix.gap > DOUBTFUL:
         warnings.warn(fix.status, Doubtful, stacklevel=3)
@@ -460,13 +419,6 @@ def _warned(fix: Balance) -> Balance:
 
 def _within(z: Complex, limit: Real | None) -> bool:
     return limit is None or bool((np.abs(z) < limit * (1 - 1e-9)).all())
-
-
-def _limits(name: str, limits: ArrayLike | None, count: int) -> Real:
-    limit = spread_to(name, np.inf if limits is None else limits, (count,))
-    if not (limit > 0).all():
-        raise ValueError(f"{name} must be positive")
-    return limit
 
 
 def _given(limit: Real) -> Real | None:

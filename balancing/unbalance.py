@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.balance import checked, least_squares
+from balancing.balance import least_squares
+from balancing.checked_data import checked
 from balancing.dependence import adjoint, columns_scaled, condition_number
 
 Complex = NDArray[np.complex128]

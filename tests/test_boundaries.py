@@ -52,6 +52,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("limited", "loads", "log_again", "rounding"),
         ("influence", "modal", "propagation", "qr", "second_run"),
         (
+            "checked_data",
             "cone_problem",
             "dependence",
             "flywheel",

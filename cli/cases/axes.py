@@ -303,15 +303,13 @@ def history_axis(m: Mechanism) -> Axis:
         else:
             raise DataError("[[input]] law: the tables of several inputs must have the same times")
     # loaded where a file has a table over time
-    from decimal import Decimal
+    from dalembert.arithmetic.splines import sums
 
-    known = m.decimals
-    exact = [
-        [Decimal(x) + Decimal(known.rest(name.dimension, x) if known else 0.0) for x in q[:, name.j].tolist()]
-        for name in names
-    ]
-    times = [Decimal(t) + Decimal(known.rest("time", t) if known else 0.0) for t in time.tolist()]
-    speed, acceleration = rates_over_time("[input] law", times, exact)
+    def exact(values: list[float], dimension: str) -> list[Decimal]:
+        return sums(values, [m.decimals.rest(dimension, x) if m.decimals else 0.0 for x in values])
+
+    columns = [exact(q[:, name.j].tolist(), name.dimension) for name in names]
+    speed, acceleration = rates_over_time("[input] law", exact(time.tolist(), "time"), columns)
     shown = np.array([[name.shown(v) for name, v in zip(names, row, strict=True)] for row in q])
     order = [*names, *(name.rate(1) for name in names), *(name.rate(2) for name in names)]
     si = np.concatenate([q, speed, acceleration], axis=1)

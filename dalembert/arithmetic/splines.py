@@ -37,6 +37,16 @@ def decimals(numbers: Iterable[str], factor: Factor = (1, 1)) -> Decimals:
         return [Decimal(number) * unit for number in numbers]
 
 
+def sums(floats: Iterable[float], rests: Iterable[float]) -> Decimals:
+    """Return floats and what they lack, together to 40 digits.
+
+    >>> sums([0.1], [-5.551115123125783e-18])[0].normalize(Context(prec=30))
+    Decimal('0.1')
+    """
+    with localcontext(Context(prec=DIGITS)):
+        return [Decimal(high) + Decimal(low) for high, low in zip(floats, rests, strict=True)]
+
+
 def periodic(x: Sequence[Decimal], y: Sequence[Decimal]) -> Decimals:
     """Return the second derivatives of the periodic spline at its rows.
 

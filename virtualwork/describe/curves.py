@@ -197,12 +197,9 @@ def curve(
     if not all(math.hypot(at, abs(value)) <= LARGEST for at, value in pairs):
         raise wrong(where, name, "finite numbers in every row")
     pairs.name = str(name)
-    known = [each for each in rows[0] if each in COLUMNS]
-    for row in rows:
-        for each in known:
-            if row[each]:
-                dimension, unit, _ = COLUMNS[each]
-                entry.file.units.decimals.note(dimension, _si(row, each), f"{row[each]} {unit}", (1, 1))
+    for each in rows[0].keys() & COLUMNS.keys():
+        texts = [row[each] for row in rows if row[each]]
+        entry.file.units.decimals.note_column(*COLUMNS[each], texts)
     return pairs, column
 
 

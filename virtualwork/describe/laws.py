@@ -283,18 +283,14 @@ def splined(
         What a number of a piece becomes; by default a float.
     """
     # loaded here: few mechanisms have a cam, and fewer a table of its lift
-    from decimal import Context, Decimal, localcontext
+    from decimal import Context, localcontext
 
-    from dalembert.arithmetic.splines import DIGITS, periodic
+    from dalembert.arithmetic.splines import DIGITS, periodic, sums
 
+    angles, lifts = zip(*table, strict=True)
+    at, y = map(sums, (angles, lifts), zip(*off, strict=True) if off else [[0.0] * len(table)] * 2)
+    y[-1] = y[0]
     with localcontext(Context(prec=DIGITS)):
-        rows = [(Decimal(at), Decimal(lift)) for at, lift in table]
-        if off:
-            rows = [
-                (at + Decimal(a), lift + Decimal(b)) for (at, lift), (a, b) in zip(rows, off, strict=True)
-            ]
-        at, y = [at for at, _ in rows], [lift for _, lift in rows]
-        y[-1] = y[0]
         bends = periodic(at, y)
         first, result = at[0], []
         for i, (bend, following) in enumerate(pairwise([*bends, bends[0]])):

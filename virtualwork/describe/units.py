@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -14,6 +14,10 @@ from virtualwork.describe import DescriptionError
 def wrong(where: str, value: Any, expected: str) -> DescriptionError:
     """The complaint that something else was expected."""
     return DescriptionError(f"{where}: found {value!r}, expected {expected}")
+
+
+# the dimension of a table's column, its unit, the factor that makes it SI, and what is written in its cells
+Written = tuple[str, str, float, Sequence[str]]
 
 
 class Decimals:
@@ -30,20 +34,33 @@ class Decimals:
         self, written: Mapping[tuple[str, float], tuple[Any, Factor]] = MappingProxyType({})
     ) -> None:
         self._written = dict(written)
+        # of tables, which are long, on request alone
+        self._columns: list[Written] = []
+        self._rests: dict[tuple[str, float], float] = {}
 
     def note(self, dimension: str, number: float, value: Any, factor: Factor) -> None:
         """Note what a number is written as: a value of TOML, bare in the unit with this factor."""
         self._written[dimension, number] = value, factor
 
+    def note_column(self, dimension: str, unit: str, factor: float, texts: Sequence[str]) -> None:
+        """Note what the numbers of a table's column are written as: their floats are those times the factor."""
+        self._columns.append((dimension, unit, factor, texts))
+
     def and_also(self, read: Iterable[tuple[str, float, Any, Factor]]) -> Decimals:
         """These and further numbers, each as `note` takes it."""
         more = Decimals(self._written)
+        more._columns, more._rests = self._columns[:], self._rests
         for each in read:
             more.note(*each)
         return more
 
     def rest(self, dimension: str, number: float) -> float:
         """Return the exact number less its float; 0 if the file does not have it."""
+        if self._columns:
+            # on the first request: a second run alone asks
+            self._rests, self._columns = self._rests | _rests(self._columns), []
+        if (dimension, number) in self._rests:
+            return self._rests[dimension, number]
         if (dimension, number) not in self._written:
             return 0.0
         value, factor = self._written[dimension, number]
@@ -52,6 +69,21 @@ class Decimals:
             return 0.0
         exact = exactly(*parts)
         return float(exact - type(exact)(number))
+
+
+def _rests(columns: Sequence[Written]) -> dict[tuple[str, float], float]:
+    """What the numbers of tables are exactly, less their floats."""
+    from decimal import Decimal
+
+    from dalembert.arithmetic.splines import decimals
+
+    rests: dict[tuple[str, float], float] = {}
+    for dimension, text, factor, texts in columns:
+        unit = composed(text)
+        assert unit is not None
+        for number, exact in zip(map(float, texts), decimals(texts, unit[0]), strict=True):
+            rests[dimension, number * factor] = float(exact - Decimal(number * factor))
+    return rests
 
 
 class Units:

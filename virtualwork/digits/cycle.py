@@ -12,7 +12,7 @@ import numpy as np
 from dalembert.arithmetic.doubled_arrays import DoubledArray
 from dalembert.arithmetic.engines.doubled import TURN
 from dalembert.arithmetic.guard import guarded
-from dalembert.arithmetic.splines import DIGITS, periodic, rates
+from dalembert.arithmetic.splines import DIGITS, periodic, rates, sums
 from virtualwork.digits.forces import ForceErrors
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.forces import Effort
@@ -110,7 +110,8 @@ class Spline:
 
     def __init__(self, place: DoubledArray, values: DoubledArray, is_periodic: bool = False) -> None:
         self.places = place.high
-        self.place, self.values = x, y = _decimals(place), _decimals(values)
+        x, y = (sums(of.high.tolist(), of.low.tolist()) for of in (place, values))
+        self.place, self.values = x, y
         with localcontext(Context(prec=DIGITS)):
             # its second derivatives
             if is_periodic:
@@ -144,8 +145,3 @@ class Spline:
                 )
                 total = self.integrals[i] + self._within(i, Decimal(at))
             return DoubledArray(float(total), float(total - Decimal(float(total))))
-
-
-def _decimals(x: DoubledArray) -> list[Decimal]:
-    with localcontext(Context(prec=DIGITS)):
-        return [Decimal(a) + Decimal(b) for a, b in zip(x.high.tolist(), x.low.tolist(), strict=True)]
