@@ -1,4 +1,4 @@
-"""Stress of motion under forces: random linkages let go from rest, against every body's own coordinates."""
+"""Stress of motion under forces: random linkages released from rest, against every body's own coordinates."""
 
 from __future__ import annotations
 
@@ -103,5 +103,5 @@ def _let_go(rng: np.random.Generator) -> Pairs:
 
 
 CAMPAIGNS = {
-    "linkages let go": ("from rest anywhere, against bodies with joint forces as multipliers", _let_go)
+    "released linkages": ("from rest anywhere, against bodies with joint forces as multipliers", _let_go)
 }

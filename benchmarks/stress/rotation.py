@@ -268,7 +268,7 @@ CAMPAIGNS: dict[str, tuple[str, Callable[[np.random.Generator], Pairs]]] = {
     "bodies in oblique axes": ("tensors with products of inertia, moments that are nearly equal", _oblique),
     "heavy tops": ("random tops, either side up, scales 1e-12 … 1e12", _any_top),
     "tops near sleeping": ("upright or hanging to 1e-1 … 1e-9 rad, near the threshold", _near_sleeping),
-    "tops near a cusp": ("let go with a push of 1e-1 … 1e-15", _near_cusp),
+    "tops near a cusp": ("released with a push of 1e-1 … 1e-15", _near_cusp),
     "tops that pass the vertical": ("missing it by 1e-1 … 1e-15", _near_vertical),
     "free rotation, kept quantities": ("near symmetric, near the separatrix, near the axes", _there_and_back),
     "free rotation in two spans": ("random bodies, phases to 60 rad", _back_again),

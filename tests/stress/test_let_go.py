@@ -13,5 +13,5 @@ from benchmarks.stress.campaigns import replay
     "seed", [36, 122, 126, 129, 0, *range(1, 36), *range(37, 122), *range(123, 126), *range(130, 240)]
 )
 def test_linkage_let_go(seed: int) -> None:
-    for error, estimate in replay("linkages let go", seed):
+    for error, estimate in replay("released linkages", seed):
         assert error <= estimate
