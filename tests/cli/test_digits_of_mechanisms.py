@@ -274,10 +274,13 @@ def test_potential_and_period_of_a_pendulum(dalembert: Dalembert, tmp_path: Path
     assert dalembert(*call).stdout == dalembert(*call, "--digits").stdout
 
 
+@pytest.mark.parametrize("sign", [1, -1, 0])
 @pytest.mark.parametrize("way", ["--cases", "law"])
-def test_rates_of_a_table_over_time_have_all_digits(dalembert: Dalembert, tmp_path: Path, way: str) -> None:
+def test_rates_of_a_table_over_time_have_all_digits(
+    dalembert: Dalembert, tmp_path: Path, way: str, sign: int
+) -> None:
     """A cubic is its own spline: of θ = 1000 t³ degrees every 0.01 s speed and acceleration are right to the last digit."""
-    table = "".join(f"{k / 100},{k**3 / 1000}\n" for k in range(60))
+    table = "".join(f"{k / 100},{sign * k**3 / 1000}\n" for k in range(60))
     (tmp_path / "law.csv").write_text(f"time_s,{'crank' if way == '--cases' else 'angle'}_deg\n{table}")
     law = 'law = "law.csv"\n' if way == "law" else ""
     text = (
@@ -294,5 +297,5 @@ def test_rates_of_a_table_over_time_have_all_digits(dalembert: Dalembert, tmp_pa
             ("omega_rad_s", Fraction(3 * k**2, 10)),
             ("alpha_rad_s2", Fraction(6 * k * 10)),
         ):
-            right = float(exact * PI / 180)
+            right = float(sign * exact * PI / 180)
             assert float(row[f"crank_{name}"]) == pytest.approx(right, rel=4e-16, abs=1e-25)

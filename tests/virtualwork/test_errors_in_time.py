@@ -64,16 +64,17 @@ def test_the_pull_of_a_pendulum_at_one_time(accuracy: float) -> None:
             assert abs(answers[name][-1] - float(value)) <= errors[name][-1], (name, end)
 
 
+@pytest.mark.parametrize("side", [1, -1, 0])
 @pytest.mark.parametrize(
     ("damping", "end", "n"), [(100.0, 7.0, 40), (107.5616723126892, 5.358242977268, 8), (400.0, 27.0, 40)]
 )
-def test_a_strongly_damped_block_comes_to_rest(damping: float, end: float, n: int) -> None:
+def test_a_strongly_damped_block_comes_to_rest(damping: float, end: float, n: int, side: int) -> None:
     """Long after it has come within rounding of rest it has a place: the pull of its spring has no digit there."""
     from mpmath import exp, mp, mpf, re, sqrt
 
     stiffness = 875.1716174912565
     slide = Guide("P", "block", turned=0.0)
-    spring = Spring((("block", 0j), ("ground", -1 + 0j)), stiffness, 1.0, damping)
+    spring = Spring((("block", 0j), ("ground", -(side or 1) + 0j)), stiffness, 1.0, damping)
     m = Mechanism(
         {"O": 0j},
         {"block": Link({"P": 0j}, mass=1)},
@@ -81,9 +82,9 @@ def test_a_strongly_damped_block_comes_to_rest(damping: float, end: float, n: in
         inputs=Input(slider="P", value=0.0),
         springs=[spring],
     )
-    run = m.simulate(np.linspace(0, end, n), angle=0.5, accuracy=1.45e-10)
+    run = m.simulate(np.linspace(0, end, n), angle=0.5 * side, accuracy=1.45e-10)
     with mp.workdps(40):
-        c, k, x = mpf(damping), mpf(stiffness), mpf(1) / 2
+        c, k, x = mpf(damping), mpf(stiffness), mpf(side) / 2
         fast = (-c - sqrt(c * c - 4 * k)) / 2
         slow = k / fast
         part = -x * slow / (fast - slow)

@@ -10,6 +10,7 @@ from typing import Any
 
 import mpmath as mp
 import numpy as np
+import pytest
 
 from virtualwork import Mechanism
 
@@ -117,3 +118,12 @@ def test_a_cam_with_a_table_of_its_lift() -> None:
                 if off:
                     ratios.append(error / off)
     assert np.median(ratios) < 2
+
+
+def test_a_cam_whose_table_has_one_lift_dwells() -> None:
+    """A round cam: the follower stands at the base circle and the lift, and never moves."""
+    m = mechanism(CAM, "angle_deg,lift_mm\n0,5\n120,5\n240,5\n360,5\n")
+    slide = m.motion(np.linspace(0, 7, 8), speed=1.0, acceleration=0.0).slide("V")
+    assert slide.position.tolist() == pytest.approx([0.03] * 8, rel=1e-15)
+    assert not slide.speed.any()
+    assert not slide.acceleration.any()
