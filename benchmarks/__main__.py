@@ -8,13 +8,14 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from importlib import import_module
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from benchmarks.speed import DOMAINS
-from cli.read import options
+from cli.read.options import quantity
+from cli.show.commands import ShowOptions
 from cli.show.output import command
 from cli.show.result import Result
 from dalembert.errors import DataError, one_line
@@ -33,8 +34,7 @@ app = typer.Typer(
     help="Measure the program; docs/quality/benchmarks.md holds its tables.",
 )
 
-Docs = Annotated[Path | None, typer.Option(dir_okay=False)]
-DOCS = """docs FILE.md  Write tables into FILE.md, between its marks <!-- bench:DOMAIN --> (stress: <!-- bench:stress -->) and \
+DOCS = """docs FILE(.md)  Write tables into FILE.md, between its marks <!-- bench:DOMAIN --> (stress: <!-- bench:stress -->) and \
 <!-- end -->, and pictures into the folder pictures beside it."""
 
 
@@ -49,9 +49,7 @@ Options:
   {DOCS}
 """
 )
-def speed(
-    name: list[str] | None = None, quick: bool = False, peers: bool = False, docs: Docs = None
-) -> Result:
+def speed(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Measure run time against error, for each method the program offers.
 
     Times are CPU times per item, also as multiples of a calibration loop measured in the same run (one element of
@@ -60,12 +58,12 @@ def speed(
     """
     from benchmarks import page
 
-    chosen = _known(name, DOMAINS)
-    if docs is not None:
-        page.check(docs, chosen)
-    measurements = list(_measure(chosen, quick, peers))
-    if docs is not None:
-        page.write(docs, measurements)
+    chosen = _known(options.name, DOMAINS)
+    if options.docs is not None:
+        page.check(options.docs, chosen)
+    measurements = list(_measure(chosen, options.quick, options.peers))
+    if options.docs is not None:
+        page.write(options.docs, measurements)
     columns: dict[str, list[Any]] = {
         "domain": [m.domain for m in measurements],
         "work": [m.work for m in measurements],
@@ -128,33 +126,28 @@ def _measure(domains: list[str], quick: bool, peers: bool) -> Iterator[Measureme
 Arguments:
   name [NAME]...  Campaigns, by the names of the table.
 Options:
-  given --time TIME  Run them for this long, such as 10min.
-  seed  The seed of the first case; without --time this one case of each.
+  time TIME  Run them for this long, such as 10min.
+  seed N(0-)=0  The seed of the first case; without --time this one case of each.
   {DOCS}
 """
 )
-def stress(
-    name: list[str] | None = None,
-    given: str | None = None,
-    seed: Annotated[int, typer.Option(min=0)] = 0,
-    docs: Docs = None,
-) -> Result:
+def stress(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Run random campaigns at singular places; status 1 if errors lie beyond the program's own estimate too often."""
     from benchmarks import page
     from benchmarks.stress.campaigns import Tally, campaigns, run
 
-    chosen = _known(name, campaigns())
-    seconds = options.quantity("--time", given, "time", positive=True)
+    chosen, docs = _known(options.name, campaigns()), options.docs
+    seconds = quantity("--time", options.time, "time", positive=True)
     if docs is not None:
         page.check(docs, ["stress"])
     tallies: list[Tally] = []
     for campaign in chosen:
         with typer.progressbar(length=1000, label=campaign, file=sys.stderr) as bar:
             if seconds is None:  # one case
-                tallies.append(next(run(campaign, 0.0, seed)))
+                tallies.append(next(run(campaign, 0.0, options.seed)))
                 continue
             share, start = seconds / len(chosen), time.monotonic()
-            for tally in run(campaign, share, seed):  # noqa: B007 the last tally is the campaign's
+            for tally in run(campaign, share, options.seed):  # noqa: B007 the last tally is the campaign's
                 bar.update(int(1000 * min(1.0, (time.monotonic() - start) / share)) - bar.pos)
             tallies.append(tally)
     if docs is not None:
@@ -180,14 +173,10 @@ def stress(
 Arguments:
   inputs N  How many damaged inputs.
 Options:
-  seed  The seed of the first: `1 --seed S` is one again.
-  workers  Processes.
+  seed N(0-)=0  The seed of the first: `1 --seed S` is one again.
+  workers N=1  Processes.
 """)
-def fuzz(
-    inputs: Annotated[int, typer.Argument(min=1)],
-    seed: Annotated[int, typer.Option(min=0)] = 0,
-    workers: Annotated[int, typer.Option(min=1)] = 1,
-) -> Result:
+def fuzz(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Run damaged inputs through the commands; status 1 if one is not handled as it should be."""
     from shlex import join
 
@@ -196,10 +185,10 @@ def fuzz(
     tallies: dict[str, Tally] = {}
     # an interrupted run shows what it has done
     with (
-        typer.progressbar(length=inputs, label="damaged inputs", file=sys.stderr) as bar,
+        typer.progressbar(length=options.inputs, label="damaged inputs", file=sys.stderr) as bar,
         suppress(KeyboardInterrupt),
     ):
-        for case, outcome in run(seed, inputs, workers):
+        for case, outcome in run(options.seed, options.inputs, options.workers):
             tallies.setdefault(outcome.command, Tally(outcome.command)).add(case, outcome)
             if outcome.fault is not None:
                 line = f"seed {case}: dalembert {join(outcome.arguments)}: {outcome.fault}"
@@ -221,7 +210,7 @@ def fuzz(
     total = sum(t.inputs for t in found)
     return Result(
         document=lambda: {
-            "first_seed": seed,
+            "first_seed": options.seed,
             "inputs": total,
             "commands": _records(columns),
             "faults": [
@@ -231,7 +220,9 @@ def fuzz(
             ],
         },
         tables={"commands": lambda: _table(columns, "command")},
-        afterword=lambda: f"{total} inputs from seed {seed}, {sum(len(t.faults) for t in found)} faults",
+        afterword=lambda: (
+            f"{total} inputs from seed {options.seed}, {sum(len(t.faults) for t in found)} faults"
+        ),
         warnings=[] if LIMITED else ["this system limits no process's memory: it was not limited"],
         failed=lambda: any(t.faults for t in found),
     )

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 from cli.read.options import bad
 from cli.show.output import command
@@ -15,6 +14,7 @@ from dalembert.errors import DataError
 
 if TYPE_CHECKING:
     from balancing.synchronous import OncePerTurn
+    from cli.show.commands import ShowOptions
     from cli.show.result import Result
     from dalembert.results.columns import Table
     from dalembert.results.way import Topic
@@ -24,16 +24,13 @@ OPTIONS = """
 Arguments:
   recording FILE  CSV of a recording: t_s, mark (or tacho), A_um …; - is standard input.
 What:
-  pulses N  Number of pulses of the mark in one turn.
+  pulses N(1-10000)=1  Number of pulses of the mark in one turn.
 """
 MARKS = ("mark", "tacho", "keyphasor", "pulse", "trigger")
 
 
 @command(OPTIONS, without=("plot",))
-def run(
-    recording: str,
-    pulses: Annotated[int, typer.Option(min=1, max=10000)] = 1,
-) -> Result:
+def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Compute amplitude and phase of a recorded vibration, once per turn.
 
     FILE has the columns t_*, mark (once per turn; tacho, keyphasor, pulse and trigger are other names) and a column of
@@ -41,7 +38,7 @@ def run(
     """
     from cli.show.result import Result
 
-    read = read_recording(recording, pulses)
+    read = read_recording(options.recording, options.pulses)
 
     return Result(
         way=partial(way, read),

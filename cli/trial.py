@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
-import typer
-
-from cli.read import options
+from cli.read.options import needed
 from cli.show.output import command
 from dalembert.results.way import Topic, figures
 from dalembert.units import G0
 
 if TYPE_CHECKING:
+    from cli.show.commands import ShowOptions
     from cli.show.result import Result
     from dalembert.arithmetic.doubled import Doubled
     from dalembert.results.columns import Table
@@ -20,29 +20,24 @@ if TYPE_CHECKING:
 RULE = "centrifugal force a tenth of the static load of each plane: m r ω² = 0.1 (M/planes) g"
 OPTIONS = """
 What:
-  rotor_mass MASS  Mass of the rotor, such as 120kg.
-  speed SPEED  Speed of the run, such as 3000rpm.
-  radius LENGTH  Radius of the trial mass, such as 200mm.
-  planes N  Number of correction planes.
+  rotor_mass MASS  Mass of the rotor, such as 120kg. [required]
+  speed SPEED  Speed of the run, such as 3000rpm. [required]
+  radius LENGTH  Radius of the trial mass, such as 200mm. [required]
+  planes N=1  Number of correction planes.
 """
 
 
 @command(OPTIONS, without=("column", "plot"))
-def run(
-    rotor_mass: str,
-    speed: str,
-    radius: str,
-    planes: Annotated[int, typer.Option(min=1)] = 1,
-) -> Result:
+def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Suggest a trial mass for the first run: large enough to change the vibration, small enough to be safe.
 
     Its centrifugal force is a tenth of the static load of each plane.
     """
     from cli.show.result import Result
 
-    mass = options.needed("--rotor-mass", rotor_mass, "mass", positive=True)
-    omega = options.needed("--speed", speed, "speed", positive=True)
-    arm = options.needed("--radius", radius, "length", positive=True)
+    mass = needed("--rotor-mass", options.rotor_mass, "mass", positive=True)
+    omega = needed("--speed", options.speed, "speed", positive=True)
+    arm = needed("--radius", options.radius, "length", positive=True)
 
     def suggestion() -> Table:
         from balancing import trial_unbalance
@@ -53,16 +48,20 @@ def run(
             from cli.read.exact import quantity, written
             from dalembert.arithmetic.doubled import Doubled
 
-            numbers = quantity(rotor_mass, "mass"), quantity(speed, "speed"), float(planes)
+            numbers = (
+                quantity(options.rotor_mass, "mass"),
+                quantity(options.speed, "speed"),
+                float(options.planes),
+            )
             result: Doubled = load_rule(*numbers, *(Doubled.of(written(x)) for x in (0.1, G0)))
             return result
 
         def mass_exact() -> Doubled:
             from cli.read.exact import quantity
 
-            return exact() / quantity(radius, "length")
+            return exact() / quantity(options.radius, "length")
 
-        unbalance = float(trial_unbalance(mass, omega, planes))
+        unbalance = float(trial_unbalance(mass, omega, options.planes))
         return Table(
             [
                 number("mass", "mass", [unbalance / arm], "g", exact=mass_exact),
@@ -72,13 +71,13 @@ def run(
             place="trial",
             above="trial mass for each plane",
             below=f"rule: {RULE}",
-            documented=[names("planes", [planes]), names("rule", [RULE])],
+            documented=[names("planes", [options.planes]), names("rule", [RULE])],
         )
 
     def steps() -> list[Topic]:
         from balancing import trial_unbalance
 
-        return way(mass, omega, arm, planes, float(trial_unbalance(mass, omega, planes)))
+        return way(mass, omega, arm, options.planes, float(trial_unbalance(mass, omega, options.planes)))
 
     return Result(
         tables={"trial": suggestion}, way=steps, about={"title": "Trial mass"}, method=f"Rule: {RULE}."

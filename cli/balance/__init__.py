@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
-import typer
-
-from cli.read import options
-from cli.show.commands import ShowOptions, suffix_among
+from cli.read.options import (
+    bad,
+    needed,
+    number_or_quantity,
+    processes,
+    quantity,
+    refuse,
+    two_bearings,
+    with_unit,
+)
 from cli.show.output import command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.read.rotor_options import Planes
+    from cli.show.commands import ShowOptions
     from cli.show.result import Result
     from dalembert.results.way import Topic
 
@@ -24,10 +31,10 @@ OPTIONS = """
 Arguments:
   table TABLE  CSV of eccentric masses; - is standard input.
 What:
-  plane NAME[:Z]:RADIUS  Correction plane, such as A:0mm:20mm; repeatable. One plane: static balancing.
+  plane NAME[:Z]:RADIUS...  Correction plane, such as A:0mm:20mm; repeatable. One plane: static balancing.
   planes FILE.csv  Table of correction planes, with the columns plane, z_*, radius_*, rotor.
-  mass NAME:MASS  Mass of a plane's correction, such as A:7kg. With --plane A:0mm:? the radius for it is found.
-  gravity G  Acceleration of gravity for weights, m/s².
+  mass NAME:MASS...  Mass of a plane's correction, such as A:7kg. With --plane A:0mm:? the radius for it is found.
+  gravity G=9.80665  Acceleration of gravity for weights, m/s².
 How:
   remove  Give the material to remove (default: to add).
   round_mass MASS  Round the corrections to this step, such as 0.1g.
@@ -41,38 +48,16 @@ Tolerance:
   permissible UNBALANCE  Permissible residual unbalance in place of a grade, such as 30g_mm.
   bearings Z1:Z2  Bearing planes, where the tolerance holds (default: the correction planes). With --speed: show the bearing forces.
 Output:
-  page FILE.html  Write a page that computes the corrections while you edit the masses.
+  page FILE(.html)  Write a page that computes the corrections while you edit the masses.
 Further options (docs/commands.md describes them):
-  mode_count K  With --modes: use the first K modes (default: all).
+  mode_count N  With --modes: use the first N modes (default: all).
   rigid  With --modes: balance force and couple too, which takes two planes more.
-  workers N  Number of processes for many rotors.
+  workers N=1  Number of processes for many rotors.
 """
 
 
 @command(OPTIONS)
-def run(
-    table: str,
-    plane: list[str] | None = None,
-    planes: str | None = None,
-    mass: list[str] | None = None,
-    gravity: str = "9.80665",
-    remove: bool = False,
-    round_mass: str | None = None,
-    round_angle: str | None = None,
-    center_z: str | None = None,
-    grade: str | None = None,
-    speed: str | None = None,
-    rotor_mass: str | None = None,
-    permissible: str | None = None,
-    bearings: str | None = None,
-    modes: str | None = None,
-    mode_count: Annotated[int | None, typer.Option(min=1)] = None,
-    rigid: bool = False,
-    workers: Annotated[int, typer.Option(min=1)] = 1,
-    page: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None,
-    *,
-    show: ShowOptions,
-) -> Result:
+def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Balance rotors from a table of known eccentric masses, in one, two or more planes.
 
     TABLE has the columns mass_* and radius_* (or weight_* and radius_*, or unbalance_*), angle_* and z_*, and
@@ -85,45 +70,53 @@ def run(
     from cli.read.rotor_options import from_options, from_table, tolerance_of
     from cli.show.result import Result
 
-    if (plane is None) == (planes is None):
-        raise options.bad("--plane", "expected --plane (once or more) or --planes FILE.csv")
-    g = options.number_or_quantity("--gravity", gravity, "acceleration")
+    if (options.plane is None) == (options.planes is None):
+        raise bad("--plane", "expected --plane (once or more) or --planes FILE.csv")
+    g = number_or_quantity("--gravity", options.gravity, "acceleration")
     if not 1e-9 < g < 1e9:
-        raise options.bad("--gravity", f"'{gravity}': expected a positive number of m/s²")
-    if modes is None:
-        options.refuse("needs --modes", mode_count=mode_count, rigid=rigid)
+        raise bad("--gravity", f"'{options.gravity}': expected a positive number of m/s²")
+    if options.modes is None:
+        refuse("needs --modes", mode_count=options.mode_count, rigid=options.rigid)
     else:
-        options.refuse("shows rigid balancing: it does not go with --modes", mass=mass)
+        refuse("shows rigid balancing: it does not go with --modes", mass=options.mass)
     shapes = None
-    if modes is not None:
+    if options.modes is not None:
         from cli.balance.modes import read_modes
 
-        shapes = read_modes(modes, mode_count, rigid)
-    chosen = from_table(planes) if planes is not None else from_options(plane or [], sought=True)
+        shapes = read_modes(options.modes, options.mode_count, options.rigid)
+    chosen = (
+        from_table(options.planes)
+        if options.planes is not None
+        else from_options(options.plane or [], sought=True)
+    )
     carried = None
-    if bearings is not None and speed is not None and shapes is None:
+    if options.bearings is not None and options.speed is not None and shapes is None:
         carried = Carried(
-            options.two_bearings("--bearings", bearings),
-            options.needed("--speed", speed, "speed", positive=True),
-            options.quantity("--rotor-mass", rotor_mass, "mass", positive=True),
+            two_bearings("--bearings", options.bearings),
+            needed("--speed", options.speed, "speed", positive=True),
+            quantity("--rotor-mass", options.rotor_mass, "mass", positive=True),
         )
-    only_forces = carried is not None and grade is None and permissible is None
+    only_forces = carried is not None and options.grade is None and options.permissible is None
     request = Request(
         gravity=g,
-        remove=remove,
-        mass_step=options.with_unit("--round-mass", round_mass, "mass", positive=True),
-        angle_step=options.with_unit("--round-angle", round_angle, "angle", positive=True),
-        center=options.quantity("--center-z", center_z, "length"),
-        tolerance=None if only_forces else tolerance_of(grade, speed, rotor_mass, permissible, bearings),
-        masses=_masses(mass or [], chosen),
+        remove=options.remove,
+        mass_step=with_unit("--round-mass", options.round_mass, "mass", positive=True),
+        angle_step=with_unit("--round-angle", options.round_angle, "angle", positive=True),
+        center=quantity("--center-z", options.center_z, "length"),
+        tolerance=None
+        if only_forces
+        else tolerance_of(
+            options.grade, options.speed, options.rotor_mass, options.permissible, options.bearings
+        ),
+        masses=_masses(options.mass or [], chosen),
         carried=carried,
         modes=shapes,
     )
     needs_z = chosen.several or carried is not None or shapes is not None
-    rotors = read_rotors(table, g, needs_z=needs_z)
+    rotors = read_rotors(options.table, g, needs_z=needs_z)
     if carried is not None and chosen.z is None:
-        raise options.bad("--bearings", "the forces need the place of the plane: --plane NAME:Z:RADIUS")
-    with options.processes(workers) as executor:
+        raise bad("--bearings", "the forces need the place of the plane: --plane NAME:Z:RADIUS")
+    with processes(options.workers) as executor:
         balancing = Balancing(rotors, chosen, request, executor)
 
     def figure() -> Figure:
@@ -143,8 +136,8 @@ def run(
 
     return Result(
         tables=tables(balancing),
-        beside={} if page is None else {page: sheet},
-        head={"correction": "remove" if remove else "add"},
+        beside={} if options.page is None else {options.page: sheet},
+        head={"correction": "remove" if options.remove else "add"},
         figure=figure,
         way=way,
         method=METHOD if shapes is None else MODAL,
@@ -160,13 +153,11 @@ def _masses(texts: list[str], planes: Planes) -> dict[str, float]:
         name, colon, amount = text.rpartition(":")
         if not colon or name.strip() not in planes.name:
             names = ", ".join(dict.fromkeys(planes.name))
-            raise options.bad(
-                "--mass", f"'{text}': expected NAME:MASS with one of the planes {names}, such as A:7kg"
-            )
+            raise bad("--mass", f"'{text}': expected NAME:MASS with one of the planes {names}, such as A:7kg")
         if name.strip() in masses:
-            raise options.bad("--mass", f"the mass of plane {name.strip()} is given twice")
-        masses[name.strip()] = options.needed("--mass", amount, "mass", positive=True)
+            raise bad("--mass", f"the mass of plane {name.strip()} is given twice")
+        masses[name.strip()] = needed("--mass", amount, "mass", positive=True)
     for name, radius in zip(planes.name, planes.radius.tolist(), strict=True):
         if radius != radius and name not in masses:
-            raise options.bad("--plane", f"the radius of plane {name} is ?: expected --mass {name}:MASS too")
+            raise bad("--plane", f"the radius of plane {name} is ?: expected --mass {name}:MASS too")
     return masses

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from functools import partial
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from cli.read import options
+from cli.read.options import bad, only, quantity, refuse, two_bearings, vector
 from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.body.moving import ShaftRequest
+    from cli.show.commands import ShowOptions
     from cli.show.result import Result
     from dalembert.results.way import Topic
 
@@ -36,7 +38,7 @@ Shaft:
   speed SPEED  Speed of the shaft, such as 1200rpm.
   speed_rate RATE  Angular acceleration of the shaft, such as 10rad_s2.
   gravity X,Y,Z  Gravity on the shaft, m/s², such as 0,-9.81,0.
-  correct NAME:Z:RADIUS  Correction plane of the shaft, such as A:0mm:20mm; repeatable.
+  correct NAME:Z:RADIUS...  Correction plane of the shaft, such as A:0mm:20mm; repeatable.
 Robot:
   check_inertias  Check the inertia tensors of a robot file (URDF, SDF, MJCF).
 Further options (docs/commands.md describes them):
@@ -45,26 +47,7 @@ Further options (docs/commands.md describes them):
 
 
 @command(OPTIONS)
-def run(
-    parts: str,
-    omega: str | None = None,
-    alpha: str | None = None,
-    frame_omega: str | None = None,
-    about: str | None = None,
-    fixed: str | None = None,
-    velocity: str | None = None,
-    acceleration: str | None = None,
-    find: str | None = None,
-    so_that: str | None = None,
-    only: str | None = None,
-    shaft: str | None = None,
-    axis: str | None = None,
-    speed: str | None = None,
-    speed_rate: str | None = None,
-    gravity: str | None = None,
-    correct: list[str] | None = None,
-    check_inertias: bool = False,
-) -> Result:
+def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Compute mass, centre of mass and inertia of a body from its parts, its angular momentum, and the forces and
     moments of its motion.
 
@@ -82,38 +65,48 @@ def run(
     from cli.show.result import Result, with_found
 
     request = Request(
-        omega=options.vector("--omega", omega, "speed"),
-        alpha=options.vector("--alpha", alpha, "angular acceleration"),
-        frame_omega=options.vector("--frame-omega", frame_omega, "speed"),
-        about=options.vector("--about", about, "length"),
-        fixed=options.vector("--fixed", fixed, "length"),
-        velocity=options.vector("--velocity", velocity, "velocity"),
-        acceleration=options.vector("--acceleration", acceleration, "acceleration"),
-        shaft=_shaft(shaft, axis, speed, speed_rate, gravity, correct),
+        omega=vector("--omega", options.omega, "speed"),
+        alpha=vector("--alpha", options.alpha, "angular acceleration"),
+        frame_omega=vector("--frame-omega", options.frame_omega, "speed"),
+        about=vector("--about", options.about, "length"),
+        fixed=vector("--fixed", options.fixed, "length"),
+        velocity=vector("--velocity", options.velocity, "velocity"),
+        acceleration=vector("--acceleration", options.acceleration, "acceleration"),
+        shaft=_shaft(options),
     )
-    if check_inertias:
-        others = request != Request() or find or so_that or only
-        if others or axis or gravity or speed or speed_rate or correct:
-            raise options.bad("--check-inertias", "goes with no option of a motion or a shaft")
-        return _inertias(parts)
-    of_center = {"velocity": velocity, "acceleration": acceleration}
-    if fixed is not None:
-        options.refuse(
-            "the motion of the centre of mass follows from --fixed: expected one of them", **of_center
-        )
-    if shaft is not None:
-        free = {"omega": omega, "alpha": alpha, "frame_omega": frame_omega, "fixed": fixed}
-        options.refuse("a shaft turns about its axis at --speed and --speed-rate", **free, **of_center)
-    sought, solution = pair(find, so_that), None
+    if options.check_inertias:
+        others = request != Request() or options.find or options.so_that or options.only
+        if (
+            others
+            or options.axis
+            or options.gravity
+            or options.speed
+            or options.speed_rate
+            or options.correct
+        ):
+            raise bad("--check-inertias", "goes with no option of a motion or a shaft")
+        return _inertias(options.parts)
+    of_center = {"velocity": options.velocity, "acceleration": options.acceleration}
+    if options.fixed is not None:
+        refuse("the motion of the centre of mass follows from --fixed: expected one of them", **of_center)
+    if options.shaft is not None:
+        free = {
+            "omega": options.omega,
+            "alpha": options.alpha,
+            "frame_omega": options.frame_omega,
+            "fixed": options.fixed,
+        }
+        refuse("a shaft turns about its axis at --speed and --speed-rate", **free, **of_center)
+    sought, solution = pair(options.find, options.so_that), None
     if sought is None:
-        bodies = [MovingBody(each, request) for each in read_bodies(parts)]
+        bodies = [MovingBody(each, request) for each in read_bodies(options.parts)]
     else:
         from cli.body.way import find as search
 
-        moving, solution = search(read_table(parts), parts, request, *sought)
+        moving, solution = search(read_table(options.parts), options.parts, request, *sought)
         bodies = [moving]
 
-    chosen = None if only is None else options.only(only, tables.names_of(bodies[0]))
+    chosen = None if options.only is None else only(options.only, tables.names_of(bodies[0]))
 
     def way() -> list[Topic]:
         from cli.body.way import way
@@ -128,7 +121,7 @@ def run(
         method=tables.METHOD,
         about={
             "title": "A shaft on two bearings"
-            if shaft is not None
+            if options.shaft is not None
             else "Mass properties and motion of a body"
         },
         warnings=tables.warnings(bodies),
@@ -154,36 +147,24 @@ def _inertias(file: str) -> Result:
     )
 
 
-def _shaft(
-    shaft: str | None,
-    axis: str | None,
-    speed: str | None,
-    speed_rate: str | None,
-    gravity: str | None,
-    correct: list[str] | None,
-) -> ShaftRequest | None:
+def _shaft(options: SimpleNamespace) -> ShaftRequest | None:
     from cli.body.moving import ShaftRequest
     from cli.read.rotor_options import from_options
 
-    if shaft is None:
-        of_shaft = {
-            "axis": axis,
-            "speed": speed,
-            "speed_rate": speed_rate,
-            "gravity": gravity,
-            "correct": correct,
-        }
-        options.refuse("this is for a shaft: expected --shaft Z1:Z2 too", **of_shaft)
+    if options.shaft is None:
+        names = ("axis", "speed", "speed_rate", "gravity", "correct")
+        of_shaft = {name: getattr(options, name) for name in names}
+        refuse("this is for a shaft: expected --shaft Z1:Z2 too", **of_shaft)
         return None
-    planes = from_options(correct, "--correct") if correct else None
+    planes = from_options(options.correct, "--correct") if options.correct else None
     if planes is not None and planes.z is None:
-        raise options.bad("--correct", "a correction plane of a shaft needs its place: NAME:Z:RADIUS")
+        raise bad("--correct", "a correction plane of a shaft needs its place: NAME:Z:RADIUS")
     return ShaftRequest(
-        axis=None if axis is None else _axis(axis),
-        bearings=options.two_bearings("--shaft", shaft),
-        speed=options.quantity("--speed", speed, "speed") or 0.0,
-        speed_rate=options.quantity("--speed-rate", speed_rate, "angular acceleration") or 0.0,
-        gravity=options.vector("--gravity", gravity, "acceleration") or (0.0, 0.0, 0.0),
+        axis=None if options.axis is None else _axis(options.axis),
+        bearings=two_bearings("--shaft", options.shaft),
+        speed=quantity("--speed", options.speed, "speed") or 0.0,
+        speed_rate=quantity("--speed-rate", options.speed_rate, "angular acceleration") or 0.0,
+        gravity=vector("--gravity", options.gravity, "acceleration") or (0.0, 0.0, 0.0),
         planes=planes,
     )
 
@@ -197,9 +178,9 @@ def _axis(text: str) -> tuple[float, float, float]:
         x, y, z = (size * (letter == each) + 0.0 for each in "xyz")
         return x, y, z
     if "," not in text:
-        raise options.bad("--axis", f"'{text}': expected x, y, z, -x, -y, -z or a vector such as 1,0,1")
-    vector = options.vector("--axis", text, "number")
-    assert vector is not None
-    if not any(vector):
-        raise options.bad("--axis", f"'{text}': expected a direction: all three numbers are 0")
-    return vector
+        raise bad("--axis", f"'{text}': expected x, y, z, -x, -y, -z or a vector such as 1,0,1")
+    direction = vector("--axis", text, "number")
+    assert direction is not None
+    if not any(direction):
+        raise bad("--axis", f"'{text}': expected a direction: all three numbers are 0")
+    return direction

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
-import typer
-
-from cli.read import options
+from cli.read.options import bad, needed
 from cli.show.output import command
 
 if TYPE_CHECKING:
+    from cli.show.commands import ShowOptions
     from cli.show.result import Result
 
 
@@ -20,23 +20,16 @@ Arguments:
   cylinders CYLINDERS  CSV with a row for each cylinder; - is standard input.
 What:
   speed SPEED  Speed of the crankshaft, such as 3000rpm.
-  order K  Highest order: the highest multiple of the speed that is computed.
+  order N(1-100)=8  Highest order: the highest multiple of the speed that is computed.
 Counterweights and balance shafts:
-  counterweight_share SHARE  Share of the reciprocating masses that counterweights balance, such as 0.5. They balance the rotating masses too.
-  plane NAME:Z:RADIUS  Plane of counterweights, such as A:0mm:60mm; repeatable (default: opposite each crank pin).
-  shaft ORDER:Z:with|against  Balance shaft at ORDER times the speed, with or against the crank, such as 2:150mm:against; repeatable.
+  counterweight_share NUMBER(0-1)  Share of the reciprocating masses that counterweights balance, such as 0.5. They balance the rotating masses too.
+  plane NAME:Z:RADIUS...  Plane of counterweights, such as A:0mm:60mm; repeatable (default: opposite each crank pin).
+  shaft ORDER:Z:with|against...  Balance shaft at ORDER times the speed, with or against the crank, such as 2:150mm:against; repeatable.
 """
 
 
 @command(OPTIONS)
-def run(
-    cylinders: str,
-    speed: str | None = None,
-    order: Annotated[int, typer.Option(min=1, max=100)] = 8,
-    counterweight_share: Annotated[float | None, typer.Option(min=0.0, max=1.0)] = None,
-    plane: list[str] | None = None,
-    shaft: list[str] | None = None,
-) -> Result:
+def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Compute the shaking forces and couples of an engine by exact orders, and the residuals after counterweights and
     balance shafts.
 
@@ -50,13 +43,19 @@ def run(
     from cli.read.rotor_options import from_options
     from cli.show.result import Result
 
-    if speed is None:
-        raise options.bad("--speed", "expected the speed of the crankshaft, such as --speed 3000rpm")
-    omega = options.needed("--speed", speed, "speed", positive=True)
-    planes = None if plane is None else from_options(plane)
-    read = read_cylinders(cylinders)
+    if options.speed is None:
+        raise bad("--speed", "expected the speed of the crankshaft, such as --speed 3000rpm")
+    omega = needed("--speed", options.speed, "speed", positive=True)
+    planes = None if options.plane is None else from_options(options.plane)
+    read = read_cylinders(options.cylinders)
     engine = Engine(
-        read, omega, order, counterweight_share, planes, read_shafts(shaft or [], order), read.pins
+        read,
+        omega,
+        options.order,
+        options.counterweight_share,
+        planes,
+        read_shafts(options.shaft or [], options.order),
+        read.pins,
     )
 
     return Result(

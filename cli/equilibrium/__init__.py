@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from cli.cases import CASES, FILE, WORKERS
-from cli.show.output import declared_command
+from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
@@ -16,7 +16,7 @@ EXAMPLE = "desk-lamp"
 OPTIONS = f"{FILE}{CASES}{WORKERS}"
 
 
-@declared_command(OPTIONS, SimpleNamespace)
+@command(OPTIONS)
 def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Find the positions in which a mechanism rests under its loads without effort, and their stability.
 

@@ -6,6 +6,7 @@ import tomllib
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from cli.show.output import reported
@@ -13,6 +14,7 @@ from dalembert.errors import DataError
 from dalembert.hints import nearest
 
 if TYPE_CHECKING:
+    from cli.show.commands import ShowOptions
     from cli.show.result import Result, Section
 
 EXAMPLES = Path(__file__).parent
@@ -33,10 +35,11 @@ Arguments:
 
 
 @reported(OPTIONS)
-def run(name: str | None = None) -> Result:
+def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """List the worked examples; with NAME, write its input files into the current folder and show its command."""
     from cli.show.result import Result, Sheet
 
+    name = options.name
     listed = names() if name is None else [name]
     if name is not None and name not in names():
         raise DataError(f"no example '{name}': expected one of {', '.join(names())}{nearest(name, names())}")

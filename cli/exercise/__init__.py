@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from cli.read import options
+from cli.read.options import bad
 from cli.show.commands import with_options
 from cli.show.output import show
 from dalembert.errors import DataError
@@ -22,24 +23,30 @@ OPTIONS = """
 Arguments:
   file FILE.toml  The exercise.
 What:
-  students NUMBER|ROSTER.csv  Number of students, or their table with a column student.
-  seed N  Random seed of the drawn values.
+  students NUMBER|ROSTER.csv=1  Number of students, or their table with a column student.
+  seed N(0-)=1  Random seed of the drawn values.
   folder -o --output FOLDER  Folder to write: sheets, answers.csv, key.csv, solutions.html, moodle.xml.
   page  Put a page that computes on each sheet. It is for practice: it shows the answers.
-  system --for prairielearn|numbas  Write the questions for this system too; repeatable.
+  system --for prairielearn|numbas...  Write the questions for this system too; repeatable.
 """
 SYSTEMS = ("prairielearn", "numbas")
 MOST = 2000
 
 
-def _run(
-    file: str,
-    students: str = "1",
-    seed: int = 1,
-    folder: str | None = None,
-    page: bool = False,
-    system: list[str] | None = None,
-) -> Result:
+def _show(result: Result, show_options: ShowOptions, call: object) -> None:
+    """Say what was written; with --json the document with the key, with --expect its check."""
+    import typer
+
+    if show_options.json or show_options.expect is not None:
+        show(result, show_options, {})
+        return
+    for line in result.warnings:
+        typer.echo(f"warning: {line}", err=True)
+    typer.echo(result.notes(), nl=False)
+
+
+@with_options(OPTIONS, ("json", "expect", "rtol"), _show)
+def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Make the variants of an exercise for a class: a sheet for each student, a table for the answers, key and solutions.
 
     FILE.toml has the command that solves the exercise, a title, and a text with drawn values, {links.crank.B.x} or
@@ -57,23 +64,23 @@ def _run(
     from cli.show.output import options_of
     from cli.show.result import Result
 
-    if folder is None:
-        raise options.bad("-o", "expected -o FOLDER, where the sheets go")
-    for name in system or ():
+    if options.folder is None:
+        raise bad("-o", "expected -o FOLDER, where the sheets go")
+    for name in options.system or ():
         if name not in SYSTEMS:
-            raise options.bad("--for", f"'{name}': expected {' or '.join(SYSTEMS)}")
-    exercise = read_exercise(file)
-    if page and "--page" not in options_of(exercise.command[0]):
-        raise options.bad("--page", f"found an exercise on {exercise.command[0]}, which has no page")
+            raise bad("--for", f"'{name}': expected {' or '.join(SYSTEMS)}")
+    exercise = read_exercise(options.file)
+    if options.page and "--page" not in options_of(exercise.command[0]):
+        raise bad("--page", f"found an exercise on {exercise.command[0]}, which has no page")
     warnings = list(exercise.warnings)
-    people = _students(students)
+    people = _students(options.students)
     with workshop(exercise) as shop:
-        drawn = variants(shop, len(people), seed, warnings)
+        drawn = variants(shop, len(people), options.seed, warnings)
         filled(shop, drawn[0].drawn)
         drawings = {id(variant): "" for variant in drawn}
         for variant in drawn:
             drawings[id(variant)] = drawings[id(variant)] or figure(variant)
-        frames = {id(variant): moving(variant) for variant in dict.fromkeys(drawn)} if page else {}
+        frames = {id(variant): moving(variant) for variant in dict.fromkeys(drawn)} if options.page else {}
         files = {
             f"sheet-{student.file}.html": sheet_page(
                 exercise, student, variant, drawings[id(variant)], frames.get(id(variant), "")
@@ -85,15 +92,20 @@ def _run(
         files["solutions.html"] = solutions(exercise, people, drawn, drawings)
         slips = {id(variant): candidates(variant) for variant in dict.fromkeys(drawn)}
         files["moodle.xml"] = questions.moodle(exercise, people, drawn, drawings, slips)
-        for name in system or ():
+        for name in options.system or ():
             files |= questions.SYSTEMS[name](exercise, drawn, drawings, slips)
-        put(Path(folder), files)
+        put(Path(options.folder), files)
         made = len({id(variant) for variant in drawn})
         result = Result(
             tables=tables(exercise, people, drawn),
-            head={"title": exercise.title, "folder": folder, "variants": made, "files": sorted(files)},
+            head={
+                "title": exercise.title,
+                "folder": options.folder,
+                "variants": made,
+                "files": sorted(files),
+            },
             notes=lambda: (
-                f"wrote {len(files)} files to {folder}: {made} variant{'s' * (made != 1)} for {len(people)} student{'s' * (len(people) != 1)}\n"
+                f"wrote {len(files)} files to {options.folder}: {made} variant{'s' * (made != 1)} for {len(people)} student{'s' * (len(people) != 1)}\n"
             ),
             warnings=warnings,
         )
@@ -116,7 +128,7 @@ def _students(text: str) -> list[Student]:
 
     if is_number(text):
         if not text.strip().isdecimal() or not 1 <= int(text) <= MOST:
-            raise options.bad("--students", f"'{text}': expected a whole number from 1 to {MOST}, or a file")
+            raise bad("--students", f"'{text}': expected a whole number from 1 to {MOST}, or a file")
         return [Student(str(k), {}) for k in range(1, int(text) + 1)]
     table = read(text, texts=None)
     named = {name.strip().lower(): name for name in table.texts}
@@ -144,18 +156,3 @@ def _students(text: str) -> list[Student]:
                 f"{text}: column student: found '{twin}' and '{person.name}', expected names that make two file names"
             )
     return people
-
-
-def _show(result: Result, show_options: ShowOptions, call: object) -> None:
-    """Say what was written; with --json the document with the key, with --expect its check."""
-    import typer
-
-    if show_options.json or show_options.expect is not None:
-        show(result, show_options, {})
-        return
-    for line in result.warnings:
-        typer.echo(f"warning: {line}", err=True)
-    typer.echo(result.notes(), nl=False)
-
-
-run = with_options(_run, OPTIONS, ("json", "expect", "rtol"), _show)

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
-import typer
-
-from cli.read import options
-from cli.show.commands import suffix_among
+from cli.read.options import (
+    bad,
+    mass_limits,
+    places,
+    processes,
+    quantity,
+    reading_error,
+    refuse,
+    weights,
+    with_unit,
+)
 from cli.show.output import command
 
 if TYPE_CHECKING:
@@ -18,6 +26,7 @@ if TYPE_CHECKING:
 
     from cli.field.field_balancing import FieldBalancing
     from cli.field.tables import Tables
+    from cli.show.commands import ShowOptions
     from cli.show.result import Result, Sheet
     from dalembert.results.columns import Column
     from dalembert.results.way import Topic
@@ -34,29 +43,29 @@ OPTIONS = """
 Arguments:
   runs RUNS  CSV of runs; - is standard input.
 What:
-  influence FILE.csv  Stored influence coefficients, in place of trial runs.
+  influence FILE.csv...  Stored influence coefficients, in place of trial runs.
   runout FILE.csv  Run-out vectors to subtract: sensor, amplitude_*, phase_deg.
   phase_lag  The phase of the instrument lags.
 How:
-  objective  Least sum of squares, or least maximum, of the residual vibration.
-  max_mass [PLANE=]MASS  Largest mass of each correction: 5g, or of one plane: A=5g.
+  objective least-squares|minimax=least-squares  Least sum of squares, or least maximum, of the residual vibration.
+  max_mass [PLANE=]MASS...  Largest mass of each correction: 5g, or of one plane: A=5g.
   max_residual AMPLITUDE  Largest residual vibration, such as 76um.
   from_here  Give the trim: what to add to the rotor with the masses of its last run.
   reading_error 2%,2deg  Standard deviations of amplitude and phase.
   grade GRADE  Balance quality grade: G6.3 (ISO 21940-11), API or MIL.
-  blades N  Split the corrections onto N evenly spaced blades.
-  save_influence FILE.csv  Store the influence coefficients.
+  blades N(1-10000)  Split the corrections onto N evenly spaced blades.
+  save_influence FILE(.csv)  Store the influence coefficients.
 Output:
-  page FILE.html  Write the machine's sheet, a page that computes: type readings, and the corrections follow.
+  page FILE(.html)  Write the machine's sheet, a page that computes: type readings, and the corrections follow.
 Further options (docs/commands.md describes them):
   fit  Fit all runs together, initial vibration and coefficients.
   predict MASS@ANGLE,…  Predict a run: 10kg@-90deg or A=1g@0deg.
   columns FILE.toml  File of other headers: lines such as mass_g = "Masse".
-  rotation  Direction of rotation seen against +z: phases lead in that direction, mass angles are ccw.
-  exclude RUN  Leave a run out of the fit; repeatable.
-  method  Influence coefficients, or amplitudes only (an initial run, then three trial runs in each plane).
-  monte_carlo N  Compute the uncertainties from N drawn sets of readings, 40 or more.
-  ridge NUMBER  Damp the corrections of nearly dependent planes, such as 0.1.
+  rotation ccw|cw  Direction of rotation seen against +z: phases lead in that direction, mass angles are ccw.
+  exclude RUN...  Leave a run out of the fit; repeatable.
+  method influence|four-run=influence  Influence coefficients, or amplitudes only (an initial run, then three trial runs in each plane).
+  monte_carlo N(0-100000)=0  Compute the uncertainties from N drawn sets of readings, 40 or more.
+  ridge NUMBER(0-)=0  Damp the corrections of nearly dependent planes, such as 0.1.
   robust  Compute a robust fit in addition (Huber): outliers have little influence on it.
   speed SPEED  Highest service speed, such as 3000rpm, for --grade.
   rotor_mass MASS  Mass of the rotor, such as 120kg, for --grade.
@@ -64,115 +73,83 @@ Further options (docs/commands.md describes them):
   radius LENGTH  Radius of the trial masses, for the tolerance.
   positions ANGLES  Split the corrections onto these places: 0deg,30deg,60deg.
   stock MASSES  With --blades or --positions: weights in stock, such as 1g,2g,5g; uses the fewest within 1 % of a correction, at most three.
-  first ANGLE  Angle of the first blade.
-  numbering  Blade numbers increase with the angles or against them.
+  first ANGLE=0deg  Angle of the first blade.
+  numbering with|against=with  Blade numbers increase with the angles or against them.
   suggest  Suggest the most informative next run within --max-mass.
-  view  static-couple: show the corrections of two planes as a static part and a couple.
-  zone_class  Show zone A to D of ISO 10816-3 for velocities: group 1 (above 300 kW) or 2 (15 to 300 kW), rigid or flexible support.
-  workers N  Processes that solve many machines.
+  view static-couple  Show the corrections of two planes as a static part and a couple.
+  zone_class 1-rigid|1-flexible|2-rigid|2-flexible  Show zone A to D of ISO 10816-3 for velocities: group 1 (above 300 kW) or 2 (15 to 300 kW), rigid or flexible support.
+  workers N=1  Processes that solve many machines.
 """
 
 
 @command(OPTIONS)
-def run(
-    runs: Annotated[str | None, typer.Argument(show_default=False)] = None,
-    influence: list[str] | None = None,
-    save_influence: Annotated[Path | None, typer.Option(callback=suffix_among(".csv"))] = None,
-    objective: Literal["least-squares", "minimax"] = "least-squares",
-    max_mass: list[str] | None = None,
-    max_residual: str | None = None,
-    from_here: bool = False,
-    runout: str | None = None,
-    reading_error: str | None = None,
-    monte_carlo: Annotated[int, typer.Option(min=0, max=100000)] = 0,
-    method: Literal["influence", "four-run"] = "influence",
-    ridge: Annotated[float, typer.Option(min=0.0)] = 0.0,
-    phase_lag: bool = False,
-    rotation: Literal["ccw", "cw"] | None = None,
-    grade: str | None = None,
-    speed: str | None = None,
-    rotor_mass: str | None = None,
-    permissible: str | None = None,
-    radius: str | None = None,
-    blades: Annotated[int | None, typer.Option(min=1, max=options.PLACES)] = None,
-    positions: str | None = None,
-    stock: str | None = None,
-    first: str = "0deg",
-    numbering: Literal["with", "against"] = "with",
-    fit: bool = False,
-    exclude: list[str] | None = None,
-    predict: str | None = None,
-    suggest: bool = False,
-    robust: bool = False,
-    view: Literal["static-couple"] | None = None,
-    zone_class: Literal["1-rigid", "1-flexible", "2-rigid", "2-flexible"] | None = None,
-    columns: str | None = None,
-    workers: Annotated[int, typer.Option(min=1)] = 1,
-    page: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None,
-) -> Result:
+def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Balance rotors from measured vibration and trial masses (influence coefficients).
 
     RUNS has a row for each run and sensor: run, sensor, amplitude_*, phase_deg, trial_plane, trial_mass_* (or
     trial_unbalance_*), trial_angle_deg, trial_kept (yes: it stays on). In the initial run the last four are empty. Phase
     and mass angle are counted in one sense. docs/field-balancing.md has more.
     """
-    if columns is not None:
+    if options.columns is not None:
         from dalembert.tables.headers import rename_from
 
-        rename_from(columns)
-    four_run = method == "four-run"
-    needs_phase: dict[str, object] = {"influence": influence, "runout": runout}
-    needs_phase |= {"reading_error": reading_error, "phase_lag": phase_lag, "rotation": rotation}
-    limited = objective == "minimax" or max_mass or max_residual is not None
-    options.refuse("expected a finite number", ridge=not ridge < float("inf"))
-    options.refuse("goes with the least-squares objective without limits", ridge=ridge and limited)
+        rename_from(options.columns)
+    four_run = options.method == "four-run"
+    needs_phase: dict[str, object] = {"influence": options.influence, "runout": options.runout}
+    needs_phase |= {
+        "reading_error": options.reading_error,
+        "phase_lag": options.phase_lag,
+        "rotation": options.rotation,
+    }
+    limited = options.objective == "minimax" or options.max_mass or options.max_residual is not None
+    refuse("expected a finite number", ridge=not options.ridge < float("inf"))
+    refuse("goes with the least-squares objective without limits", ridge=options.ridge and limited)
     if four_run:
-        options.refuse("has no meaning with --method four-run, which uses no phase", **needs_phase)
+        refuse("has no meaning with --method four-run, which uses no phase", **needs_phase)
     no_trials = "has no meaning with --influence: there are no trial masses"
-    options.refuse(no_trials, from_here=from_here and influence)
-    options.refuse("needs --reading-error", monte_carlo=monte_carlo and reading_error is None)
-    if 0 < monte_carlo < FEWEST_DRAWS:
-        spread = 100 / (2 * monte_carlo) ** 0.5
-        few = f"{monte_carlo} drawn set{'s' * (monte_carlo > 1)} of readings give a standard deviation to {spread:.0f} % only"
-        raise options.bad("--monte-carlo", f"{few}: expected {FEWEST_DRAWS} at least")
-    places, in_stock = options.places(positions, blades, first, numbering), options.weights("--stock", stock)
-    options.refuse("expected --positions or --blades for the weights to go to", stock=in_stock and not places)
-    options.refuse("the sheet that --page writes has no stock of weights", stock=in_stock and page)
-    arm = options.quantity("--radius", radius, "length", positive=True)
-    if runs is None:
-        raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
+    refuse(no_trials, from_here=options.from_here and options.influence)
+    refuse("needs --reading-error", monte_carlo=options.monte_carlo and options.reading_error is None)
+    if 0 < options.monte_carlo < FEWEST_DRAWS:
+        spread = 100 / (2 * options.monte_carlo) ** 0.5
+        few = f"{options.monte_carlo} drawn set{'s' * (options.monte_carlo > 1)} of readings give a standard deviation to {spread:.0f} % only"
+        raise bad("--monte-carlo", f"{few}: expected {FEWEST_DRAWS} at least")
+    chosen = places(options.positions, options.blades, options.first, options.numbering)
+    in_stock = weights("--stock", options.stock)
+    refuse("expected --positions or --blades for the weights to go to", stock=in_stock and not chosen)
+    refuse("the sheet that --page writes has no stock of weights", stock=in_stock and options.page)
+    arm = quantity("--radius", options.radius, "length", positive=True)
 
     from cli.field.field_balancing import FieldBalancing
     from cli.field.fit import Request, measured_groups
     from cli.read.rotor_options import tolerance_of
 
     request = Request(
-        reading_error=options.reading_error(reading_error),
-        tolerance=tolerance_of(grade, speed, rotor_mass, permissible, None),
-        max_mass=options.mass_limits(max_mass or []),
-        max_residual=options.with_unit("--max-residual", max_residual, "amplitude", positive=True),
-        objective=objective,
-        from_here=from_here,
-        monte_carlo=monte_carlo,
+        reading_error=reading_error(options.reading_error),
+        tolerance=tolerance_of(options.grade, options.speed, options.rotor_mass, options.permissible, None),
+        max_mass=mass_limits(options.max_mass or []),
+        max_residual=with_unit("--max-residual", options.max_residual, "amplitude", positive=True),
+        objective=options.objective,
+        from_here=options.from_here,
+        monte_carlo=options.monte_carlo,
         four_run=four_run,
-        ridge=ridge,
+        ridge=options.ridge,
         radius=arm,
-        phase_lag=phase_lag,
-        rotation=rotation,
-        places=places,
+        phase_lag=options.phase_lag,
+        rotation=options.rotation,
+        places=chosen,
         stock=in_stock,
-        fit=fit,
-        exclude=exclude or (),
-        predict=predict,
-        suggest=suggest,
-        robust=robust,
-        view=view,
-        zone_class=zone_class,
+        fit=options.fit,
+        exclude=options.exclude or (),
+        predict=options.predict,
+        suggest=options.suggest,
+        robust=options.robust,
+        view=options.view,
+        zone_class=options.zone_class,
     )
-    measured, stored = measured_groups(runs, request, influence or (), runout)
-    with options.processes(workers) as executor:
+    measured, stored = measured_groups(options.runs, request, options.influence or (), options.runout)
+    with processes(options.workers) as executor:
         balancing = FieldBalancing(measured, request, stored, executor)
-    return _result(balancing, save_influence, page)
+    return _result(balancing, options.save_influence, options.page)
 
 
 def _tables(b: FieldBalancing, warnings: list[str]) -> Tables:

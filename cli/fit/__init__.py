@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from cli.cases import CASES, FILE, WORKERS
-from cli.show.output import declared_command
+from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
@@ -24,11 +24,11 @@ Target and free dimensions:
 Search:
   starts N  Number of starting points (default 256).
   best N  Number of distinct solutions (default 1).
-  seed N=0  Random seed of the starting points.
+  seed N(0-)=0  Random seed of the starting points.
 """
 
 
-@declared_command(OPTIONS, SimpleNamespace)
+@command(OPTIONS)
 def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Fit dimensions of a mechanism to a target: a path, a function of the input, a guided body, an effort.
 

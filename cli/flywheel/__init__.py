@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from functools import partial
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from cli.read import options
+from cli.read.options import bad, needed
 from cli.show.output import command
 from dalembert.quantities import parse_number
 
 if TYPE_CHECKING:
+    from cli.show.commands import ShowOptions
     from cli.show.result import Result
 
 
@@ -31,7 +33,7 @@ def coefficient(text: str) -> float:
         value = 0.0
     value = value / 100 if text.strip().endswith("%") else value
     if not 1e-60 < value <= 2:
-        raise options.bad(
+        raise bad(
             "--fluctuation",
             f"'{text}': expected a number above 0 and at most 2, where the shaft comes to rest, such as 0.02 or 2%",
         )
@@ -39,7 +41,7 @@ def coefficient(text: str) -> float:
 
 
 @command(OPTIONS)
-def run(table: str, speed: str | None = None, fluctuation: str | None = None) -> Result:
+def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Find the flywheel that keeps the speed of a shaft within a fluctuation, from a table of its torque.
 
     TABLE has the columns angle_* and torque_*. The star is a unit: angle_deg, torque_N_m. The torque is linear between rows; two rows at one angle are a
@@ -49,13 +51,11 @@ def run(table: str, speed: str | None = None, fluctuation: str | None = None) ->
     from cli.flywheel.turns import METHOD, draw, read_torque, tables, warnings, way
     from cli.show.result import Result
 
-    if speed is None or fluctuation is None:
-        missing = "--speed" if speed is None else "--fluctuation"
-        raise options.bad(
-            missing, "expected --speed and --fluctuation, such as --speed 600rpm --fluctuation 0.02"
-        )
-    omega = options.needed("--speed", speed, "speed", positive=True)
-    wheel = read_torque(table, omega, coefficient(fluctuation))
+    if options.speed is None or options.fluctuation is None:
+        missing = "--speed" if options.speed is None else "--fluctuation"
+        raise bad(missing, "expected --speed and --fluctuation, such as --speed 600rpm --fluctuation 0.02")
+    omega = needed("--speed", options.speed, "speed", positive=True)
+    wheel = read_torque(options.table, omega, coefficient(options.fluctuation))
 
     return Result(
         way=partial(way, wheel),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from cli.read.options import bad
@@ -12,6 +13,7 @@ from cli.show.output import reported
 from dalembert.errors import DataError
 
 if TYPE_CHECKING:
+    from cli.show.commands import ShowOptions
     from cli.show.result import Result, Sheet
     from virtualwork import Mechanism
 
@@ -36,14 +38,14 @@ OPTIONS = """
 Arguments:
   file FILE.toml  The mechanism; - is standard input.
 Options:
-  output --output -o FILE  File to write: .dxf, .svg, .csv, .urdf, .sdf or .xml (MJCF).
+  output --output -o FILE  File to write: .dxf, .svg, .csv, .urdf, .sdf or .xml (MJCF). [required]
   at INPUT  Start pose, such as 60deg or crank=60deg,arm=30deg (default: the file's input).
   profile FOLLOWER  Profile of the cam that moves this slider or arm, in the cam's axes (.dxf, .svg, .csv).
 """
 
 
 @reported(OPTIONS)
-def run(file: str, output: Path, at: str | None = None, profile: str | None = None) -> Result:
+def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Write a mechanism for other programs: a drawing (DXF, SVG), curves (CSV), a robot (URDF, SDF, MJCF).
 
     A drawing shows the pose of the file's own input, and the curves over the travel of the input; a robot starts in that
@@ -56,17 +58,18 @@ def run(file: str, output: Path, at: str | None = None, profile: str | None = No
     from cli.show.result import Result
     from virtualwork import MechanismError
 
+    output, file, profile = Path(options.output), options.file, options.profile
     suffix = output.suffix.lower()
     if suffix not in FORMATS:
         raise bad("-o", f"'{output}': expected a name that ends in {', '.join(FORMATS)}")
     described = load(file)
     m, bare = described.mechanism, described.bare
-    if profile is not None and (suffix not in PROFILES or at is not None):
+    if profile is not None and (suffix not in PROFILES or options.at is not None):
         wrong = (
             "it has no pose: leave --at out" if suffix in PROFILES else f"expected -o {', '.join(PROFILES)}"
         )
         raise bad("--profile", wrong)
-    _, moved = grids(m, None if at is None else [at], None, None, bare, [])
+    moved = grids(m, None if options.at is None else [options.at], None, None, bare, [])[1]
     inputs = tuple(of_one(m, moved).part(0, 1).values[0].tolist())
     name = "standard input" if file == "-" else Path(file).name
     try:

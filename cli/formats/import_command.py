@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from enum import StrEnum
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from cli.formats.robots import ROOTS
@@ -15,6 +15,7 @@ from dalembert.tables.files import read_bytes
 
 if TYPE_CHECKING:
     from cli.formats.drawn import Drawing
+    from cli.show.commands import ShowOptions
     from cli.show.result import Result, Sheet
 
 # kinds of files, as --from names them
@@ -29,7 +30,6 @@ KINDS = {
     "sdf": "SDF model",
     "mjcf": "MuJoCo's MJCF",
 }
-Kind = StrEnum("Kind", {name.replace("-", "_"): name for name in KINDS})  # type: ignore[misc]
 
 
 # an address itself holds the mechanism: nothing is fetched
@@ -41,17 +41,17 @@ METHOD = (
 )
 
 
-OPTIONS = """
+OPTIONS = f"""
 Arguments:
   file FILE  The other program's file, or its link in quotes; - is standard input.
 Options:
-  output --output -o FILE.toml  File to write (default: standard output).
-  kind --from  Program of the file (default: recognized by the content).
+  output --output -o FILE(.toml)  File to write (default: standard output).
+  kind --from {"|".join(KINDS)}  Program of the file (default: recognized by the content).
 """
 
 
 @reported(OPTIONS)
-def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Result:
+def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Read a mechanism of another program: PMKS text and links, PMKS+ links, MotionGen, Linkage, linkage_sim, FreeCAD sketches, planar robots (URDF, SDF, MJCF).
 
     The result is a file for `dalembert mechanism`. In the drawn pose, which is that of input 0, the links' axes are
@@ -63,13 +63,11 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
     from cli.formats.settled import settle
     from cli.show.result import Result
 
-    if output is not None and output.suffix.lower() != ".toml":
-        raise bad("-o", f"'{output}': expected a name that ends in .toml")
-    link = LINK.match(file) is not None
-    name, data = ("the link", file.encode()) if link else read_bytes(file)
-    folder = None if link or file == "-" else Path(file).parent
-    program, drawings = read(name, data, None if kind is None else str(kind.value), folder)
-    stem = "" if folder is None else Path(file).stem
+    link = LINK.match(options.file) is not None
+    name, data = ("the link", options.file.encode()) if link else read_bytes(options.file)
+    folder = None if link or options.file == "-" else Path(options.file).parent
+    program, drawings = read(name, data, options.kind, folder)
+    stem = "" if folder is None else Path(options.file).stem
     result: list[tuple[str, list[str]]] = []
     lost: list[str] = []
     for d in drawings:
@@ -85,11 +83,12 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
             "; ".join([f"{name}: no mechanism: nothing in it is driven by an input{mend}", *lost])
         )
     several = len(result) > 1
-    if several and output is None:
+    if several and options.output is None:
         raise bad(
             "-o", f"{name} holds {len(result)} mechanisms: expected a file, which becomes FILE-1.toml …"
         )
     ends = [f"-{k}" for k in range(1, len(result) + 1)] if several else [""]
+    output: Path | None = options.output
     paths = [output.with_name(f"{output.stem}{end}{output.suffix}") for end in ends] if output else []
     titles = [path.name for path in paths] if several else [""]
     lines = [

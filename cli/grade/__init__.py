@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from cli.show.commands import with_options
 from cli.show.output import show
 
 if TYPE_CHECKING:
+    from cli.show.commands import ShowOptions
     from cli.show.result import Result
 
 
@@ -21,7 +23,8 @@ What:
 """
 
 
-def _run(file: str, answers: str, key: str | None = None) -> Result:
+@with_options(OPTIONS, ("json", "output", "text", "report", "about", "no_color"), show)
+def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Mark the answers to an exercise: right, rounding, figures, carried, wrong or blank, with the likely mistake.
 
     ANSWERS has the columns student, quantity, answer, unit and those that name the row; further columns are kept. An
@@ -33,9 +36,9 @@ def _run(file: str, answers: str, key: str | None = None) -> Result:
     from cli.grade.marks import METHOD, mark_all, read_students, tables
     from cli.show.result import Result
 
-    exercise = read_exercise(file)
+    exercise = read_exercise(options.file)
     warnings: list[str] = []
-    students = read_students(exercise, answers, key, warnings)
+    students = read_students(exercise, options.answers, options.key, warnings)
     with workshop(exercise) as shop:
         marks = mark_all(exercise, shop, students)
     points = sum(mark.points for mark in marks)
@@ -48,6 +51,3 @@ def _run(file: str, answers: str, key: str | None = None) -> Result:
         about={"title": f"Marks: {exercise.title}"},
         warnings=warnings,
     )
-
-
-run = with_options(_run, OPTIONS, ("json", "output", "text", "report", "about", "no_color"), show)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from functools import partial
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from cli.show.output import command
 
 if TYPE_CHECKING:
+    from cli.show.commands import ShowOptions
     from cli.show.result import Result
 
 
@@ -21,7 +23,7 @@ What:
 
 
 @command(OPTIONS)
-def run(readings: str, phase_lag: bool = False) -> Result:
+def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Separate a rotor's unbalance from its mandrel's: index balancing, by least squares over all positions.
 
     READINGS has the columns turned_deg (the angle by which the rotor was turned on the mandrel) with unbalance_* and
@@ -31,7 +33,7 @@ def run(readings: str, phase_lag: bool = False) -> Result:
     from cli.index.positions import METHOD, draw, read_positions, tables, warnings, way
     from cli.show.result import Result
 
-    positions = read_positions(readings, phase_lag)
+    positions = read_positions(options.readings, options.phase_lag)
 
     return Result(
         way=partial(way, positions),

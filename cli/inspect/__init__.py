@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from cli.cases import CASES, FILE, WORKERS
-from cli.show.output import declared_command
+from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
@@ -20,7 +20,7 @@ Quantities:
 """
 
 
-@declared_command(OPTIONS, SimpleNamespace)
+@command(OPTIONS)
 def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Inspect a planar mechanism: mobility, groups, Grashof classes, limits, dead and change points, strokes.
 

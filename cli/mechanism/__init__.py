@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from cli.cases import BRANCH, CASES, FILE, WORKERS
-from cli.show.output import declared_command
+from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
@@ -39,7 +39,7 @@ def print_schema(_: bool) -> None:
     typer.echo(json.dumps(schema(), indent=2, ensure_ascii=False))
 
 
-@declared_command(OPTIONS, SimpleNamespace, eager={"schema": print_schema})
+@command(OPTIONS, eager={"schema": print_schema})
 def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Solve the poses of a planar mechanism: positions, velocities, accelerations.
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Literal
+from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
-import typer
-
-from cli.read import options
-from cli.show.commands import ShowOptions
+from cli.read.options import bad, exact_degrees, exact_places, needed, places, quantity, refuse, weights
 from cli.show.output import command
 
 if TYPE_CHECKING:
     from fractions import Fraction
 
     from cli.place.placing import Drill
+    from cli.show.commands import ShowOptions
     from cli.show.result import Result
     from dalembert.results.way import Topic
 
@@ -29,7 +28,7 @@ What:
   rotor NAME  With a FILE: rotor to place.
   plane NAME  With a FILE: plane to place.
   positions ANGLES  Angles where masses can go, such as 292.5deg,315deg.
-  blades N  Number of blades, evenly spaced, numbered from 1.
+  blades N(1-10000)  Number of blades, evenly spaced, numbered from 1.
   max_mass MASS  Largest mass of each place, such as 5g.
 How: weights as they are:
   stock MASSES  Weights in stock, such as 1g,2g,5g: uses the fewest within 1 % of the correction, at most three.
@@ -45,40 +44,16 @@ How: drilling:
   density DENSITY  Density of the drilled material, such as 7850kg_m3.
   remove  The corrections are material to REMOVE: drill at their angles, not opposite.
 Further options (docs/commands.md describes them):
-  first ANGLE  Angle of the first blade.
-  numbering  Blade numbers increase with the angles or against them.
-  pieces N  Largest number of weights from stock on one place.
-  drill_point ANGLE  Point angle of the drill, such as 118deg; 180deg is flat.
+  first ANGLE=0deg  Angle of the first blade.
+  numbering with|against=with  Blade numbers increase with the angles or against them.
+  pieces N=1  Largest number of weights from stock on one place.
+  drill_point ANGLE=180deg  Point angle of the drill, such as 118deg; 180deg is flat.
   max_depth DEPTH  Largest depth of a hole; a place gets more holes if necessary.
 """
 
 
 @command(OPTIONS)
-def run(
-    corrections: list[str],
-    rotor: str | None = None,
-    plane: str | None = None,
-    positions: str | None = None,
-    blades: Annotated[int | None, typer.Option(min=1, max=options.PLACES)] = None,
-    first: str = FIRST,
-    numbering: Literal["with", "against"] = "with",
-    max_mass: str | None = None,
-    stock: str | None = None,
-    weights: str | None = None,
-    pieces: Annotated[int, typer.Option(min=1)] = 1,
-    max_pieces: Annotated[int | None, typer.Option(min=1)] = None,
-    at_radius: str | None = None,
-    to_radius: str | None = None,
-    at_z: str | None = None,
-    to_z: str | None = None,
-    drill: str | None = None,
-    density: str | None = None,
-    drill_point: str = FLAT,
-    max_depth: str | None = None,
-    remove: bool = False,
-    *,
-    show: ShowOptions,
-) -> Result:
+def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Put a correction where masses can go: holes, blades, weights in stock, another radius, drilling.
 
     Several corrections are added as vectors first. Without --positions or --blades the result is one mass. In a FILE
@@ -89,42 +64,58 @@ def run(
     from cli.show.result import Result, Section, Sheet
     from dalembert.results.text import heading
 
-    every = read_corrections(corrections, rotor, plane)
+    every = read_corrections(options.corrections, options.rotor, options.plane)
     stated = (
         []
-        if remove or not every[0].removed
-        else [f"{corrections[0]}: its corrections are material to remove"]
+        if options.remove or not every[0].removed
+        else [f"{options.corrections[0]}: its corrections are material to remove"]
     )
-    remove = remove or every[0].removed
-    radii = _radii(at_radius, to_radius)
-    drilled = _drill(drill, density, drill_point, max_depth)
-    in_stock, fixed = options.weights("--stock", stock), options.weights("--weights", weights)
+    remove = options.remove or every[0].removed
+    radii = _radii(options.at_radius, options.to_radius)
+    drilled = _drill(options.drill, options.density, options.drill_point, options.max_depth)
+    in_stock, fixed = weights("--stock", options.stock), weights("--weights", options.weights)
     if in_stock is not None and drilled is not None:
-        raise options.bad("--stock", "weights from stock are not drilled: expected --stock or --drill")
+        raise bad("--stock", "weights from stock are not drilled: expected --stock or --drill")
     if fixed is not None:
         turned = "does not go with --weights, which have a mass of their own and stand at any angle"
-        options.refuse(turned, positions=positions, blades=blades, stock=stock, max_mass=max_mass)
-        options.refuse(turned, max_pieces=max_pieces, drill=drill, remove=remove)
+        refuse(
+            turned,
+            positions=options.positions,
+            blades=options.blades,
+            stock=options.stock,
+            max_mass=options.max_mass,
+        )
+        refuse(turned, max_pieces=options.max_pieces, drill=options.drill, remove=remove)
     if in_stock is None:
-        options.refuse("goes with --stock", pieces=pieces > 1, max_pieces=max_pieces)
-    if blades is None and first != FIRST:
-        raise options.bad("--first", "goes with --blades")
-    moved = _planes(at_z, to_z)
-    chosen = options.places(positions, blades, first, numbering)
+        refuse("goes with --stock", pieces=options.pieces > 1, max_pieces=options.max_pieces)
+    if options.blades is None and options.first != FIRST:
+        raise bad("--first", "goes with --blades")
+    moved = _planes(options.at_z, options.to_z)
+    chosen = places(options.positions, options.blades, options.first, options.numbering)
     if in_stock is not None and chosen is None:
-        raise options.bad("--stock", "expected --positions or --blades for the weights to go to")
-    limit = options.quantity("--max-mass", max_mass, "mass", positive=True)
+        raise bad("--stock", "expected --positions or --blades for the weights to go to")
+    limit = quantity("--max-mass", options.max_mass, "mass", positive=True)
 
-    def exact_places() -> list[Fraction]:
-        return options.exact_places(positions, blades, first, numbering)
+    def exact() -> list[Fraction]:
+        return exact_places(options.positions, options.blades, options.first, options.numbering)
 
     request = Request(
-        chosen, limit, in_stock, fixed, pieces, max_pieces, radii, drilled, moved, remove, exact_places
+        chosen,
+        limit,
+        in_stock,
+        fixed,
+        options.pieces,
+        options.max_pieces,
+        radii,
+        drilled,
+        moved,
+        remove,
+        exact,
     )
     placings = [Placing(correction, request) for correction in every]
     alone = len(placings) == 1
     if not alone and show.plot is not None:
-        raise options.bad("--plot", "draws one correction: expected --rotor and --plane too")
+        raise bad("--plot", "draws one correction: expected --rotor and --plane too")
 
     def sheet(placing: Placing) -> Sheet:
         parts = {name: table() for name, table in tables([placing]).items()}
@@ -153,13 +144,13 @@ def run(
 def _both(one: str, value: object, other: str, second: object) -> None:
     """Refuse one of two options without the other."""
     if (value is None) != (second is None):
-        raise options.bad(one if value is None else other, f"expected both {one} and {other}")
+        raise bad(one if value is None else other, f"expected both {one} and {other}")
 
 
 def _radii(at_radius: str | None, to_radius: str | None) -> tuple[float, float] | None:
     """Read --at-radius and --to-radius."""
-    at = options.quantity("--at-radius", at_radius, "length", positive=True)
-    to = options.quantity("--to-radius", to_radius, "length", positive=True)
+    at = quantity("--at-radius", at_radius, "length", positive=True)
+    to = quantity("--to-radius", to_radius, "length", positive=True)
     _both("--at-radius", at, "--to-radius", to)
     return None if at is None or to is None else (at, to)
 
@@ -170,33 +161,31 @@ def _drill(drill: str | None, density: str | None, drill_point: str, max_depth: 
 
     from cli.place.placing import Drill
 
-    diameter = options.quantity("--drill", drill, "length", positive=True)
-    rho = options.quantity("--density", density, "density", positive=True)
+    diameter = quantity("--drill", drill, "length", positive=True)
+    rho = quantity("--density", density, "density", positive=True)
     _both("--drill", diameter, "--density", rho)
-    deepest = options.quantity("--max-depth", max_depth, "length", positive=True)
+    deepest = quantity("--max-depth", max_depth, "length", positive=True)
     if deepest is not None and diameter is None:
-        raise options.bad("--max-depth", "is for --drill")
+        raise bad("--max-depth", "is for --drill")
     if drill_point != FLAT and diameter is None:
-        raise options.bad("--drill-point", "is for --drill")
-    point = options.needed("--drill-point", drill_point, "angle", positive=True)
+        raise bad("--drill-point", "is for --drill")
+    point = needed("--drill-point", drill_point, "angle", positive=True)
     if point > math.pi * (1 + 1e-15):
-        raise options.bad("--drill-point", "expected at most 180deg")
+        raise bad("--drill-point", "expected at most 180deg")
     if diameter is None or rho is None:
         return None
-    return Drill(
-        diameter, rho, min(point, math.pi), deepest, min(options.exact_degrees(drill_point), Fraction(180))
-    )
+    return Drill(diameter, rho, min(point, math.pi), deepest, min(exact_degrees(drill_point), Fraction(180)))
 
 
 def _planes(at_z: str | None, to_z: str | None) -> tuple[float, list[float]] | None:
     """Read --at-z and --to-z."""
-    at = options.quantity("--at-z", at_z, "length")
+    at = quantity("--at-z", at_z, "length")
     _both("--at-z", at, "--to-z", to_z)
     if at is None or to_z is None:
         return None
-    planes = [options.needed("--to-z", part, "length") for part in to_z.split(":")]
+    planes = [needed("--to-z", part, "length") for part in to_z.split(":")]
     if len(planes) < 2:
-        raise options.bad("--to-z", f"'{to_z}': expected two planes or more, such as 0mm:90mm")
+        raise bad("--to-z", f"'{to_z}': expected two planes or more, such as 0mm:90mm")
     if len(set(planes)) < len(planes):
-        raise options.bad("--to-z", f"'{to_z}': two planes lie at the same place")
+        raise bad("--to-z", f"'{to_z}': two planes lie at the same place")
     return at, planes

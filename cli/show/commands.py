@@ -5,18 +5,17 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
-from copy import copy
 from functools import wraps
 from inspect import Parameter, signature
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import typer
 from typer.core import TyperCommand
 
 from cli.read.options import HEAD, column_names
-from dalembert.dataclass import dataclass
 
 if TYPE_CHECKING:
     from cli.show.result import Result
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
 
 SHARED = """
 Tables:
-  column NAME=HEADER  Read the column HEADER of the file as NAME, such as mass_kg=Masse; repeatable.
+  column NAME=HEADER...  Read the column HEADER of the file as NAME, such as mass_kg=Masse; repeatable.
 Output:
   json  Print one JSON document in SI units with full precision.
   output -o --output FILE  Write the result to FILE (.csv .json .xlsx .parquet .md .tex).
@@ -35,9 +34,9 @@ Output:
   units UNIT,...  Show the columns in these units, such as mm,g,deg,N_mm,rpm.
   report FILE  Write a report (.html or .md) with data, results and method.
 Further options (docs/commands.md describes them):
-  rtol NUMBER  With --expect: relative tolerance of each value, of angles in radians.
-  about KEY=TEXT  With --report: a line of its head: title=, machine=, customer=, date= or author=; repeatable.
+  rtol NUMBER=1e-3  With --expect: relative tolerance of each value, of angles in radians.
   text  Print the aligned table into a pipe too (default there: CSV).
+  about KEY=TEXT...  With --report: a line of its head: title=, machine=, customer=, date= or author=; repeatable.
   no_color  Print without colours, as the environment variable NO_COLOR does.
   help  Show this message and exit.
 """
@@ -48,11 +47,14 @@ FORMS = (".csv", ".json", ".xlsx", ".parquet", ".md", ".tex")
 """Suffixes of what every result can be written as."""
 
 
-def suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
-    """Return the check of a file's option: its suffix is one of these."""
+def suffix_among(*suffixes: str) -> Callable[[str | Path | None], Path | None]:
+    """Return the check of a file's option: its suffix is one of these, any where there are none."""
 
-    def check(path: Path | None) -> Path | None:
-        if path is not None and path.suffix.lower() not in suffixes:
+    def check(name: str | Path | None) -> Path | None:
+        if name is None:
+            return None
+        path = Path(name)
+        if suffixes and path.suffix.lower() not in suffixes:
             report = (
                 "; --report writes .html" if path.suffix.lower() == ".html" and ".json" in suffixes else ""
             )
@@ -68,24 +70,36 @@ def _tolerance(value: float) -> float:
     return value
 
 
-# each method that dataclass makes costs a tenth of a millisecond at every start
-@dataclass(eq=False, repr=False)
-class ShowOptions:
-    """The options that every command shares, in the order in which its help lists them."""
+CHECKS: dict[str, Callable[[Any], Any]] = {
+    "output": suffix_among(*FORMS, ".toml"),
+    "plot": suffix_among(".svg", ".png", ".pdf"),
+    "expect": suffix_among(),
+    "report": suffix_among(".html", ".htm", ".md"),
+    "rtol": _tolerance,
+}
+"""What checks their values."""
 
-    json: bool = False
-    output: Annotated[Path | None, typer.Option(callback=suffix_among(*FORMS, ".toml"))] = None
-    plot: Annotated[Path | None, typer.Option(callback=suffix_among(".svg", ".png", ".pdf"))] = None
-    expect: Path | None = None
-    rtol: Annotated[float, typer.Option(callback=_tolerance)] = 1e-3
-    text: bool = False
-    steps: bool = False
-    digits: bool = False
-    column: list[str] | None = None
-    units: str | None = None
-    report: Annotated[Path | None, typer.Option(callback=suffix_among(".html", ".htm", ".md"))] = None
-    about: list[str] | None = None
-    no_color: bool = False
+
+class ShowOptions(SimpleNamespace):
+    """The values of the options that every command shares."""
+
+    json: bool
+    output: Path | None
+    plot: Path | None
+    expect: Path | None
+    rtol: float
+    text: bool
+    steps: bool
+    digits: bool
+    column: list[str] | None
+    units: str | None
+    report: Path | None
+    about: list[str] | None
+    no_color: bool
+
+    def __init__(self, **values: object) -> None:
+        """Take these values; an option that is not among them has its default."""
+        super().__init__(**({name: p.default for name, p in _SHARED.items()} | values))
 
     @property
     def head(self) -> dict[str, str]:
@@ -168,89 +182,60 @@ def help_lines(options: str) -> dict[str, HelpLine]:
 
 
 def with_options(
-    find: Callable[..., Result],
     options: str,
-    chosen: Sequence[str] | None,
+    shared: Collection[str],
     present: Callable[[Result, ShowOptions, Mapping[str, str]], None],
-    values: Callable[..., object] | None = None,
-    declared: Mapping[str, Parameter] | None = None,
-) -> Callable[..., None]:
-    """Make a command that takes these of the shared options too, None for all, and presents its result.
+    eager: Mapping[str, Callable[[bool], None]] | None = None,
+) -> Callable[[Callable[[SimpleNamespace, ShowOptions], Result]], Callable[..., None]]:
+    """Make a command of a function of its own options and of the shared ones; `present` shows its result.
 
-    `options` is what its help says of its own, as `help_lines` reads it. `values` is a class of them: then the function takes
-    one of these and the shared ones. `declared`: its options, where their text is their only declaration.
+    `options` declares its own, as `parameters` reads them; `shared` are those of the shared ones that it takes.
     """
-    own = dict(declared) if declared is not None else _parameters(values or find, options)
-    shared = _parameters(ShowOptions, SHARED)
-    shared = {name: p for name, p in shared.items() if chosen is None or name in chosen}
+    own = parameters(options, eager)
+    common = {name: p for name, p in _SHARED.items() if name in shared}
     # a command may have a value of its own below --about, which is no KEY=TEXT
     two = "about" in own
     if two:
         point, head = help_lines(options)["about"], help_lines(SHARED)["about"]
         line = point._replace(help=f"{point.help} KEY=TEXT: {head.help}")
-        shared["about"] = shared["about"].replace(annotation=_annotated(list[str] | None, line))
+        info = typer.Option(*line.flags, metavar=line.metavar, help=line.help)
+        common["about"] = common["about"].replace(annotation=Annotated[list[str] | None, info])
 
-    @wraps(find)
-    def run(**values_of: object) -> None:
-        from dalembert.tables.headers import rename
+    def made(find: Callable[[SimpleNamespace, ShowOptions], Result]) -> Callable[..., None]:
+        @wraps(find)
+        def run(**values: object) -> None:
+            from dalembert.tables.headers import rename
 
-        options = ShowOptions(**{name: values_of.pop(name) for name in shared})  # type: ignore[arg-type]
-        if two:
-            texts = options.about or []
-            options.about = [text for text in texts if "=" in text]
-            values_of["about"] = next((text for text in reversed(texts) if "=" not in text), None)
-        if options.head and options.report is None:
-            raise typer.BadParameter("expected --report FILE too", param_hint="--about")
-        rename(column_names(options.column))
-        messages = {
-            name.replace("_", " "): _typed(value)
-            for name, value in values_of.items()
-            if value != own[name].default and value is not None
-        }
-        if "show" in own:
-            values_of["show"] = options
-        result = find(**values_of) if values is None else find(values(**values_of), options)
-        with result.within():
-            present(result, options, messages)
+            show = ShowOptions(**{name: values.pop(name) for name in common})
+            if two:
+                texts = show.about or []
+                show.about = [text for text in texts if "=" in text]
+                values["about"] = next((text for text in reversed(texts) if "=" not in text), None)
+            if show.head and show.report is None:
+                raise typer.BadParameter("expected --report FILE too", param_hint="--about")
+            rename(column_names(show.column))
+            call = {
+                name.replace("_", " "): _typed(value)
+                for name, value in values.items()
+                if value != own[name].default and value is not None
+            }
+            result = find(SimpleNamespace(**values), show)
+            with result.within():
+                present(result, show, call)
 
-    mine = [p for name, p in own.items() if name != "show" and not (two and name == "about")]
-    parameters = [*mine, *shared.values()]
-    run.__signature__ = signature(find).replace(parameters=parameters, return_annotation=None)  # type: ignore[attr-defined]
-    run.__annotations__ = {p.name: p.annotation for p in parameters}
-    return run
+        every = [*(p for name, p in own.items() if not (two and name == "about")), *common.values()]
+        run.__signature__ = signature(find).replace(parameters=every, return_annotation=None)  # type: ignore[attr-defined]
+        run.__annotations__ = {p.name: p.annotation for p in every}
+        return run
+
+    return made
 
 
 def _typed(value: object) -> str:
     """Return an option's value as the user gave it."""
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return (
-        ", ".join(map(str, value))
-        if isinstance(value, (list, tuple))
-        else str(getattr(value, "value", value))
-    )
-
-
-def _parameters(of: Callable[..., object], options: str) -> dict[str, Parameter]:
-    """Return the parameters with their types and help; what is returned is not looked at, nor loaded for it."""
-    names, lines = vars(sys.modules[of.__module__]), help_lines(options)
-    return {
-        name: p.replace(
-            kind=Parameter.KEYWORD_ONLY,
-            annotation=_annotated(eval(p.annotation, names), lines[name]) if name != "show" else None,
-        )
-        for name, p in signature(of).parameters.items()
-    }
-
-
-def _annotated(kind: Any, line: HelpLine) -> object:
-    """Add to a parameter's type its help."""
-    argument = line.heading == "Arguments"
-    kind, default = get_args(kind) if hasattr(kind, "__metadata__") else (kind, None)
-    info = copy(default) or (typer.Argument() if argument else typer.Option())
-    info.param_decls = None if argument else line.flags
-    info.metavar, info.help = line.metavar, line.help
-    return Annotated[kind, info]
+    return ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
 
 
 FURTHER = "Further options"
@@ -363,73 +348,80 @@ def with_help(options: str, example: str, call_of: Callable[[str], str]) -> type
     return type("Command", (Command,), own)
 
 
-_DEFAULT = re.compile(r"(N|NUMBER|[a-z|-]+)=(.*)")
-Complete = Callable[[Any, list[str], str], list[str]]
+_REQUIRED = " [required]"
+_VALUE = re.compile(r"(?P<value>.+?)(?:\((?P<least>[\d.]+)-(?P<most>[\d.]*)\))?(?:=(?P<default>.+))?")
+_CHOICE = re.compile(r"(?:(?:[a-z\d_-]+|[A-Z]+\d+)(?:\||$))+")
 
 
 def parameters(
     text: str,
     eager: Mapping[str, Callable[[bool], None]] | None = None,
-    complete: Mapping[str, Complete] | None = None,
+    checks: Mapping[str, Callable[[Any], Any]] | None = None,
 ) -> dict[str, Parameter]:
-    """The parameters of a command, by their names.
+    """Read the parameters of a command, by their names, from the text of its help (`help_lines`).
+
+    The placeholder of a value says what the value may be: `N` a whole number from 1 on, `N(0-100)` one from 0 to 100,
+    `NUMBER` and `NUMBER(0-1)` a number, `one|other` one of these words, `FILE(.html)` a file with such a suffix,
+    `NAME...` an option that may be repeated, anything else a text. `=` and a value behind it is the default; without a
+    placeholder it is a flag. `[required]` ends the help of an option that cannot be left out.
 
     Parameters
     ----------
     eager : mapping of name to function
         Flags that are answered before anything else is looked at.
-    complete : mapping of name to function
-        What a shell completes an option's value with.
+    checks : mapping of name to function
+        What checks a value, or refuses it.
     """
-    parameters = {}
+    result = {}
     for name, line in help_lines(text).items():
-        kind, default, more = _kind(line.metavar or "", line.heading == "Arguments")
-        shown = line.metavar
-        if shown is not None and not shown.endswith(",..."):
-            shown = shown.removesuffix("...")
-        if "=" in (line.metavar or "") and (match := _DEFAULT.fullmatch(line.metavar or "")):
-            shown = match[1]
+        argument = line.heading == "Arguments"
+        kind, default, more = _kind(line.metavar or "", argument)
         if eager and name in eager:
-            more = {"is_eager": True, "callback": _answered(eager[name])}
-        if complete and name in complete:
-            more["autocompletion"] = complete[name]
-        if line.heading == "Arguments":
-            info = typer.Argument(metavar=shown, help=line.help, **more)
+            more |= {"is_eager": True, "callback": _answered(eager[name])}
+        if checks and name in checks:
+            more["callback"] = checks[name]
+        words = line.help.removesuffix(_REQUIRED)
+        if argument:
+            optional = (line.metavar or "").startswith("[")
+            kind, default = (kind | None, None) if optional else (kind, Parameter.empty)
+            info = typer.Argument(help=words, show_default=False, **more)
         else:
-            # typer shows the words of a choice itself
-            words = "|" in (shown or "") and (shown or "").islower()
-            info = typer.Option(*line.flags, metavar=None if words else shown, help=line.help, **more)
-        parameters[name] = Parameter(
+            required = words != line.help
+            if default is None and not required:
+                kind = kind | None
+            info = typer.Option(*line.flags, help=words, **more)
+            default = Parameter.empty if required else default
+        result[name] = Parameter(
             name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, info]
         )
-    return parameters
+    return result
 
 
-def _kind(metavar: str, argument: bool) -> tuple[Any, Any, dict[str, Any]]:
-    """An option's type, its default, and further settings."""
-    if not metavar:
+def _kind(placeholder: str, argument: bool) -> tuple[Any, Any, dict[str, Any]]:
+    """Return the type of a value, its default, and what else the parser is to know of it."""
+    if not placeholder:
         return bool, False, {}
-    if argument:
-        optional = metavar.startswith("[")
-        if metavar.endswith("..."):
-            return list[str], Parameter.empty, {}
-        return (str | None, None, {}) if optional else (str, Parameter.empty, {})
-    if metavar.endswith("...") and not metavar.endswith(",..."):
-        return list[str] | None, None, {}
-    match = _DEFAULT.fullmatch(metavar)
-    value, default = (match[1], match[2]) if match else (metavar, None)
-    if value == "N":
-        least = 1 if default is None else 0
-        return (int, int(default), {"min": least}) if default else (int | None, None, {"min": least})
-    if value == "NUMBER":
-        return (float, float(default), {}) if default else (float | None, None, {})
-    if "|" in value and value.islower():
-        choice = Literal[tuple(value.split("|"))]  # type: ignore[valid-type]
-        return (choice, default, {}) if default else (choice | None, None, {})
+    if placeholder.endswith("...") and not placeholder.endswith(",..."):
+        return list[str], None, {"metavar": placeholder if argument else placeholder.removesuffix("...")}
+    match = _VALUE.fullmatch(placeholder)
+    assert match is not None
+    value, least, most, default = match.groups()
+    if value in ("N", "NUMBER"):
+        kind = int if value == "N" else float
+        bounds = {"min": least or (1 if value == "N" else None), "max": most}
+        limits = {name: kind(bound) for name, bound in bounds.items() if bound}
+        return kind, None if default is None else kind(default), {"metavar": value, **limits}
+    if _CHOICE.fullmatch(value):
+        # the parser shows the words itself
+        return Literal[tuple(value.split("|"))], default, {}
     suffixes = re.findall(r"\.\w+", value) if "(" in value else []
     if suffixes:
-        return Path | None, None, {"callback": suffix_among(*suffixes)}
-    return str | None, None, {}
+        one = value.replace("(", "").replace(")", "") if len(suffixes) == 1 else value
+        return Path, None, {"metavar": one, "callback": suffix_among(*suffixes)}
+    # of NAME=VALUE both are placeholders
+    if default is None or not default[0].isdecimal():
+        return str, None, {"metavar": placeholder}
+    return str, default, {"metavar": value}
 
 
 def _answered(answer: Callable[[bool], None]) -> Callable[[bool], bool]:
@@ -442,3 +434,6 @@ def _answered(answer: Callable[[bool], None]) -> Callable[[bool], bool]:
         return value
 
     return callback
+
+
+_SHARED = parameters(SHARED.replace("  help  Show this message and exit.\n", ""), checks=CHECKS)

@@ -10,11 +10,12 @@ from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from shutil import get_terminal_size
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cli.show.commands import FORMS, ShowOptions, parameters, with_options
+from cli.show.commands import FORMS, ShowOptions, with_options
 from cli.show.terminal import coloured
 from dalembert.errors import DataError, one_line
 
@@ -27,28 +28,15 @@ if TYPE_CHECKING:
 
 
 def command(
-    options: str, without: Collection[str] = ()
-) -> Callable[[Callable[..., Result]], Callable[..., None]]:
-    """Make a command of a function that returns its result: it takes the shared options too, and shows the result.
+    options: str, without: Collection[str] = (), eager: Mapping[str, Callable[[bool], None]] | None = None
+) -> Callable[[Callable[[SimpleNamespace, ShowOptions], Result]], Callable[..., None]]:
+    """Make a command of a function that returns its result: the result is shown as the shared options say.
 
-    `options` is what the help says of its own, `without` the shared ones that mean nothing for it. Where the function has
-    a parameter `show`, it is given the shared ones.
+    `options` declares its own by the text of their help, `without` are the shared ones that mean nothing for it, `eager`
+    answers flags that need nothing else.
     """
-    chosen = [name for name in ShowOptions.__annotations__ if name not in without]
-    return lambda find: with_options(find, options, chosen, show)
-
-
-def declared_command(
-    options: str,
-    values: Callable[..., object],
-    eager: Mapping[str, Callable[[bool], None]] | None = None,
-    complete: Mapping[str, Callable[[Any, list[str], str], list[str]]] | None = None,
-) -> Callable[[Callable[..., Result]], Callable[..., None]]:
-    """Make a command whose options are declared by their text alone (`cli.show.commands`).
-
-    The function takes its own options, as attributes of a `values`, and the shared ones.
-    """
-    return lambda find: with_options(find, options, None, show, values, parameters(options, eager, complete))
+    shared = [name for name in ShowOptions.__annotations__ if name not in without]
+    return with_options(options, shared, show, eager)
 
 
 def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
@@ -210,13 +198,15 @@ def _with_first(result: Result, table: Callable[[], Table]) -> Result:
     return replace(result, tables={**result.tables, next(iter(result.tables)): table})
 
 
-def reported(options: str) -> Callable[[Callable[..., Result]], Callable[..., None]]:
+def reported(
+    options: str,
+) -> Callable[[Callable[[SimpleNamespace, ShowOptions], Result]], Callable[..., None]]:
     """Make a command of a function that returns the files to be written and what a report says of them.
 
-    `options` is what the help says of its own. The files are `beside` of its result, `notes` is what goes to standard
-    output, `warnings` are the remarks.
+    `options` declares its own. The files are `beside` of its result, `notes` is what goes to standard output, `warnings`
+    are the remarks.
     """
-    return lambda find: with_options(find, options, ("report", "about"), _hand_on)
+    return with_options(options, ("report", "about"), _hand_on)
 
 
 def _hand_on(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from cli.cases import BRANCH, CASES, FILE, WORKERS
-from cli.show.output import declared_command
+from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
@@ -27,7 +27,7 @@ Output:
 """
 
 
-@declared_command(OPTIONS, SimpleNamespace)
+@command(OPTIONS)
 def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Simulate a mechanism whose inputs are released: its motion in time under the loads of FILE.toml.
 

@@ -15,6 +15,7 @@ from cli.cases.axes import input_values
 from cli.cases.case import Case, Study
 from cli.cases.poses import bounds_of, cells, column, in_rows, keys_of, nested
 from cli.read import options
+from cli.show.commands import ShowOptions
 from cli.show.picture import shown as on_page
 from cli.show.terminal import progress_in_time
 from dalembert.angles import read_degrees
@@ -153,9 +154,8 @@ class Motion(Case):
 
     def pattern(self) -> Table:
         """Return the columns, from the first time alone."""
-        first = replace(
-            self.study, times=self.study.times[:1], until=None, show=replace(self.study.show, digits=False)
-        )
+        show = ShowOptions(**(vars(self.study.show) | {"digits": False}))
+        first = replace(self.study, times=self.study.times[:1], until=None, show=show)
         return Motion(first, self.analysis).table()
 
     @cached_property

@@ -2,33 +2,16 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
-import typer
-
-from cli.read import options
-from cli.show.commands import ShowOptions, suffix_among
+from cli.read.options import bad, number_or_quantity, only, time_range
 from cli.show.output import command
 
 if TYPE_CHECKING:
+    from cli.show.commands import ShowOptions
     from cli.show.result import Result
-
-
-class Method(StrEnum):
-    """How the rotation is computed."""
-
-    exact = "exact"
-    integrate = "integrate"
-
-
-class Integrator(StrEnum):
-    """What integrates it."""
-
-    dop853 = "DOP853"
-    splitting = "splitting"
 
 
 EXAMPLE = "tennis-racket"
@@ -37,32 +20,20 @@ Arguments:
   body BODY.toml  The body and its state; - is standard input.
 What:
   time START:STOP:STEP  Times in seconds, such as 0:10:0.01 or 0:10/1000.
-  at T  Time in seconds; repeatable (default: 0).
+  at T...  Time in seconds; repeatable (default: 0).
   find NAME  Number of the file to find: omega.z, inertia.3, top.mgl, or tilt of a top.
   so_that QUANTITY=VALUE  With --find: wanted value of a result, such as slow=0.5rad_s or momentum.z=2.
   only NAME,...  Show only these results: omega, attitude, momentum, energy, drift, period, nutation_period, cones, steady.
 How:
-  method  Use the closed form, or integrate (default: exact where a closed form exists).
-  integrator  Method of integration; splitting is for a symmetric top.
+  method exact|integrate  Use the closed form, or integrate (default: exact where a closed form exists).
+  integrator DOP853|splitting=DOP853  Method of integration; splitting is for a symmetric top.
 Output:
-  page FILE.html  Write a page that replays the rotation, with curves and values.
+  page FILE(.html)  Write a page that replays the rotation, with curves and values.
 """
 
 
 @command(OPTIONS)
-def run(
-    body: str,
-    time: str | None = None,
-    at: list[str] | None = None,
-    find: str | None = None,
-    so_that: str | None = None,
-    only: str | None = None,
-    method: Annotated[Method | None, typer.Option(show_default=False)] = None,
-    integrator: Integrator = Integrator.dop853,
-    page: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None,
-    *,
-    show: ShowOptions,
-) -> Result:
+def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Compute the rotation of a body in time: angular velocity, attitude, momentum and energy at any instant.
 
     BODY.toml has inertia = [I1, I2, I3] in kg·m² (or a 3 × 3 matrix, or parts = "parts.csv"), omega in body axes in
@@ -77,25 +48,25 @@ def run(
     from cli.spin import tables
     from cli.spin.rotation import Rotation, read_body
 
-    if time is not None and at:
-        raise options.bad("--at", "expected --time or --at, not both")
-    if time is not None:
-        times = options.time_range("--time", time)
+    if options.time is not None and options.at:
+        raise bad("--at", "expected --time or --at, not both")
+    if options.time is not None:
+        times = time_range("--time", options.time)
     else:
-        times = [options.number_or_quantity("--at", text, "time") for text in at or ["0"]]
-    chosen = options.only(only, tables.QUANTITIES)
-    if page is not None:
+        times = [number_or_quantity("--at", text, "time") for text in options.at or ["0"]]
+    chosen = only(options.only, tables.QUANTITIES)
+    if options.page is not None:
         from cli.show.picture import refuse_long
 
         refuse_long(len(times))
-    turning = read_body(body)
-    rotation = Rotation(turning, np.array(times), method.value if method else None, integrator.value)
-    sought, solution = pair(find, so_that), None
+    turning = read_body(options.body)
+    rotation = Rotation(turning, np.array(times), options.method, options.integrator)
+    sought, solution = pair(options.find, options.so_that), None
     if sought is not None:
         rotation, solution = tables.find(rotation, *sought)
         turning = rotation.body
-    if rotation.exact and integrator is not Integrator.dop853:
-        raise options.bad("--integrator", "expected --method integrate too: this rotation has a closed form")
+    if rotation.exact and options.integrator != "DOP853":
+        raise bad("--integrator", "expected --method integrate too: this rotation has a closed form")
     rotation.states  # noqa: B018  faults of the data are errors before anything is shown
 
     def moving() -> bytes:
@@ -111,13 +82,13 @@ def run(
         tables=tables.tables(rotation, chosen),
         head={"method": "exact" if rotation.exact else rotation.integrator},
         figure=partial(tables.draw, rotation),
-        beside={} if page is None else {page: moving},
+        beside={} if options.page is None else {options.page: moving},
         method=tables.METHOD,
         about={"title": turning.name or "Rotation in time"} | turning.about,
         warnings=[
             *turning.warnings,
             *tables.warnings(rotation),
-            *(tables.coarse(rotation) if page else ()),
+            *(tables.coarse(rotation) if options.page else ()),
         ],
     )
     return result if solution is None else with_found(result, solution)

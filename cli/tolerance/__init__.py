@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from cli.cases import CASES, FILE, WORKERS
-from cli.show.output import declared_command
+from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
@@ -20,12 +20,12 @@ Quantities:
   order position|velocity|acceleration|jerk  Highest derivative (default: the highest that the input's rates give).
 Drawn mechanisms:
   draws N  Number of mechanisms drawn at random within the tolerances.
-  seed N=0  With --draws: random seed.
+  seed N(0-)=0  With --draws: random seed.
   distribution normal|uniform=normal  With --draws: normal (a limit is three standard deviations) or uniform (a limit is an end).
 """
 
 
-@declared_command(OPTIONS, SimpleNamespace)
+@command(OPTIONS)
 def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Compute the effect of the [tolerances] of FILE.toml on the motion: worst case, standard deviation, shares.
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from functools import partial
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from cli.read import options
+from cli.read.options import plane_vector
 from cli.show.output import command
 
 if TYPE_CHECKING:
+    from cli.show.commands import ShowOptions
     from cli.show.result import Result
 
 
@@ -24,7 +26,7 @@ Output:
 
 
 @command(OPTIONS)
-def run(states: str, gravity: str | None = None, ledger: bool = False) -> Result:
+def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Find the unknown force or torque that balances a table of link states, by virtual power.
 
     STATES has a row for each link, at each step (instant). Its columns are step, link, mass_*, inertia_*; vx_* vy_* and
@@ -33,16 +35,16 @@ def run(states: str, gravity: str | None = None, ledger: bool = False) -> Result
     the velocity of the centre of mass. One cell of a force or torque holds ?. Several unknowns are marked ?NAME; they
     need as many fields of virtual velocities, named in a column field.
     """
-    g = 0j if gravity is None else options.plane_vector("--gravity", gravity, "acceleration")
+    g = 0j if options.gravity is None else plane_vector("--gravity", options.gravity, "acceleration")
     from cli.show.result import Result
     from cli.work.power import METHOD, WorkBalance, draw, tables, way
     from cli.work.states import read_states
 
-    table = read_states(states)
+    table = read_states(options.states)
     balance = WorkBalance(table, g)
 
     return Result(
-        tables=tables(balance, ledger_first=ledger),
+        tables=tables(balance, ledger_first=options.ledger),
         figure=partial(draw, balance),
         method=METHOD,
         way=partial(way, balance),
