@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 
 SHARED = """
-Tables:
-  column NAME=HEADER...  Read the column HEADER of the file as NAME, such as mass_kg=Masse; repeatable.
 Output:
   json  Print one JSON document in SI units with full precision.
   output -o --output FILE  Write the result to FILE (.csv .json .xlsx .parquet .md .tex).
@@ -33,6 +31,8 @@ Output:
   digits  Print only the right digits: computed twice, with 16 and with 32 digits.
   units UNIT,...  Show the columns in these units, such as mm,g,deg,N_mm,rpm.
   report FILE  Write a report (.html or .md) with data, results and method.
+Tables:
+  column NAME=HEADER...  Read the column HEADER of the file as NAME, such as mass_kg=Masse; repeatable.
 Further options (docs/commands.md describes them):
   rtol NUMBER=1e-3  With --expect: relative tolerance of each value, of angles in radians.
   text  Print the aligned table into a pipe too (default there: CSV).
@@ -66,7 +66,7 @@ def suffix_among(*suffixes: str) -> Callable[[str | Path | None], Path | None]:
 
 def _tolerance(value: float) -> float:
     if not 0 <= value < float("inf"):
-        raise typer.BadParameter(f"{value}: expected a number from 0 on, such as 1e-6")
+        raise typer.BadParameter(f"{value}: expected a number, at least 0, such as 1e-6")
     return value
 
 
@@ -270,6 +270,10 @@ class Command(TyperCommand):
             typer.echo(line, err=True)
             raise typer.Exit(2) from None
 
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Return the words behind the command's name: arguments stand there as the help below calls them."""
+        return [piece.strip("{}") for piece in super().collect_usage_pieces(ctx)]
+
     def panels_of(self, ctx: Any, without: Collection[str] = ()) -> dict[str, list[tuple[str, str]]]:
         """Return the rows of help below their headings, further options last; `without`: parameters to leave out."""
         shared = help_lines(SHARED)
@@ -324,7 +328,7 @@ _OUTSIDE = re.compile(rf"(\S+) is not in the range ({_RANGE.pattern})\.?")
 def _span(match: re.Match[str]) -> str:
     """A range of numbers, as help and messages say it."""
     least, sign, bound = match.groups()
-    return f"from {least} to {bound}" if least else f"from {bound} on" if sign == ">=" else f"at most {bound}"
+    return f"from {least} to {bound}" if least else f"at {'least' if sign == '>=' else 'most'} {bound}"
 
 
 def in_plain_words(message: str) -> str:
@@ -333,12 +337,14 @@ def in_plain_words(message: str) -> str:
     >>> in_plain_words("'abc' is not a valid int range.")
     "'abc': expected a whole number"
     >>> in_plain_words("-1 is not in the range x>=1."), in_plain_words("0 is not in the range 1<=x<=100.")
-    ('-1: expected a number from 1 on', '0: expected a number from 1 to 100')
+    ('-1: expected a number, at least 1', '0: expected a number from 1 to 100')
     """
     if match := _NO_NUMBER.fullmatch(message):
         return f"{match[1]}: expected {_TYPES[match[2]]}"
     if match := _OUTSIDE.fullmatch(message):
-        return f"{match[1]}: expected a number {_RANGE.sub(_span, match[2])}"
+        return f"{match[1]}: expected a number {_RANGE.sub(_span, match[2])}".replace(
+            "number at", "number, at"
+        )
     return message
 
 
@@ -360,7 +366,7 @@ def parameters(
 ) -> dict[str, Parameter]:
     """Read the parameters of a command, by their names, from the text of its help (`help_lines`).
 
-    The placeholder of a value says what the value may be: `N` a whole number from 1 on, `N(0-100)` one from 0 to 100,
+    The placeholder of a value says what the value may be: `N` a whole number that is at least 1, `N(0-100)` one from 0 to 100,
     `NUMBER` and `NUMBER(0-1)` a number, `one|other` one of these words, `FILE(.html)` a file with such a suffix,
     `NAME...` an option that may be repeated, anything else a text. `=` and a value behind it is the default; without a
     placeholder it is a flag. `[required]` ends the help of an option that cannot be left out.
