@@ -115,7 +115,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
 
     result = Result(
         tables=tables.tables(bodies, chosen),
-        screen=lambda: tables.every(bodies, partial(tables.quantities, only=chosen)),
+        screen=lambda: [tables.every(bodies, partial(tables.quantities, only=chosen))],
         figure=partial(tables.draw, bodies),
         way=way,
         method=tables.METHOD,

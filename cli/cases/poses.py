@@ -242,6 +242,60 @@ def by_link(analysis: Analysis) -> Table:
     return Table(columns, keys=("step", "link"))
 
 
+SINGULAR = {
+    "points": "point",
+    "links": "link",
+    "slides": "slide",
+    "cams": "cam",
+    "vectors": "vector",
+    "effort": "input",
+    "reactions": "joint",
+}
+"""What a row of the table of a kind of quantities is called."""
+
+
+def by_owner(analysis: Analysis, table: Table) -> list[Table]:
+    """Return the table of one pose as short tables: a row for each point, link, slide and joint.
+
+    The first has what names the pose.
+    """
+    columns = {column.header: column for column in table.columns}
+    kinds: dict[str, dict[tuple[str, ...], dict[str, Column]]] = {}
+    kind, owner = "", tuple[str, ...]()
+    for each in analysis.tabled:
+        shown = columns.get(each.header)
+        if shown is None:
+            continue
+        if each.path:
+            kind, *between, head = each.path
+            owner = between[-1] if between and isinstance(between[-1], tuple) else tuple(between[-1:])
+        elif owner:
+            # what tables alone have stands with the quantity before it
+            head = each.header.removeprefix(f"{owner[0]}_")
+        if not owner:
+            head = each.header
+        kinds.setdefault(kind, {}).setdefault(owner, {})[head] = shown
+    made = [Table([column for column in table.columns if column.header in table.keys])]
+    for kind, rows in kinds.items():
+        heads = dict.fromkeys(head for row in rows.values() for head in row)
+        names = {SINGULAR.get(kind, ""): [owner[0] for owner in rows if owner]}
+        if kind == "reactions":
+            names |= {"on": [owner[1] for owner in rows], "from": [owner[2] for owner in rows]}
+        lead = [Column(name, "", cells) for name, cells in names.items() if cells]
+        made.append(Table([*lead, *(_of_rows(head, list(rows.values())) for head in heads)], [*names]))
+    return made
+
+
+def _of_rows(head: str, rows: Sequence[Mapping[str, Column]]) -> Column:
+    """Return a column of the single cells that some rows have below a header."""
+
+    def error() -> list[float]:
+        found = (row.get(head) for row in rows)
+        return [0.0 if each is None or each.error is None else float(each.error()[0]) for each in found]
+
+    return column(head, [row[head].values[0] if head in row else None for row in rows], error)
+
+
 # --- as JSON ----------------------------------------------------------------------------------------------------------
 def documents(analysis: Analysis) -> list[Document]:
     """Return the poses for the JSON document, one assembly after the other at each input."""

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from dalembert.results.columns import Document
     from virtualwork.family.part import Part, Solver
 
+IN_A_ROW = 8
+"""Quantities that a terminal shows of a single pose in one row."""
 METHOD = (
     "Assur groups one after the other, two-link groups in closed form (Chace), larger ones by Newton-Raphson; rates by the "
     "derivatives of the loop equations along the input; effort by virtual work and by Newton and Euler, joint forces by "
@@ -167,14 +169,18 @@ class PoseCase(Case):
         tables = result.tables
         result.expected = (*self.further().values(), lambda: poses.by_link(a))
         result.afterword = self.afterword
-        result.sheets = lambda: [Sheet("", _sections(tables), self.figure)]
+        if a.inputs.n == 1 and len(a.assemblies) == 1 and len(a.tabled) > IN_A_ROW:
+            result.screen = lambda: poses.by_owner(a, tables[self.study.title]())
+        result.sheets = lambda: [Sheet("", _sections(result), self.figure)]
         return result
 
 
-def _sections(tables: Mapping[str, Callable[[], Table]]) -> list[Section]:
+def _sections(result: Result) -> list[Section]:
     """Return the sections of a report: every table; one without columns is of the JSON document alone."""
-    made = {name: table() for name, table in tables.items()}
-    return [Section(heading(name), [table]) for name, table in made.items() if table.columns]
+    (first, whole), *others = result.tables.items()
+    made = {first: [whole()] if result.screen is None else result.screen()}
+    made |= {name: [table()] for name, table in others}
+    return [Section(heading(name), tables) for name, tables in made.items() if tables[0].columns]
 
 
 @dataclass(frozen=True)

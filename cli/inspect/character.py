@@ -85,7 +85,7 @@ class Character(Case):
         """Return the result in every form: a terminal and a report have what is there once as a list."""
         result = super().result()
         once = [column for table in self.quantities.values() if not table.keys for column in table.columns]
-        result.screen = lambda: as_list(Table([column for column in once if column.values[0] != ""]))
+        result.screen = lambda: [as_list(Table([column for column in once if column.values[0] != ""]))]
         return result
 
     def warnings(self) -> list[str]:

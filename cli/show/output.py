@@ -71,7 +71,7 @@ def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
         from cli.show.expect import compare
 
         _, *others = result.tables.values()
-        screen = [] if result.screen is None else [result.screen]
+        screen = [] if result.screen is None else [lambda of=of: of for of in result.screen()]
         checked = compare(whole(), str(options.expect), options.rtol, [*screen, *result.expected, *others])
         result.warnings.extend(checked.warnings)
     check_renamed()
@@ -177,7 +177,8 @@ def _tables_text(result: Result, width: int | None) -> Iterator[str]:
     from dalembert.results.text import as_list, heading
 
     first, *others = result.tables.items()
-    yield table_block((result.screen or first[1])(), width)
+    for table in (first[1](),) if result.screen is None else result.screen():
+        yield table_block(table, width)
     for name, of in others:
         table = of()
         # without columns it is of the document alone; where the document has another form, one without a place is not shown
@@ -243,10 +244,11 @@ def _in_chosen_units(result: Result, units: str | None) -> Result:
     def of(table: Callable[[], Table]) -> Callable[[], Table]:
         return lambda: in_units(table(), chosen)
 
+    screen = result.screen
     return replace(
         result,
         tables={name: of(table) for name, table in result.tables.items()},
-        screen=None if result.screen is None else of(result.screen),
+        screen=None if screen is None else lambda: [in_units(table, chosen) for table in screen()],
         expected=[of(table) for table in result.expected],
     )
 
@@ -306,13 +308,19 @@ def _with_digits_that_hold(result: Result) -> Result:
     from dalembert.results.digits import digits_that_hold
 
     table, unknown = digits_that_hold(_first(result)())
-    screen = result.screen if result.screen is None else cache(result.screen)
-    if screen is not None and not any(column.error for column in table.columns):
-        unknown = digits_that_hold(screen())[1]
+    screen = None
+    if result.screen is not None:
+        cut = cache(lambda of=result.screen: [digits_that_hold(table) for table in of()])
+
+        def screen() -> list[Table]:
+            return [table for table, _ in cut()]
+
+        if not any(column.error for column in table.columns):
+            unknown = sum(count for _, count in cut())
     return replace(
         _with_first(result, lambda: table),
         warnings=[*result.warnings, *_unknown(unknown)],
-        screen=None if screen is None else lambda: digits_that_hold(screen())[0],
+        screen=screen,
     )
 
 

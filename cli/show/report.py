@@ -122,7 +122,12 @@ def _plain_sheet(result: Result) -> Sheet:
     (name, first), *others = result.tables.items()
     sections = [
         Section(
-            heading(name), [result.notes(), *with_sentences([(result.screen or first)()]), result.afterword()]
+            heading(name),
+            [
+                result.notes(),
+                *with_sentences([first()] if result.screen is None else result.screen()),
+                result.afterword(),
+            ],
         ),
         *(
             Section(heading(name), with_sentences([table]))

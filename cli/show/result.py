@@ -126,8 +126,8 @@ class Result:
     """The top of the JSON document, in front of the tables."""
     companions: Sequence[str] = ()
     """Which further tables go beside a file that holds one table, as FILE-name.csv."""
-    screen: Callable[[], Table] | None = None
-    """The terminal's table, where another layout reads better than that of the CSV."""
+    screen: Callable[[], Sequence[Table]] | None = None
+    """The terminal's tables in place of the CSV's, where another layout reads better."""
     expected: Sequence[Callable[[], Table]] = ()
     """Further tables whose columns a file of expected values may have."""
     notes: Callable[[], str] = lambda: ""
