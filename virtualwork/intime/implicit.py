@@ -48,8 +48,8 @@ def nodes() -> Nodes:
     (True, True)
     """
     legendre = np.polynomial.legendre
-    # the roots of P_s − P_{s−1}: the right end is one of them
-    c = 0.5 * (1 + np.sort(legendre.legroots([0.0] * (STAGES - 1) + [-1.0, 1.0])))
+    # the roots of P_s − P_{s−1}, all real (numpy 2.5 has them as complex numbers): the right end is one of them
+    c = 0.5 * (1 + np.sort(legendre.legroots([0.0] * (STAGES - 1) + [-1.0, 1.0]).real))
     c[-1] = 1.0
     x, w = legendre.leggauss(STAGES)
     x, w = 0.5 * (1 + x), 0.5 * w
