@@ -32,23 +32,23 @@ Arguments:
   table TABLE  CSV of eccentric masses; - is standard input.
 What:
   plane NAME[:Z]:RADIUS...  Correction plane, such as A:0mm:20mm; repeatable. One plane: static balancing.
-  planes FILE.csv  Table of correction planes, with the columns plane, z_*, radius_*, rotor.
+  planes FILE.csv  Table of planes: plane, z_*, radius_*, rotor.
   mass NAME:MASS...  Mass of a plane's correction, such as A:7kg. With --plane A:0mm:? the radius for it is found.
-  gravity G=9.80665  Acceleration of gravity for weights, m/s².
+  gravity G=9.80665  Acceleration of gravity, m/s².
 How:
   remove  Give the material to remove (default: to add).
   round_mass MASS  Round the corrections to this step, such as 0.1g.
   round_angle ANGLE  Round the angles to this step, such as 1deg.
-  modes FILE.csv  Balance a flexible rotor by its mode shapes: z_* and a column for each mode.
+  modes FILE.csv  Flexible rotor: table of mode shapes, z_* and columns.
 Tolerance:
   center_z Z  Axial position of the centre of mass. The couple is about it, and the tolerance is shared by it.
   grade GRADE  Balance quality grade, such as G2.5 (ISO 21940-11), API (4W/N) or MIL (MIL-STD-167-1).
   speed SPEED  Highest service speed, such as 3000rpm.
   rotor_mass MASS  Mass of the rotor, such as 12kg.
-  permissible UNBALANCE  Permissible residual unbalance in place of a grade, such as 30g_mm.
+  permissible UNBALANCE  Permissible residual unbalance, such as 30g_mm.
   bearings Z1:Z2  Bearing planes, where the tolerance holds (default: the correction planes). With --speed: show the bearing forces.
 Output:
-  page FILE(.html)  Write a page that computes the corrections while you edit the masses.
+  page FILE(.html)  Write a page that computes: edit the masses.
 Further options (docs/commands.md describes them):
   mode_count N  With --modes: use the first N modes (default: all).
   rigid  With --modes: balance force and couple too, which takes two planes more.

@@ -24,23 +24,23 @@ Arguments:
   parts PARTS  CSV of parts; - is standard input.
 What:
   omega X,Y,Z  Angular velocity, rad/s, such as 0,4,12.
-  alpha X,Y,Z  Angular acceleration, rad/s². With --frame-omega: the rate of omega's components in those axes.
-  frame_omega X,Y,Z  Angular velocity of axes that do not turn with the body, rad/s.
-  fixed X,Y,Z  Point about which the body turns, m. The motion of the centre of mass follows from it.
+  alpha X,Y,Z  Angular acceleration, rad/s².
+  frame_omega X,Y,Z  Angular velocity of other axes, rad/s: --alpha is the rate of omega's components in them.
+  fixed X,Y,Z  Point about which the body turns, m.
   velocity X,Y,Z  Velocity of the centre of mass, m/s.
   acceleration X,Y,Z  Acceleration of the centre of mass, m/s².
-  find NAME  Number to find, such as omega.y, the shaft's speed or a cell of the table, rod.ry.
-  so_that QUANTITY=VALUE  With --find: wanted value of a result, such as momentum.x=2 or bearing1_dynamic.size=20N.
-  only NAME,...  Show only these results, such as mass,inertia,principal_axes,momentum,bearing1.
+  find NAME  Number to find: omega.y, speed or a cell, rod.ry.
+  so_that QUANTITY=VALUE  With --find: wanted result, such as momentum.x=2.
+  only NAME,...  Show only these: mass,inertia,momentum,bearing1.
 Shaft:
-  shaft Z1:Z2  Positions of the two bearings along the axis, such as 0mm:400mm.
-  axis AXIS  Axis of the shaft through the origin: x, y, z (default), -x … or a vector, such as 1,0,1.
+  shaft Z1:Z2  Two bearings along the axis, such as 0mm:400mm.
+  axis AXIS  Axis: x, y, z (default), -x … or a vector 1,0,1.
   speed SPEED  Speed of the shaft, such as 1200rpm.
-  speed_rate RATE  Angular acceleration of the shaft, such as 10rad_s2.
+  speed_rate RATE  Rate of the speed, such as 10rad_s2.
   gravity X,Y,Z  Gravity on the shaft, m/s², such as 0,-9.81,0.
-  correct NAME:Z:RADIUS...  Correction plane of the shaft, such as A:0mm:20mm; repeatable.
+  correct NAME:Z:RADIUS...  Correction plane, A:0mm:20mm; repeatable.
 Robot:
-  check_inertias  Check the inertia tensors of a robot file (URDF, SDF, MJCF).
+  check_inertias  Check the inertia tensors of a robot file.
 Further options (docs/commands.md describes them):
   about X,Y,Z  Point about which the angular momentum is given, m, fixed in space (default: --fixed, else the origin).
 """

@@ -6,13 +6,13 @@ Arguments:
 """
 CASES = """
 Which poses, which mechanism:
-  at INPUT...  Pose by its input: 60deg, 20mm or crank=60deg,arm=30deg; repeatable.
+  at INPUT...  Pose: 60deg, 20mm, crank=60deg,arm=30deg; repeatable.
   over RANGE...  Range of the input, 0deg:360deg:1deg or 0deg:360deg/360; of any input or dimension, NAME=FROM:TO:STEP; repeatable.
   cases FILE.csv  Table with a row for each case, a column for each input or dimension (crank_deg, t_s, links.crank.B.x_mm).
   set NAME=VALUE...  Change a dimension: links.crank.B.x=62mm; repeatable.
 """
 BRANCH = """
-  branch all|NUMBER  All assemblies, or one by its number (default: that of the guess).
+  branch all|NUMBER  Every assembly, or one (default: that of the guess).
 """
 WORKERS = """
   workers N  Number of processes for many variants.

@@ -48,15 +48,15 @@ What:
   phase_lag  The phase of the instrument lags.
 How:
   objective least-squares|minimax=least-squares  Least sum of squares, or least maximum, of the residual vibration.
-  max_mass [PLANE=]MASS...  Largest mass of each correction: 5g, or of one plane: A=5g.
+  max_mass [PLANE=]MASS...  Largest mass of a correction: 5g or A=5g.
   max_residual AMPLITUDE  Largest residual vibration, such as 76um.
   from_here  Give the trim: what to add to the rotor with the masses of its last run.
   reading_error 2%,2deg  Standard deviations of amplitude and phase.
-  grade GRADE  Balance quality grade: G6.3 (ISO 21940-11), API or MIL.
-  blades N(1-10000)  Split the corrections onto N evenly spaced blades.
+  grade GRADE  Balance quality grade: G6.3, API or MIL.
+  blades N(1-10000)  Split the corrections onto N blades.
   save_influence FILE(.csv)  Store the influence coefficients.
 Output:
-  page FILE(.html)  Write the machine's sheet, a page that computes: type readings, and the corrections follow.
+  page FILE(.html)  Write the machine's sheet, a page that computes.
 Further options (docs/commands.md describes them):
   fit  Fit all runs together, initial vibration and coefficients.
   predict MASS@ANGLE,…  Predict a run: 10kg@-90deg or A=1g@0deg.

@@ -16,8 +16,8 @@ EXAMPLE = "door-closer"
 OPTIONS = f"""
 {FILE}{CASES}{BRANCH}{WORKERS}
 Quantities:
-  only NAME,...  Show only these quantities: crank.torque,B.coupler.fx,shaking.fx,H.x.
-  find NAME  Dimension to find at one pose: input.speed, links.crank.B.x.
+  only NAME,...  Show only these: crank.torque,B.coupler.fx,H.x.
+  find NAME  Dimension to find: input.speed, links.crank.B.x.
   so_that QUANTITY=VALUE  With --find: value that a quantity has then, such as B.vx=3m_s or crank.torque=12.
 Over a whole cycle:
   flywheel NUMBER  Compute the flywheel for this fluctuation of speed, such as 0.02.

@@ -28,25 +28,25 @@ What:
   rotor NAME  With a FILE: rotor to place.
   plane NAME  With a FILE: plane to place.
   positions ANGLES  Angles where masses can go, such as 292.5deg,315deg.
-  blades N(1-10000)  Number of blades, evenly spaced, numbered from 1.
+  blades N(1-10000)  Number of blades, evenly spaced.
   max_mass MASS  Largest mass of each place, such as 5g.
 How: weights as they are:
   stock MASSES  Weights in stock, such as 1g,2g,5g: uses the fewest within 1 % of the correction, at most three.
   weights MASSES  Weights of fixed mass at any angle, such as 4g,4g: gives the angle of each.
-  max_pieces N  Largest number of weights from stock: gives the least error, in place of the fewest weights.
 How: elsewhere:
   at_radius R  Radius of the corrections.
   to_radius R  Radius of the masses.
   at_z Z  Axial position of the corrections.
-  to_z Z1:Z2  Axial positions of the new planes: force and moment stay equal.
+  to_z Z1:Z2  Axial positions of the new planes.
 How: drilling:
-  drill DIAMETER  Diameter of holes: removes material opposite the corrections.
+  drill DIAMETER  Diameter of holes, opposite the corrections.
   density DENSITY  Density of the drilled material, such as 7850kg_m3.
-  remove  The corrections are material to REMOVE: drill at their angles, not opposite.
+  remove  The corrections are material to REMOVE.
 Further options (docs/commands.md describes them):
   first ANGLE=0deg  Angle of the first blade.
   numbering with|against=with  Blade numbers increase with the angles or against them.
   pieces N=1  Largest number of weights from stock on one place.
+  max_pieces N  Largest number of weights from stock: gives the least error, in place of the fewest weights.
   drill_point ANGLE=180deg  Point angle of the drill, such as 118deg; 180deg is flat.
   max_depth DEPTH  Largest depth of a hole; a place gets more holes if necessary.
 """

@@ -24,15 +24,15 @@ if TYPE_CHECKING:
 SHARED = """
 Output:
   json  Print one JSON document in SI units with full precision.
-  output -o --output FILE  Write the result to FILE (.csv .json .xlsx .parquet .md .tex).
-  plot FILE  Draw a picture (.svg, .png or .pdf).
+  output -o --output FILE  Write the result (.csv .json .xlsx .parquet .md .tex).
+  plot FILE  Draw a picture (.svg .png .pdf).
   expect FILE.csv  Compare the result with the expected values in FILE.csv.
   steps  Show the worked solution: equations with their numbers.
-  digits  Print only the right digits: computed twice, with 16 and with 32 digits.
-  units UNIT,...  Show the columns in these units, such as mm,g,deg,N_mm,rpm.
-  report FILE  Write a report (.html or .md) with data, results and method.
+  digits  Print only the right digits (computed twice).
+  units UNIT,...  Units of the columns, such as mm,g,deg,N_mm,rpm.
+  report FILE  Write a report (.html .md): data, results, method.
 Tables:
-  column NAME=HEADER...  Read the column HEADER of the file as NAME, such as mass_kg=Masse; repeatable.
+  column NAME=HEADER...  Read column HEADER as NAME: mass_kg=Masse; repeatable.
 Further options (docs/commands.md describes them):
   rtol NUMBER=1e-3  With --expect: relative tolerance of each value, of angles in radians.
   text  Print the aligned table into a pipe too (default there: CSV).
@@ -292,7 +292,9 @@ class Command(TyperCommand):
             if record is not None:
                 heading = "Arguments" if param.param_type_name == "argument" else "Options"
                 flags, words = record
-                rows[place.get(param.name or "", heading)].append((flags, _RANGE.sub(_span, words)))
+                # that a number counts goes without saying
+                words = _RANGE.sub(_span, _COUNTS.sub("", words))
+                rows[place.get(param.name or "", heading)].append((flags, words))
         return {heading: records for heading, records in rows.items() if records}
 
     def format_options(self, ctx, formatter) -> None:  # type: ignore[no-untyped-def]
@@ -322,6 +324,7 @@ _TYPES = {
 }
 _NO_NUMBER = re.compile(r"('.*') is not a valid (integer|int range|float range|float)\.?", re.DOTALL)
 _RANGE = re.compile(r"(?:(\d+)(?:\.0)?<=)?x([<>]=)(\d+)(?:\.0)?")
+_COUNTS = re.compile(r"  \[x>=[01](?:\.0)?\]|; x>=[01](?:\.0)?(?=\])")
 _OUTSIDE = re.compile(rf"(\S+) is not in the range ({_RANGE.pattern})\.?")
 
 

@@ -70,8 +70,9 @@ def test_options_stand_in_panels_of_at_most_ten(command: str, dalembert: Dalembe
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_help_is_at_most_60_lines_with_26_options(command: str, dalembert: Dalembert) -> None:
-    page = dalembert(command, "--help").stdout
+def test_help_is_at_most_60_lines_with_26_options(command: str, tmp_path: Path) -> None:
+    """On a terminal of 80 columns, and so in a pipe."""
+    page = on_a_terminal(tmp_path, command, "--help", COLUMNS="80")
     assert len(page.splitlines()) <= 60
     assert len(re.findall(r"^ +(?:-., )?--", page, re.MULTILINE)) <= 26
 
