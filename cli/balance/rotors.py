@@ -235,7 +235,8 @@ class Balancing:
             step, step_unit = request.mass_step
             if step_unit != unit:
                 step = from_si(to_si(step, "mass", step_unit), "mass", unit)
-            mass = _to_step(mass, step)
+            # a mass that is given is that of the weight there is
+            mass = np.where(np.isnan(fixed), _to_step(mass, step), mass)
         if request.angle_step is not None:
             step, step_unit = request.angle_step
             step = step if step_unit == "deg" else float(np.degrees(step))

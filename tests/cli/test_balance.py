@@ -193,6 +193,18 @@ def test_the_residual_is_that_of_the_rounded_corrections(
     assert one["residual"]["couple_unbalance_kg_m2"] == pytest.approx(couple, rel=1e-11)
 
 
+@pytest.mark.parametrize("radius", ["20mm", "?"])
+def test_a_mass_that_is_given_is_not_rounded(radius: str, dalembert: Dalembert) -> None:
+    table = "mass_kg,radius_mm,angle_deg\n1,60,30\n"
+    options = ("--plane", f"A:{radius}", "--mass", "A:2.4kg", "--round-mass", "1kg", "--json")
+    (one,) = answer(dalembert("balance", "-", *options, stdin=table))["rotors"]
+    (fix,) = one["corrections"]
+    assert fix["mass_kg"] == 2.4
+    left = 0.0 if radius == "?" else 0.060 - 2.4 * 0.020
+    assert fix["radius_m"] == pytest.approx(0.060 / 2.4 if radius == "?" else 0.020, rel=1e-15)
+    assert abs(one["residual"]["static_unbalance_kg_m"] - left) <= 1e-15 * 0.060
+
+
 def test_tolerance_in_the_bearings(dalembert: Dalembert) -> None:
     """The turbine of the annex of ISO 21940-11, with an unbalance in the plane of its centre of mass."""
     table = "unbalance_g_mm,angle_deg,z_mm\n28000,30,1500\n"
