@@ -58,7 +58,8 @@ def test_what_an_option_requests_is_shown_where_the_table_goes_into_a_pipe(dalem
     requested = ("--suggest", "--max-mass", "50g", "--robust", "--blades", "3")
     done = dalembert("field", "-", *requested, stdin=runs)
     (rotor,) = document(dalembert("field", "-", *requested, "--json", stdin=runs))["rotors"]
-    assert done.stdout.startswith("rotor,plane,mass_g") and done.stdout.count("\n") == 2
+    assert done.stdout.startswith("rotor,plane,mass_g")
+    assert done.stdout.count("\n") == 2
     entries = [
         *rotor["suggest"]["masses"],
         *rotor["robust"]["corrections"],
