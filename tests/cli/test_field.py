@@ -151,6 +151,36 @@ def test_runout(dalembert: Dalembert, tmp_path: Path) -> None:
     assert "found '9', expected a sensor of the runs" in done.stderr
 
 
+def test_runout_is_turned_with_the_readings(dalembert: Dalembert, tmp_path: Path) -> None:
+    """Runs show that the instrument of rotor x lags; those of y do not show the sense, so that y stays as it is alone."""
+    head = HEAD.replace("run,", "rotor,run,", 1)
+    runout, initial, alpha = 1 + 2j, 3 - 1j, 2 + 1j
+    on = {"x": [0, 1, 1j, -1], "y": [0, 1]}
+    rows = [
+        f"{rotor},{k},1,{cell((initial + alpha * w + runout).conjugate())},{f'A,1,{np.degrees(np.angle(w))}' if w else ',,'}"
+        for rotor, masses in on.items()
+        for k, w in enumerate(masses)
+    ]
+    (tmp_path / "r.csv").write_text(f"sensor,amplitude_um,phase_deg\n1,{cell(runout.conjugate())}\n")
+    call = ("field", "-", "--runout", "r.csv")
+    together = document(dalembert(*call, "--json", stdin=table(*rows, head=head)))
+    alone = document(dalembert(*call, "--json", stdin=table(*rows[4:], head=head)))
+    turned = document(dalembert(*call, "--json", "--phase-lag", stdin=table(*rows, head=head)))
+    assert any(
+        "rotor x: the runs show that the instrument's phase lags" in text for text in together["warnings"]
+    )
+    assert together["rotors"][1]["corrections"] == alone["rotors"][0]["corrections"]
+    w = -initial / alpha
+    for rotor in (together["rotors"][0], *turned["rotors"]):
+        (fix,) = rotor["corrections"]
+        assert 1e3 * fix["mass_kg"] == pytest.approx(abs(w), rel=1e-14)
+        assert fix["angle_deg"] == pytest.approx(np.degrees(np.angle(w)) % 360, rel=1e-14)
+    (fix,) = together["rotors"][1]["corrections"]
+    assert fix["angle_deg"] == pytest.approx(-np.degrees(np.angle(w)) % 360, rel=1e-14)
+    digits = dalembert(*call, "--digits", stdin=table(*rows, head=head)).stdout.splitlines()
+    assert digits[2].startswith("y,A,1.41421356237")
+
+
 def goodman(*more: str) -> tuple[str, str]:
     alpha = [(3, 180), (5, 180), (5, 180)], [(2, 0), (2, 0), (3, 0)]
     initial = table("0,1,1,180", "0,2,1,0", "0,3,0,0", head="run,sensor,amplitude_um,phase_deg")
