@@ -140,6 +140,14 @@ def test_several_speeds(dalembert: Dalembert, tmp_path: Path) -> None:
     assert np.abs(corrections(again) * 1e3 - W).max() < 1e-12
 
 
+def test_an_amplitude_that_is_too_small_to_square(dalembert: Dalembert) -> None:
+    done = dalembert(
+        "field", "-", stdin=table("0,1,5e-160,0,,,", "1,1,7e-160,0,A,1,0", "2,1,4e-160,9,A,1,180")
+    )
+    assert done.returncode == 1
+    assert done.stderr.endswith("found '5e-160', expected 0, or an amplitude of 1e-60 at least\n")
+
+
 def test_runout(dalembert: Dalembert, tmp_path: Path) -> None:
     text = runs("A,1,0,", "B,1,90,", on=[[1, 0], [0, 1j]], v0=V0 + 0.5j)
     (tmp_path / "r.csv").write_text("sensor,amplitude_mm,phase_deg\n0,0.0005,90\n1,0.0005,90\n2,0.0005,90\n")
