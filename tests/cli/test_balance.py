@@ -467,3 +467,9 @@ def test_angles_are_rounded_to_marks_on_a_circle(
     table = f"mass_g,radius_mm,angle_deg\n10,20,{angle - 180}\n"
     done = dalembert("balance", "-", "--plane", "A:20mm", "--round-angle", step, stdin=table)
     assert [float(row["angle_deg"]) for row in rows(done.stdout)] == [mark]
+
+
+@pytest.mark.parametrize("unit", ["g.mm", "g·mm", "g mm", "g*mm", "g_mm"])
+def test_every_spelling_of_an_unbalance(unit: str, dalembert: Dalembert) -> None:
+    done = dalembert("balance", "-", "--plane", "A:1mm", stdin=f"unbalance [{unit}],angle_deg\n10,0\n")
+    assert done.stdout == "rotor,plane,radius_mm,unbalance_g_mm,mass_g,angle_deg\n1,A,1.0,10.0,10.0,180.0\n"
