@@ -473,3 +473,19 @@ def test_angles_are_rounded_to_marks_on_a_circle(
 def test_every_spelling_of_an_unbalance(unit: str, dalembert: Dalembert) -> None:
     done = dalembert("balance", "-", "--plane", "A:1mm", stdin=f"unbalance [{unit}],angle_deg\n10,0\n")
     assert done.stdout == "rotor,plane,radius_mm,unbalance_g_mm,mass_g,angle_deg\n1,A,1.0,10.0,10.0,180.0\n"
+
+
+@pytest.mark.parametrize("planes", [("A:20mm",), ("A:0mm:20mm", "B:90mm:20mm")])
+def test_equal_masses_evenly_around_need_no_correction(planes: tuple[str, ...], dalembert: Dalembert) -> None:
+    """A rounding of sin 120° gave 9e-17 kg at 180°."""
+    table = "mass_kg,radius_mm,angle_deg,z_mm\n1,10,0,10\n1,10,120,10\n1,10,240,10\n"
+    options = [word for plane in planes for word in ("--plane", plane)]
+    done = dalembert("balance", "-", *options, "--steps", "--json", stdin=table)
+    document = answer(done)
+    (one,) = document["rotors"]
+    assert all((fix["mass_kg"], fix["angle_deg"]) == (0.0, 0.0) for fix in one["corrections"])
+    assert one["initial"]["static_unbalance_kg_m"] == one["initial"]["static_angle_deg"] == 0.0
+    assert one["residual"]["static_unbalance_kg_m"] == 0.0
+    assert one["initial"]["couple_unbalance_kg_m2"] == one["residual"]["couple_unbalance_kg_m2"]
+    assert one["residual"]["couple_unbalance_kg_m2"] in (None, 0.0)
+    assert set(document["way"][0]["sum"].values()) <= {0.0, None}
