@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.angles import phasor
+from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
 
 Real = NDArray[np.float64]
@@ -21,7 +22,7 @@ class Indexed(NamedTuple):
     rotor: Complex
     mounting: Complex
     residuals: Complex
-    """Each reading less its fitted value, (..., k)."""
+    """Each reading less its fitted value, (..., k); 0 within rounding, as the parts are."""
     residual_sd: Real
     """√(Σ|residual|²/(k − 2)); NaN for two readings."""
     uncertainty: Real
@@ -68,8 +69,10 @@ def index_balancing(readings: ArrayLike, turned: ArrayLike = (0.0, np.pi)) -> In
     """
     read = np.asarray(readings, dtype=complex)
     phi = np.asarray(turned, dtype=float)
-    if phi.ndim != 1 or read.shape[-1:] != phi.shape or len(phi) < 2:
-        raise ValueError("expected as many readings as angles, and at least two")
+    if phi.ndim != 1 or read.shape[-1:] != phi.shape:
+        raise ValueError("expected as many readings as angles")
+    if len(phi) < 2:
+        raise ValueError("one position: expected two at least, half a turn apart")
     if not (np.isfinite(read).all() and np.isfinite(phi).all()):
         raise ValueError("readings and angles must be finite")
     # in degrees half a turn is exact
@@ -82,6 +85,10 @@ def index_balancing(readings: ArrayLike, turned: ArrayLike = (0.0, np.pi)) -> In
     rotor = (read @ apart.conj()) / size
     mounting = read.mean(axis=-1) - mean * rotor
     residuals = read - (mounting[..., None] + rotor[..., None] * turn)
+    # what the readings and the factor by which their errors grow leave of rounding
+    noise = 24 * EPS * len(phi) / size * (np.abs(read).sum(axis=-1) + len(phi) * np.abs(rotor))
+    rotor, mounting = (np.where(np.abs(part) > noise / len(phi), part, 0.0) for part in (rotor, mounting))
+    residuals = np.where(np.abs(residuals) > noise[..., None], residuals, 0.0)
     spare = len(phi) - 2
     square = np.square(np.abs(residuals)).sum(axis=-1)
     variance = square / spare if spare else np.full_like(square, np.nan)

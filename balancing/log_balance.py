@@ -88,6 +88,9 @@ class CoefficientSpread(NamedTuple):
 class LogBalance:
     """Corrections of a rotor whose log was fitted, with their uncertainty.
 
+    The uncertainties are NaN where the squares of readings or coefficients leave the range of doubles (below 1e-150 or beyond
+    1e150): choose another unit.
+
     Examples
     --------
     >>> from balancing import joint_fit, least_squares

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.correction import correct
 from dalembert.arithmetic.records import record, table
+from dalembert.arithmetic.shapes import as_array, in_32_digits, is_doubled
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -245,14 +246,14 @@ def _nearest(goal: complex, arms: Complex, limit: Real) -> tuple[Real, tuple[int
 
 
 def drill_depth(
-    mass: ArrayLike, diameter: ArrayLike, density: ArrayLike, point_angle: float = np.pi
+    mass: ArrayLike, diameter: ArrayLike, density: ArrayLike, point_angle: ArrayLike = np.pi
 ) -> NDArray[np.float64]:
     """Return the depth of a hole that removes a mass, (...), m, measured at the tip of the drill.
 
     Parameters
     ----------
     mass, diameter, density
-        kg, m, kg/m³; they broadcast.
+        kg, m, kg/m³; they broadcast. In numbers of 32 digits (`doubled_arrays`) the depth is too.
     point_angle
         The drill's point angle, rad; π for a flat bottom.
 
@@ -271,19 +272,30 @@ def drill_depth(
     >>> round(float(drill_depth(0.010, 0.010, 7850.0)) * 1000, 2)
     16.22
     """
-    m, d, rho = (np.asarray(value, dtype=float) for value in (mass, diameter, density))
-    if not ((m >= 0).all() and (d > 0).all() and (rho > 0).all() and 0 < point_angle <= np.pi):
+    m, d, rho, point = map(as_array, (mass, diameter, density, point_angle))
+    if not (
+        (m >= 0).all() and (d > 0).all() and (rho > 0).all() and (point > 0).all() and (point <= np.pi).all()
+    ):
         raise ValueError(
             "mass must not be negative, diameter and density positive, the point angle in (0, π]"
         )
     volume, area = m / rho, np.pi * d**2 / 4
-    if point_angle == np.pi:
-        return np.asarray(volume / area)
-    slope = np.tan(point_angle / 2)
-    point = d / 2 / slope
-    cone = area * point / 3
-    shallow = np.cbrt(3 * volume / (np.pi * slope**2))
-    return np.asarray(np.where(volume >= cone, (volume - cone) / area + point, shallow))
+    if (point == np.pi).all():
+        return as_array(volume / area)
+    half = point / 2
+    slope = np.sin(half) / np.cos(half) if is_doubled(half) else np.tan(half)
+    tip = d / 2 / slope
+    cone = area * tip / 3
+    shallow = _cube_root(3 * volume / (np.pi * slope**2))
+    return as_array(np.where(volume >= cone, (volume - cone) / area + tip, shallow))
+
+
+def _cube_root(x: Any) -> Any:
+    if not is_doubled(x):
+        return np.cbrt(x)
+    # a step of Newton's doubles the digits
+    root = in_32_digits(np.cbrt(x.value))
+    return root - np.where(x.value > 0, (root * root * root - x) / (3 * root * root), 0.0)
 
 
 def transfer(unbalance: ArrayLike, z: ArrayLike, planes: ArrayLike) -> Complex:

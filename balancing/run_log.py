@@ -91,14 +91,16 @@ class JointFit:
         return JointFit(y, t, weights, unknowns, gain, leverage, count, prior)
 
     def without(self, runout: Complex) -> JointFit:
-        """Return the fit with the run-out (s,) subtracted from every reading."""
+        """Return the fit with the run-out (..., s) subtracted from every reading."""
         unknowns = self.unknowns.copy()
         unknowns[..., 0] -= runout
         prior = self.foreknown
         if prior is not None:
             again = partial(_without, prior.again, runout)
             prior = replace(prior, plain=prior.plain.without(runout), again=again)
-        return replace(self, readings=self.readings - runout, unknowns=unknowns, foreknown=prior)
+        return replace(
+            self, readings=self.readings - runout[..., None, :], unknowns=unknowns, foreknown=prior
+        )
 
     @property
     def alone(self) -> JointFit:

@@ -76,8 +76,32 @@ class Marks(NamedTuple):
 
     at: Any
     """(n,), s."""
-    resolution: Any
-    """The possible common shift of all of them, to either side, s."""
+    low: Any = None
+    """The last low sample before each, (n,), s; None where the times lie between the samples."""
+    high: Any = None
+    """The first high sample of each, (n,), s."""
+    even: bool = False
+    """Whether the distances from each to the next are alike."""
+
+    def slack(self, place: float) -> Any:
+        """Return by how much they may all be shifted at a place among them, to either side, s; the first one is at 0."""
+        if self.low is None or not len(self.at):
+            return 0.0
+        if not self.even:
+            apart = self.high - self.low
+            return apart[apart.argmax()] / 2
+        # other even marks lie elsewhere there
+        line, k = self.at[0] + (self.at[1] - self.at[0]) * place, np.arange(len(self.at)) - place
+        return max(line - _envelope(k, self.low), -_envelope(k, -self.high) - line, key=float)
+
+    def resolution(self, middle: float, pulses: int) -> Any:
+        """Return by how much they may shift the vectors of turns of so many marks, to either side, s; `middle`: that of all turns.
+
+        The vector of a turn is shifted as its middle is. A distance that is wrong by δ shifts it by pulses/(4π) δ more, as the mean
+        of (θ − π) sin²(θ + φ) over a turn is −sin(2φ)/4.
+        """
+        beside = pulses / (4 * np.pi)
+        return max(self.slack(middle - beside), self.slack(middle + beside), key=float)
 
 
 def marks(t: ArrayLike, mark: ArrayLike) -> Marks:
@@ -87,8 +111,9 @@ def marks(t: ArrayLike, mark: ArrayLike) -> Marks:
     either way. Where the marks are even within the samples they are taken as even, in the middle of what all of
     them allow. Any other mark rises between two samples by linear interpolation.
 
-    >>> marks([0, 1, 2, 3], [0, 0, 1, 0]), marks([0, 1, 2, 3], [0, 0, 3, 4])
-    (Marks(at=array([1.5]), resolution=0.5), Marks(at=array([1.66666667]), resolution=0.0))
+    >>> one, other = marks([0, 1, 2, 3], [0, 0, 1, 0]), marks([0, 1, 2, 3], [0, 0, 3, 4])
+    >>> one.at, float(one.slack(0)), other.at.round(9), other.slack(0)
+    (array([1.5]), 0.5, array([1.66666667]), 0.0)
     """
     time, level = as_array(t), as_array(mark)
     nearest = _floats(level)
@@ -100,16 +125,16 @@ def marks(t: ArrayLike, mark: ArrayLike) -> Marks:
         rises = rises + 1
         falls = np.flatnonzero((nearest[:-1] >= float(half)) & (nearest[1:] < float(half))) + 1
         whole = rises[rises < falls[-1:].max(initial=0)]
-        pulses = falls[np.searchsorted(falls, whole, side="right")] - whole
+        lengths = falls[np.searchsorted(falls, whole, side="right")] - whole
         first = 1.0
-        if nearest[0] >= float(half) and len(pulses) and falls[0] >= pulses.min():
-            # the recording begins with a whole pulse; shorter than others, it may lack its first sample
+        if nearest[0] >= float(half) and len(lengths) and falls[0] >= lengths.min():
+            # the recording begins with a whole pulse; as short as any other, it may lack its first sample
             rises = np.concatenate([[0], rises])
-            first += float(falls[0] < pulses.max())
+            first += float(falls[0] == lengths.min())
         before = np.concatenate([time[:1] - (time[1:2] - time[:1]) * first, time[:-1]])
         return _even(before[rises], time[rises])
     share = (half - level[rises]) / (level[rises + 1] - level[rises])
-    return Marks(time[rises] + share * (time[rises + 1] - time[rises]), 0.0)
+    return Marks(time[rises] + share * (time[rises + 1] - time[rises]))
 
 
 def _floats(x: Any) -> Any:
@@ -120,23 +145,17 @@ def _floats(x: Any) -> Any:
 def _even(low: Any, high: Any) -> Marks:
     """Return marks that each lie in an interval as even ones, where they can be."""
     middle = (low + high) / 2
-    apart = high - low
-    widest = apart[apart.argmax()] / 2 if len(middle) else 0.0
-    each = Marks(middle, widest if is_doubled(widest) else float(widest))
+    each = Marks(middle, low, high)
     if len(middle) < 3:
         return each
     k = np.arange(len(middle)) - (len(middle) - 1) / 2
-    start, wide = float(k @ _floats(middle) / (k @ k)), 4 * float(each.resolution) / len(k)
+    start, wide = float(k @ _floats(middle) / (k @ k)), 4 * float(each.slack(0)) / len(k)
     slope = _roomiest(k, low, high, start - wide, start + wide)
     below, above = low - slope * k, high - slope * k
     first, last = below[below.argmax()], above[above.argmin()]
     if not first < last:
         return each
-    middle = (first + last) / 2
-    # other slopes leave other places for the middle of the marks
-    sides = middle - _envelope(k, low), -_envelope(k, -high) - middle
-    shift = sides[int(float(sides[1]) > float(sides[0]))]
-    return Marks(middle + slope * k, shift if is_doubled(shift) else float(shift))
+    return Marks((first + last) / 2 + slope * k, low, high, even=True)
 
 
 def _envelope(k: Any, y: Any) -> Any:
@@ -260,7 +279,7 @@ def once_per_turn(
         raise ValueError("the times must rise from row to row")
     if pulses < 1:
         raise ValueError(f"{pulses} pulses in a turn: expected one at least")
-    knots, _ = marks(time, level)
+    knots = marks(time, level).at
     if len(knots) < pulses + 1:
         expected = (
             "two at least, a turn apart" if pulses == 1 else f"{pulses + 1} at least, a turn of {pulses}"
@@ -274,10 +293,12 @@ def once_per_turn(
 
 def _averaged(time: Any, x: Any, level: Any, pulses: int, tacho: Any) -> OncePerTurn:
     """Return the vectors of a recording, of floats or of numbers in 32 digits."""
-    knots, resolution = marks(time, level)
-    at = knots[::pulses]
+    rises = marks(time, level)
     if tacho is not None:
-        knots, at, pulses = _counted(time, tacho, at)
+        knots, at, pulses, resolution = _counted(time, tacho, rises)
+    else:
+        knots, at = rises.at, rises.at[::pulses]
+        resolution = rises.resolution((len(at) - 1) * pulses / 2, pulses)
     each = at[1:] - at[:-1]
     vectors = _turns(time, x, at, knots, pulses)
     turns = len(each)
@@ -298,15 +319,17 @@ def _averaged(time: Any, x: Any, level: Any, pulses: int, tacho: Any) -> OncePer
     return OncePerTurn(mean, deviation, float(speed), float(of_speed), turns, float(speed * resolution))
 
 
-def _counted(time: Any, tacho: Any, at: Any) -> tuple[Any, Any, int]:
-    """Return the times of a tacho's pulses, the marks between the first and the last of them, and how many a turn has."""
+def _counted(time: Any, tacho: Any, rises: Marks) -> tuple[Any, Any, int, Any]:
+    """Return the times of a tacho's pulses, the marks between them, how many pulses a turn has, and the resolution, s."""
     if tacho.shape != time.shape or not np.isfinite(_floats(tacho)).all():
         raise ValueError("the tacho must be finite, a value for each time")
-    knots = marks(time, tacho).at
+    pulse = marks(time, tacho)
+    knots = pulse.at
     if len(knots) < 2:
         raise ValueError(f"the tacho rises {len(knots)} times: expected several pulses in each turn")
     places = _floats(knots)
-    at = at[(_floats(at) >= places[0]) & (_floats(at) <= places[-1])]
+    within = np.flatnonzero((_floats(rises.at) >= places[0]) & (_floats(rises.at) <= places[-1]))
+    at = rises.at[within]
     if len(at) < 2:
         raise ValueError("the tacho has no whole turn from mark to mark")
     # pulses and marks may coincide: between marks their whole number is told by the mean
@@ -319,7 +342,10 @@ def _counted(time: Any, tacho: Any, at: Any) -> tuple[Any, Any, int]:
         raise ValueError(
             f"the turn at {_floats(at)[k]:g} s has {period:.3g} pulses of the tacho: expected {max(pulses, 1)}, as others"
         )
-    return knots, at, pulses
+    # turns begin at marks; from there on the pulses give the angle
+    begin = float(passed[:-1].mean())
+    of_tacho = pulse.slack(begin) + pulse.resolution(begin + pulses / 2, pulses)
+    return knots, at, pulses, rises.slack(float(within[:-1].mean())) + of_tacho
 
 
 def _turns(t: Any, x: Any, at: Any, knots: Any, pulses: int) -> Any:

@@ -192,7 +192,7 @@ def _spelled(text: str) -> str:
 
 
 def unit_name(written: str) -> str:
-    """Return a unit as headers spell it: `mm/s` is mm_s, `g·mm` g_mm, `N/mm` N_per_mm, `µm` um, `°` deg, `1/min` rpm."""
+    """Return a unit as headers spell it: `mm/s` is mm_s, `g·mm` and `g.mm` g_mm, `N/mm` N_per_mm, `µm` um, `°` deg, `1/min` rpm."""
     text = _spelled(written).replace("^", "")
     above, slash, below = (part.strip() for part in text.partition("/"))
     if slash:
@@ -202,7 +202,7 @@ def unit_name(written: str) -> str:
             else "_per_"
         )
         text = f"{above}{joint}{below}"
-    return re.sub("_+", "_", re.sub(r"[\s*/]", "_", text)).strip("_")
+    return re.sub("_+", "_", re.sub(r"[\s*./]", "_", text)).strip("_")
 
 
 def _is_stiffness(above: str, below: str) -> bool:

@@ -49,6 +49,7 @@ def test_slug_and_blob_are_what_a_pound_force_accelerates() -> None:
         ("2 kN", "force", 2000.0),
         ("1 slug", "mass", 14.593902937206364),
         ("4 N/mm", "stiffness", 4000.0),
+        ("30 g.mm", "unbalance", 3e-5),
         ("-3 °", "angle", -3 * math.pi / 180),
         ("−3 mm", "length", -0.003),
     ],

@@ -163,6 +163,7 @@ def sheet(b: Balancing) -> Page:
             "tapes": tapes[text],
             # a mass and a radius that are both given leave something
             "given": bool(steps or (~np.isnan(b.given_mass[here]) & ~b.sought[here]).any()),
+            "fixed": (~np.isnan(b.given_mass[here])).tolist(),
         }
         if limit is not None:
             verdicts = b.verdicts(r)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from balancing import CoincidentPlanes, Correction, UnreachedMode, by_size, correct, modal_corrections
 from cli.read.rotor_options import Planes, Tolerance, Verdict
 from dalembert.angles import degrees, phasor
+from dalembert.arithmetic.exact import EPS
 from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError, quote
 from dalembert.tables.table import Table, read
@@ -171,10 +172,12 @@ class Balancing:
             except CoincidentPlanes as error:
                 name = rotors.names[group[int(np.argmax(error.rotors))]]
                 raise DataError(f"rotor {quote(name)}: {error}") from None
-            self.static[group] = fix.static
-            self.couple[group] = fix.couple(self.about[group])
-            self.ideal[rows] = fix.unbalance
+            size, lever = np.abs(u), np.abs(at - self.about[group, None])
+            self.static[group] = _nonzero(fix.static, size.sum(axis=-1))
+            self.couple[group] = _nonzero(fix.couple(self.about[group]), (size * lever).sum(axis=-1))
             self.growth[group] = fix.amplification
+            terms = fix.amplification * size.sum(axis=-1)
+            self.ideal[rows] = _nonzero(fix.unbalance, terms[:, None])
             self.solved.append((group, rows, fix))
         self.modal: list[tuple[NDArray[np.intp], NDArray[np.intp], ModalCorrection]] = []
         """Where modes are given: of rotors of like size their numbers, the rows of their planes, their corrections."""
@@ -182,8 +185,11 @@ class Balancing:
             self._modal(request.modes, z, plane_z)
         self.mass, self.angle, self.made = self._given_out()
         for group, rows, fix in self.solved:
-            left = fix.residual_of(self.made[rows], self.about[group])
-            self.residual_static[group], self.residual_couple[group] = left
+            added = self.made[rows].any(axis=-1)
+            static, couple = fix.residual_of(self.made[rows], self.about[group])
+            # of nothing nothing is left
+            self.residual_static[group] = np.where(added | (self.static[group] != 0), static, 0.0)
+            self.residual_couple[group] = np.where(added | (self.couple[group] != 0), couple, 0.0)
         self.before, self.after = self._in_tolerance_planes()
 
     def _modal(self, modes: Modes, z: Real, plane_z: Real) -> None:
@@ -235,7 +241,8 @@ class Balancing:
             step, step_unit = request.mass_step
             if step_unit != unit:
                 step = from_si(to_si(step, "mass", step_unit), "mass", unit)
-            mass = _to_step(mass, step)
+            # a mass that is given is that of the weight there is
+            mass = np.where(np.isnan(fixed), _to_step(mass, step), mass)
         if request.angle_step is not None:
             step, step_unit = request.angle_step
             step = step if step_unit == "deg" else float(np.degrees(step))
@@ -370,6 +377,11 @@ class Balancing:
             shapes = modes.exactly_at(there)
             result[rows] = least_norm(Vectors(shapes, shapes * 0.0), modal)
         return result
+
+
+def _nonzero(value: Complex, terms: Real) -> Complex:
+    """Return sums of terms of these sizes, zero where they are the rounding of the terms: of masses evenly around, for one."""
+    return np.where(np.abs(value) > 4 * EPS * terms, value, 0.0)
 
 
 def _to_mark(angle: Real, step: float) -> Real:

@@ -103,7 +103,7 @@ def corrections(b: Balancing) -> Table:
         return mass_of(w) * writtens(gravity)
 
     def turn() -> Real:
-        return b.exact.turned(b.ideal)
+        return (-b.exact).turned(-b.ideal) if b.request.remove else b.exact.turned(b.ideal)
 
     size, masses = np.abs(b.ideal), np.abs(b.ideal) / np.where(radius > 0, radius, np.nan)
     unit, mass_unit = rotors.unbalance_unit, rotors.mass_unit

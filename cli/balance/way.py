@@ -9,6 +9,7 @@ import numpy as np
 
 from cli.balance.rotors import Balancing
 from dalembert.angles import degrees, in_turn
+from dalembert.arithmetic.exact import EPS
 from dalembert.results.columns import Column, Table, names, number
 from dalembert.results.way import Topic, figures
 from dalembert.units import from_si
@@ -82,7 +83,7 @@ def _of_rotor(b: Balancing, rotor: int, rows: list[int], fix: Correction, i: int
     topics = [_components(b, rotor, about, planes[0], scale)]
     masses = _masses(b, mine)
     if len(planes) == 1 or not has_z:
-        static = complex(fix.static[i]) if fix.static.ndim else complex(fix.static)
+        static = complex(b.static[rotor])
         text = [
             f"Σ {scale.letter}·r + {scale.letter}_e·r_e = 0, each component alone (Riul, eqs. 6 to 11):",
             f"  {_sum_of(scale, masses, 'x')} + x = 0,  x = {scale.of(-static.real)} {scale.name}",
@@ -125,7 +126,8 @@ def _components(b: Balancing, rotor: int, about: float | None, plane: str, scale
     ]
     hidden = [] if rotors.z is not None else [number("z", "length", z, length)]
     hidden += [component(name, values[name]) for name in COMPONENTS if name not in shown]
-    sums = {name: np.array([np.sum(of)]) for name, of in values.items()}
+    totals = {name: (np.sum(of), 4 * EPS * np.abs(of).sum()) for name, of in values.items()}
+    sums = {name: np.array([0.0 if abs(of) <= noise else of]) for name, (of, noise) in totals.items()}
     total = Table(
         [names("name", ["sum"], None), *(component(name, sums[name]) for name in shown)],
         ("name",),
@@ -164,6 +166,7 @@ def _two_planes(
     apart = figures((z[1] - z[0]) * scale.reach)
     couple = complex(np.ravel(fix.couple(fix.planes[..., 0]))[i])
     c = complex(made[1])
+    couple = couple if c else 0j
     w = scale.letter
     text = [
         f"ΣM = 0 about plane {first}: Σ a·{w}·r + a_{second}·{w}_{second}·r_{second} = 0 (Riul, eqs. 13 to 19):"

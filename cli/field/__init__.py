@@ -39,6 +39,10 @@ METHOD = (
     "21940-11. The masses are at the radius of the trial masses."
 )
 FEWEST_DRAWS = 40  # they give a standard deviation to a ninth
+REQUESTED = (
+    "predict", "suggest", "suggest_gain", "robust", "static", "couple", "split", "trim_split", "tolerance", "zones",
+)  # fmt: skip
+"""Tables that an option requests: where a pipe takes the corrections, standard error has them in words."""
 OPTIONS = """
 Arguments:
   runs RUNS  CSV of runs; - is standard input.
@@ -234,11 +238,9 @@ def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -
         return way(b)
 
     def aside() -> list[str]:
-        if b.predict is None:
-            return []
-        from cli.field.fit_tables import prediction_lines
+        from cli.field.fit_tables import in_words
 
-        return prediction_lines(b)
+        return [line for name in REQUESTED if name in made for line in in_words(name, made[name]())]
 
     beside: dict[Path, Callable[[], bytes]] = {} if save_influence is None else {save_influence: stored}
     if page is not None:

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from balancing import (
     Balance,
@@ -176,10 +177,11 @@ class FieldBalancing:
         return self.runs.of(group.rotors[i])
 
     def runout(self, group: Group) -> Complex:
-        """Return the run-out of each channel, (s,)."""
-        return np.array(
+        """Return the run-out of each channel in the sense of the mass angles, (g, s)."""
+        read = np.array(
             [self.runs.runout.get(channel.sensor, 0) for channel in group.channels], dtype=complex
         )
+        return np.where(self.against(group)[:, None], read.conj(), read)
 
     def _solve(self, group: Group) -> Solved:
         request = self.request
@@ -344,10 +346,10 @@ class FieldBalancing:
 
     # -- in the units and by the names of the table ------------------------------------------------------
 
-    def against(self, group: Group, i: int) -> bool:
-        """Whether a rotor's phases were turned round, for the instrument counts them against the sense of the mass angles."""
-        by_its_runs = self.request.lagging is None and group.lines.senses[i] == "lag"
-        return self.request.against or by_its_runs
+    def against(self, group: Group) -> NDArray[np.bool_]:
+        """Return whose phases were turned round, (g,), for the instrument counts them against the sense of the mass angles."""
+        by_its_runs = [self.request.lagging is None and sense == "lag" for sense in group.lines.senses]
+        return np.array(by_its_runs) | self.request.against
 
     def in_kg_m(self, corrections: Complex) -> Real:
         """Return the unbalances of masses at the trial radius, or of unbalances as they are."""

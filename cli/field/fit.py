@@ -97,11 +97,8 @@ def measured_groups(
     # the one fact that shows a fit: it is requested, or there are readings to spare, or no run is without masses
     runs.fitted = not request.four_run and (measured.fit or any(_spares(group) for group in runs.groups))
     runs.warnings = [*runs.table.warnings, *runs.warnings, *measured.warnings]
-    lags = request.against or runs.lags
     if runout is not None:
-        runs.runout = read_runout(runout, runs, lagging=lags)
-    elif lags:
-        runs.runout = {sensor: vector.conjugate() for sensor, vector in runs.runout.items()}
+        runs.runout = read_runout(runout, runs)
     return runs, stored
 
 

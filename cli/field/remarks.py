@@ -236,7 +236,7 @@ class _Group:
         for pair in islice(pairs, SHOWN):
             runs = list(dict.fromkeys(lines[j] for j in pair.runs))
             read = group.readings[i, list(pair.runs), pair.channel]
-            shown = read.conj() if self.b.against(group, i) else read
+            shown = read.conj() if self.b.against(group)[i] else read
             first, second = (f"{abs(v):.6g} {unit} at {degrees(v):.6g}°" for v in shown)
             yield (
                 f"{self.b.of(group, i)}run{'s' * (len(runs) > 1)} {' and '.join(runs)}, sensor {group.channels[pair.channel]}: with "
@@ -307,7 +307,7 @@ def instrument(rotor: Rotor) -> str:
     b = rotor.b
     if b.request.four_run:
         return sense(b)
-    if not b.against(rotor.group, rotor.i):
+    if not rotor.against:
         return (
             "Phases as the instrument shows them; they and the mass angles are counted in one common sense, from one mark "
             "on the rotor."

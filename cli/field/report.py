@@ -71,7 +71,7 @@ class _Pages:
     def __init__(self, rotor: Rotor, made: Mapping[str, Table]) -> None:
         self.rotor, self.b, self.solved, self.i, self.last = rotor, rotor.b, rotor.solved, rotor.i, rotor.last
         self.tables = {name: _of_rotor(table, rotor.name) for name, table in made.items() if table.columns}
-        self.unit, self.against = rotor.b.runs.amplitude_unit, rotor.b.against(rotor.group, rotor.i)
+        self.unit, self.against = rotor.b.runs.amplitude_unit, rotor.against
 
     def parts(self, *of: str) -> list[str | Table]:
         """Return tables of the result, where there are such, between the sentences above and below them."""
@@ -424,8 +424,8 @@ def machine_page(b: FieldBalancing) -> Page:
         ridge=request.ridge,
         errors=request.reading_error,
         covariance=covariance,
-        runout=b.runout(group),
-        against=b.against(group, 0),
+        runout=b.runout(group)[0],
+        against=bool(b.against(group)[0]),
         first=next(
             (run for run, bare in zip(group.lines.runs(0), group.bare[0], strict=True) if bare), "initial"
         ),

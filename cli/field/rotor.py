@@ -148,6 +148,11 @@ class Rotor:
         """What is on it in its last run, (p,)."""
         return np.asarray(self.solved.standing[self.i])
 
+    @property
+    def against(self) -> bool:
+        """Whether its phases were turned round."""
+        return bool(self.b.against(self.group)[self.i])
+
     @cached_property
     def reasons(self) -> list[str]:
         """Why a plane needs no trim; "" where it does."""
@@ -171,7 +176,6 @@ class Rotor:
     def last(self) -> LastRun | None:
         """Its last run, where that shows how well it is balanced; None where it was a trial run."""
         runs = self._runs
-        # an excluded run is not in the group
         run = self.group.last[self.i] if self.group.last[self.i] in runs else list(runs)[-1]
         if self.b.request.four_run or not runs[run].any():
             return None
@@ -195,18 +199,15 @@ class Rotor:
     @property
     def _runs(self) -> dict[str, Complex]:
         """Its runs, in order, and what was on the rotor in each."""
-        return dict(zip(self.group.lines.of(self.i), self.group.masses[self.i], strict=True))
+        return dict(zip(self.group.lines.runs(self.i), self.group.on[self.i], strict=True))
 
     def _read(self, run: str) -> Complex:
-        """The mean readings of a run, run-out off; NaN where a sensor was not read."""
-        rows = [j for j, name in enumerate(self.group.lines.of(self.i)) if name == run]
-        readings = self.group.readings[self.i, rows]
-        there = np.isfinite(readings)
-        mean = np.full(readings.shape[-1:], complex(np.nan))
-        np.divide(
-            np.where(there, readings, 0).sum(axis=0), there.sum(axis=0), out=mean, where=there.any(axis=0)
-        )
-        return np.asarray(mean - self.b.runout(self.group))
+        """The mean readings of a run, run-out off; NaN where a sensor was not read, and of a run that is excluded."""
+        runs = self.group.lines.runs(self.i)
+        if run not in runs:
+            return np.full(len(self.channels), complex(np.nan))
+        mean = self.group.means[self.i, runs.index(run)]
+        return np.asarray(mean - self.b.runout(self.group)[self.i])
 
     # -- its tolerance -------------------------------------------------------------------------------------
 

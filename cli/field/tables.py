@@ -228,10 +228,11 @@ class SecondRun:
 
         runout, exact = Vectors.of(self.balancing.runout(self.group)), self.balancing.runs.exact_runout
         if exact is not None:
-            vectors = exact()
+            vectors, sign = exact(), np.where(self.balancing.against(self.group), -1.0, 1.0)
             for s, channel in enumerate(self.group.channels):
                 if channel.sensor in vectors:
-                    runout[s] = vectors[channel.sensor]
+                    read = vectors[channel.sensor]
+                    runout[:, s] = Vectors(read.x + 0.0 * sign, read.y * sign)
         return self.fit.unknowns[..., 0] - runout
 
     @cached_property

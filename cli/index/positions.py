@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from balancing import index_balancing
 from balancing.indexing import Indexed
 from dalembert.angles import degrees, phasor
-from dalembert.arithmetic.exact import EPS
 from dalembert.errors import DataError, quote
 from dalembert.results.columns import Column, Table, apart, names, number
 from dalembert.results.way import Topic, figures, vector_text
@@ -44,12 +43,6 @@ class Positions:
     readings: Complex
     parts: Indexed
     phase_lag: bool
-
-    @property
-    def noise(self) -> float:
-        """A residual up to this size is rounding."""
-        terms = np.abs(self.readings).sum() + len(self.turned) * abs(self.parts.rotor)
-        return float(24 * EPS * self.parts.amplification**2 * terms)
 
     @cached_property
     def exact(self) -> ExactParts:
@@ -190,8 +183,7 @@ def parts(p: Positions) -> Table:
 def readings(p: Positions) -> Table:
     """A row for each position: the reading and its residual."""
     residuals = p.parts.residuals
-    # two readings have no residual but rounding
-    shown = np.where(np.abs(residuals) > p.noise, np.abs(residuals), 0.0)
+    shown = np.abs(residuals)
     columns = [
         number("turned", "angle", p.turned),
         size(p, p.quantity, np.abs(p.readings), p.quantity),

@@ -242,24 +242,19 @@ class SecondRun:
 
 
 def _depth(mass: Doubled, drill: Drill) -> Doubled:
-    """The depth of a hole, by the formula of `balancing.drill_depth`."""
+    """The depth of a hole in 32 digits."""
+    from balancing import drill_depth
     from cli.read.exact import written
     from dalembert.arithmetic.doubled import PI, Doubled
-    from dalembert.arithmetic.doubled_functions import DOUBLED
+    from dalembert.arithmetic.doubled_arrays import DoubledArray
 
-    diameter = Doubled.of(written(drill.diameter))
-    volume, area = mass / Doubled.of(written(drill.density)), PI * diameter * diameter / 4.0
-    if drill.exact_point == 180:
-        return volume / area
-    sine, cosine = DOUBLED.sincos(Doubled.of(drill.exact_point) * PI / 360.0)
-    slope = sine / cosine
-    tip = diameter / 2.0 / slope
-    cone = area * tip / 3.0
-    if float(volume.high) >= float(cone.high):
-        return (volume - cone) / area + tip
-    cube = volume * 3.0 / (PI * slope * slope)
-    root = Doubled(float(np.cbrt(cube.high)))
-    return root - (root * root * root - cube) / (root * root * 3.0)
+    def stated(x: float) -> Any:
+        return DoubledArray.of(Doubled.of(written(x)))
+
+    point = DoubledArray.of(Doubled.of(drill.exact_point) * PI / 180.0) if drill.exact_point != 180 else np.pi
+    depth: Any = drill_depth(DoubledArray.of(mass), stated(drill.diameter), stated(drill.density), point)
+    exact: Doubled = depth.doubled
+    return exact
 
 
 def _joined(numbers: Iterable[Doubled]) -> Doubled:

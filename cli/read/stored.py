@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from dalembert.arithmetic.doubled_vectors import Vectors
 
 
-def read_runout(path: str, runs: Runs, *, lagging: bool) -> dict[str, complex]:
-    """Read the run-out vector of each sensor, in the runs' amplitude unit."""
+def read_runout(path: str, runs: Runs) -> dict[str, complex]:
+    """Read the run-out vector of each sensor as the instrument shows it, in the runs' amplitude unit."""
     table = read(path, numbers={"amplitude": "amplitude", "phase": "angle"}, texts=["sensor"])
     amplitude, phase = table.require("amplitude", "amplitude"), table.require("phase", "angle")
     table.reject(amplitude.values < 0, "amplitude", "an amplitude that is not negative")
     size = runs.in_unit(amplitude.values, amplitude.unit, f"{table.file}: the run-out")
-    vectors = phasor(size, -phase.values if lagging else phase.values, phase.unit).tolist()
+    vectors = phasor(size, phase.values, phase.unit).tolist()
     sensors = table.named("sensor")
     measured = {channel.sensor for group in runs.groups for channel in group.channels}
     out: dict[str, complex] = {}
@@ -48,7 +48,6 @@ def read_runout(path: str, runs: Runs, *, lagging: bool) -> dict[str, complex]:
         each = vectors(
             _converted(amplitude.decimals, "amplitude", amplitude.unit, runs.amplitude_unit), phase
         )
-        each = each.conj if lagging else each
         return {sensor: each[i] for i, sensor in enumerate(sensors)}
 
     runs.exact_runout = exact

@@ -54,8 +54,10 @@ solveSheet = () => {
       rotor.planes.forEach((_, p) => {
         for (const [name, from] of [["mass", `mass ${p}`], ["radius", `radius ${p}`], ["angle", `plane ${p} angle`]]) {
           const x = out.get(from)[0];
-          put[`${name} ${p}`] = !sheet.steps[name] ? x : name === "angle" ? marked(whole(x), sheet.steps[name]) : rounded(x, sheet.steps[name]);
-          if (sheet.steps[name]) out.set(from, [put[`${name} ${p}`], 0]);
+          // a mass that is given stays
+          const step = name === "mass" && rotor.fixed[p] ? null : sheet.steps[name];
+          put[`${name} ${p}`] = !step ? x : name === "angle" ? marked(whole(x), step) : rounded(x, step);
+          if (step) out.set(from, [put[`${name} ${p}`], 0]);
         }
       });
       for (const [name, x] of solved(given, names.given, { ...sums, ...put }, { ...pairs, ...put })) out.set(name, x);

@@ -367,3 +367,11 @@ def test_masses_on_top_of_earlier_ones(dalembert: Dalembert) -> None:
         a = mp.matrix([[1, w] for w in on])
         x = mp.lu_solve(a.H * a, a.H * mp.matrix([vector(one[0], one[1]) for one in log]))
         check(row, -x[0] / x[1], 12)
+
+
+def test_the_angle_of_material_to_remove(dalembert: Dalembert) -> None:
+    """Its rounding is its own: 206° was exact, and 26° was printed as 25.999999999999993."""
+    table = "unbalance_kg_m,angle_deg,z_mm\n12,386,189\n"
+    planes = [word for z in (-46, 92, 390, 395) for word in ("--plane", f"P{z}:{z}mm:50cm")]
+    for row in rows(dalembert("balance", "-", *planes, "--remove", "--digits", stdin=table)):
+        assert float(row["angle_deg"]) == 26

@@ -140,6 +140,14 @@ def test_several_speeds(dalembert: Dalembert, tmp_path: Path) -> None:
     assert np.abs(corrections(again) * 1e3 - W).max() < 1e-12
 
 
+def test_an_amplitude_that_is_too_small_to_square(dalembert: Dalembert) -> None:
+    done = dalembert(
+        "field", "-", stdin=table("0,1,5e-160,0,,,", "1,1,7e-160,0,A,1,0", "2,1,4e-160,9,A,1,180")
+    )
+    assert done.returncode == 1
+    assert done.stderr.endswith("found '5e-160', expected 0, or an amplitude of 1e-60 at least\n")
+
+
 def test_runout(dalembert: Dalembert, tmp_path: Path) -> None:
     text = runs("A,1,0,", "B,1,90,", on=[[1, 0], [0, 1j]], v0=V0 + 0.5j)
     (tmp_path / "r.csv").write_text("sensor,amplitude_mm,phase_deg\n0,0.0005,90\n1,0.0005,90\n2,0.0005,90\n")
@@ -149,6 +157,36 @@ def test_runout(dalembert: Dalembert, tmp_path: Path) -> None:
     done = dalembert("field", "-", "--runout", "r.csv", stdin=text)
     assert done.returncode == 1
     assert "found '9', expected a sensor of the runs" in done.stderr
+
+
+def test_runout_is_turned_with_the_readings(dalembert: Dalembert, tmp_path: Path) -> None:
+    """Runs show that the instrument of rotor x lags; those of y do not show the sense, so that y stays as it is alone."""
+    head = HEAD.replace("run,", "rotor,run,", 1)
+    runout, initial, alpha = 1 + 2j, 3 - 1j, 2 + 1j
+    on = {"x": [0, 1, 1j, -1], "y": [0, 1]}
+    rows = [
+        f"{rotor},{k},1,{cell((initial + alpha * w + runout).conjugate())},{f'A,1,{np.degrees(np.angle(w))}' if w else ',,'}"
+        for rotor, masses in on.items()
+        for k, w in enumerate(masses)
+    ]
+    (tmp_path / "r.csv").write_text(f"sensor,amplitude_um,phase_deg\n1,{cell(runout.conjugate())}\n")
+    call = ("field", "-", "--runout", "r.csv")
+    together = document(dalembert(*call, "--json", stdin=table(*rows, head=head)))
+    alone = document(dalembert(*call, "--json", stdin=table(*rows[4:], head=head)))
+    turned = document(dalembert(*call, "--json", "--phase-lag", stdin=table(*rows, head=head)))
+    assert any(
+        "rotor x: the runs show that the instrument's phase lags" in text for text in together["warnings"]
+    )
+    assert together["rotors"][1]["corrections"] == alone["rotors"][0]["corrections"]
+    w = -initial / alpha
+    for rotor in (together["rotors"][0], *turned["rotors"]):
+        (fix,) = rotor["corrections"]
+        assert 1e3 * fix["mass_kg"] == pytest.approx(abs(w), rel=1e-14)
+        assert fix["angle_deg"] == pytest.approx(np.degrees(np.angle(w)) % 360, rel=1e-14)
+    (fix,) = together["rotors"][1]["corrections"]
+    assert fix["angle_deg"] == pytest.approx(-np.degrees(np.angle(w)) % 360, rel=1e-14)
+    digits = dalembert(*call, "--digits", stdin=table(*rows, head=head)).stdout.splitlines()
+    assert digits[2].startswith("y,A,1.41421356237")
 
 
 def goodman(*more: str) -> tuple[str, str]:

@@ -160,3 +160,50 @@ def test_german_words_in_a_table_with_a_row_a_reading(dalembert: Dalembert, head
     assert german.stdout == plain.stdout
     assert "as sensor" in german.stderr
     assert "as sensor" not in plain.stderr
+
+
+@pytest.mark.parametrize("sensor", ["Lager", "Sensor", "Messstelle"])
+@pytest.mark.parametrize(
+    "masses",
+    [
+        ("Ebene", "Masse [g]", "Winkel [°]"),
+        ("Ausgleichsebene", "Testmasse [g]", "Testwinkel [°]"),
+        ("Wuchtebene", "Probegewicht [g]", "Probewinkel [°]"),
+    ],
+    ids=lambda names: names[0],
+)
+def test_a_german_table_with_a_row_for_each_reading(
+    sensor: str, masses: tuple[str, ...], dalembert: Dalembert
+) -> None:
+    """Every word is known, also where that for the sensor is the English one, and `Lager` is a sensor."""
+    head = ";".join(("Lauf", sensor, "Schwinggeschwindigkeit [mm/s]", "Phase [°]", *masses, "bleibt"))
+    lines = [
+        line.replace(",", ";").replace(".", ",").replace("yes", "ja").replace("no", "nein")
+        for line in LONG.splitlines()
+    ]
+    done = dalembert("field", "-", "--json", stdin="\n".join([head, *lines[1:]]) + "\n")
+    assert rotor(done) == rotor(dalembert("field", "-", "--json", stdin=LONG))
+
+
+def test_a_german_table_of_one_sensor(dalembert: Dalembert) -> None:
+    table = "Lauf;Schwingweg [µm];Phase [°];Masse [g];Winkel [°]\n1;3,4;116;;\n2;1,8;42;2;0\n"
+    english = "run,amplitude_um,phase_deg,trial_mass_g,trial_angle_deg\n1,3.4,116,,\n2,1.8,42,2,0\n"
+    done = dalembert("field", "-", stdin=table)
+    assert done.stdout == dalembert("field", "-", stdin=english).stdout
+    assert "read 'Lauf' as run, 'Schwingweg [µm]' as amplitude_um, 'Masse [g]' as trial_mass_g" in done.stderr
+
+
+def test_words_of_a_wide_sheet_that_hold_the_trial_mass(dalembert: Dalembert) -> None:
+    """The plane was ignored as `Ausgleichsebene`, and the angle not found as `Testwinkel 1`."""
+    rows = [",".join(cell(v) for v in read) for read in READ]
+    sensors = ",".join(f"{s}_mm_s,{s}_deg" for s in "ABC")
+    ones = [f"Lauf,{sensors},Ausgleichsebene,Gewicht [g],Winkel [°],bleibt", f"0,{rows[0]},,,,"]
+    ones += [f"1,{rows[1]},1,1,0,ja", f"2,{rows[2]},2,1,90,nein"]
+    each = [
+        f"Lauf,{sensors},Testmasse 1 [g],Testwinkel 1 [°],Testmasse 2 [g],Testwinkel 2 [°]",
+        f"0,{rows[0]},,,,",
+    ]
+    each += [f"1,{rows[1]},1,0,,", f"2,{rows[2]},1,0,1,90"]
+    plain = rotor(dalembert("field", "-", "--json", stdin=LONG))
+    for lines in (ones, each):
+        assert rotor(dalembert("field", "-", "--json", stdin="\n".join(lines) + "\n")) == plain

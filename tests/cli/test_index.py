@@ -102,7 +102,7 @@ def test_positions_close_together_are_named(dalembert: Dalembert) -> None:
 
 
 BAD = {
-    "one position": ("turned_deg,amplitude_um,phase_deg\n0,5,30\n", "at least two"),
+    "one position": ("turned_deg,amplitude_um,phase_deg\n0,5,30\n", "two at least"),
     "never turned": ("turned_deg,amplitude_um,phase_deg\n0,5,30\n360,5,30\n", "not turned"),
     "no turned": ("amplitude_um,phase_deg\n5,30\n5,30\n", "no column turned_deg"),
     "no reading": ("turned_deg,phase_deg\n0,5\n", "no column unbalance_g_mm"),
@@ -126,3 +126,16 @@ def test_bad_readings(case: str, dalembert: Dalembert) -> None:
     assert done.returncode == 1
     assert message in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("of", ["rotor", "mandrel"])
+def test_one_part_alone(of: str, dalembert: Dalembert) -> None:
+    """Three positions: the rounding of 120° was shown as the other part, and as its uncertainty."""
+    turned = (0, 120, 240)
+    rows = "".join(f"{angle},5,{angle if of == 'rotor' else 0}\n" for angle in turned)
+    done = dalembert("index", "-", "--json", stdin="turned_deg,unbalance_g_mm,angle_deg\n" + rows)
+    parts = json.loads(done.stdout)
+    other = parts["mandrel" if of == "rotor" else "rotor"]
+    assert other == {"unbalance_kg_m": 0.0, "angle_deg": 0.0, "uncertainty_kg_m": 0.0}
+    assert parts[of]["unbalance_kg_m"] == pytest.approx(5e-6, rel=1e-15)
+    assert {row["residual_kg_m"] for row in parts["readings"]} == {0.0}

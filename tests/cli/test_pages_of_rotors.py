@@ -82,6 +82,7 @@ def test_a_plane_whose_place_is_not_stated(dalembert: Dalembert, tmp_path: Path,
         ("--round-angle", "7deg", "--remove"),
         ("--mass", "A:0.3kg"),
         ("--mass", "B:0.3kg", "--round-angle", "5deg"),
+        ("--mass", "B:0.33kg", "--round-mass", "0.1kg"),
     ],
     ids=" ".join,
 )

@@ -20,6 +20,9 @@ from tests.conftest import COMMAND, Dalembert
 
 FULL = Path("/dev/full")
 LOG = log([(0, 0), (10, -90), (30, -60)])
+TWO_PLANES = table(
+    "0,1,3.4,116,,,", "0,2,2,30,,,", "1,1,1.8,42,A,2,0", "1,2,2,40,A,2,0", "2,1,3,90,B,2,0", "2,2,3,9,B,2,0"
+)
 
 
 @pytest.mark.parametrize("few", ["1", "2", "39"])
@@ -48,6 +51,32 @@ def test_a_prediction_is_shown_where_the_table_goes_into_a_pipe(dalembert: Dalem
     # where it stands already nothing more is said
     assert "should read" not in dalembert("field", "-", *asked, "--text", stdin=LOG).stderr
     assert "should read" not in dalembert("field", "-", *asked, "--json", stdin=LOG).stderr
+
+
+def test_what_an_option_requests_is_shown_where_the_table_goes_into_a_pipe(dalembert: Dalembert) -> None:
+    runs = FAN + "2,1,4.5,109,A,2,180\n3,1,2.1,98,A,2,90\n"
+    requested = ("--suggest", "--max-mass", "50g", "--robust", "--blades", "3")
+    done = dalembert("field", "-", *requested, stdin=runs)
+    (rotor,) = document(dalembert("field", "-", *requested, "--json", stdin=runs))["rotors"]
+    assert done.stdout.startswith("rotor,plane,mass_g")
+    assert done.stdout.count("\n") == 2
+    entries = [
+        *rotor["suggest"]["masses"],
+        *rotor["robust"]["corrections"],
+        *rotor["corrections"][0]["split"],
+    ]
+    for entry in entries:
+        assert f"mass_g {1e3 * entry['mass_kg']:.6g}, " in done.stderr
+    assert f"uncertainty_after_g {1e3 * rotor['suggest']['uncertainty_after_kg']:.6g}" in done.stderr
+
+
+def test_the_view_of_two_planes_is_shown_where_the_table_goes_into_a_pipe(dalembert: Dalembert) -> None:
+    done = dalembert("field", "-", "--view", "static-couple", stdin=TWO_PLANES)
+    (rotor,) = document(dalembert("field", "-", "--view", "static-couple", "--json", stdin=TWO_PLANES))[
+        "rotors"
+    ]
+    for part in rotor["static_couple"].values():
+        assert f"mass_g {1e3 * part['mass_kg']:.6g}, angle_deg {part['angle_deg']:.6g}" in done.stderr
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="no file that is always full")

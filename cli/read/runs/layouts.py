@@ -126,13 +126,44 @@ AMPLITUDE = (
     "vibration",
 )
 PHASE = ("phase", "phasenwinkel", "phasenlage")
-ANGLE = ("angle", "winkel", "winkellage")
+TRIAL_ANGLE = ("testwinkel", "probewinkel")
+ANGLE = ("angle", "winkel", "winkellage", *TRIAL_ANGLE)
 MASS = ("mass", "masse", "gewicht", "weight", "testmasse", "probemasse", "testgewicht", "probegewicht")
 UNBALANCE = ("unbalance", "unwucht")
 PLACE = ("sensor", "lager", "messstelle", "messpunkt", "messebene", "aufnehmer", "bearing", "at", "am", "an")
 PLANE = ("plane", "ebene", "in", "der", "trial", "test", "probe", "ausgleichsebene")
 KEPT = ("bleibt", "kept", "trial_kept", "bleibt_drauf")
 WHOLE = ("rotor", "run", "state", "speed", "weight", "ref", "use", "date", "trial_plane", "trial_kept")
+MEANT = (
+    *WHOLE,
+    "sensor",
+    "amplitude",
+    "phase",
+    "mass",
+    "trial_mass",
+    "angle",
+    "trial_angle",
+    "plane",
+    "unbalance",
+)
+"""What a foreign word may mean in a table of runs."""
+OWN = {
+    **{
+        name: name
+        for name in (*WHOLE, "sensor", "amplitude", "phase", "trial_mass", "trial_unbalance", "trial_angle")
+    },
+    "mass": "trial_mass",
+    "unbalance": "trial_unbalance",
+    "angle": "trial_angle",
+    "plane": "trial_plane",
+    "doublea": "amplitude",
+    "mode": "state",
+    "operating_mode": "state",
+    "reference": "ref",
+    "useful": "use",
+    "start": "run",
+}
+"""The words of a table of runs, and of a log, and what they are in such a table."""
 
 
 @dataclass(frozen=True)
@@ -185,23 +216,28 @@ def long_form(source: Source) -> Source:
 def _translated(source: Source) -> Source:
     """Return a table with a row for each reading under the names of its columns that the command knows.
 
-    A foreign word for the sensor makes it one; a name that is known already, or that two columns would share, stays.
+    A foreign word for the sensor makes it one, and then every column is translated; else those under a foreign word alone. A
+    name that is known already, or that two columns would share, stays.
     """
     names, before = [each.name for each in source.headings], ""
-    if not any(_is_foreign_sensor(each) for each in source.headings):
+    own = [OWN.get(_stem(each), "") for each in source.headings]
+    whole = any(_is_foreign_sensor(each) for each in source.headings)
+    if not whole and not any(quantity_meant(_stem(each), MEANT) for each in _foreign(source.headings)):
         return source
     for place, each in enumerate(source.headings):
         column = _known(place, each, before)
-        before = "" if column is None else column.kind
+        before = own[place] if column is None else column.kind
+        if own[place] and not whole:
+            continue
         unit = find_unit("amplitude", each.unit or parted(each.name)[1])
-        words = plain_word(each.base).split("_")
+        words = _stem(each).split("_")
         if _is_foreign_sensor(each):
             names[place] = "sensor"
         elif unit and any(word in AMPLITUDE for word in words):
             names[place] = f"amplitude_{unit}"
         elif quantity_meant(each.base, ["trial_plane", "plane"]):
             names[place] = "trial_plane"
-        elif column is not None:
+        elif column is not None and (whole or (column.kind not in own and _is_word(words))):
             names[place] = f"{column.kind}_{column.unit}" if column.unit else column.kind
     read = [
         (k, each, name)
@@ -214,6 +250,21 @@ def _translated(source: Source) -> Source:
     for k, each, name in read:
         headings[k] = Heading(each.written, name)
     return replace(source, headings=headings)
+
+
+def _stem(each: Heading) -> str:
+    """The plain words of a header without its unit."""
+    return plain_word(each.base if each.unit else parted(each.name)[0])
+
+
+def _foreign(headings: Sequence[Heading]) -> list[Heading]:
+    return [each for each in headings if _stem(each) not in OWN]
+
+
+def _is_word(words: Sequence[str]) -> bool:
+    """Whether a header has a word of the trade, and not a unit alone."""
+    every = (*AMPLITUDE, *PHASE, *ANGLE, *MASS, *UNBALANCE, *KEPT)
+    return any(word in every for word in words) or bool(quantity_meant("_".join(words), WHOLE))
 
 
 def _is_foreign_sensor(each: Heading) -> bool:
@@ -260,7 +311,11 @@ def _known(place: int, each: Heading, before: str) -> _Column | None:
     if has(UNBALANCE) and find_unit("unbalance", unit):
         return _Column(place, each, "trial_unbalance", name(UNBALANCE), find_unit("unbalance", unit) or "")
     if angle or (has(PHASE, ANGLE) and not unit):
-        of_mass = before in ("trial_mass", "trial_unbalance") or (has(ANGLE) and "trial" in words)
+        of_mass = (
+            before in ("trial_mass", "trial_unbalance")
+            or (has(ANGLE) and "trial" in words)
+            or has(TRIAL_ANGLE)
+        )
         kind = "trial_angle" if of_mass and not has(PHASE) else "phase"
         return _Column(place, each, kind, name(PHASE, ANGLE), angle or "deg")
     if amplitude and name(AMPLITUDE):

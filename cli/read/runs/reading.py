@@ -172,6 +172,8 @@ class _Reading:
         """Return what each row reads, NaN where it is blank."""
         table, amplitude = self.table, self.amplitude
         table.reject(amplitude.values < 0, "amplitude", "an amplitude that is not negative")
+        tiny = (amplitude.values > 0) & (amplitude.values < SMALLEST)
+        table.reject(tiny, "amplitude", f"0, or an amplitude of {SMALLEST:g} at least")
         unread = np.isnan(amplitude.values)
         if "weight" in table.numbers:
             table.reject(table.numbers["weight"].values < 0, "weight", "a weight that is not negative")

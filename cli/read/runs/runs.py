@@ -281,9 +281,9 @@ class Runs:
     lags: bool = False
     """Whether runs show that the phase lags, so that phases were turned round."""
     runout: dict[str, complex] = field(default_factory=dict)
-    """What the file itself states of it, sensor -> vector as read."""
+    """That of a file, sensor -> vector as the instrument shows it."""
     exact_runout: Callable[[], dict[str, Vectors]] | None = None
-    """The same in 32 digits, of a file of run-out; None: it is the floats."""
+    """These in 32 digits, where --runout names a file; None: they are the floats."""
     warnings: list[str] = field(default_factory=list)
     """Shown once each, however often they stand here."""
 
