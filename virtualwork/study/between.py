@@ -76,10 +76,11 @@ class Between:
 
 
 def largest(of: Callable[[Reals], Reals], place: Reals, values: Reals) -> tuple[float, float]:
-    """The largest size of a function and the first place of it, from its values at rising places.
+    """The first place of the largest size of a function, and that size, from its values at rising places.
 
     The intervals beside the largest values are divided until the value stands; the last places are those of the
-    parabola's vertex, so that the value is as exact as the function.
+    parabola's vertex, so that the value is as exact as the function. Of places whose values differ by rounding the first
+    counts; the size is the largest of all, no less than any of the values.
 
     >>> at, peak = largest(np.cos, np.linspace(-1, 1, 4), np.cos(np.linspace(-1, 1, 4)))
     >>> round(at, 7) + 0.0, peak
@@ -92,12 +93,12 @@ def largest(of: Callable[[Reals], Reals], place: Reals, values: Reals) -> tuple[
     result = [_within(of, place[max(i - 1, 0)], place[min(i + 1, len(place) - 1)]) for i in tops.tolist()]
     # the poses themselves are known best
     result += [(float(place[i]), float(size[i])) for i in tops.tolist()]
-    best = max(value for _, value in result)
-    return min((at, value) for at, value in result if value >= best * (1 - ALIKE))
+    best = max(value for _, value in result if not np.isnan(value))
+    return min(at for at, value in result if value >= best * (1 - ALIKE)), best
 
 
 def _within(of: Callable[[Reals], Reals], low: float, high: float) -> tuple[float, float]:
-    """The largest size between two places."""
+    """The place of the largest size between two places, and that size; NaN where the function is not defined throughout."""
     at, best = low, -np.inf
     for _ in range(ROUNDS):
         q = np.linspace(low, high, INSIDE)
@@ -114,7 +115,7 @@ def _within(of: Callable[[Reals], Reals], low: float, high: float) -> tuple[floa
             if (bend := a - 2 * b + c) < 0:
                 vertex = float(q[i] + (q[1] - q[0]) * (a - c) / (2 * bend))
                 value = float(np.abs(of(np.array([vertex]))[0]))
-                return (vertex, value) if value >= best * (1 - ALIKE) else (at, best)
+                return (vertex, max(value, best)) if value >= best * (1 - ALIKE) else (at, best)
         if settled:
             break
         low, high = float(q[max(i - 1, 0)]), float(q[min(i + 1, INSIDE - 1)])
