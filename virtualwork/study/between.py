@@ -90,10 +90,12 @@ def largest(of: Callable[[Reals], Reals], place: Reals, values: Reals) -> tuple[
     inner = np.concatenate([[-np.inf], size, [-np.inf]])
     tops = np.flatnonzero((inner[1:-1] >= inner[:-2]) & (inner[1:-1] >= inner[2:]))
     tops = tops[np.argsort(-size[tops], kind="stable")][:LOOKED]
-    result = [_within(of, place[max(i - 1, 0)], place[min(i + 1, len(place) - 1)]) for i in tops.tolist()]
-    # the poses themselves are known best
-    result += [(float(place[i]), float(size[i])) for i in tops.tolist()]
-    best = max(value for _, value in result if not np.isnan(value))
+    result = []
+    for i in tops.tolist():
+        at, value = _within(of, place[max(i - 1, 0)], place[min(i + 1, len(place) - 1)])
+        # NaN is not larger
+        result.append((at, value) if value > size[i] else (float(place[i]), float(size[i])))
+    best = max(value for _, value in result)
     return min(at for at, value in result if value >= best * (1 - ALIKE)), best
 
 
@@ -115,7 +117,7 @@ def _within(of: Callable[[Reals], Reals], low: float, high: float) -> tuple[floa
             if (bend := a - 2 * b + c) < 0:
                 vertex = float(q[i] + (q[1] - q[0]) * (a - c) / (2 * bend))
                 value = float(np.abs(of(np.array([vertex]))[0]))
-                return (vertex, max(value, best)) if value >= best * (1 - ALIKE) else (at, best)
+                return (vertex, value) if value >= best * (1 - ALIKE) else (at, best)
         if settled:
             break
         low, high = float(q[max(i - 1, 0)]), float(q[min(i + 1, INSIDE - 1)])
