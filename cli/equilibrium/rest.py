@@ -10,7 +10,7 @@ import numpy as np
 
 from cli.cases.analysis import Analysis
 from cli.cases.case import Case, Study
-from cli.cases.inputs import Inputs
+from cli.cases.inputs import Driven, Inputs
 from cli.cases.ledger import Entry, entries_of, ledger
 from cli.cases.poses import bounds_of, column, degrees_off
 from dalembert.angles import in_turn
@@ -35,13 +35,13 @@ class Rest(Case):
 
     Attributes
     ----------
-    ranged : bool
-        Whether the inputs are the range that is searched.
+    ranged : set of int
+        The inputs of which a range is searched, by their number.
     """
 
     study: Equilibria
     analysis: Analysis
-    ranged: bool
+    ranged: set[int]
 
     @cached_property
     def equilibria(self) -> Found:
@@ -50,9 +50,23 @@ class Rest(Case):
         if self.ranged:
             values = self.analysis.inputs.whole.values
             spans = np.stack([values.min(axis=0), values.max(axis=0)], axis=1)
-            # an input that is not moved is looked for in its whole range
-            spans[spans[:, 0] == spans[:, 1]] = np.nan
+            # the others are searched in their whole range
+            spans[[j for j in range(len(spans)) if j not in self.ranged]] = np.nan
         return self.analysis.mechanism.equilibria(spans)
+
+    @cached_property
+    def shown(self) -> list[list[float]]:
+        """Each input at the positions: m, or deg within a turn; deg with its turns where these wind a torsion spring up."""
+        from virtualwork.study.equilibrium import winding
+
+        m = self.analysis.mechanism
+        winds, columns = winding(m.assembly), []
+        for j, entry in enumerate(m.inputs):
+            values = [e.inputs[j] for e in self.equilibria.found]
+            if not entry.is_slide:
+                values = [math.degrees(x) if winds[j] else in_turn(math.degrees(x)) for x in values]
+            columns.append(values)
+        return columns
 
     def table(self) -> Table:
         """Return a row for each position."""
@@ -60,11 +74,8 @@ class Rest(Case):
         one = len(m.inputs) == 1
         columns = []
         for j, (entry, header) in enumerate(zip(m.inputs, self.analysis.input_columns, strict=True)):
-            values = [
-                e.inputs[j] if entry.is_slide else in_turn(math.degrees(e.inputs[j])) for e in positions
-            ]
             place = self.analysis.input_names[entry.name]
-            columns.append(column(header, values, partial(self._errors, j, values)))
+            columns.append(column(header, self.shown[j], partial(self._errors, j)))
             columns[-1].place = place if one else f"inputs.{entry.name}.{place}"
         columns.append(names("stable", [e.stable for e in positions]))
         energy = np.array([e.potential for e in positions], dtype=float)
@@ -76,12 +87,13 @@ class Rest(Case):
             columns.append(number(name, "time", np.array(periods, dtype=float), error=error))
         return Table(columns, place="equilibria[]")
 
-    def _errors(self, j: int, shown: list[float]) -> list[float]:
+    def _errors(self, j: int) -> list[float]:
         """How far an input lies from where it rests, as it is shown."""
         positions, entry = self.equilibria.found, self.analysis.mechanism.inputs[j]
         off = np.array([e.error_estimate()[j] for e in positions])
         if not entry.is_slide:
-            off = np.degrees(off) + degrees_off(np.array([e.inputs[j] for e in positions]), np.array(shown))
+            at = np.array([e.inputs[j] for e in positions])
+            off = np.degrees(off) + degrees_off(at, np.array(self.shown[j]))
         return bounds_of(off)
 
     def _estimates(self, of: str, i: int) -> list[float]:
@@ -112,7 +124,7 @@ class Rest(Case):
 
     def way(self) -> list[Topic]:
         """Return the virtual work of every load at each position."""
-        return way(self.analysis, self.equilibria.found)
+        return way(self.analysis, self.equilibria.found, self.shown)
 
     def figure(self) -> Figure:
         """Draw the mechanism in its positions of rest; in its own pose where there is none."""
@@ -141,10 +153,11 @@ class Equilibria(Study):
         """Return the positions of rest of one mechanism."""
         moved = self.cases.moved
         _ = analysis.mechanism.assembly
-        return Rest(self, analysis, moved is not None and moved.axes[0].option != "[input] law")
+        names = () if moved is None or moved.axes[0].option == "[input] law" else moved.names
+        return Rest(self, analysis, {name.j for name in names if isinstance(name, Driven) and not name.order})
 
 
-def way(a: Analysis, positions: Sequence[Equilibrium]) -> list[Topic]:
+def way(a: Analysis, positions: Sequence[Equilibrium], shown: Sequence[Sequence[float]]) -> list[Topic]:
     """Return the topics: the condition, and the ledger at every position."""
     m = a.mechanism
     text = [
@@ -157,15 +170,14 @@ def way(a: Analysis, positions: Sequence[Equilibrium]) -> list[Topic]:
     motion = m.motion(np.array([e.inputs for e in positions]), *([[0.0] * len(m.inputs)] * 2))
     every = [entries_of(motion, j) for j in range(len(m.inputs))]
     instants: list[tuple[list[Column], list[Entry]]] = []
-    for i, e in enumerate(positions):
+    for i in range(len(positions)):
         head = []
-        for entry, value in zip(m.inputs, e.inputs, strict=True):
+        for entry, values in zip(m.inputs, shown, strict=True):
             key = a.input_names[entry.name]
-            shown = value if entry.is_slide else in_turn(math.degrees(value))
             one = len(m.inputs) == 1
             place = key if one else f"inputs.{entry.name}.{key}"
             name = "input" if one else f"{entry.name}_input"
-            head.append(Column(name, key.removeprefix("input_"), [shown], place=place))
+            head.append(Column(name, key.removeprefix("input_"), [values[i]], place=place))
         loads = [load for each in every for load in each[i] if load.kind not in ("unknown", "joint force")]
         instants.append((head, loads))
     sums = [

@@ -284,13 +284,14 @@ class _Lists:
         parent = self.parent(table.place)
         way = table.place[len(parent) :].lstrip(".").split(".") if table.place else []
         shared = self.keys.get(parent, ())
-        every = [*table.columns, *table.documented]
-        columns = {column.name: column.documented for column in every}
-        within = [c for c in every if c.place is not None and c.name not in shared]
+        every = [(column, column.documented) for column in (*table.columns, *table.documented)]
+        columns = {column.name: values for column, values in every}
+        # two columns of a name may differ in their unit
+        cells = [(c.keys, values) for c, values in every if c.place and c.name not in shared]
         if table.by_column:
             whole = _walk(self.document, way)
-            for column in within:
-                _put(whole, column.keys, column.documented)
+            for path, values in cells:
+                _put(whole, path, values)
             return
         homes = list(self.elements[parent].values()) if parent else [self.document]
         if way and way[-1].endswith("[]"):
@@ -302,7 +303,6 @@ class _Lists:
             self.keys[table.place] = tuple(name for name in names_of if name in columns)
             self.elements[table.place] = {}
         of_parent = list(zip(*(columns[name] for name in shared), strict=True)) if shared else []
-        cells = [(column.keys, columns[column.name]) for column in within if column.place]
         indexed = bool(cells) and all(len(path) == 1 and path[0].isdecimal() for path, _ in cells)
         for i in range(table.length):
             home = self.elements[parent][of_parent[i]] if parent else self.document

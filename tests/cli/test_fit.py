@@ -141,7 +141,13 @@ def test_a_link_and_a_point_with_weights(dalembert, target, tmp_path):
     fit = json.loads(found.stdout)["fit"]
     assert fit["max_m"] < 1e-10
     assert fit["max_deg"] < 1e-8
+    assert [set(each) for each in fit["targets"]] == [
+        {"name", "rms_m", "max_m"},
+        {"name", "rms_deg", "max_deg"},
+    ]
     assert [each["name"] for each in fit["targets"]] == ["H", "rocker"]
+    point, link = fit["targets"]
+    assert (point["rms_m"], link["rms_deg"]) == (fit["rms_m"], fit["rms_deg"])
     # a table of its own with the short header, and as many rows as it has
     (tmp_path / "r.csv").write_text(
         "input_deg,angle_deg,weight\n"

@@ -209,6 +209,28 @@ def test_equilibrium(dalembert: Dalembert) -> None:
     assert set(found) == {"name", "equilibria", "warnings"}
 
 
+def test_equilibrium_of_a_wound_spring(dalembert: Dalembert) -> None:
+    """The angle has its whole turns, which the spring's torque depends on: it may be negative, and `forces` finds no effort there."""
+    text = """
+    gravity = [0, -9.81]
+    [ground]
+    O = [0, 0]
+    [links.bob]
+    points = { O = [0, 0] }
+    mass = 2
+    center = [0.5, 0]
+    [input]
+    link = "bob"
+    [[torsion_springs]]
+    links = ["ground", "bob"]
+    stiffness = 30
+    """
+    (rest,) = run_json(dalembert, "equilibrium", "-", stdin=text)["equilibria"]
+    assert (-45 < rest["input_deg"] < 0, rest["stable"]) == (True, True)
+    found = run_json(dalembert, "forces", "-", "--at", f"{rest['input_deg']!r}deg", stdin=text)
+    assert abs(found["poses"][0]["effort"]["input_torque_N_m"]) < 1e-13 * 9.81
+
+
 def test_counterweights(dalembert: Dalembert) -> None:
     found = run_json(
         dalembert,

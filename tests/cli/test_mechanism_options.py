@@ -101,6 +101,8 @@ b = { points = { A = [0, 0] }, mass = 1, center = [0.25, 0] }
         (("b=-10deg:100deg:10deg",), {(90, 0), (270, 0)}),
         (("a=0deg:100deg:10deg", "b=-10deg:100deg:10deg"), {(90, 0)}),
         (("a=260deg:450deg:10deg", "b=170deg:190deg:1deg"), {(90, 180), (270, 180)}),
+        (("a=90deg:90deg:1deg",), {(90, 0), (90, 180)}),
+        (("a=0deg:0deg:1deg",), set()),
     ],
 )
 def test_rest_lies_in_the_range_of_every_input(dalembert: Dalembert, tmp_path, ranges, rests) -> None:

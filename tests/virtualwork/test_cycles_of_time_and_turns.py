@@ -12,6 +12,7 @@ from scipy.optimize import minimize_scalar
 from tests.virtualwork.mechanisms import four_bar, slider_crank
 from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism, TorsionSpring
 from virtualwork.motion import Motion
+from virtualwork.study.between import largest
 from virtualwork.study.cycle import Cycle
 
 G = 9.81
@@ -210,3 +211,9 @@ def test_peaks_of_random_four_bars_against_dense_sweeps() -> None:
         assert np.abs(dense).max() * (1 - 1e-12) <= c.peak <= np.abs(dense).max() * (1 + 1e-6)
         assert c.mean == pytest.approx(dense[:-1].mean(), abs=1e-10 * c.peak)
         assert c.rms == pytest.approx(np.sqrt((dense[:-1] ** 2).mean()), rel=1e-9)
+
+
+def test_the_largest_value_is_no_less_than_any_of_the_table() -> None:
+    """Of two peaks that differ by rounding the first counts, with the size of the larger one."""
+    place, values = np.arange(5.0), np.array([0.0, 1.0 - 1e-13, 0.0, -1.0, 0.0])
+    assert largest(lambda q: np.interp(q, place, values), place, values) == (1.0, 1.0)

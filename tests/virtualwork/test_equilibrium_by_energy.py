@@ -57,8 +57,8 @@ def test_a_torsion_spring_and_a_torque(first: str) -> None:
 
     with mp.workdps(30):
         found = m.equilibria().found
-        # all sign changes of V' over the turn
-        grid = [mp.mpf(i) / 50 for i in range(315)]
+        # all sign changes of V' over a turn either way of the guess
+        grid = [mp.mpf(i) / 50 for i in range(-314, 315)]
         slope = [mp.diff(energy, t) for t in grid]
         assert len(found) == sum(a * b < 0 for a, b in pairwise(slope)) > 0
         for e in found:
@@ -175,6 +175,46 @@ def test_two_inputs_with_torsion_springs() -> None:
     assert e.stiffness == pytest.approx(half - math.sqrt(half**2 - k1 * k2), rel=1e-12)
     assert e.stable is True
     assert abs(e.potential or 0.0) < 1e-25
+
+
+@pytest.mark.parametrize("inputs", [1, 2])
+def test_a_rest_at_a_negative_angle_under_a_torsion_spring(inputs: int) -> None:
+    """A bar that a stiff spring holds level hangs a little below: k θ = −m g l cos θ, and not a turn later."""
+    k, held = 30.0, TorsionSpring(("ground", "bar"), 30.0, 0.0)
+    other = {"other": Link({"Q": 0j}, 1.0, 1.0)}
+    m = Mechanism(
+        {"O": 0j, "Q": 5},
+        {"bar": Link({"O": 0j}, 2.0, 0.5)} | (other if inputs == 2 else {}),
+        inputs=[Input(link="bar"), Input(link="other")][:inputs],
+        gravity=-G * 1j,
+        torsion_springs=[held],
+    )
+    sag = float(mp.findroot(lambda t: k * t + G * mp.cos(t), -0.3))
+    for spans in (None, [[-1.0, 1.0], [math.nan] * 2][:inputs]):
+        found = m.equilibria(spans).found
+        assert [e.inputs[0] for e in found] == pytest.approx([sag] * inputs, rel=1e-13)
+        assert [e.stable for e in found] == [False, True][-inputs:]
+
+
+@pytest.mark.parametrize(("at", "stable"), [(0.5 * math.pi, False), (1.5 * math.pi, True), (0.0, None)])
+def test_a_range_of_one_position(at: float, stable: bool | None) -> None:
+    """A pendulum stands, hangs, or does not rest there at all."""
+    found = bar().equilibria([[at, at]]).found
+    assert [(e.inputs[0], e.stable) for e in found] == ([] if stable is None else [(at, stable)])
+
+
+@pytest.mark.parametrize("width", [0.0, 1e-6, 1e-3])
+def test_a_narrow_range_of_one_of_two_inputs(width: float) -> None:
+    hanging = 1.5 * math.pi
+    m = Mechanism(
+        {"O": 0j},
+        {"a": Link({"O": 0j, "P": 1}, 1.0, 1.0), "b": Link({"P": 0j}, 1.0, 1.0)},
+        inputs=[Input(link="a"), Input(link="b")],
+        gravity=-G * 1j,
+    )
+    found = m.equilibria([[hanging - width, hanging + width], [math.nan] * 2]).found
+    assert [e.stable for e in found] == [False, True]
+    assert not m.equilibria([[0.1, 0.1 + width], [math.nan] * 2]).found
 
 
 def test_a_range_with_gaps_and_a_range_about_zero() -> None:

@@ -76,10 +76,11 @@ class Between:
 
 
 def largest(of: Callable[[Reals], Reals], place: Reals, values: Reals) -> tuple[float, float]:
-    """The largest size of a function and the first place of it, from its values at rising places.
+    """The first place of the largest size of a function, and that size, from its values at rising places.
 
     The intervals beside the largest values are divided until the value stands; the last places are those of the
-    parabola's vertex, so that the value is as exact as the function.
+    parabola's vertex, so that the value is as exact as the function. Of places whose values differ by rounding the first
+    counts; the size is the largest of all, no less than any of the values.
 
     >>> at, peak = largest(np.cos, np.linspace(-1, 1, 4), np.cos(np.linspace(-1, 1, 4)))
     >>> round(at, 7) + 0.0, peak
@@ -89,15 +90,17 @@ def largest(of: Callable[[Reals], Reals], place: Reals, values: Reals) -> tuple[
     inner = np.concatenate([[-np.inf], size, [-np.inf]])
     tops = np.flatnonzero((inner[1:-1] >= inner[:-2]) & (inner[1:-1] >= inner[2:]))
     tops = tops[np.argsort(-size[tops], kind="stable")][:LOOKED]
-    result = [_within(of, place[max(i - 1, 0)], place[min(i + 1, len(place) - 1)]) for i in tops.tolist()]
-    # the poses themselves are known best
-    result += [(float(place[i]), float(size[i])) for i in tops.tolist()]
+    result = []
+    for i in tops.tolist():
+        at, value = _within(of, place[max(i - 1, 0)], place[min(i + 1, len(place) - 1)])
+        # NaN is not larger
+        result.append((at, value) if value > size[i] else (float(place[i]), float(size[i])))
     best = max(value for _, value in result)
-    return min((at, value) for at, value in result if value >= best * (1 - ALIKE))
+    return min(at for at, value in result if value >= best * (1 - ALIKE)), best
 
 
 def _within(of: Callable[[Reals], Reals], low: float, high: float) -> tuple[float, float]:
-    """The largest size between two places."""
+    """The place of the largest size between two places, and that size; NaN where the function is not defined throughout."""
     at, best = low, -np.inf
     for _ in range(ROUNDS):
         q = np.linspace(low, high, INSIDE)

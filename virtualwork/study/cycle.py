@@ -194,7 +194,11 @@ class Cycle(Sweep):
         if power:
             error = error * abs(speed) + 0.5 * EPS * size
         low, high = float(self.place.min()), float(self.place.max())
-        if not self.between.defined or at in (low, high) or not size:
+        if not self.between.defined or not size:
+            return error, 0.0
+        # of tops alike but for rounding the first place counts, and the largest size
+        error += abs(size - float(np.abs(of(np.array([at]))[0])))
+        if at in (low, high):
             return error, 0.0
         h = min(BESIDE * (high - low), (at - low) / 2, (high - at) / 2)
         far, before, here, behind, farther = np.abs(of(at + h * AROUND)).tolist()

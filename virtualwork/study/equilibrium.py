@@ -25,6 +25,10 @@ from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.study.loads_at_rest import Rest
 
 SAMPLES = 1440
+# steps of a turn in which springs are looked at
+AROUND = 72
+# of a turn: a range in which the loads' usual work cannot be seen
+NARROW = 0.1
 # halvings of the way from the last sample to a limit
 NEARER = 30
 
@@ -163,8 +167,9 @@ def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int 
     assembly : Description
         With its gravity, constant and follower forces, torques, springs. Dampers and friction do not act at rest.
     spans : array (k, 2), optional
-        The range of each input, rad or m. Default, also of an input whose row is NaN: a whole turn; for a slide, two
-        sizes of the mechanism either way, where its loops are no farther from their ends.
+        The range of each input, rad or m; it may be one position. Default, also of an input whose row is NaN: a whole turn; for
+        a slide, two sizes of the mechanism either way, where its loops are no farther from their ends. An input that
+        winds a torsion spring up is searched a turn either way of the guess; half a turn where it cannot go round.
     samples : int
         How finely the range of one input is looked through for sign changes, more finely where a body turns faster;
         every root is then found to rounding.
@@ -191,12 +196,28 @@ def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int 
     if not limited.all():
         slide = np.array([e.is_slide for e in assembly.mechanism.inputs])
         size = assembly.track.length if k == 1 else assembly.mechanism.size
-        low = np.where(slide, at - 2 * size, 0.0)
-        high = np.where(slide, at + 2 * size, 2 * np.pi)
+        reach = winding(assembly)
+        low = np.where(slide, at - 2 * size, np.where(reach > 0, at - reach, 0.0))
+        high = np.where(slide, at + 2 * size, np.where(reach > 0, at + reach, 2 * np.pi))
         ranges = np.where(limited[:, None], given, np.stack([low, high], axis=1))
     # at a limit, and beyond it, a loop has no rates
     with np.errstate(all="ignore"):
         return _one(assembly, ranges[0], samples) if k == 1 else _many(assembly, ranges, limited)
+
+
+def winding(assembly: Assembly) -> Reals:
+    """How far either way of the guess inputs are searched that wind a torsion spring up, (k,) rad; 0 of all others."""
+    m, at = assembly.mechanism, np.asarray(assembly.mechanism.at, dtype=float)
+    reach = np.zeros(len(at))
+    for j, entry in enumerate(m.inputs if m.torsion_springs else ()):
+        if not entry.is_slide:
+            ways = np.tile(at, (AROUND + 1, 1))
+            ways[:, j] += np.linspace(-np.pi, np.pi, AROUND + 1)
+            poses = Rest(assembly, ways).poses
+            twists = np.array([poses.twist(i) for i in range(len(m.torsion_springs))])
+            wound = np.abs(twists[:, -1] - twists[:, 0]) > np.pi
+            reach[j] = np.pi * (0 if not wound.any() else 2 if np.isfinite(twists).all() else 1)
+    return reach
 
 
 def _one(assembly: Assembly, span: Reals, samples: int) -> Equilibria:
@@ -209,9 +230,15 @@ def _one(assembly: Assembly, span: Reals, samples: int) -> Equilibria:
         return Equilibria(())
     # beside a limit the loads' work grows without bound: that is no measure of it elsewhere
     largest, scale = float(size[good].max()), _usual(size[good])
+    turn = assembly.track.length
+    if span[1] - span[0] < NARROW * turn:
+        # nor is it about a position of rest, where all terms may vanish
+        beside = q.mean() + turn * np.linspace(-0.5, 0.5, AROUND + 1)
+        scale = max(scale, _usual(Rest(assembly, beside[:, None]).force()[1][:, 0]))
     # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart; but for dwells
     cams = bool(assembly.mechanism.cams)
-    if not (np.max if cams else np.median)(np.abs(force[good])) > 1e-12 * (largest if cams else scale):
+    vanishes = not (np.max if cams else np.median)(np.abs(force[good])) > 1e-12 * (largest if cams else scale)
+    if vanishes and len(q) > 1:
         return Equilibria((), everywhere=True, loaded=scale > 0)
     ends = _towards_limits(assembly, q, good)
     if len(ends):
@@ -260,7 +287,7 @@ def _usual(size: Reals) -> float:
     >>> _usual(np.array([0.0, 1.0, 2.0, 1e14]))
     2.0
     """
-    some = size[size > 0]
+    some = size[(size > 0) & np.isfinite(size)]
     return float(np.median(some)) if len(some) else 0.0
 
 
@@ -334,7 +361,10 @@ def _many(assembly: Assembly, ranges: Reals, limited: NDArray[np.bool_]) -> Equi
     k = len(ranges)
     per = max(4, round(4000 ** (1 / k)))
     per = min(per, 40)
-    axes = [np.linspace(low, high, per, endpoint=False) + (high - low) / (2 * per) for low, high in ranges]
+    axes = [
+        np.linspace(low, high, per, endpoint=False) + (high - low) / (2 * per) if low < high else [low]
+        for low, high in ranges
+    ]
     x = np.array(list(product(*axes)))
     force, size = Rest(assembly, x).force()
     good = np.isfinite(force).all(axis=1)
@@ -348,7 +378,10 @@ def _many(assembly: Assembly, ranges: Reals, limited: NDArray[np.bool_]) -> Equi
         return Equilibria((), everywhere=True, loaded=scale > 0)
     # the most promising starts: where no neighbour is nearer to balance would do; a few hundred suffice
     x = x[np.argsort(np.abs(force[good]).max(axis=1))[:400]]
-    reach = (ranges[:, 1] - ranges[:, 0]) / per
+    turning = np.array([not e.is_slide for e in assembly.mechanism.inputs])
+    unit = np.where(turning, 1.0, assembly.mechanism.size)
+    width = ranges[:, 1] - ranges[:, 0]
+    reach = np.where(width > 0, width / per, 0.1 * unit)
     for _ in range(60):
         rest = Rest(assembly, x)
         force, _ = rest.force()
@@ -365,20 +398,21 @@ def _many(assembly: Assembly, ranges: Reals, limited: NDArray[np.bool_]) -> Equi
     force, size = Rest(assembly, x).force()
     settled = (np.abs(force) <= 1e-10 * np.maximum(size, 1e-3 * scale)).all(axis=1)
     x = x[settled]
-    turning = np.array([not e.is_slide for e in assembly.mechanism.inputs])
-    x = np.where(turning, np.mod(x, 2 * np.pi), x)
-    x = np.where(turning & (2 * np.pi - x < 1e-9), 0.0, x)
-    unit = np.where(turning, 1.0, assembly.mechanism.size)
+    # a turn later it is another position where a torsion spring is wound up
+    winds = winding(assembly) > 0
+    again = turning & ~winds
+    x = np.where(again, np.mod(x, 2 * np.pi), x)
+    x = np.where(again & (2 * np.pi - x < 1e-9), 0.0, x)
     # Newton's steps lead out of the range too; an angle lies in it up to whole turns
     slack = 1e-9 * unit
     off = x - ranges[:, 0] + slack
-    off = np.where(turning, np.mod(off, 2 * np.pi), off)
-    within = (off >= 0) & (off <= ranges[:, 1] - ranges[:, 0] + 2 * slack)
-    x = x[(within | ~limited).all(axis=1)]
+    off = np.where(again, np.mod(off, 2 * np.pi), off)
+    within = (off >= 0) & (off <= width + 2 * slack)
+    x = x[(within | ~(limited | winds)).all(axis=1)]
     distinct: list[Any] = []
     for row in x[np.lexsort(np.round(x / unit, 7).T[::-1])] if len(x) else []:
         gaps = [(row - other) / unit for other in distinct]
-        gaps = [np.where(turning, np.abs(np.angle(np.exp(1j * gap))), np.abs(gap)) for gap in gaps]
+        gaps = [np.where(again, np.abs(np.angle(np.exp(1j * gap))), np.abs(gap)) for gap in gaps]
         if not any((gap < 1e-6).all() for gap in gaps):
             distinct.append(row)
     judged = _judged(assembly, np.array(distinct).reshape(-1, k), scale)
