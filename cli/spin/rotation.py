@@ -362,8 +362,7 @@ def _steady(g: TurningBody, moments: Array) -> dict[str, Any]:
     w, x, y, z = g.attitude
     tilt = 2 * np.arctan2(np.hypot(x, y), np.hypot(w, z))
     rates = steady_of(moments[0], moments[2], mgl, tilt, g.omega[2])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        threshold = threshold_of(moments[0], moments[2], mgl)
+    threshold = threshold_of(moments[0], moments[2], mgl)
     return {"slow_rad_s": rates.slow, "fast_rad_s": rates.fast, "sleeping_threshold_rad_s": threshold}
 
 
