@@ -35,8 +35,9 @@ def run(states: str, gravity: str | None = None, ledger: bool = False) -> Result
     """
     g = 0j if gravity is None else options.plane_vector("--gravity", gravity, "acceleration")
     from cli.show.result import Result
-    from cli.work.power import METHOD, WorkBalance, draw, tables, way
+    from cli.work.power import METHOD, WorkBalance, draw, tables
     from cli.work.states import read_states
+    from cli.work.way import way
 
     table = read_states(states)
     balance = WorkBalance(table, g)
