@@ -326,25 +326,25 @@ def _in_blocks(w: Array, I: Array) -> Array:
 def _momentum_and_rate(
     I: Array, w: Array, alpha: Array, momentum: Array | None = None
 ) -> tuple[Array, Array]:
-    """I ω, unless it is given, and I α + ω × I ω for states (..., 3) of one tensor, in blocks that stay in the cache."""
+    """I ω, unless it is given, and ω × I ω + I α for states (..., 3) of one tensor, in blocks that stay in the cache."""
     flat, turn = w.reshape(-1, 3), alpha.reshape(-1, 3)
-    transposed, gyroscopic = np.ascontiguousarray(I.T), _gyroscopic(I)
+    transposed = np.ascontiguousarray(I.T)
+    coefficients = np.concatenate([_gyroscopic(I), transposed])
     rate = np.empty_like(flat)
     new = np.empty_like(flat) if momentum is None else None
     most = min(BLOCK, len(flat))
-    columns, products, terms = np.empty((3, most)), np.empty((6, most)), np.empty((most, 3))
+    columns, terms = np.empty((3, most)), np.empty((9, most))
     for s in range(0, len(flat), BLOCK):
         part, size = slice(s, s + BLOCK), min(BLOCK, len(flat) - s)
-        spin, pairs = columns[:, :size], products[:, :size]
+        spin, each = columns[:, :size], terms[:, :size]
         if new is not None:
             np.matmul(flat[part], transposed, out=new[part])
-        np.matmul(turn[part], transposed, out=rate[part])
-        # products of components of ω as rows: whole columns of a block in one stroke
-        spin[...] = flat[part].T
-        np.multiply(spin, spin, out=pairs[:3])
+        # products of components of ω, then α, as rows: whole columns of a block in one stroke
+        spin[...], each[6:] = flat[part].T, turn[part].T
+        np.multiply(spin, spin, out=each[:3])
         for row, (a, b) in enumerate(_PAIRS, 3):
-            np.multiply(spin[a], spin[b], out=pairs[row])
-        rate[part] += np.matmul(pairs.T, gyroscopic, out=terms[:size])
+            np.multiply(spin[a], spin[b], out=each[row])
+        np.matmul(each.T, coefficients, out=rate[part])
     if new is not None:
         momentum = new.reshape(w.shape)
     assert momentum is not None
