@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.page import Page, Shown, fits, packed, page, rounded
 from rigidbody3d.inertia import principal
-from rigidbody3d.traced_axis import pole as pole_of
-from rigidbody3d.traced_axis import traced_axis
+from rigidbody3d.solids import pole as pole_of
+from rigidbody3d.solids import traced_axis
 
 Array = NDArray[np.float64]
 

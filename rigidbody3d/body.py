@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from dalembert.arithmetic.records import components, numbers, record, table
 from dalembert.arithmetic.shapes import as_array, common_shape, in_32_digits
 from rigidbody3d import solids
-from rigidbody3d.inertia import Principal, principal, products, shift, turn
+from rigidbody3d.inertia import Principal, principal, products, shift, turn, vectors
 from rigidbody3d.shapes import inertia_of
 from rigidbody3d.solids import Solid, Whole
 
@@ -92,7 +92,7 @@ class Body:
 
     def moved(self, offset: ArrayLike) -> Body:
         """Return the body moved by an offset (..., 3), m: its tensor stays as it is, digit for digit."""
-        by = as_array(offset)
+        by = vectors("offset", offset)
         return Body(
             self.mass,
             self.center + by,
@@ -104,7 +104,9 @@ class Body:
     def turned(self, rotation: ArrayLike, about: ArrayLike | None = None) -> Body:
         """Return the body turned by a rotation matrix (..., 3, 3) about a point (default: its centre of mass)."""
         R = as_array(rotation)
-        point = None if about is None else as_array(about)
+        if R.shape[-2:] != (3, 3):
+            raise ValueError(f"rotation must have the shape (..., 3, 3), found {R.shape}")
+        point = None if about is None else vectors("about", about)
         center = self.center
         if point is not None:
             center = point + (R * (center - point)[..., None, :]).sum(axis=-1)
@@ -118,7 +120,7 @@ class Body:
 
     def about(self, point: ArrayLike) -> Array:
         """Return the tensor about a point (..., 3): the parallel axis theorem, (..., 3, 3), kg·m²."""
-        return self.inertia + shift(self.mass, self.center - as_array(point))
+        return self.inertia + shift(self.mass, self.center - vectors("point", point))
 
     def to_frame(self) -> pd.DataFrame:
         """Return a table with a row per body: mass_kg, x_m …, and the tensor at the centre of mass, ixx_kg_m2 … iyz_kg_m2."""
@@ -217,15 +219,15 @@ class Body:
         return BodyError(mass, center, second.inertia.off(self.inertia))
 
 
-def compose(parts: Body, axis: int = -1) -> Body:
-    """Compose a body from parts along one axis of the bodies; a hole is a part of negative mass.
+def compose(parts: Body | Sequence[Body], axis: int = -1) -> Body:
+    """Compose a body from parts: several bodies, or a `Body` along one of its axes; a hole is a part of negative mass.
 
     Parameters
     ----------
     parts
-        The parts; their leading axes are parts and bodies.
+        The parts: a list of bodies, or one `Body` whose leading axes are parts and bodies.
     axis
-        The axis of the parts.
+        The axis of the parts of one `Body`.
 
     Returns
     -------
@@ -235,7 +237,7 @@ def compose(parts: Body, axis: int = -1) -> Body:
     Raises
     ------
     ValueError
-        A total mass that is not positive.
+        No part, a total mass that is not positive, shapes that do not fit.
 
     Notes
     -----
@@ -250,7 +252,17 @@ def compose(parts: Body, axis: int = -1) -> Body:
     >>> arms = Body.of("rod", mass=[1.0, 1.0], center=[[0, 0, 0.5], [0, 0, -0.5]], length=1.0)
     >>> compose(arms).inertia.diagonal().round(12)
     array([0.66666667, 0.66666667, 0.        ])
+
+    A hammer: a handle and a head.
+
+    >>> head = Body.of("cylinder", mass=1.0, radius=0.02, length=0.08).moved([0, 0, 0.3])
+    >>> compose([Body.of("rod", mass=0.5, length=0.6), head]).center.round(12)
+    array([0. , 0. , 0.2])
     """
+    if not isinstance(parts, Body):
+        parts = _beside_each_other(parts)
+    elif not parts.mass.ndim:
+        parts = _beside_each_other([parts])
     at = axis % parts.mass.ndim
     mass, center, inertia = (np.moveaxis(x, at, 0) for x in (parts.mass, parts.center, parts.inertia))
     total = mass.sum(axis=0)
@@ -262,6 +274,26 @@ def compose(parts: Body, axis: int = -1) -> Body:
     slip = (mass[..., None] * offset).sum(axis=0) / total[..., None]
     whole = inertia.sum(axis=0) + shift(mass, offset).sum(axis=0) - shift(total, slip)
     return Body(total, middle + slip, whole, partial(_again, compose, parts, axis), parts.solids)
+
+
+def _beside_each_other(bodies: Sequence[Body]) -> Body:
+    """Bodies as the parts along a new last axis."""
+    if not bodies:
+        raise ValueError("a body is composed of at least one part, found none")
+    lead = common_shape(**{f"part {k}": body.mass.shape for k, body in enumerate(bodies, 1)})
+    mass, center, inertia = (
+        np.stack([np.broadcast_to(getattr(body, name), lead + own) for body in bodies], axis=-1 - len(own))
+        for name, own in (("mass", ()), ("center", (3,)), ("inertia", (3, 3)))
+    )
+    return Body(mass, center, inertia, partial(_beside_again, bodies), partial(_solids_of, bodies))
+
+
+def _beside_again(bodies: Sequence[Body]) -> Body:
+    return _beside_each_other([body.in_32_digits for body in bodies])
+
+
+def _solids_of(bodies: Sequence[Body]) -> list[Solid]:
+    return [solid for body in bodies for solid in body.solids()]
 
 
 def _shaped(shape: str, mass: Array, center: Array, dimensions: Mapping[str, ArrayLike]) -> Body:

@@ -34,7 +34,7 @@ def eigenvectors(tensor: Doubled, axes: Array) -> tuple[Doubled, Doubled]:
     # by a power of two near the largest: no square underflows
     largest = np.maximum(np.abs(tensor.high).max(axis=(-1, -2)), 1e-280)
     size = np.exp2(np.floor(np.log2(largest)))
-    E = tensor / size[..., None, None]
+    E = (tensor + np.swapaxes(tensor, -1, -2)) / 2 / size[..., None, None]
     rows = _orthonormal(axes)
     T = [[_form(rows[i], E, rows[j]) for j in range(3)] for i in range(3)]
     for _ in range(12):

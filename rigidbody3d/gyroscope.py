@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.records import record
 from dalembert.arithmetic.shapes import as_array, in_32_digits
+from rigidbody3d.inertia import vectors
 
 Array = NDArray[np.float64]
 
@@ -23,6 +24,11 @@ def gyroscopic_couple(momentum: ArrayLike, frame_omega: ArrayLike) -> Array:
     frame_omega
         Angular velocity Ω of the base, (..., 3), rad/s.
 
+    Raises
+    ------
+    ValueError
+        Not three components.
+
     Notes
     -----
     Beer and Johnston, ch. 18; Riul II, eq. 44, with a constant H in the axes of the base.
@@ -35,7 +41,7 @@ def gyroscopic_couple(momentum: ArrayLike, frame_omega: ArrayLike) -> Array:
     >>> gyroscopic_couple(H, [0, 0, 25 / 200])
     array([-10.4728...,   0.        ,   0.        ])
     """
-    return np.asarray(np.cross(np.asarray(frame_omega, dtype=float), np.asarray(momentum, dtype=float)))
+    return np.asarray(np.cross(vectors("frame_omega", frame_omega), vectors("momentum", momentum)))
 
 
 class _Rates(NamedTuple):
@@ -112,7 +118,7 @@ def steady_precession(
 def sleeping_threshold(transverse: ArrayLike, axial: ArrayLike, mgl: ArrayLike) -> Array:
     """Return the spin above which a top is stable upright, 2 √(m g l I1)/I3, (...), rad/s.
 
-    It is zero if the centre of mass lies below the fixed point.
+    It is zero if the centre of mass lies below the fixed point, infinite for a thin rod along the axis.
 
     Parameters
     ----------
@@ -131,7 +137,8 @@ def sleeping_threshold(transverse: ArrayLike, axial: ArrayLike, mgl: ArrayLike) 
     49.5227...
     """
     I1, I3, a = map(as_array, (transverse, axial, mgl))
-    return as_array(2 * np.sqrt(np.maximum(a, 0.0) * I1) / I3)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return as_array(2 * np.sqrt(np.maximum(a, 0.0) * I1) / I3)
 
 
 class _Cones(NamedTuple):

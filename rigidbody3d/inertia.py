@@ -58,8 +58,8 @@ class Principal(_Axes):
 
         Notes
         -----
-        Computed twice, with 16 and with 32 digits. Of two moments that are equal the axes are as good as any: the estimate
-        then is how far they are from principal axes.
+        Computed twice, with 16 and with 32 digits, both from these axes. Of two moments that are equal the axes are as good
+        as any: the estimate then is how far they are from principal axes.
 
         Examples
         --------
@@ -68,11 +68,15 @@ class Principal(_Axes):
         >>> bool(error.moments.max() < 1e-15 < 1e-14 < error.axes.max() < 1e-12)
         True
         """
-        from rigidbody3d.eigenvectors import unknown
+        from rigidbody3d.eigenvectors import eigenvectors, unknown
 
-        second: Any = principal(in_32_digits(self.tensor) if exact is None else exact)
-        hidden, swing = unknown(second.moments)
-        return _Axes(second.moments.off(self.moments) + hidden, second.axes.off(self.axes) + swing)
+        given: Any = in_32_digits(self.tensor) if exact is None else exact
+        second: tuple[Any, Any] = (
+            eigenvectors(given, self.axes) if given.ndim == self.axes.ndim else principal(given)
+        )
+        moments, axes = second
+        hidden, swing = unknown(moments)
+        return _Axes(moments.off(self.moments) + hidden, axes.off(self.axes) + swing)
 
 
 @record
@@ -116,6 +120,27 @@ def _arranged(*entries: Array) -> Array:
     xx, yy, zz, xy, xz, yz = np.broadcast_arrays(*entries)
     rows = [[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def vectors(name: str, value: ArrayLike) -> Array:
+    """Return vectors of three numbers, (..., 3).
+
+    Raises
+    ------
+    ValueError
+        Other things than numbers, or not three of them.
+
+    Examples
+    --------
+    >>> vectors("pin", [0, 1])
+    Traceback (most recent call last):
+    ...
+    ValueError: pin must have the shape (..., 3), found (2,)
+    """
+    numbers = as_numbers(name, value)
+    if numbers.shape[-1:] != (3,):
+        raise ValueError(f"{name} must have the shape (..., 3), found {numbers.shape}")
+    return numbers
 
 
 def products(inertia: ArrayLike) -> Array:
@@ -210,16 +235,16 @@ def principal(inertia: ArrayLike) -> Principal:
 
 
 def _principal(I: Array) -> _Axes:
-    if not (I.shape[-1:] == (3,) and np.isfinite(I).all()):
-        raise ValueError(
-            f"inertia must be 3 moments or a 3 x 3 tensor of finite numbers, found the shape {I.shape}"
-        )
+    if I.shape[-1:] != (3,):
+        raise ValueError(f"inertia must be 3 moments or a 3 x 3 tensor, found the shape {I.shape}")
+    if not np.isfinite(I).all():
+        raise ValueError("inertia must be finite")
     if I.ndim == 1 or I.shape[-2] != 3:
         return _sorted(I)
     if is_doubled(I):
         from rigidbody3d.eigenvectors import eigenvectors
 
-        pair: tuple[Array, Array] = eigenvectors((I + np.swapaxes(I, -1, -2)) / 2, _principal(I.value).axes)
+        pair: tuple[Array, Array] = eigenvectors(I, _principal(I.value).axes)
         return _Axes(*pair)
     if I.ndim == 2 and np.array_equal(I, np.diag(np.diag(I))):
         return _sorted(np.diag(I))

@@ -140,6 +140,8 @@ FEW = 12 * EPS
 """The error of a dozen roundings."""
 MOST = 10_000_000
 """So many steps take some quarter of an hour."""
+METHODS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA", "splitting")
+"""scipy's methods, and the splitting."""
 
 
 def integrate(
@@ -198,8 +200,8 @@ def integrate(
     Raises
     ------
     ValueError
-        More steps than `most` would be needed.
-        A splitting of what is no symmetric top; another frame; an inertia that is not positive.
+        More steps than `most` would be needed; a splitting of what is no symmetric top; another method or frame; an inertia
+        that is not positive; numbers that are not finite, shapes that do not fit.
     RuntimeError
         The integrator gave up; with its reason.
 
@@ -214,11 +216,25 @@ def integrate(
         raise ValueError(f"integration needs positive principal moments, found {moments}")
     if frame not in ("body", "space"):
         raise ValueError(f"frame is 'body' or 'space', found '{frame}'")
+    if method not in METHODS:
+        raise ValueError(f"method is one of {', '.join(METHODS)}, found '{method}'")
     I = np.asarray(inertia, dtype=float)
     tensor = np.diag(I) if I.ndim == 1 else I
     time = np.atleast_1d(np.asarray(t, dtype=float))
-    q0 = quaternion.normalize(attitude)
-    H0 = quaternion.rotate(q0, tensor @ np.asarray(omega, dtype=float))
+    w0, q0 = np.asarray(omega, dtype=float), quaternion.normalize(attitude)
+    constant = np.zeros(3) if torque is None or callable(torque) else np.asarray(torque, dtype=float)
+    shapes = {
+        "inertia": (tensor, (3, 3)),
+        "omega": (w0, (3,)),
+        "attitude": (q0, (4,)),
+        "torque": (constant, (3,)),
+    }
+    for name, (value, shape) in shapes.items():
+        if value.shape != shape:
+            raise ValueError(f"{name}: expected one body, the shape {shape}, found {value.shape}")
+    if not all(np.isfinite(value).all() for value in (w0, constant, time, mgl)):
+        raise ValueError("omega, torque, times and mgl must be finite")
+    H0 = quaternion.rotate(q0, tensor @ w0)
     # the finer repetition of an estimate may take as many more steps as it is finer
     again = partial(
         integrate,
@@ -241,8 +257,8 @@ def integrate(
         H, q, count = _split(tensor[0, 0], tensor[2, 2], mgl, H0, q0, time, steps_per_turn, refine, most)
         finer = partial(again, steps_per_turn=steps_per_turn, refine=2 * refine)
         return Trajectory(time, H, q, tensor, mgl, count, finer)
-    w0 = np.asarray(omega, dtype=float)
-    H, q, count, step = _solve(tensor, w0, H0, q0, time, torque, frame, mgl, method, rtol, longest, most)
+    given = torque if callable(torque) else constant
+    H, q, count, step = _solve(tensor, w0, H0, q0, time, given, frame, mgl, method, rtol, longest, most)
     finer = partial(again, longest=step / 2, rtol=rtol / 256)
     return Trajectory(time, H, q, tensor, mgl, count, finer)
 
@@ -253,7 +269,7 @@ def _solve(
     H0: Array,
     q0: Array,
     time: Array,
-    torque: ArrayLike | Torque | None,
+    torque: Array | Torque,
     frame: str,
     mgl: float,
     method: str,
@@ -265,7 +281,7 @@ def _solve(
 
     (a, b, c), (d, e, f), (g, h, i) = np.linalg.inv(tensor).tolist()
     function = torque if callable(torque) else None
-    fixed = np.zeros(3) if torque is None or callable(torque) else np.asarray(torque, dtype=float)
+    fixed = np.zeros(3) if callable(torque) else torque
     tx, ty, tz = fixed.tolist()
     # measured by the momentum itself, so that one tolerance serves a watch and a ship
     reach = float(np.abs(time).max(initial=0.0))

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.records import components, numbers, record, table
 from dalembert.arithmetic.shapes import as_array, as_numbers, common_shape, in_32_digits, is_doubled
+from rigidbody3d.inertia import vectors
 from rigidbody3d.states import BLOCK, require
 
 if TYPE_CHECKING:
@@ -98,29 +99,23 @@ class Motion:
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         acceleration: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
-        def keep(name: str, given: ArrayLike, *wanted: int) -> None:
-            value = as_numbers(name, given)
-            if value.shape[value.ndim - len(wanted) :] != wanted:
-                shape = ", ".join(map(str, ("...", *wanted)))
-                raise ValueError(f"{name} must have the shape ({shape}), found {value.shape}")
-            object.__setattr__(self, name, value)
-
-        keep("inertia", inertia, 3, 3)
-        keep("mass", mass)
-        keep("omega", omega, 3)
-        keep("alpha", alpha, 3)
-        keep("center", center, 3)
-        keep("velocity", velocity, 3)
-        keep("acceleration", acceleration, 3)
-        object.__setattr__(self, "pivot", None)
-        object.__setattr__(self, "frame_omega", None)
+        I, m = as_numbers("inertia", inertia), as_numbers("mass", mass)
+        if I.shape[-2:] != (3, 3):
+            raise ValueError(f"inertia must have the shape (..., 3, 3), found {I.shape}")
+        given = {
+            "omega": omega,
+            "alpha": alpha,
+            "center": center,
+            "velocity": velocity,
+            "acceleration": acceleration,
+        }
         if frame_omega is not None:
-            keep("frame_omega", frame_omega, 3)
-        leads = {name: getattr(self, name).shape[:-1] for name in ("omega", "alpha", "center")}
-        leads |= {name: getattr(self, name).shape[:-1] for name in ("velocity", "acceleration")}
-        if self.frame_omega is not None:
-            leads["frame_omega"] = self.frame_omega.shape[:-1]
-        common_shape(inertia=self.inertia.shape[:-2], mass=self.mass.shape, **leads)
+            given["frame_omega"] = frame_omega
+        each = {name: vectors(name, value) for name, value in given.items()}
+        common_shape(inertia=I.shape[:-2], mass=m.shape, **{name: v.shape[:-1] for name, v in each.items()})
+        none = {"frame_omega": None, "pivot": None}
+        for name, value in ({"inertia": I, "mass": m} | none | each).items():
+            object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
         states = np.broadcast_shapes(self.inertia.shape[:-2], self.omega.shape[:-1], self.mass.shape)
@@ -276,9 +271,7 @@ class Motion:
         frame_omega: ArrayLike | None = None,
     ) -> Motion:
         """Return the motion of a body that turns about a point fixed in space: v = ω × r, a = α × r + ω × v."""
-        motion, pivot = cls(inertia, omega, alpha, frame_omega, mass, center), as_numbers("point", point)
-        if pivot.shape[-1:] != (3,):
-            raise ValueError(f"point must have the shape (..., 3), found {pivot.shape}")
+        motion, pivot = cls(inertia, omega, alpha, frame_omega, mass, center), vectors("point", point)
         common_shape(point=pivot.shape[:-1], center=motion.center.shape[:-1], omega=motion.omega.shape[:-1])
         velocity, acceleration = _about_pivot(motion, pivot)
         for name, value in (("velocity", velocity), ("acceleration", acceleration), ("pivot", pivot)):
@@ -333,25 +326,25 @@ def _in_blocks(w: Array, I: Array) -> Array:
 def _momentum_and_rate(
     I: Array, w: Array, alpha: Array, momentum: Array | None = None
 ) -> tuple[Array, Array]:
-    """I ω, unless it is given, and I α + ω × I ω for states (..., 3) of one tensor, in blocks that stay in the cache."""
+    """I ω, unless it is given, and ω × I ω + I α for states (..., 3) of one tensor, in blocks that stay in the cache."""
     flat, turn = w.reshape(-1, 3), alpha.reshape(-1, 3)
-    transposed, gyroscopic = np.ascontiguousarray(I.T), _gyroscopic(I)
+    transposed = np.ascontiguousarray(I.T)
+    coefficients = np.concatenate([_gyroscopic(I), transposed])
     rate = np.empty_like(flat)
     new = np.empty_like(flat) if momentum is None else None
     most = min(BLOCK, len(flat))
-    columns, products, terms = np.empty((3, most)), np.empty((6, most)), np.empty((most, 3))
+    columns, terms = np.empty((3, most)), np.empty((9, most))
     for s in range(0, len(flat), BLOCK):
         part, size = slice(s, s + BLOCK), min(BLOCK, len(flat) - s)
-        spin, pairs = columns[:, :size], products[:, :size]
+        spin, each = columns[:, :size], terms[:, :size]
         if new is not None:
             np.matmul(flat[part], transposed, out=new[part])
-        np.matmul(turn[part], transposed, out=rate[part])
-        # products of components of ω as rows: whole columns of a block in one stroke
-        spin[...] = flat[part].T
-        np.multiply(spin, spin, out=pairs[:3])
+        # products of components of ω, then α, as rows: whole columns of a block in one stroke
+        spin[...], each[6:] = flat[part].T, turn[part].T
+        np.multiply(spin, spin, out=each[:3])
         for row, (a, b) in enumerate(_PAIRS, 3):
-            np.multiply(spin[a], spin[b], out=pairs[row])
-        rate[part] += np.matmul(pairs.T, gyroscopic, out=terms[:size])
+            np.multiply(spin[a], spin[b], out=each[row])
+        np.matmul(each.T, coefficients, out=rate[part])
     if new is not None:
         momentum = new.reshape(w.shape)
     assert momentum is not None

@@ -23,6 +23,7 @@ from dalembert.arithmetic.records import components, numbers, record, table
 from dalembert.arithmetic.shapes import as_array, in_32_digits
 from rigidbody3d.attitude import length
 from rigidbody3d.body import Body
+from rigidbody3d.inertia import vectors
 from rigidbody3d.states import require
 
 if TYPE_CHECKING:
@@ -123,7 +124,7 @@ class Shaft:
         object.__setattr__(self, "bearings", z)
         object.__setattr__(self, "speed", as_array(speed))
         object.__setattr__(self, "speed_rate", as_array(speed_rate))
-        object.__setattr__(self, "gravity", as_array(gravity))
+        object.__setattr__(self, "gravity", vectors("gravity", gravity))
 
     def __repr__(self) -> str:
         speed, unbalance = numbers(self.speed), numbers(self.unbalance)

@@ -91,10 +91,9 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("freebody", "gyroscope", "integration", "momentum", "percussion", "shaft", "top"),
         ("body", "free_rotation", "states"),
         ("animation", "picture"),
-        ("solids", "traced_axis"),
+        ("solids",),
         ("inertia",),
         ("attitude", "eigenvectors", "elliptic", "shapes", "top_roots"),
-        ("carlson",),
     ),
     "cli": (
         ("__main__",),

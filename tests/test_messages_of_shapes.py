@@ -50,7 +50,15 @@ CASES: dict[str, tuple[Callable[[], object], str]] = {
         lambda: r.Motion.about_fixed_point(np.eye(3), f(4, 3), mass=1, center=[1, 2, 3], point=[1, 2]),
         "point must have the shape",
     ),
-    "strike": (lambda: r.strike(1.0, np.eye(2), [1, 2, 3], [1, 2, 3]), "inertia must be"),
+    "strike": (lambda: r.strike(1.0, np.eye(2), [1, 2, 3], [1, 2, 3]), "inertia must have the shape"),
+    "blow": (lambda: r.strike(1.0, np.eye(3), [1, 2], [1, 2, 3]), "impulse must have the shape"),
+    "rate": (lambda: r.integrate([1, 2, 3], [1, 2], t=1.0), r"omega: expected one body, the shape \(3,\)"),
+    "torque": (lambda: r.integrate([1, 2, 3], [1, 2, 3], t=1.0, torque=[1]), "torque: expected one body"),
+    "method": (lambda: r.integrate([1, 2, 3], [1, 2, 3], t=1.0, method="RK4"), "method is one of DOP853"),
+    "time": (lambda: r.integrate([1, 2, 3], [1, 2, 3], t=np.nan), "times and mgl must be finite"),
+    "couple": (lambda: r.gyroscopic_couple([0, 1], [1, 0, 0]), "momentum must have the shape"),
+    "offset": (lambda: r.Body.of("rod", 1.0, length=1.0).moved([0, 1]), "offset must have the shape"),
+    "turn": (lambda: r.Body.of("rod", 1.0, length=1.0).turned(np.eye(2)), "rotation must have the shape"),
     "strikes": (lambda: r.strike([1.0, 2], np.eye(3), f(3, 3), [1, 2, 3]), r"mass \(2,\)"),
 }
 

@@ -85,6 +85,10 @@ def _of_body(b: MovingBody) -> Iterator[Entry]:
     yield _entry(b, "center", "length", lambda b: b.body.center)
     for i, letter in enumerate("xyz"):
         yield _entry(b, f"inertia_{letter}", "inertia", partial(_tensor_row, i), f"inertia.{i}", "inertia")
+    if b.request.about is not None:
+        for i, letter in enumerate("xyz"):
+            name, place = f"inertia_about_{letter}", f"inertia_about.{i}"
+            yield _entry(b, name, "inertia", partial(_tensor_row_about, i), place, "inertia_about")
     yield Entry("principal", "inertia", lambda: b.body.principal.moments, lambda: b.principal_errors[0])
     for i in range(3):
         name, place = f"principal_axis_{i + 1}", f"principal_axes.{i}"
@@ -94,6 +98,11 @@ def _of_body(b: MovingBody) -> Iterator[Entry]:
 
 def _tensor_row(i: int, b: MovingBody) -> Array:
     row: Array = b.body.inertia[i]
+    return row
+
+
+def _tensor_row_about(i: int, b: MovingBody) -> Array:
+    row: Array = b.body.about(b.point)[i]
     return row
 
 
@@ -260,7 +269,8 @@ def of_document(b: MovingBody) -> Table:
     """The document without the lists of the shaft: every quantity, of a motion that is none too."""
     entries = [*_of_body(b), *_of_motion(b)]
     columns = [each for entry in entries if (each := entry.documented) is not None]
-    columns.insert(8, _one("about", "length", b.point))
+    after = next(k for k, column in enumerate(columns) if column.name == "momentum")
+    columns.insert(after, _one("about", "length", b.point))
     columns.append(names("products", ["+∫xy dm; the matrix carries -I_xy"]))
     if b.request.shaft is not None:
         shaft = b.shaft
@@ -336,9 +346,20 @@ def warnings(bodies: Bodies) -> list[str]:
 
 
 def _warnings(b: MovingBody) -> list[str]:
-    """Warn where eq. 44 with a constant tensor would go wrong, and of a couple that stays."""
+    """Warn of options that mean nothing, where eq. 44 with a constant tensor would go wrong, and of a couple that stays."""
     lines = []
-    motion = b.motion
+    motion, shaft = b.motion, b.request.shaft
+    if not b.moving:
+        given = {"--fixed": b.request.fixed, "--frame-omega": b.request.frame_omega}
+        lines += [
+            f"{option}: the body is at rest: expected --omega or --alpha too"
+            for option, value in given.items()
+            if value is not None
+        ]
+    if shaft is not None and not (shaft.speed or shaft.speed_rate or any(shaft.gravity)):
+        lines.append(
+            "the shaft is at rest and has no weight: no force on the bearings without --speed, --speed-rate or --gravity"
+        )
     if motion.frame_omega is not None:
         size = np.abs(motion.momentum).max() * max(
             np.abs(motion.omega).max(), np.abs(motion.frame_omega).max()
@@ -356,12 +377,15 @@ def _warnings(b: MovingBody) -> list[str]:
 
 def conventions(b: MovingBody) -> str:
     """Say which conventions hold."""
+    count = len(b.parts.name)
     lines = [
-        f"{len(b.parts.name)} parts; inertia at the centre of mass, products as +∫xy dm (the matrix carries -I_xy)"
+        f"{count} part{'s' * (count != 1)}; inertia at the centre of mass, products as +∫xy dm (the matrix carries -I_xy)"
     ]
+    about = ", ".join(f"{x:g}" for x in b.point)
     if b.moving:
-        about = ", ".join(f"{x:g}" for x in b.point)
         lines.append(f"momentum at the centre of mass, and about {about} m; rates are true ones")
+    if b.request.about is not None:
+        lines.append(f"inertia_about: the tensor about {about} m")
     if b.request.shaft is not None:
         lines.append("bearing forces act on the shaft; dynamic ones leave the static part out")
         if b.letters != "xyz":

@@ -209,7 +209,12 @@ def warnings(e: Engine) -> list[str]:
         if (text := e.idle(shaft, unbalance))
     ]
     if not e.cylinders.reciprocating.any():
-        lines.append("every reciprocating mass is zero: the orders are")
+        lines.append("every reciprocating mass is zero, and with it every order")
+    weights = e.counterweights
+    if weights is not None and not weights.unbalance.any():
+        lines.append(
+            "the counterweights are zero: there is no rotating mass, and no --counterweight-share above 0"
+        )
     if e.share and not e.cylinders.rotating.any() and "rotating" not in e.cylinders.table.numbers:
         lines.append("no column rotating_*: the counterweights are for the reciprocating masses alone")
     return lines

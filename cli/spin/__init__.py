@@ -39,7 +39,8 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     BODY.toml has inertia = [I1, I2, I3] in kg·m² (or a 3 × 3 matrix, or parts = "parts.csv"), omega in body axes in
     rad/s, and attitude = [w, x, y, z], a quaternion from body to space (default [1, 0, 0, 0]). A top has a table [top]
     with mgl in N·m, weight times distance: then inertia is about the fixed point, the axis is body z and gravity acts
-    along -z of space. A torque is torque = [x, y, z] in N·m with frame = "body" or "space".
+    along -z of space. A torque is torque = [x, y, z] in N·m with frame = "body" or "space". Other units stand in
+    quotes, such as "700 rpm".
     """
     import numpy as np
 
@@ -87,7 +88,7 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
         about={"title": turning.name or "Rotation in time"} | turning.about,
         warnings=[
             *turning.warnings,
-            *tables.warnings(rotation),
+            *tables.warnings(rotation, () if options.only is None else chosen),
             *(tables.coarse(rotation) if options.page else ()),
         ],
     )

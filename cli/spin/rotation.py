@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cli.read.options import about
 from dalembert.errors import DataError
 from dalembert.hints import nearest
-from dalembert.results.columns import finite
+from dalembert.quantities import decimals, exactly, expected, number_in_si
+from dalembert.results.columns import document_unit, finite
 from dalembert.tables.files import read_toml, remember
 from dalembert.units import LARGEST
+from dalembert.units import written as spelled
 from rigidbody3d import Body, FreeBody, FreeState, Top, TopState, Trajectory, check, integrate, principal
 from rigidbody3d import cones as cones_of
 from rigidbody3d import sleeping_threshold as threshold_of
@@ -30,6 +32,31 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 KEYS = ("name", "inertia", "parts", "omega", "attitude", "top", "torque", "frame", "report")
+DIMENSIONS = {
+    "inertia": "inertia",
+    "omega": "speed",
+    "attitude": "number",
+    "top.mgl": "torque",
+    "torque": "torque",
+}
+
+
+class Written(NamedTuple):
+    """Numbers of the file, in SI, and what stands there."""
+
+    numbers: Array
+    texts: list[Any]
+    dimension: str
+
+    @property
+    def exact(self) -> Any:
+        """The numbers in 32 digits, with the decimals of the file exact."""
+        from dalembert.arithmetic.doubled_arrays import DoubledArray
+        from dalembert.arithmetic.doubled_vectors import doubled_array
+
+        parts = [decimals(text, self.dimension) for text in self.texts]
+        exact = [exactly(*each) for each in parts if each is not None]
+        return DoubledArray.of(doubled_array(exact, self.numbers.shape))
 
 
 @dataclass(frozen=True)
@@ -49,19 +76,23 @@ class TurningBody:
     """What the file says for the head of a report."""
     exact_tensor: Callable[[], DoubledArray] | None = None
     """The tensor of a body made of parts to 32 digits, (3, 3)."""
-    written_attitude: Array | None = None
-    """The attitude as the file has it, of any length."""
+    written: Mapping[str, Written] = field(default_factory=dict)
+    """The numbers of the file by their keys; an attitude of any length."""
 
     def exact(self) -> TurningBody:
         """Return the body in doubled numbers, the decimals of the file exact."""
         from cli.read.exact import plain
 
-        written = self.written_attitude
-        same = written is not None and np.array_equal(normalize(written), self.attitude)
-        attitude: Any = plain(written if same and written is not None else self.attitude)
-        inertia: Any = self.exact_tensor() if self.exact_tensor is not None else plain(self.inertia)
-        mgl: Any = None if self.mgl is None else plain(self.mgl)
-        omega: Any = plain(self.omega)
+        def each(key: str, value: ArrayLike) -> Any:
+            written = self.written.get(key)
+            if written is None:
+                return plain(value)
+            numbers = normalize(written.numbers) if key == "attitude" else written.numbers
+            return written.exact if np.array_equal(numbers, value) else plain(value)
+
+        inertia: Any = each("inertia", self.inertia) if self.exact_tensor is None else self.exact_tensor()
+        mgl = None if self.mgl is None else each("top.mgl", self.mgl)
+        omega, attitude = each("omega", self.omega), each("attitude", self.attitude)
         return replace(self, inertia=inertia, omega=omega, attitude=attitude, mgl=mgl)
 
 
@@ -72,13 +103,26 @@ def read_body(path: str) -> TurningBody:
     for key in document:
         if key not in KEYS:
             raise DataError(f"{file}: unknown key '{key}': expected {', '.join(KEYS)}{nearest(key, KEYS)}")
+    written: dict[str, Written] = {}
+
+    def numbers(key: str, value: object, *shapes: tuple[int, ...]) -> Array:
+        written[key] = _written(file, key, value, *shapes)
+        return written[key].numbers
+
     top = document.get("top")
     mgl = None
     if top is not None:
         if not isinstance(top, dict) or set(top) != {"mgl"}:
             raise DataError(f"{file}: [top] holds mgl = weight times distance, N·m, and nothing else")
-        mgl = float(_numbers(file, "top.mgl", top["mgl"], ()))
-    inertia, exact_tensor, warnings = _inertia(file, path, document, mgl is not None)
+        mgl = float(numbers("top.mgl", top["mgl"], ()))
+    if ("inertia" in document) == ("parts" in document):
+        raise DataError(f'{file}: expected inertia = [I1, I2, I3] (or a matrix) or parts = "parts.csv"')
+    warnings: list[str] = []
+    exact_tensor = None
+    if "inertia" in document:
+        inertia = numbers("inertia", document["inertia"], (3,), (3, 3))
+    else:
+        inertia, exact_tensor, warnings = _of_parts(file, path, document["parts"], mgl is not None)
     try:
         verdict = check(inertia)
     except ValueError as error:
@@ -96,19 +140,20 @@ def read_body(path: str) -> TurningBody:
     frame = document.get("frame", "body")
     if frame not in ("body", "space"):
         raise DataError(f'{file}: frame: found {frame!r}, expected "body" or "space"')
-    written = _numbers(file, "attitude", document.get("attitude", [1, 0, 0, 0]), (4,))
+    if "frame" in document and torque is None:
+        warnings.append(f"{file}: frame: these are the axes of a torque, and there is none: not used")
     try:
-        attitude = normalize(written)
+        attitude = normalize(numbers("attitude", document.get("attitude", [1, 0, 0, 0]), (4,)))
     except ValueError as error:
         raise DataError(f"{file}: attitude: {error}") from None
     return TurningBody(
         file,
         str(document.get("name", "")),
         inertia,
-        _numbers(file, "omega", document["omega"], (3,)),
+        numbers("omega", document["omega"], (3,)),
         attitude,
         mgl,
-        None if torque is None else _numbers(file, "torque", torque, (3,)),
+        None if torque is None else numbers("torque", torque, (3,)),
         frame,
         warnings,
         about(file, document),
@@ -117,23 +162,25 @@ def read_body(path: str) -> TurningBody:
     )
 
 
-def _inertia(
-    file: str, path: str, document: Mapping[str, object], top: bool
-) -> tuple[Array, Callable[[], DoubledArray] | None, list[str]]:
-    """Return the tensor, the one of parts to 32 digits as well, and warnings."""
-    if ("inertia" in document) == ("parts" in document):
-        raise DataError(f'{file}: expected inertia = [I1, I2, I3] (or a matrix) or parts = "parts.csv"')
-    if "inertia" in document:
-        return _numbers(file, "inertia", document["inertia"], (3,), (3, 3)), None, []
-    named = document["parts"]
+def _of_parts(
+    file: str, path: str, named: object, top: bool
+) -> tuple[Array, Callable[[], DoubledArray], list[str]]:
+    """Return the tensor of a table of parts, the same to 32 digits, and warnings."""
     if not isinstance(named, str):
         raise DataError(f"{file}: parts: found {named!r}, expected the name of a CSV file")
     from cli.read.parts import read_parts
 
     parts = read_parts(str((Path() if path == "-" else Path(path).parent) / named))
-    point = [0.0, 0.0, 0.0] if top else None
-    inertia = parts.whole.inertia if point is None else parts.whole.about(point)
-    return inertia, partial(_exact_tensor, parts.whole, point), parts.warnings
+    warnings = list(parts.warnings)
+    if not top:
+        return parts.whole.inertia, partial(_exact_tensor, parts.whole, None), warnings
+    x, y, z = parts.whole.center.tolist()
+    if np.hypot(x, y) > 1e-9 * abs(z):
+        warnings.append(
+            f"{parts.file}: the centre of mass lies at x = {x:g} m, y = {y:g} m: expected it on body z, the axis of a top"
+        )
+    point = [0.0, 0.0, 0.0]
+    return parts.whole.about(point), partial(_exact_tensor, parts.whole, point), warnings
 
 
 def _exact_tensor(body: Body, about: list[float] | None) -> DoubledArray:
@@ -142,25 +189,25 @@ def _exact_tensor(body: Body, about: list[float] | None) -> DoubledArray:
     return tensor
 
 
-def _numbers(file: str, key: str, value: object, *shapes: tuple[int, ...]) -> Array:
-    wanted = " or ".join("×".join(map(str, shape)) if shape else "one" for shape in shapes)
-
-    def plain(x: object) -> bool:
-        return (
-            all(map(plain, x))
-            if isinstance(x, list)
-            else isinstance(x, (int, float)) and not isinstance(x, bool)
-        )
-
+def _written(file: str, key: str, value: object, *shapes: tuple[int, ...]) -> Written:
+    """Numbers of a key in an array of one of the shapes, bare in SI or with their units."""
+    dimension = DIMENSIONS[key]
     try:
-        array = np.array(value, dtype=float) if plain(value) else np.array([np.nan])
-    except (ValueError, OverflowError):
+        texts = np.array(value, dtype=object)
+        numbers = [number_in_si(x, dimension) for x in texts.ravel().tolist()]
+        array = np.array([np.nan if x is None else x for x in numbers]).reshape(texts.shape)
+    except ValueError:
         array = np.array([np.nan])
     if array.shape not in shapes or not (np.abs(array) <= LARGEST).all():
-        raise DataError(
-            f"{file}: {key}: found {value!r}, expected {wanted} finite number{'s' * (wanted != 'one')}"
+        wanted = " or ".join("×".join(map(str, shape)) if shape else "one" for shape in shapes)
+        plural = "s" * (wanted != "one")
+        units = (
+            ""
+            if dimension == "number"
+            else f" in {spelled(document_unit(dimension))}, or {expected(dimension)}"
         )
-    return array
+        raise DataError(f"{file}: {key}: found {value!r}, expected {wanted} finite number{plural}{units}")
+    return Written(array, texts.ravel().tolist(), dimension)
 
 
 DEFAULT_STEPS = 20_000
@@ -362,8 +409,7 @@ def _steady(g: TurningBody, moments: Array) -> dict[str, Any]:
     w, x, y, z = g.attitude
     tilt = 2 * np.arctan2(np.hypot(x, y), np.hypot(w, z))
     rates = steady_of(moments[0], moments[2], mgl, tilt, g.omega[2])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        threshold = threshold_of(moments[0], moments[2], mgl)
+    threshold = threshold_of(moments[0], moments[2], mgl)
     return {"slow_rad_s": rates.slow, "fast_rad_s": rates.fast, "sleeping_threshold_rad_s": threshold}
 
 

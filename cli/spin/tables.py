@@ -97,9 +97,18 @@ def constants(r: Rotation, only: Collection[str] = QUANTITIES) -> Table:
     return Table(columns, place="", documented=absent)
 
 
-def warnings(r: Rotation) -> list[str]:
-    """Warnings about the method and the precession."""
-    lines = []
+def warnings(r: Rotation, only: Collection[str] = ()) -> list[str]:
+    """Warnings about the method, the precession, and what --only names and this rotation does not have."""
+    absent = {
+        "drift": (r.body.torque is not None, "a torque changes momentum and energy"),
+        "period": (r.period is None, "the angular velocity is constant, or not periodic"),
+        "nutation_period": (r.nutation_period is None, "only a top that nutates has it"),
+        "cones": (r.cones() is None, "only a free body of revolution has them"),
+        "steady": (r.steady() is None, "only a symmetric top has it"),
+    } if only else {}  # fmt: skip
+    lines = [
+        f"--only {name}: none here: {why}" for name, (none, why) in absent.items() if none and name in only
+    ]
     if r.body.mgl is not None and r.round_moments is None:
         lines.append("a top whose moments across body z differ has no closed form: it was integrated")
     steady = r.steady()

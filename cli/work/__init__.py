@@ -37,8 +37,9 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """
     g = 0j if options.gravity is None else plane_vector("--gravity", options.gravity, "acceleration")
     from cli.show.result import Result
-    from cli.work.power import METHOD, WorkBalance, draw, tables, way
+    from cli.work.power import METHOD, WorkBalance, draw, tables
     from cli.work.states import read_states
+    from cli.work.way import way
 
     table = read_states(options.states)
     balance = WorkBalance(table, g)

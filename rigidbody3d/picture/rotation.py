@@ -11,7 +11,7 @@ from dalembert.drawing.curves import Curve, panel, spread
 from dalembert.drawing.sheet import sheet
 from rigidbody3d.attitude import rotate
 from rigidbody3d.inertia import principal
-from rigidbody3d.traced_axis import traced_axis
+from rigidbody3d.solids import traced_axis
 
 if TYPE_CHECKING:
     from matplotlib.figure import FigureBase

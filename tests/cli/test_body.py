@@ -225,3 +225,26 @@ def test_a_tensor_beyond_its_last_digit_is_refused_as_written(body) -> None:
     assert done.returncode == 1
     assert "found '3.33'" in done.stderr
     assert "triangle inequality" in done.stderr
+
+
+def test_the_tensor_about_a_point(dalembert, tmp_path) -> None:
+    (tmp_path / "rod.csv").write_text("part,shape,mass_kg,length_m\nrod,rod,3,2\n")
+    found = json.loads(dalembert("body", "rod.csv", "--about", "0,0,1", "--json").stdout)
+    assert found["inertia_about_kg_m2"] == [[4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 0.0]]
+    assert found["inertia_kg_m2"][0][0] == 1.0
+    done = dalembert("body", "rod.csv", "--about", "1,0,1", "--only", "inertia_about", "--digits")
+    assert done.stdout.splitlines()[1:] == ["x,4.0,0.0,-3.0", "y,0.0,7.0,0.0", "z,-3.0,0.0,3.0"]
+    assert "inertia_about" not in dalembert("body", "rod.csv", "--fixed", "0,0,1", "--omega", "1,0,0").stdout
+
+
+def test_options_of_a_motion_without_one(dalembert, tmp_path) -> None:
+    (tmp_path / "rod.csv").write_text("part,shape,mass_kg,length_m\nrod,rod,3,2\n")
+    for option in ("--fixed", "--frame-omega"):
+        assert f"{option}: the body is at rest" in dalembert("body", "rod.csv", option, "0,0,1").stderr
+        assert not dalembert(
+            "body", "rod.csv", option, "0,0,1", "--omega", "0,1,0", "--only", "mass"
+        ).stderr.count("rest")
+    shaft = ("body", "rod.csv", "--shaft", "0mm:900mm")
+    assert "the shaft is at rest and has no weight" in dalembert(*shaft).stderr
+    for more in (("--gravity", "0,-9.81,0"), ("--speed", "60rpm"), ("--speed-rate", "1rad_s2")):
+        assert "at rest" not in dalembert(*shaft, *more).stderr

@@ -259,3 +259,15 @@ def test_what_is_constant_in_a_rotation_has_its_error_too(tmp_path) -> None:
             off = abs(mp.mpf(value) - exact)
             assert off <= error <= 1.02 * off
         assert found["nutation_period"][1] < 1e-15
+
+
+def test_the_third_axis_of_a_ring_that_lies_aslant(dalembert, tmp_path) -> None:
+    (tmp_path / "p.csv").write_text(
+        "part,shape,radius_mm,mass_kg,axis_x,axis_y\nrim,ring,187.6,4.31,-1,0.3\n"
+    )
+    shown = printed(dalembert("body", "p.csv", "--digits"))
+    size = F(mp.nstr(1 / mp.sqrt(F(109, 100)), 30))
+    sign = 1 if float(shown["principal_axis_3"][1]) > 0 else -1
+    for cell, true in zip(shown["principal_axis_3"], (-size, F(3, 10) * size, F(0)), strict=True):
+        holds(cell, sign * true)
+    assert min(map(digits, shown["principal_axis_3"][:2])) >= 14

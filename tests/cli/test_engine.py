@@ -250,3 +250,11 @@ def test_bad_options(options: tuple[str, ...], message: str, dalembert: Dalember
     done = dalembert("engine", "-", *options, stdin=HEAD + ROW)
     assert done.returncode == 2
     assert message in " ".join(done.stderr.split())
+
+
+def test_counterweights_of_nothing(dalembert, tmp_path) -> None:
+    (tmp_path / "one.csv").write_text("crank_deg,throw_mm,rod_mm,reciprocating_kg\n0,50,200,1\n")
+    engine = ("engine", "one.csv", "--speed", "3000rpm")
+    for option in (("--plane", "A:0mm:60mm"), ("--counterweight-share", "0")):
+        assert "the counterweights are zero" in dalembert(*engine, *option).stderr
+    assert "are zero" not in dalembert(*engine, "--counterweight-share", "0.5").stderr

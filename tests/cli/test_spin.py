@@ -132,6 +132,8 @@ def test_csv_and_pictures(spin, tmp_path) -> None:
         ("inertia = [1, 2, 3]\nomegas = [1, 2, 3]\n", ("omegas", "did you mean 'omega'?")),
         ("inertia = [1, 2, 3]\nomega = [1, 2, 3]\n[top]\nmass = 3\n", ("[top]", "mgl")),
         ('inertia = [1, 2, 3]\nomega = [1, 2, 3]\nframe = "moon"\n', ("frame",)),
+        ('inertia = [1, 2, 3]\nomega = [1, 2, "3 kg"]\n', ("3 finite numbers in rad/s", "'700 rpm'")),
+        ('inertia = [1, 2, 3]\nomega = [1, 2, 3]\nattitude = ["1 deg", 0, 0, 0]\n', ("4 finite numbers",)),
         ("omega = [1, 2, 3]\n", ("inertia",)),
         ('parts = "none.csv"\nomega = [1, 2, 3]\n', ("none.csv",)),
         ("inertia = [1, 2, 3\n", ("body.toml",)),
@@ -181,3 +183,32 @@ def test_an_absurd_phase_is_refused_not_integrated(dalembert, tmp_path) -> None:
     done = dalembert("spin", "body.toml", "--at", "5")
     assert done.returncode == 1
     assert "omega" in done.stderr
+
+
+def test_numbers_of_the_file_in_other_units(spin) -> None:
+    bare = document(spin("inertia = [1, 1, 1.5]\nomega = [0, 3, 4]\n[top]\nmgl = 2\n", "--json"))
+    text = 'inertia = ["1e6 kg mm2", 1, 1.5]\nomega = [0, "180 deg/s", "30 rpm"]\n[top]\nmgl = "2 kN mm"\n'
+    units = document(spin(text, "--json"))
+    assert units["states"][0]["omega_rad_s"] == pytest.approx([0, np.pi, np.pi], rel=4e-16)
+    assert units["steady"]["sleeping_threshold_rad_s"] == bare["steady"]["sleeping_threshold_rad_s"]
+    # 30 rpm are π rad/s, whatever is printed of it
+    late = spin(text, "--at", "1000", "--digits", "--only", "omega")
+    assert late.stdout.splitlines()[1].split(",")[3] == "3.141592653589793"
+
+
+def test_what_a_rotation_does_not_have_is_said(spin) -> None:
+    free = 'inertia = [1, 2, 3]\nomega = [0, 0, 4]\nframe = "space"\n'
+    done = spin(free, "--only", "steady,cones,period,energy")
+    assert done.returncode == 0
+    assert "frame: these are the axes of a torque, and there is none" in done.stderr
+    for name in ("steady", "cones", "period"):
+        assert f"--only {name}: none here" in done.stderr
+    assert "--only" not in spin(free).stderr
+
+
+def test_a_top_of_parts_stands_on_its_axis(spin, tmp_path) -> None:
+    top = 'parts = "parts.csv"\nomega = [0, 0, 90]\n[top]\nmgl = 0.4\n'
+    (tmp_path / "parts.csv").write_text("part,shape,mass_kg,radius_mm,x_mm,z_mm\nwheel,disk,1,50,2,40\n")
+    assert "the centre of mass lies at x = 0.002 m, y = 0 m" in spin(top).stderr
+    (tmp_path / "parts.csv").write_text("part,shape,mass_kg,radius_mm,z_mm\nwheel,disk,1,50,40\n")
+    assert "centre of mass" not in spin(top).stderr

@@ -206,3 +206,11 @@ def test_digits_of_two_unknowns_in_any_units(dalembert: Dalembert) -> None:
             assert abs(mp.mpf(text) - true) <= mp.mpf(10) ** (
                 mp.floor(mp.log10(abs(true))) - places + 1
             ) / 2 * mp.mpf("1.000001")
+
+
+def test_gravity_without_masses_is_said(dalembert: Dalembert) -> None:
+    table = "link,omega_rad_s,torque_N_m\na,2,?\nb,1,3\n"
+    done = dalembert("work", "-", "--gravity", "0,-9.81", stdin=table)
+    assert done.stdout.splitlines()[1] == "1,a,-1.5"
+    assert "--gravity: there is no column mass_*" in done.stderr
+    assert not dalembert("work", "-", stdin=table).stderr

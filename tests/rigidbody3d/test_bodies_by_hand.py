@@ -48,6 +48,26 @@ def test_one_shape_at_many_places() -> None:
     np.testing.assert_allclose(whole.center, [1.0, 2 / 3, 1 / 3], rtol=1e-15)
 
 
+def test_parts_of_unlike_shapes_are_composed() -> None:
+    disk = Body.of("disk", 2.0, radius=0.3).moved([0.0, 0.0, 1.0])  # 0.045, 0.045, 0.09
+    rod = Body.of("rod", 2.0, length=2.0)  # 2/3, 2/3, 0
+    whole = compose([disk, rod])
+    np.testing.assert_allclose(whole.center, [0, 0, 0.5], rtol=1e-15)
+    np.testing.assert_allclose(whole.inertia.diagonal(), [1.045 + 2 / 3, 1.045 + 2 / 3, 0.09], rtol=1e-15)
+    # the decimals are those of floats, and one of the errors is that of 2/3 + 1 + 0.045
+    assert 0 < whole.error_estimate().inertia[0, 0] < 1e-15
+    assert [solid.shape for solid in whole.solids()] == ["disk", "rod"]
+    assert compose(rod) == compose([rod]) == Body(2.0, np.zeros(3), rod.inertia)
+    # one hub with blades at two lengths
+    several = compose([disk, Body.of("rod", [2.0, 4.0], length=[2.0, 1.0])])
+    np.testing.assert_allclose(several.mass, [4.0, 6.0])
+    np.testing.assert_allclose(several.inertia[0], whole.inertia, atol=1e-16)
+    with pytest.raises(ValueError, match="at least one part"):
+        compose([])
+    with pytest.raises(ValueError, match=r"part 1 \(2,\), part 2 \(3,\)"):
+        compose([Body.of("rod", [1.0, 2.0], length=1.0), Body.of("rod", [1.0, 2.0, 3.0], length=1.0)])
+
+
 def test_a_batch_is_judged_body_by_body() -> None:
     good, askew = np.diag([1.0, 2.0, 2.5]), np.diag([1.0, 2.0, 2.5])
     askew[0, 1] = 0.1

@@ -350,3 +350,27 @@ def test_percussion_free_and_pinned() -> None:
         balance = body.inertia @ blow.omega - np.cross(r, J) - np.cross(p, blow.reaction)
         # a hinge also answers with a moment across itself
         np.testing.assert_allclose(balance if axis is None else balance @ axis, 0, atol=1e-13)
+
+
+def test_a_thin_rod_is_struck() -> None:
+    rod = Body.of("rod", 3.0, length=2.0)
+    free = strike(rod.mass, rod.inertia, [6.0, 0, 0], [0, 0, 0.5])
+    np.testing.assert_array_equal(free.velocity, [2.0, 0, 0])
+    np.testing.assert_array_equal(free.omega, [0, 3.0, 0])
+    # hung at its upper end by a ball: 4 kg·m², lever 1.5 m
+    held = strike(rod.mass, rod.inertia, [8.0, 0, 0], [0, 0, -0.5], pin=[0, 0, 1.0])
+    np.testing.assert_array_equal(held.omega, [0, -3.0, 0])
+    np.testing.assert_array_equal(held.reaction, [1.0, 0, 0])
+    # a point mass moves, and no rod turns about itself
+    np.testing.assert_array_equal(strike(2.0, np.zeros((3, 3)), [1.0, 0, 0], [0, 0, 0]).velocity, [0.5, 0, 0])
+    with pytest.raises(ValueError, match="no moment of inertia"):
+        strike(rod.mass, rod.inertia, [0, 1.0, 0], [0.1, 0, 0.5])
+    with pytest.raises(ValueError, match="axis of its hinge"):
+        strike(rod.mass, rod.inertia, [1.0, 0, 0], [0, 0, 0.5], pin=[0, 0, 1.0], axis=[0, 0, 2.0])
+    for wrong, message in (({"axis": [0, 1, 0]}, "needs a pin"), ({"pin": [0, 1]}, "pin must have")):
+        with pytest.raises(ValueError, match=message):
+            strike(rod.mass, rod.inertia, [1.0, 0, 0], [0, 0, 0.5], **wrong)
+    with pytest.raises(ValueError, match="not all of its numbers are 0"):
+        strike(rod.mass, rod.inertia, [1.0, 0, 0], [0, 0, 0.5], pin=[0, 0, 1], axis=[0, 0, 0])
+    with pytest.raises(ValueError, match="must be positive"):
+        strike(0.0, rod.inertia, [1.0, 0, 0], [0, 0, 0.5])
