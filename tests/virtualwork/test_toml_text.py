@@ -138,6 +138,10 @@ MIRROR = [
     ({"forces": [Force("arm", "X", 1j)]}, r"\[\[forces\]\] 1 point: unknown point of link arm 'X'"),
     ({"forces": [Force("arm", None, 1j, "world")]}, r"\[\[forces\]\] 1 frame: found 'world'"),
     ({"forces": [Torque("arm", 1.0)]}, "forces 1: expected Force, found Torque"),
+    ({"friction": [Friction("P", -0.1)]}, r"\[\[friction\]\] 1 coefficient: found -0.1, but it must not be negative"),
+    ({"friction": [Friction("P", 0.1, -0.01)]}, r"\[\[friction\]\] 1 radius: found -0.01, but it must not be negative"),
+    ({"motors": [Motor("arm", "arm", -1.0)]}, r"\[\[motors\]\] 1 mass: found -1.0, but it must not be negative"),
+    ({"gears": [Gear(("arm", "arm"), 2.0)]}, r"\[\[gears\]\] 1: found the links arm and arm and the arm ground"),
     ({"inputs": [Input("arm", on="arm")]}, r"\[input\] on: link 'arm' cannot turn against itself"),
     ({"inputs": [Input("arm", slider="P")]}, r"\[input\].*either a link or a slider"),
 ]  # fmt: skip
@@ -164,11 +168,29 @@ ARM = "[ground]\nO = [0, 0]\n[links.arm]\npoints = { O = [0, 0], P = [1, 0] }\n"
         ('[input]\nlink = "arm"\n[[friction]]\njoint = "X"\ncoefficient = 1', r"\[\[friction\]\] 1 joint: unknown"),
         ('[input]\nlink = "arm"\n[[springs]]\nbetween = ["arm.X", "ground.O"]', r"1 between: unknown point of link arm"),
         ('[input]\nlink = "arm"\n[[springs]]\nbetween = ["ram.P", "ground.O"]', r"1 between: unknown link 'ram'"),
+        ('[input]\nlink = "arm"\n[guess]\nP = 3', r"\[guess\] P: found 3, expected two numbers \[x, y\]"),
+        ('[input]\nlink = "arm"\n[guess]\narm = [1, 2]', r"\[guess\] arm: found \[1, 2\], expected an angle"),
+        ('[input]\nlink = "arm"\n[guess]\nram = 3', r"\[guess\] ram: unknown link or point 'ram'; did you mean 'arm'"),
+        ('[input]\nslider = "P"\n[[slots]]\npoint = "Q"\nlink = "arm"', r"\[\[slots\]\] 1 \(Q\) point: unknown point of link arm 'Q'"),
+        ('[input]\nlink = "arm"\n[[forces]]\nlink = "arm"\nforce = [0, 0]\nframe = "lnk"', r"frame: found 'lnk', expected 'ground' or 'link'; did you mean 'link'"),
+        (f'[input]\nlink = "arm"\nspeed = 1{"0" * 300}', r"\[input\] speed: found 10{56}\.\.\., expected an angular speed"),
     ],
 )  # fmt: skip
 def test_files_are_refused_in_words_of_their_keys(text: str, message: str) -> None:
     with pytest.raises(DescriptionError, match=message):
         Mechanism.from_toml_text(ARM + text)
+
+
+def test_the_guess_of_a_driven_slide_is_where_it_stands_as_the_guess_of_a_driven_link_is() -> None:
+    slide = (
+        "[ground]\nO = [0, 0]\n[links.block]\npoints = { B = [0, 0] }\n[[sliders]]\npoint = 'B'\n"
+        "[input]\nslider = 'B'\n[guess]\nB = '20 mm'"
+    )
+    assert Mechanism.from_toml_text(slide).at == (0.02,)
+    assert Mechanism.from_toml_text(f"{ARM}[input]\nlink = 'arm'\n[guess]\narm = '20 mrad'").at == (0.02,)
+    # a position of the file's own pose comes before it
+    own = slide.replace("slider = 'B'", "slider = 'B'\nposition = '3 mm'")
+    assert Mechanism.from_toml_text(own).at == (0.003,)
 
 
 def test_a_torque_by_a_table_has_no_constant_to_vary() -> None:
