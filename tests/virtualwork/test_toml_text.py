@@ -32,6 +32,7 @@ from virtualwork.describe.keys import Part, check, declared, keys_of, read_field
 from virtualwork.describe.parts import PARTS, TABLES, Friction, Polar
 from virtualwork.describe.text import table_of, toml_text, written
 from virtualwork.describe.units import Units
+from virtualwork.toml_template import toml_template
 
 ROOT = Path(__file__).parents[2]
 FILES = [
@@ -128,6 +129,42 @@ def test_every_key_fills_a_field_of_its_part() -> None:
                 or key.default is None
                 or callable(key.default)
             )
+
+
+CAM = """
+[ground]
+U = [0, 0]
+[links.cam]
+points = { U = [0, 0] }
+[links.valve]
+points = { F = [0, 0] }
+[[sliders]]
+point = "F"
+[input]
+link = "cam"
+[[cams]]
+cam = "cam"
+slider = "F"
+base_radius = 0.02
+"""
+TURN = "[{ to = 2, rise = 0.01, motion = '3-4-5' }, { to = 3, motion = 'dwell' }, { motion = '3-4-5' }]"
+WHOLE = (
+    "[{ from = 0, to = 2, rise = 0.01, motion = '3-4-5' }, { from = 2, to = 3, motion = 'dwell' },"
+    " { from = 3, to = '1 rev', rise = -0.01, motion = '3-4-5' }]"
+)
+
+
+@pytest.mark.parametrize("law", [TURN, WHOLE])
+def test_the_file_of_a_page_has_a_place_for_every_number_of_a_cams_law(law: str) -> None:
+    m = Mechanism.from_toml_text(f"{CAM}law = {law}")
+    lines = toml_template(m, list(m.dimensions))
+    assert lines is not None
+    text = "\n".join(
+        "".join(piece if isinstance(piece, str) else repr(m.value(piece[0])) for piece in line["of"])
+        for line in lines
+        if line["needed"]
+    )
+    assert Mechanism.from_toml_text(text) == m
 
 
 MIRROR = [
