@@ -163,7 +163,8 @@ def test_mujoco_agrees_with_what_is_read_of_poses() -> None:
 <body name="a" pos="1 2 3" euler="10 20 30"><joint axis="1 2 3" pos=".1 .2 .3"/><geom size=".1"/>
  <frame pos="0 1 0" axisangle="0 1 1 40"><body name="b" quat="1 2 3 4" childclass="s"><joint type="slide"/><geom size=".1"/>
   <site name="p"/><frame zaxis="1 1 -1"><site name="q" pos="1 0 0"/></frame>
-  <body name="c" xyaxes="1 1 0 0 1 1"><geom size=".1"/><body name="d" zaxis="0 0 -1"><geom size=".1"/></body></body></body></frame>
+  <body name="c" xyaxes="1 1 0 0 1 1"><geom size=".1"/><body name="d" zaxis="0 0 -1"><geom size=".1"/>
+   <frame pos="1 0 2" euler="0 0 30"><joint name="last" axis="1 0 1" pos=".1 0 0"/></frame></body></body></body></frame>
 </body></worldbody></mujoco>"""
     model = mujoco.MjModel.from_xml_string(text)
     state = mujoco.MjData(model)
@@ -175,12 +176,14 @@ def test_mujoco_agrees_with_what_is_read_of_poses() -> None:
     for name, link in (("p", "b"), ("q", "b")):
         at = robot.links[link].pose @ np.append(robot.links[link].points[name], 1)
         assert at[:3] == pytest.approx(state.site(name).xpos, abs=1e-14)
-    first = next(iter(robot.joints.values()))
-    assert first.axis == pytest.approx(state.xaxis[0], abs=1e-14)
-    assert first.ends[1] == pytest.approx(state.xanchor[0], abs=1e-14)
+    joints = list(robot.joints.values())
+    for k in (0, -1):
+        assert joints[k].axis == pytest.approx(state.xaxis[k], abs=1e-14)
+        assert joints[k].ends[1] == pytest.approx(state.xanchor[k], abs=1e-14)
 
 
-def test_masses_that_follow_from_shapes_are_mujocos() -> None:
+@pytest.mark.parametrize("total", [-1, 14])
+def test_masses_that_follow_from_shapes_are_mujocos(total: int) -> None:
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads its own format: pip install mujoco")
     from cli.formats.robots import read_robot
 
@@ -193,9 +196,10 @@ def test_masses_that_follow_from_shapes_are_mujocos() -> None:
         '<geom type="box" size=".1 .2" fromto="0 0 0 1 1 0"/><geom class="heavy" pos="0 1 0"/>',
         '<geom type="ellipsoid" size=".1 .2 .3"/>',
         '<geom type="ellipsoid" size=".1" fromto="0 0 0 0 .1 .4"/>',
+        '<frame pos="1 2 0" euler="0 40 0"><geom type="box" size=".1 .2 .3" pos="0 0 1"/></frame>',
     ]
     bodies = "".join(f'<body name="b{k}"><joint/>{s}</body>' for k, s in enumerate(shapes))
-    text = f"""<mujoco><compiler angle="degree"/><default><default class="heavy"><geom size=".2" density="5000"/></default>
+    text = f"""<mujoco><compiler angle="degree" settotalmass="{total}"/><default><default class="heavy"><geom size=".2" density="5000"/></default>
 </default><worldbody>{bodies}</worldbody></mujoco>"""
     model = mujoco.MjModel.from_xml_string(text)
     robot = read_robot("file", text.encode(), None)

@@ -330,11 +330,11 @@ def together(parts: list[tuple[float, Array, Array]]) -> Inertial | None:
 
 
 def mass_of_shapes(
-    frames: Frames, where: str, geoms: Iterable[Mapping[str, str]], notes: list[str]
+    frames: Frames, where: str, geoms: Iterable[tuple[Mapping[str, str], Array]], notes: list[str]
 ) -> Inertial | None:
-    """Return the inertia of a body's shapes, each by its attributes."""
+    """Return the inertia of a body's shapes, each by its attributes and the pose in the body in which it is written."""
     at, parts = At(frames.file, where), []
-    for values in geoms:
+    for values, frame in geoms:
         shape = values.get("type", "sphere")
         if shape not in SIZES or "mesh" in values:
             notes.append(f"{where}: the mass of a {values.get('mesh', shape)} is not imported")
@@ -352,7 +352,7 @@ def mass_of_shapes(
         volume, moments = unit_mass(shape, size[: SIZES[shape]])
         density = at.number("geom density", values.get("density", str(DENSITY)))
         mass = at.number("geom mass", values.get("mass", repr(density * volume)))
-        parts.append((mass, here, mass * moments))
+        parts.append((mass, frame @ here, mass * moments))
     return together(parts)
 
 
