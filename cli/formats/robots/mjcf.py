@@ -204,14 +204,12 @@ class _Reader:
             elif e.tag in ("connect", "weld"):
                 self._connect(e.tag, name, at, values)
             elif e.tag == "joint":
-                terms = [(named(self.file, e, "joint1"), 1.0)]
-                powers = at.numbers("polycoef", values.get("polycoef", "0 1 0 0 0"), 5)
-                if any(powers[2:]):
+                offset, factor, *powers = [*at.numbers("polycoef", values.get("polycoef", "0 1")), 0.0, 0.0]
+                if any(powers):
                     robot.notes.append(f"{where}: left out: its polynomial is not a straight line")
                     continue
-                if "joint2" in values:
-                    terms.append((values["joint2"], -powers[1]))
-                robot.couplings.append((name, terms))
+                first = named(self.file, e, "joint1")
+                robot.couple(name, first, values.get("joint2", ""), factor, offset, where)
             elif e.tag == "tendon" and "tendon2" not in values:
                 robot.couplings.append((name, self._fixed(named(self.file, e, "tendon1"), at)))
             else:

@@ -135,6 +135,12 @@ class Robot:
             raise DataError(f"{self.file}: two joints are called '{joint.name}'")
         self.joints[joint.name] = joint
 
+    def couple(self, name: str, joint: str, other: str, factor: float, offset: float, where: str) -> None:
+        """Keep a joint's coordinate at a factor times another's, or as it is where there is no other; the offset is the file's."""
+        self.couplings.append((name, [(joint, 1.0), *([(other, -factor)] if other else [])]))
+        if offset:
+            self.notes.append(f"{where}: its offset {offset:g} is left out: the pose is that of the file")
+
 
 def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), rotation: Array | None = None) -> Array:
     """Return a pose (4, 4) from a place and a rotation."""
