@@ -8,7 +8,7 @@ from typing import Any
 
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
-from virtualwork.describe.dimensions import changed
+from virtualwork.describe.dimensions import parts_with
 from virtualwork.describe.text import toml_text
 
 
@@ -20,7 +20,8 @@ def toml_template(m: Description, paths: Sequence[str]) -> list[Any] | None:
     marked = {path: 0.5 + (i + 1) * 1.000123456789e-4 for i, path in enumerate(paths)}
     try:
         own = toml_text(m)
-        text = toml_text(changed(m, marked))
+        # marks are no mechanism: the segments of a cam's law would not close
+        text = toml_text(m, parts=parts_with(m, marked))
     except DescriptionError:
         return None
     written = set(_keyed(own))

@@ -6,7 +6,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import islice, zip_longest
+from itertools import islice
 from typing import TYPE_CHECKING
 
 from dalembert.dataclass import dataclass, field
@@ -184,30 +184,6 @@ def source_of(
         raise DataError(f"{file}: the file is empty{source.of_sheet}: expected a header and rows")
     _find_header(source, first, dimensions, texts)
     return source
-
-
-def table_rows(file: str, data: bytes) -> list[dict[str, str]]:
-    """Return the rows of a whole table, each cell under its column's name with the unit: `angle_deg`.
-
-    Where the cells are not parted by commas, a comma is a decimal one, and then no number has a decimal point.
-
-    Raises
-    ------
-    DataError
-        No text, an empty file, unbalanced quotes, a broken workbook.
-
-    Examples
-    --------
-    >>> table_rows("wind.csv", b"angle [deg];fx_N\\n0;-1,5\\n90;2\\n")
-    [{'angle_deg': '0', 'fx_N': '-1.5'}, {'angle_deg': '90', 'fx_N': '2'}]
-    """
-    source = source_of(file, data, {}, None)
-    names = [each.name for each in source.headings]
-    rows = [cells for _, cells in source.rows()]
-    if source.has_commas(rows):
-        # 2.500 beside 1,5 may be 2500: it is made no number, and refused
-        rows = [[cell.replace(".", "'").replace(",", ".") for cell in row] for row in rows]
-    return [dict(zip_longest(names, row[: len(names)], fillvalue="")) for row in rows]
 
 
 def _find_header(

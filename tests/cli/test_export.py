@@ -14,6 +14,7 @@ from cli.formats.description import described
 from cli.formats.export_command import file_bytes
 from cli.formats.import_command import read
 from cli.formats.settled import settle
+from dalembert.errors import DataError
 from tests.cli.exported import EXAMPLES, FILES, FOUR_BAR, MASSIVE, PLANETARY, exported, home, moved
 from tests.conftest import Dalembert
 from virtualwork import Mechanism
@@ -205,6 +206,24 @@ def test_gears_of_two_joints_are_mimicked_others_are_gearboxes() -> None:
     sdf = ElementTree.fromstring(exported(Mechanism.from_toml_text(PLANETARY), ".sdf"))
     boxes = [e for e in sdf.iter("joint") if e.get("type") == "gearbox"]
     assert [float(e.findtext("gearbox_ratio") or 0) for e in boxes] == [2.0, -4.0]
+
+
+@pytest.mark.parametrize("suffix", ROBOTS)
+def test_a_joint_or_a_point_that_is_called_as_a_link_or_the_world_has_a_name_of_its_own(suffix: str) -> None:
+    """SDF has one name for each of its links, joints and frames, and keeps `world` for itself."""
+    text = FOUR_BAR.replace("crank", "B").replace("D = ", "world = ").replace("P = ", "rocker = ")
+    m = Mechanism.from_toml_text(text)
+    ours, theirs = m.motion(), taken_back(exported(m, suffix)).motion()
+    names = {
+        "C": "C",
+        "B": "B 2",
+        "world": "world 2",
+        "rocker": "rocker_2" if suffix == ".xml" else "rocker point",
+    }
+    for point, name in names.items():
+        assert theirs.point(name).position[0] == pytest.approx(ours.point(point).position[0], abs=1e-15)
+    with pytest.raises(DataError, match="the link 'world' is called as the ground"):
+        exported(Mechanism.from_toml_text(FOUR_BAR.replace("crank", "world")), suffix)
 
 
 # --- what is said, and what is refused ----------------------------------------------------------------------------

@@ -163,7 +163,8 @@ def test_mujoco_agrees_with_what_is_read_of_poses() -> None:
 <body name="a" pos="1 2 3" euler="10 20 30"><joint axis="1 2 3" pos=".1 .2 .3"/><geom size=".1"/>
  <frame pos="0 1 0" axisangle="0 1 1 40"><body name="b" quat="1 2 3 4" childclass="s"><joint type="slide"/><geom size=".1"/>
   <site name="p"/><frame zaxis="1 1 -1"><site name="q" pos="1 0 0"/></frame>
-  <body name="c" xyaxes="1 1 0 0 1 1"><geom size=".1"/><body name="d" zaxis="0 0 -1"><geom size=".1"/></body></body></body></frame>
+  <body name="c" xyaxes="1 1 0 0 1 1"><geom size=".1"/><body name="d" zaxis="0 0 -1"><geom size=".1"/>
+   <frame pos="1 0 2" euler="0 0 30"><joint name="last" axis="1 0 1" pos=".1 0 0"/></frame></body></body></body></frame>
 </body></worldbody></mujoco>"""
     model = mujoco.MjModel.from_xml_string(text)
     state = mujoco.MjData(model)
@@ -175,12 +176,14 @@ def test_mujoco_agrees_with_what_is_read_of_poses() -> None:
     for name, link in (("p", "b"), ("q", "b")):
         at = robot.links[link].pose @ np.append(robot.links[link].points[name], 1)
         assert at[:3] == pytest.approx(state.site(name).xpos, abs=1e-14)
-    first = next(iter(robot.joints.values()))
-    assert first.axis == pytest.approx(state.xaxis[0], abs=1e-14)
-    assert first.ends[1] == pytest.approx(state.xanchor[0], abs=1e-14)
+    joints = list(robot.joints.values())
+    for k in (0, -1):
+        assert joints[k].axis == pytest.approx(state.xaxis[k], abs=1e-14)
+        assert joints[k].ends[1] == pytest.approx(state.xanchor[k], abs=1e-14)
 
 
-def test_masses_that_follow_from_shapes_are_mujocos() -> None:
+@pytest.mark.parametrize("total", [-1, 14])
+def test_masses_that_follow_from_shapes_are_mujocos(total: int) -> None:
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads its own format: pip install mujoco")
     from cli.formats.robots import read_robot
 
@@ -193,9 +196,10 @@ def test_masses_that_follow_from_shapes_are_mujocos() -> None:
         '<geom type="box" size=".1 .2" fromto="0 0 0 1 1 0"/><geom class="heavy" pos="0 1 0"/>',
         '<geom type="ellipsoid" size=".1 .2 .3"/>',
         '<geom type="ellipsoid" size=".1" fromto="0 0 0 0 .1 .4"/>',
+        '<frame pos="1 2 0" euler="0 40 0"><geom type="box" size=".1 .2 .3" pos="0 0 1"/></frame>',
     ]
     bodies = "".join(f'<body name="b{k}"><joint/>{s}</body>' for k, s in enumerate(shapes))
-    text = f"""<mujoco><compiler angle="degree"/><default><default class="heavy"><geom size=".2" density="5000"/></default>
+    text = f"""<mujoco><compiler angle="degree" settotalmass="{total}"/><default><default class="heavy"><geom size=".2" density="5000"/></default>
 </default><worldbody>{bodies}</worldbody></mujoco>"""
     model = mujoco.MjModel.from_xml_string(text)
     robot = read_robot("file", text.encode(), None)
@@ -256,6 +260,21 @@ def test_poses_of_sdf_relative_to_frames_links_and_in_degrees() -> None:
     )
 
 
+def test_joints_of_sdf_between_frames_are_those_of_the_links_that_hold_the_frames() -> None:
+    frames = (
+        '<frame name="W" attached_to="world"/><frame name="E" attached_to="BC"><pose>0.3 0 0 0 0 0</pose></frame>'
+        '<frame name="F" attached_to="CD"/><frame name="G" attached_to="F"/><frame name="H" attached_to="H"/>'
+    )
+    text = SDF.replace('<joint name="A"', f'{frames}<joint name="A"', 1)
+    text = text.replace("<parent>world</parent><child>AB", "<parent>W</parent><child>AB")
+    between = "<parent>BC</parent><child>CD</child>"
+    m, _ = taken(text.replace(between, "<parent>E</parent><child>G</child>").replace('attached_to="H"', ""))
+    ours, theirs = m.motion(0.3), taken(SDF)[0].motion(0.3)
+    for point in "ABCDP":
+        assert ours.point(point).position[0] == pytest.approx(theirs.point(point).position[0], abs=1e-15)
+    assert "'H' is attached to itself" in refused(text)
+
+
 def test_a_robot_whose_loop_is_open_as_it_stands_is_assembled_and_said() -> None:
     m, notes = taken(URDF.format(loop=LOOPS["loop_joint"].replace("-0.02 0 0.2", "0 0 0.25")))
     assert any("joint C is 0.0539 m open as the file stands" in note for note in notes)
@@ -270,6 +289,19 @@ def test_mimicked_joints_are_gears() -> None:
 <mimic joint="one" multiplier="2.5"/></joint></robot>"""
     m, _ = taken(text)
     assert m.motion(0.1, speed=2.0).link("b").omega[0] == pytest.approx(-5.0)
+
+
+@pytest.mark.parametrize("powers", ["0.1 2.5", "0.1 2.5 0 0 0"])
+def test_coupled_joints_of_mjcf_are_gears_and_what_is_no_ratio_is_named(powers: str) -> None:
+    joint = '<joint name="{0}" axis="0 0 1"/><geom size=".1"/>'
+    text = f"""<mujoco><worldbody><body name="a">{joint.format("one")}</body>
+<body name="b" pos="1 0 0">{joint.format("two")}</body></worldbody>
+<equality><joint joint1="two" joint2="one" polycoef="{powers}"/></equality>
+<actuator><velocity joint="one"/></actuator></mujoco>"""
+    m, notes = taken(text)
+    assert m.motion(0.1, speed=2.0).link("b").omega[0] == pytest.approx(5.0)
+    assert "equality 'joint 1': its offset 0.1 is left out: the pose is that of the file" in notes
+    assert "not a straight line" in str(taken(text.replace(powers, "0 1 2"))[1])
 
 
 def test_axes_rounded_to_a_few_digits_are_planar_and_said() -> None:

@@ -56,17 +56,42 @@ def test_every_spelling_of_a_law_is_one_law(table: bytes, tmp_path: Path) -> Non
         (b'time_s,angle_deg\n0,"0\n', "balanced quotes"),
         (b"time_s,angle_deg\n0,\x01\x02\n", "this is not text"),
         (b"", "the file is empty"),
-        (b"time_s,speed_rpm\n0,1\n1,2\n", "expected columns time_s and angle_rad or angle_deg"),
-        (b"time_s,angle_deg\n0,0\n1,x\n", "numbers in every row"),
-        (b"time_s;angle_deg\n0;1,5\n1;2.500\n", "numbers in every row"),
-        (b"time_s,angle_deg\n0,0\n1\n", "numbers in every row"),
+        (b"time_s,speed_rpm\n0,1\n1,2\n", "found the columns time_s, speed_rpm, expected time_s or t_s, and angle_deg"),
+        (b"time_s,angle_deg\n0,0\n1,x\n", "row 2 (line 3), column angle_deg: found 'x', expected a number"),
+        (b"time_s;angle_deg\n0;1,5\n1;2.500\n", "column angle_deg: found '2.500', expected a number with a decimal comma"),
+        (b"time_s,angle_deg\n0,0\n1\n", "row 2 (line 3), column angle_deg: found '', expected a number"),
+        (b"time_s,angle_deg\n0,0\n1,nan\n", "column angle_deg: found 'nan', expected a number"),
+        (b"time_s,angle_deg,angle_rad\n0,0,0\n1,90,1\n", "more than once, by the columns angle_deg and angle_rad"),
+        (b"time_s,angle\n0,0\n1,90\n", "the column angle has no unit"),
+        (b"time_s,angle_mm\n0,0\n1,90\n", "the column angle_mm has the unknown unit 'mm'"),
+        (b"time_s,angle_deg\n1,0\n0,90\n", "at least two rows with rising time_s"),
     ],
-)
+)  # fmt: skip
 def test_what_is_wrong_with_a_table_is_one_sentence(table: bytes, words: str, tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match="law") as error:
         crank(tmp_path, table)
     assert words in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("keys", "table", "rows"),
+    [
+        ('law = "t.csv"', "Time (ms),Angle [rev]\n0,0\n500,0.25\n", [(0, 0), (0.5, np.pi / 2)]),
+        ('law = "t.csv"', "angle_deg,t_s\n0,0\n90,0.5\n", [(0, 0), (0.5, np.pi / 2)]),
+        ('[[forces]]\nlink = "crank"\ntable = "t.csv"', "angle_deg,fx_kN,fy_lbf\n0,1,2\n90,3,\n", [(0, 1000 + 8.896443230521j), (np.pi / 2, 3000)]),
+        ('[[forces]]\nlink = "crank"\ntable = "t.csv"', "angle_rad,fy_N\n0,1\n1,2\n", [(0, 1j), (1, 2j)]),
+        ('[[torques]]\nlink = "crank"\ntorque = "t.csv"', "speed_Hz,torque_N_mm\n0,20\n1,-3\n", [(0, 0.02), (2 * np.pi, -0.003)]),
+    ],
+)  # fmt: skip
+def test_a_table_takes_any_unit_and_any_case(
+    keys: str, table: str, rows: list[tuple[float, complex]], tmp_path: Path
+) -> None:
+    (tmp_path / "t.csv").write_text(table)
+    m = Mechanism.from_toml_text(CRANK.replace('law = "law.csv"', keys), folder=tmp_path)
+    history = next(part.history for part in (*m.forces, *m.torques, *m.inputs))
+    assert history is not None
+    assert np.array(history).ravel().tolist() == pytest.approx(np.array(rows).ravel().tolist(), rel=1e-15)
 
 
 def test_a_torque_over_what_it_cannot_be_over_is_refused() -> None:

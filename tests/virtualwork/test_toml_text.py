@@ -32,6 +32,7 @@ from virtualwork.describe.keys import Part, check, declared, keys_of, read_field
 from virtualwork.describe.parts import PARTS, TABLES, Friction, Polar
 from virtualwork.describe.text import table_of, toml_text, written
 from virtualwork.describe.units import Units
+from virtualwork.toml_template import toml_template
 
 ROOT = Path(__file__).parents[2]
 FILES = [
@@ -130,6 +131,42 @@ def test_every_key_fills_a_field_of_its_part() -> None:
             )
 
 
+CAM = """
+[ground]
+U = [0, 0]
+[links.cam]
+points = { U = [0, 0] }
+[links.valve]
+points = { F = [0, 0] }
+[[sliders]]
+point = "F"
+[input]
+link = "cam"
+[[cams]]
+cam = "cam"
+slider = "F"
+base_radius = 0.02
+"""
+TURN = "[{ to = 2, rise = 0.01, motion = '3-4-5' }, { to = 3, motion = 'dwell' }, { motion = '3-4-5' }]"
+WHOLE = (
+    "[{ from = 0, to = 2, rise = 0.01, motion = '3-4-5' }, { from = 2, to = 3, motion = 'dwell' },"
+    " { from = 3, to = '1 rev', rise = -0.01, motion = '3-4-5' }]"
+)
+
+
+@pytest.mark.parametrize("law", [TURN, WHOLE])
+def test_the_file_of_a_page_has_a_place_for_every_number_of_a_cams_law(law: str) -> None:
+    m = Mechanism.from_toml_text(f"{CAM}law = {law}")
+    lines = toml_template(m, list(m.dimensions))
+    assert lines is not None
+    text = "\n".join(
+        "".join(piece if isinstance(piece, str) else repr(m.value(piece[0])) for piece in line["of"])
+        for line in lines
+        if line["needed"]
+    )
+    assert Mechanism.from_toml_text(text) == m
+
+
 MIRROR = [
     ({"friction": [Friction("X", 0.1)]}, r"\[\[friction\]\] 1 joint: unknown point 'X'"),
     ({"motors": [Motor("arm", "ram")]}, r"\[\[motors\]\] 1 drives: unknown link 'ram'"),
@@ -138,6 +175,10 @@ MIRROR = [
     ({"forces": [Force("arm", "X", 1j)]}, r"\[\[forces\]\] 1 point: unknown point of link arm 'X'"),
     ({"forces": [Force("arm", None, 1j, "world")]}, r"\[\[forces\]\] 1 frame: found 'world'"),
     ({"forces": [Torque("arm", 1.0)]}, "forces 1: expected Force, found Torque"),
+    ({"friction": [Friction("P", -0.1)]}, r"\[\[friction\]\] 1 coefficient: found -0.1, but it must not be negative"),
+    ({"friction": [Friction("P", 0.1, -0.01)]}, r"\[\[friction\]\] 1 radius: found -0.01, but it must not be negative"),
+    ({"motors": [Motor("arm", "arm", -1.0)]}, r"\[\[motors\]\] 1 mass: found -1.0, but it must not be negative"),
+    ({"gears": [Gear(("arm", "arm"), 2.0)]}, r"\[\[gears\]\] 1: found the links arm and arm and the arm ground"),
     ({"inputs": [Input("arm", on="arm")]}, r"\[input\] on: link 'arm' cannot turn against itself"),
     ({"inputs": [Input("arm", slider="P")]}, r"\[input\].*either a link or a slider"),
 ]  # fmt: skip
@@ -164,11 +205,29 @@ ARM = "[ground]\nO = [0, 0]\n[links.arm]\npoints = { O = [0, 0], P = [1, 0] }\n"
         ('[input]\nlink = "arm"\n[[friction]]\njoint = "X"\ncoefficient = 1', r"\[\[friction\]\] 1 joint: unknown"),
         ('[input]\nlink = "arm"\n[[springs]]\nbetween = ["arm.X", "ground.O"]', r"1 between: unknown point of link arm"),
         ('[input]\nlink = "arm"\n[[springs]]\nbetween = ["ram.P", "ground.O"]', r"1 between: unknown link 'ram'"),
+        ('[input]\nlink = "arm"\n[guess]\nP = 3', r"\[guess\] P: found 3, expected two numbers \[x, y\]"),
+        ('[input]\nlink = "arm"\n[guess]\narm = [1, 2]', r"\[guess\] arm: found \[1, 2\], expected an angle"),
+        ('[input]\nlink = "arm"\n[guess]\nram = 3', r"\[guess\] ram: unknown link or point 'ram'; did you mean 'arm'"),
+        ('[input]\nslider = "P"\n[[slots]]\npoint = "Q"\nlink = "arm"', r"\[\[slots\]\] 1 \(Q\) point: unknown point of link arm 'Q'"),
+        ('[input]\nlink = "arm"\n[[forces]]\nlink = "arm"\nforce = [0, 0]\nframe = "lnk"', r"frame: found 'lnk', expected 'ground' or 'link'; did you mean 'link'"),
+        (f'[input]\nlink = "arm"\nspeed = 1{"0" * 300}', r"\[input\] speed: found 10{56}\.\.\., expected an angular speed"),
     ],
 )  # fmt: skip
 def test_files_are_refused_in_words_of_their_keys(text: str, message: str) -> None:
     with pytest.raises(DescriptionError, match=message):
         Mechanism.from_toml_text(ARM + text)
+
+
+def test_the_guess_of_a_driven_slide_is_where_it_stands_as_the_guess_of_a_driven_link_is() -> None:
+    slide = (
+        "[ground]\nO = [0, 0]\n[links.block]\npoints = { B = [0, 0] }\n[[sliders]]\npoint = 'B'\n"
+        "[input]\nslider = 'B'\n[guess]\nB = '20 mm'"
+    )
+    assert Mechanism.from_toml_text(slide).at == (0.02,)
+    assert Mechanism.from_toml_text(f"{ARM}[input]\nlink = 'arm'\n[guess]\narm = '20 mrad'").at == (0.02,)
+    # a position of the file's own pose comes before it
+    own = slide.replace("slider = 'B'", "slider = 'B'\nposition = '3 mm'")
+    assert Mechanism.from_toml_text(own).at == (0.003,)
 
 
 def test_a_torque_by_a_table_has_no_constant_to_vary() -> None:

@@ -316,7 +316,7 @@ def known_by_guess(m: Description) -> tuple[dict[str, float], dict[str, complex]
     from dalembert.arithmetic.varied import heading, rotation
 
     angles = dict(m.guess.angles)
-    points = dict(m.ground) | dict(m.guess.points)
+    points = dict(m.guess.points) | dict(m.ground)
     driven = {e.link: (e.on, at) for e, at in zip(m.inputs, m.at, strict=True) if e.link is not None}
     # exact where each is driven on the next one, down to the ground
     exact = {GROUND: 0.0}
@@ -396,7 +396,8 @@ def refuse(m: Description) -> None:
                 f"[links.{name}] points: {earlier} and {later} are both joints at the same place: "
                 "a link of zero length; pin the links at one point name instead"
             )
-    for _, number, part in listed(m):
+    # an input may name a guide: a guide's own names come first
+    for _, number, part in sorted(listed(m), key=lambda entry: isinstance(entry[2], Input)):
         check(part, place_of(part.table, number, len(m.inputs)) + part.label, m)
     followers: dict[Any, int] = {}
     for number, drive in enumerate(m.cam_drives, 1):

@@ -199,15 +199,20 @@ def changed(m: D, numbers: Mapping[str, Any]) -> D:
     >>> changed(m, {"links.arm.P": (1, 0)}).links["arm"].points["Q"]
     (1.25+0j)
     """
+    return type(m)(**parts_with(m, numbers))
+
+
+def parts_with(m: Description, numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """The parts of a mechanism with other numbers at some paths, as `changed` takes them; whether they fit is not checked."""
     every = dimensions(m)
-    parts: dict[str | int, Any] = {f.name: getattr(m, f.name) for f in fields(m)}
+    parts: dict[Any, Any] = {f.name: getattr(m, f.name) for f in fields(m)}
     for path, number in numbers.items():
         places = named(m, path, every)
         pair = (number.real, number.imag) if isinstance(number, complex) and len(places) == 2 else number
         for dimension, part in zip(places, pair if len(places) == 2 else (number,), strict=True):
             first, *rest = dimension.where
             parts[first] = _with(parts[first], tuple(rest), part)
-    return type(m)(**parts)  # type: ignore[arg-type]
+    return parts
 
 
 def _part(of: Any, key: str | int) -> Any:

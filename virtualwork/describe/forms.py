@@ -10,6 +10,7 @@ from numbers import Real
 from typing import Any, Protocol
 
 from dalembert.dataclass import dataclass
+from dalembert.hints import nearest
 from virtualwork.describe import DescriptionError, require
 from virtualwork.describe.file import GROUND, Entry
 from virtualwork.describe.units import SI, Units, wrong
@@ -193,7 +194,7 @@ class Choice(Form):
 
     def check(self, value: Any, where: str, part: Any, names: Names) -> None:
         if value not in self.words:
-            raise wrong(where, value, " or ".join(map(repr, self.words)))
+            raise wrong(where, value, " or ".join(map(repr, self.words)) + nearest(str(value), self.words))
 
 
 @dataclass(eq=False, repr=False)

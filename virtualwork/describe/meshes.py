@@ -61,6 +61,14 @@ def shares_of(first: str, second: str, arm: str, ratio: Any) -> dict[Coordinate,
     return {body: c for body, c in shares.items() if c != 0}
 
 
+def _refuse_few(where: str, links: tuple[str, str], arm: str) -> None:
+    """Refuse a gear or a belt on fewer than three bodies."""
+    if len({*links, arm}) < 3:
+        raise DescriptionError(
+            f"{where}: found the links {' and '.join(links)} and the arm {arm}, expected two links and an arm that is neither"
+        )
+
+
 @dataclass(frozen=True)
 class Gear(Part):
     """Two toothed links: (ω_b − ω_arm) = ratio·(ω_a − ω_arm); an external mesh has a negative ratio."""
@@ -73,10 +81,9 @@ class Gear(Part):
     arm: str = declared(Body(), "the link that carries both", default=GROUND)
 
     def check(self, where: str) -> None:
-        if self.ratio == 0 or len({*self.links, self.arm}) < 3:
-            raise DescriptionError(
-                f"{where}: expected two links, an arm that is neither, and a ratio other than 0"
-            )
+        _refuse_few(where, self.links, self.arm)
+        if self.ratio == 0:
+            raise DescriptionError(f"{where} ratio: found 0, expected a ratio other than 0")
 
     @property
     def mesh(self) -> Mesh:
@@ -99,8 +106,7 @@ class Belt(Part):
     arm: str = declared(Body(), "the link that carries both", default=GROUND)
 
     def check(self, where: str) -> None:
-        if len({*self.links, self.arm}) < 3:
-            raise DescriptionError(f"{where}: expected two links and an arm that is neither")
+        _refuse_few(where, self.links, self.arm)
         for radius in self.radii:
             if not radius > 0:
                 raise DescriptionError(f"{where} radii: found {radius:g} m, expected a radius above zero")

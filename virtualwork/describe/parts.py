@@ -383,7 +383,9 @@ class Motor(Part):
 
     carrier: str = declared(Body(), "the link that carries it")
     drives: str = declared(Body(ground=False), "the link that it drives")
-    mass: float = declared(Scalar("mass"), "its mass, which joins the carrier, kg", default=0.0)
+    mass: float = declared(
+        Scalar("mass", negative=False), "its mass, which joins the carrier, kg", default=0.0
+    )
     center: complex = declared(Pair("length"), "its centre in the carrier's axes", default=0j)
 
 
@@ -395,8 +397,10 @@ class Friction(Part):
     collection: ClassVar = "friction"
 
     joint: str = declared(PointName(), "the point of the pin or guide")
-    coefficient: float = declared(Scalar("number"), "the coefficient of friction")
-    radius: float = declared(Scalar("length"), "the radius of the pin; 0 in a guide", default=0.0)
+    coefficient: float = declared(Scalar("number", negative=False), "the coefficient of friction")
+    radius: float = declared(
+        Scalar("length", negative=False), "the radius of the pin; 0 in a guide", default=0.0
+    )
 
 
 PARTS: tuple[type[Part], ...] = (

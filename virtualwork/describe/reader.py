@@ -90,7 +90,7 @@ def _parts(file: File) -> dict[str, Any]:
 
 def _name(file: File) -> str:
     name = file.data.get("name", "")
-    if not isinstance(name, (str, int, float)):
+    if isinstance(name, bool) or not isinstance(name, (str, int, float)):
         raise wrong("name", name, "text")
     return str(name)
 
@@ -132,17 +132,24 @@ def _guess(file: File, inputs: list[Input]) -> Guess:
     angles: dict[str, float] = {}
     points: dict[str, complex] = {}
     names = {p for body in file.bodies.values() for p in body}
-    slides = {e.name for e in inputs if e.is_slide}
+    links = file.bodies.keys() - {GROUND}
+    # of inputs that are slides
+    slides: dict[str, float] = {}
     for key, value in table.items():
         where = f"[guess] {key}"
         if key in table_keys(Guess):
             continue
-        if isinstance(value, list):
-            require(key, names, where, "point")
-            points[key] = units.pair(value, "length", where)
-        elif key not in slides:
-            require(key, {name for name in file.bodies if name != GROUND}, where, "link")
+        if key in names and (isinstance(value, list) or key not in links):
+            if not isinstance(value, list) and any(e.slider == key for e in inputs):
+                slides[key] = units.number(value, "length", where)
+            else:
+                points[key] = units.pair(value, "length", where)
+        else:
+            require(key, links | names, where, "link or point")
             angles[key] = units.number(value, "angle", where)
+    if at is None and slides:
+        own = (e.value if e.value is not None else (slides | angles).get(e.name, 0.0) for e in inputs)
+        at = list(own)
     return Guess(at, angles, points)
 
 

@@ -48,7 +48,9 @@ class AsWritten(Units):
         return si
 
 
-def toml_text(m: Description, length: str = "m", angle: str = "rad") -> str:
+def toml_text(
+    m: Description, length: str = "m", angle: str = "rad", parts: Mapping[str, Any] | None = None
+) -> str:
     """The TOML text of a mechanism; the same mechanism is read from it.
 
     Parameters
@@ -56,6 +58,8 @@ def toml_text(m: Description, length: str = "m", angle: str = "rad") -> str:
     m : Description
     length, angle : str
         The units of bare lengths and angles.
+    parts : mapping, optional
+        Written in place of its own, by the names that `Description` gives them.
 
     Raises
     ------
@@ -83,7 +87,7 @@ def toml_text(m: Description, length: str = "m", angle: str = "rad") -> str:
     speed = 3
     """
     units = {"length": length, "angle": angle}
-    parts = {f.name: getattr(m, f.name) for f in fields(Description)}
+    parts = parts or {f.name: getattr(m, f.name) for f in fields(Description)}
     tree = document(parts, Exact(units))
     if m.tolerances:
         from virtualwork.describe.dimensions import named

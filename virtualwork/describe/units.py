@@ -10,14 +10,19 @@ from dalembert.quantities import decimals, exactly, expected, number_in_si
 from dalembert.units import DIMENSIONS, LARGEST, Factor, composed
 from virtualwork.describe import DescriptionError
 
+LONGEST = 60
+"""The length to which a message cuts a value."""
+
 
 def wrong(where: str, value: Any, expected: str) -> DescriptionError:
     """The complaint that something else was expected."""
-    return DescriptionError(f"{where}: found {value!r}, expected {expected}")
+    found = repr(value)
+    found = found if len(found) <= LONGEST else f"{found[: LONGEST - 3]}..."
+    return DescriptionError(f"{where}: found {found}, expected {expected}")
 
 
-# the dimension of a table's column, its unit, the factor that makes it SI, and what is written in its cells
-Written = tuple[str, str, float, Sequence[str]]
+# the dimension of a table's column, the factor of its unit, what is written in its cells, and their numbers in SI
+Written = tuple[str, Factor, Sequence[str], Sequence[float]]
 
 
 class Decimals:
@@ -42,9 +47,11 @@ class Decimals:
         """Note what a number is written as: a value of TOML, bare in the unit with this factor."""
         self._written[dimension, number] = value, factor
 
-    def note_column(self, dimension: str, unit: str, factor: float, texts: Sequence[str]) -> None:
-        """Note what the numbers of a table's column are written as: their floats are those times the factor."""
-        self._columns.append((dimension, unit, factor, texts))
+    def note_column(
+        self, dimension: str, factor: Factor, texts: Sequence[str], numbers: Sequence[float]
+    ) -> None:
+        """Note what the numbers of a table's column, SI, are written as, in the unit with this factor."""
+        self._columns.append((dimension, factor, texts, numbers))
 
     def and_also(self, read: Iterable[tuple[str, float, Any, Factor]]) -> Decimals:
         """These and further numbers, each as `note` takes it."""
@@ -78,11 +85,9 @@ def _rests(columns: Sequence[Written]) -> dict[tuple[str, float], float]:
     from dalembert.arithmetic.splines import decimals
 
     rests: dict[tuple[str, float], float] = {}
-    for dimension, text, factor, texts in columns:
-        unit = composed(text)
-        assert unit is not None
-        for number, exact in zip(map(float, texts), decimals(texts, unit[0]), strict=True):
-            rests[dimension, number * factor] = float(exact - Decimal(number * factor))
+    for dimension, factor, texts, numbers in columns:
+        for number, exact in zip(numbers, decimals(texts, factor), strict=True):
+            rests[dimension, number] = float(exact - Decimal(number))
     return rests
 
 

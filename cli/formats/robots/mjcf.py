@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element
@@ -54,12 +54,13 @@ class _Reader:
         self.robot, self.file, self.root = robot, robot.file, root
         self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
         self.sites: dict[str, tuple[str, Array]] = {}
-        # how angles are written, and whether shapes give masses
+        # how angles are written, whether shapes give masses, and what all of these are together
         compiler = {key: text for e in children(root, "compiler") for key, text in e.attrib.items()}
         self.frames = Frames(
             self.file, compiler.get("angle", "degree") != "radian", compiler.get("eulerseq", "xyz")
         )
         self.shapes = compiler.get("inertiafromgeom", "auto")
+        self.total = At(self.file, "compiler").number("settotalmass", compiler.get("settotalmass", "-1"))
         robot.gravity = np.array([0.0, 0.0, -9.81])
         for e in children(root, "option"):
             if e.get("gravity") is not None:
@@ -88,26 +89,32 @@ class _Reader:
         robot.add(RobotLink(WORLD, np.eye(4)))
         for e in children(self.root, "worldbody"):
             self._inside(e, WORLD, np.eye(4), "main")
+        masses = [link.inertial for link in robot.links.values() if link.inertial is not None]
+        share = self.total / (sum(held.mass for held in masses) or 1.0)
+        for held in masses if share > 0 else ():
+            held.mass, held.tensor, held.half = held.mass * share, held.tensor * share, held.half * share
         for e in children(self.root, "equality"):
             self._equalities(e)
         self._tendons()
         self._actuators()
 
-    def _inside(self, element: Element, link: str, base: Array, of: str) -> None:
-        """Read bodies, sites and frames inside a body; `base` is the pose, in the world, in which they are written."""
+    def _contents(self, element: Element, of: str, frame: Array) -> Iterator[tuple[Element, str, Array]]:
+        """Yield what a body holds, in frames too, each with its default class and the pose in the body in which it is written."""
         for e in element:
             if e.tag == "frame":
-                frame = self.frames.pose(f"frame '{e.get('name', '')}'", e.attrib)
-                self._inside(e, link, base @ frame, e.get("childclass", of))
-            elif e.tag == "site":
-                values = self.whole(e, of)
-                name = e.get("name")
-                if name:
-                    at = np.linalg.inv(self.robot.links[link].pose) @ base
-                    at = at @ self.frames.pose(f"site '{name}'", values)
-                    self.sites[name] = link, at[:3, 3]
+                inner = frame @ self.frames.pose(f"frame '{e.get('name', '')}'", e.attrib)
+                yield from self._contents(e, e.get("childclass", of), inner)
+            elif isinstance(e.tag, str):
+                yield e, of, frame
+
+    def _inside(self, element: Element, link: str, base: Array, of: str) -> None:
+        """Read bodies and sites inside a body, which stands at `base` in the world."""
+        for e, class_, frame in self._contents(element, of, np.eye(4)):
+            if e.tag == "site" and e.get("name"):
+                at = frame @ self.frames.pose(f"site '{e.get('name')}'", self.whole(e, class_))
+                self.sites[named(self.file, e)] = link, at[:3, 3]
             elif e.tag == "body":
-                self._body(e, link, base, e.get("childclass", of))
+                self._body(e, link, base @ frame, e.get("childclass", class_))
             elif e.tag in ("replicate", "attach", "composite", "flexcomp"):
                 self.robot.notes.append(f"<{e.tag}> is left out: generated bodies are not read")
 
@@ -116,27 +123,30 @@ class _Reader:
         name = e.get("name") or f"body {len(robot.links)}"
         where = f"body '{name}'"
         here = base @ self.frames.pose(where, e.attrib)
-        joints = list(children(e, "joint"))
-        if child(e, "freejoint") is not None or any(self.whole(j, of).get("type") == "free" for j in joints):
+        held = [
+            (inner, self.whole(inner, class_), at) for inner, class_, at in self._contents(e, of, np.eye(4))
+        ]
+        joints = [(values, at) for j, values, at in held if j.tag == "joint"]
+        if any(j.tag == "freejoint" for j, _, _ in held) or any(v.get("type") == "free" for v, _ in joints):
             robot.notes.append(f"{where}: its free joint is left out: the body is fixed")
             joints = []
         inertial = child(e, "inertial")
-        held = self._inertial(where, inertial)
+        mass = self._inertial(where, inertial)
         if self.shapes == "true" or (self.shapes == "auto" and inertial is None):
-            geoms = (self.whole(g, of) for g in children(e, "geom"))
-            held = mass_of_shapes(self.frames, where, geoms, robot.notes)
-        robot.add(RobotLink(name, here, held))
+            geoms = ((values, at) for g, values, at in held if g.tag == "geom")
+            mass = mass_of_shapes(self.frames, where, geoms, robot.notes)
+        robot.add(RobotLink(name, here, mass))
         above = parent
         if not joints:
             robot.join(
                 RobotJoint(f"{name} fixed", "fixed", parent, name, (here[:3, 3], here[:3, 3]), np.zeros(3))
             )
-        for k, j in enumerate(joints, 1):
+        for k, (values, at) in enumerate(joints, 1):
             # several joints of a body follow one another, with nothing between them
             below = name if k == len(joints) else f"{name} {k}"
             if below != name:
                 robot.add(RobotLink(below, here))
-            self._joint(self.whole(j, of), f"{name} joint {k}", above, below, here)
+            self._joint(values, f"{name} joint {k}", above, below, here @ at)
             above = below
         self._inside(e, name, here, of)
 
@@ -194,14 +204,12 @@ class _Reader:
             elif e.tag in ("connect", "weld"):
                 self._connect(e.tag, name, at, values)
             elif e.tag == "joint":
-                terms = [(named(self.file, e, "joint1"), 1.0)]
-                powers = at.numbers("polycoef", values.get("polycoef", "0 1 0 0 0"), 5)
-                if any(powers[2:]):
+                offset, factor, *powers = [*at.numbers("polycoef", values.get("polycoef", "0 1")), 0.0, 0.0]
+                if any(powers):
                     robot.notes.append(f"{where}: left out: its polynomial is not a straight line")
                     continue
-                if "joint2" in values:
-                    terms.append((values["joint2"], -powers[1]))
-                robot.couplings.append((name, terms))
+                first = named(self.file, e, "joint1")
+                robot.couple(name, first, values.get("joint2", ""), factor, offset, where)
             elif e.tag == "tendon" and "tendon2" not in values:
                 robot.couplings.append((name, self._fixed(named(self.file, e, "tendon1"), at)))
             else:
@@ -241,11 +249,8 @@ class _Reader:
         for element in children(self.root, "tendon"):
             for k, e in enumerate(children(element, "spatial", "fixed"), 1):
                 self._spring(e, At(self.file, f"tendon '{e.get('name') or k}'"))
-        points: dict[str, dict[str, Array]] = {}
         for name, (link, at) in self.sites.items():
-            points.setdefault(link, {})[name] = at
-        for link, held in points.items():
-            self.robot.links[link].points = held
+            self.robot.links[link].points[name] = at
 
     def _spring(self, e: Element, at: At) -> None:
         """Read a tendon that pulls: between two sites, or on joints."""
@@ -313,15 +318,11 @@ def _leading(at: At, values: Mapping[str, str], *keys: str) -> list[float]:
 
 
 # --- writing ------------------------------------------------------------------------------------------------------
-HOLDS = ("springs", "torsion springs", "inputs", "gravity")
-
-
 def write(s: Skeleton, comment: str) -> tuple[bytes, list[str]]:
     """Return the file of a mechanism, and what it leaves out."""
     m = s.m
     root = Element("mujoco", model=m.name or "mechanism")
-    masses = [p.mass for p in s.bodies.values() if p.mass > 0]
-    light = max(LIGHT * max(masses, default=1.0), LIGHTEST)
+    light = max(LIGHT * (max(p.mass for p in s.bodies.values()) or 1.0), LIGHTEST)
     inertias = [p.inertia for p in s.bodies.values() if p.inertia > 0]
     least = max(min([light * m.size**2, *inertias]), LIGHTEST)
     add(
@@ -364,7 +365,7 @@ def write(s: Skeleton, comment: str) -> tuple[bytes, list[str]]:
             motor.set("ctrlrange", digits(-s.travel.peak, s.travel.peak))
     root.extend(e for e in (equality, tendon, actuator) if len(e))
     _key(s, add(root, "keyframe"))
-    return document(root, comment), s.left_out(HOLDS)
+    return document(root, comment), s.left_out(("springs", "torsion springs", "inputs", "gravity"))
 
 
 def _fixed(tendon: Element, name: str, terms: dict[str, float]) -> Element:
@@ -442,6 +443,5 @@ def _close(j: Joint, bodies: dict[str, Element], equality: Element) -> None:
 def _key(s: Skeleton, keyframe: Element) -> None:
     """The start: coordinates, speeds, efforts of the inputs."""
     walked = [b.joint for b in s.walk()]
-    key = add(keyframe, "key", name="start")
-    key.set("qpos", digits(*(j.value for j in walked)))
-    key.set("qvel", digits(*(j.rate for j in walked)))
+    start = {"qpos": digits(*(j.value for j in walked)), "qvel": digits(*(j.rate for j in walked))}
+    add(keyframe, "key", name="start", **start)

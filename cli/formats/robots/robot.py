@@ -135,6 +135,12 @@ class Robot:
             raise DataError(f"{self.file}: two joints are called '{joint.name}'")
         self.joints[joint.name] = joint
 
+    def couple(self, name: str, joint: str, other: str, factor: float, offset: float, where: str) -> None:
+        """Keep a joint's coordinate at a factor times another's, or as it is where there is no other; the offset is the file's."""
+        self.couplings.append((name, [(joint, 1.0), *([(other, -factor)] if other else [])]))
+        if offset:
+            self.notes.append(f"{where}: its offset {offset:g} is left out: the pose is that of the file")
+
 
 def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), rotation: Array | None = None) -> Array:
     """Return a pose (4, 4) from a place and a rotation."""
@@ -330,11 +336,11 @@ def together(parts: list[tuple[float, Array, Array]]) -> Inertial | None:
 
 
 def mass_of_shapes(
-    frames: Frames, where: str, geoms: Iterable[Mapping[str, str]], notes: list[str]
+    frames: Frames, where: str, geoms: Iterable[tuple[Mapping[str, str], Array]], notes: list[str]
 ) -> Inertial | None:
-    """Return the inertia of a body's shapes, each by its attributes."""
+    """Return the inertia of a body's shapes, each by its attributes and the pose in the body in which it is written."""
     at, parts = At(frames.file, where), []
-    for values in geoms:
+    for values, frame in geoms:
         shape = values.get("type", "sphere")
         if shape not in SIZES or "mesh" in values:
             notes.append(f"{where}: the mass of a {values.get('mesh', shape)} is not imported")
@@ -352,7 +358,7 @@ def mass_of_shapes(
         volume, moments = unit_mass(shape, size[: SIZES[shape]])
         density = at.number("geom density", values.get("density", str(DENSITY)))
         mass = at.number("geom mass", values.get("mass", repr(density * volume)))
-        parts.append((mass, here, mass * moments))
+        parts.append((mass, frame @ here, mass * moments))
     return together(parts)
 
 

@@ -112,8 +112,8 @@ class _Model:
             name, at = placed(file, e)
             robot.add(RobotLink(name, self.frame(name, at), _inertial(at, child(e, "inertial"))))
         for e in children(self.element, "frame"):
-            held = e.get("attached_to", "")
             name, at = placed(file, e)
+            held = self.holder(name, at)
             if held in robot.links:
                 inside = np.linalg.inv(robot.links[held].pose) @ self.frame(name, at)
                 robot.links[held].points[name] = inside[:3, 3]
@@ -143,6 +143,20 @@ class _Model:
                 base = e.get("attached_to") or MODEL
         self.at[name] = self.frame(base, at) @ read_pose(at, pose)
         return self.at[name]
+
+    def holder(self, name: str, at: At) -> str:
+        """Return the link that holds a frame: a frame that is attached to none is the model's, and so its first link's."""
+        passed: set[str] = set()
+        while name in self.frames and plain(self.frames[name]) != "link":
+            if name in passed:
+                raise DataError(f"{self.file}: {at.where}: the frame '{name}' is attached to itself")
+            passed.add(name)
+            e = self.frames[name]
+            name = (text(e, "child") if plain(e) == "joint" else e.get("attached_to")) or MODEL
+        first = self.element.get("canonical_link") or next(
+            iter(n for n in self.robot.links if n != WORLD), ""
+        )
+        return first if name == MODEL else name
 
     def _motors(self) -> None:
         """Set the motors: the joints that plug-ins drive; without plug-ins those with an effort limit, where others have the limit 0."""
@@ -187,12 +201,13 @@ def read_joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
     name, at = placed(robot.file, e)
 
     def resolved(link: str) -> str:
-        link = robot.ground if link == WORLD and model is None else link
+        if model is not None:
+            link = model.holder(link, at)
+        elif link == WORLD:
+            link = robot.ground
         return robot.link(link, at.where).name
 
-    parent, below = (_named_text(at, e, tag) for tag in ("parent", "child"))
-    parent = resolved(parent)
-    robot.link(below, at.where)
+    parent, below = (resolved(_named_text(at, e, tag)) for tag in ("parent", "child"))
     if model is not None:
         frame = model.frame(name, at)
     else:
@@ -218,8 +233,12 @@ def read_joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
     )
     mimic = child(axis, "mimic")
     if mimic is not None:
-        factor = at.number("mimic multiplier", text(mimic, "multiplier") or "1")
-        robot.couplings.append((name, [(name, 1.0), (named(robot.file, mimic, "joint"), -factor)]))
+        factor, offset, zero = (
+            at.number(f"mimic {tag}", text(mimic, tag) or default)
+            for tag, default in (("multiplier", "1"), ("offset", "0"), ("reference", "0"))
+        )
+        other = named(robot.file, mimic, "joint")
+        robot.couple(name, name, other, factor, offset - factor * zero, f"{at.where}, mimic")
 
 
 def _axis(at: At, axis: Element | None, frame: Array, model: _Model | None) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 
 from cli.formats.drawing import Travel, bodies_of, start_of
 from cli.formats.drawn import Body, Groups, unused
-from cli.formats.robots.robot import BLOCK
+from cli.formats.robots.robot import BLOCK, WORLD
 from dalembert.errors import DataError
 from virtualwork.describe.meshes import Mesh
 from virtualwork.describe.parts import GROUND, TorsionSpring
@@ -79,6 +79,8 @@ class Skeleton:
     """The bodies, the joints, the tree and the loops of a mechanism at some inputs."""
 
     def __init__(self, m: Mechanism, inputs: tuple[float, ...], travel: Travel) -> None:
+        if WORLD in m.links:
+            raise DataError(f"the link '{WORLD}' is called as the ground of robots: give it another name")
         self.m, self.inputs, self.travel = m, inputs, travel
         self.start = start_of(m, inputs)
         self.bodies = bodies_of(m, self.start)
@@ -166,7 +168,8 @@ class Skeleton:
         return next((j for j in self.joints if j.input == k), None)
 
     def _name(self, wanted: str) -> str:
-        return unused(wanted, (j.name for j in self.joints), " ")
+        # no two of SDF's links, joints and frames have one name
+        return unused(wanted, {WORLD, *self.bodies, *(j.name for j in self.joints)}, " ")
 
     # --- tree -------------------------------------------------------------------------------------------------
     def _branch(self) -> None:
@@ -222,9 +225,11 @@ class Skeleton:
         return self.bodies[body].world(z)
 
     def free_points(self, name: str) -> dict[str, complex]:
-        """Return the named points of a link that no joint holds, in its axes."""
+        """Return the named points of a link that no joint holds, in its axes; none is called as a body is."""
         held = {*self.m.pins, *(j.point for j in self.joints)}
-        return {p: z for p, z in self.bodies[name].points.items() if p not in held and name != GROUND}
+        points = {} if name == GROUND else self.bodies[name].points
+        bodies = {WORLD, *self.bodies}
+        return {f"{p} point" if p in bodies else p: z for p, z in points.items() if p not in held}
 
     def walk(self, parent: str = GROUND) -> Iterator[Branching]:
         """Yield the tree's joints, each branch to its end."""

@@ -217,9 +217,7 @@ def _mimic(robot: Robot, name: str, mimic: Element) -> None:
         at.number(f"mimic {key}", mimic.get(key, default))
         for key, default in (("multiplier", "1"), ("offset", "0"))
     )
-    robot.couplings.append((name, [(name, 1.0), (other, -factor)]))
-    if offset:
-        robot.notes.append(f"{where}: its offset {offset:g} is left out: the pose is that of the file")
+    robot.couple(name, name, other, factor, offset, where)
 
 
 def _motors(robot: Robot, root: Element) -> None:
@@ -304,8 +302,7 @@ def _add_joint(s: Skeleton, root: Element, b: Branching, origin: dict[str, compl
 
 def _add_frames(s: Skeleton, root: Element, name: str, origin: complex) -> None:
     """Add named points that no joint holds as links without mass, fixed there."""
-    for point, z in s.free_points(name).items():
-        frame = point if point not in s.bodies else f"{point} point"
+    for frame, z in s.free_points(name).items():
         add(root, "link", name=frame)
         made = add(root, "joint", name=f"{frame} fixed", type="fixed")
         add(made, "origin", xyz=spatial(z - origin), rpy="0 0 0")
