@@ -12,6 +12,7 @@ from dalembert.errors import DataError
 from dalembert.quantities import is_number
 
 if TYPE_CHECKING:
+    from cli.exercise.description import Exercise
     from cli.exercise.sheets import Student
     from cli.show.commands import ShowOptions
     from cli.show.result import Result
@@ -66,7 +67,7 @@ def _run(
     if page and "--page" not in options_of(exercise.command[0]):
         raise options.bad("--page", f"found an exercise on {exercise.command[0]}, which has no page")
     warnings = list(exercise.warnings)
-    people = _students(students)
+    people = _students(students, exercise)
     with workshop(exercise) as shop:
         drawn = variants(shop, len(people), seed, warnings)
         filled(shop, drawn[0].drawn)
@@ -103,14 +104,15 @@ def _run(
     return result
 
 
-def _students(text: str) -> list[Student]:
+def _students(text: str, exercise: Exercise) -> list[Student]:
     """Read a number of students, or the roster with their names.
 
     Raises
     ------
     DataError
-        A roster without the column, or with a name twice.
+        A roster without the column, with a name twice, or with a column that the tables of answers have.
     """
+    from cli.exercise.description import MARKED
     from cli.exercise.sheets import Student
     from dalembert.tables.table import read
 
@@ -133,6 +135,12 @@ def _students(text: str) -> list[Student]:
             )
         seen[name] = row
     others = [name for name in table.texts if name != named["student"]]
+    own = {*MARKED, *exercise.keys.values(), *(draw.name for draw in exercise.draws)}
+    for name in others:
+        if name.strip().lower() in map(str.lower, own):
+            raise DataError(
+                f"{text}: column {name}: the tables of answers have one of that name: expected another, such as {name} 2"
+            )
     people = [
         Student(name, {each: table.texts[each][row] for each in others}) for row, name in enumerate(column)
     ]

@@ -30,12 +30,12 @@ def _run(file: str, answers: str, key: str | None = None) -> Result:
     """
     from cli.exercise.description import read_exercise
     from cli.exercise.solving import workshop
-    from cli.grade.marks import METHOD, mark_all, read_students, tables
+    from cli.grade.answers import read_students
+    from cli.grade.marks import METHOD, mark_all, tables
     from cli.show.result import Result
 
     exercise = read_exercise(file)
-    warnings: list[str] = []
-    students = read_students(exercise, answers, key, warnings)
+    students = read_students(exercise, answers, key)
     with workshop(exercise) as shop:
         marks = mark_all(exercise, shop, students)
     points = sum(mark.points for mark in marks)
@@ -46,7 +46,6 @@ def _run(file: str, answers: str, key: str | None = None) -> Result:
         notes=lambda: f"{exercise.title}: {len(students)} students, {points:g} of {of:g} points",
         method=METHOD,
         about={"title": f"Marks: {exercise.title}"},
-        warnings=warnings,
     )
 
 
