@@ -15,11 +15,15 @@ from dalembert.units import MINUS
 TIE = Decimal("1e-13")
 """Share of a computed number within which it may lie on either side of a tie."""
 _NUMBER = re.compile(
-    r"\s*([+-]?)\s*(\d[\d ']*(?:[.,][\d ']*)*|[.,]\d+)"
-    r"(?:\s*(?:[eE]|[·*x×]\s*10\s*(?:\^|\*\*)?\s*\(?)\s*([+-]?\d+)\)?)?\s*(.*?)\s*\Z",
+    r"[\s=≈~]*([+-]?)\s*((?:\d+(?:[ ']\d{3}(?!\d))*)(?:[.,]\d*(?:[ ']\d{3}(?!\d))*)*|[.,]\d+)"
+    r"(?:\s*(?:[eE]|[·*x×]?\s*10\s*(?:\^|\*\*)\s*\(?|[·*x×]\s*10\s*)\s*([+-]?\d+)\)?)?\s*(.*?)\s*\Z",
     re.DOTALL,
 )
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+_PLAIN = str.maketrans(
+    {MINUS: "-", **dict.fromkeys("‐‑–", "-"), "’": "'", **dict.fromkeys("\u00a0\u202f\u2009", " ")}
+)
+"""Signs of word processors and web pages as they stand on a keyboard."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +78,7 @@ def typed(text: str) -> list[Typed]:
     >>> [str(one.value) for one in typed("82,350")], typed("five")
     (['82.350', '82350'], [])
     """
-    text = text.replace(MINUS, "-").replace("\u00a0", " ").replace("\u202f", " ").replace("\u2009", " ")
+    text = text.translate(_PLAIN).rstrip(" .,;")
     power = re.search(r"10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)", text)
     if power is not None:
         text = text[: power.start(1)] + "^" + power[1].translate(_SUPERSCRIPTS) + text[power.end(1) :]

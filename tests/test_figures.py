@@ -61,7 +61,8 @@ def test_a_tie_that_computing_has_moved_is_right_either_way() -> None:
         ("82350", ["82350"]), ("82 350", ["82350"]), ("82'350", ["82350"]), ("82,350", ["82.350", "82350"]),
         ("1.234.567,8", ["1234567.8"]), ("1,234,567.8", ["1234567.8"]), ("0,350", ["0.350"]), (".5", ["0.5"]), ("5.", ["5"]),
         ("−3,5·10^2", ["-3.5E+2"]), ("3.5 x 10^2", ["-0"]), ("1.2×10³", ["1.2E+3"]), ("1e-3", ["0.001"]), ("+7", ["7"]),
-        ("five", []), ("", []), ("1.2.3", []), ("--1", []), ("1e9999", []),
+        ("1.234 567", ["1.234567"]), ("12 345,6", ["12345.6"]), ("–7", ["-7"]), ("1’234", ["1234"]), ("= 1.5", ["1.5"]), ("≈1.5", ["1.5"]),
+        ("1.5.", ["1.5"]), ("1.5 10^3", ["1.5E+3"]), ("five", []), ("", []), ("1.2.3", []), ("--1", []), ("1e9999", []),
     ],
 )  # fmt: skip
 def test_numbers_as_people_type_them(text: str, readings: list[str]) -> None:
@@ -75,6 +76,9 @@ def test_a_number_brings_its_unit() -> None:
     assert [(one.value, one.unit) for one in typed("18,1 kJ")] == [(Decimal("18.1"), "kJ")]
     assert [(one.value, one.unit) for one in typed("256.8°")] == [(Decimal("256.8"), "°")]
     assert [(one.value, one.unit) for one in typed("3 rad/s")] == [(Decimal(3), "rad/s")]
+    # blanks part groups of three digits, and nothing else
+    assert [(one.value, one.unit) for one in typed("1.23 1/s")] == [(Decimal("1.23"), "1/s")]
+    assert [(one.value, one.unit) for one in typed("1 234 1/s")] == [(Decimal(1234), "1/s")]
 
 
 def check(random_: random.Random, count: int) -> None:

@@ -13,6 +13,7 @@ from dalembert.errors import DataError
 from dalembert.quantities import is_number
 
 if TYPE_CHECKING:
+    from cli.exercise.description import Exercise
     from cli.exercise.sheets import Student
     from cli.show.commands import ShowOptions
     from cli.show.result import Result
@@ -73,7 +74,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     if options.page and "--page" not in options_of(exercise.command[0]):
         raise bad("--page", f"found an exercise on {exercise.command[0]}, which has no page")
     warnings = list(exercise.warnings)
-    people = _students(options.students)
+    people = _students(options.students, exercise)
     with workshop(exercise) as shop:
         drawn = variants(shop, len(people), options.seed, warnings)
         filled(shop, drawn[0].drawn)
@@ -115,14 +116,15 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     return result
 
 
-def _students(text: str) -> list[Student]:
+def _students(text: str, exercise: Exercise) -> list[Student]:
     """Read a number of students, or the roster with their names.
 
     Raises
     ------
     DataError
-        A roster without the column, or with a name twice.
+        A roster without the column, with a name twice, or with a column that the tables of answers have.
     """
+    from cli.exercise.description import MARKED
     from cli.exercise.sheets import Student
     from dalembert.tables.table import read
 
@@ -145,6 +147,12 @@ def _students(text: str) -> list[Student]:
             )
         seen[name] = row
     others = [name for name in table.texts if name != named["student"]]
+    own = {*MARKED, *exercise.keys.values(), *(draw.name for draw in exercise.draws)}
+    for name in others:
+        if name.strip().lower() in map(str.lower, own):
+            raise DataError(
+                f"{text}: column {name}: the tables of answers have one of that name: expected another, such as {name} 2"
+            )
     people = [
         Student(name, {each: table.texts[each][row] for each in others}) for row, name in enumerate(column)
     ]

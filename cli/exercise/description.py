@@ -9,13 +9,14 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
-from math import isfinite
+from math import inf, isfinite, remainder, tau
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dalembert.errors import DataError, quote
 from dalembert.hints import nearest
 from dalembert.quantities import is_number
+from dalembert.results.text import plain
 from dalembert.tables.files import read_toml
 from dalembert.units import composed, parted, unit_name, written
 
@@ -24,13 +25,24 @@ if TYPE_CHECKING:
 
 
 COMMANDS = (
-    "balance", "body", "engine", "field", "flywheel", "forces", "index", "inspect", "mechanism", "place", "signal",
-    "simulate", "spin", "trial", "work",
+    "balance", "body", "engine", "equilibrium", "field", "flywheel", "forces", "index", "inspect", "mechanism", "place",
+    "signal", "simulate", "spin", "tolerance", "trial", "work",
 )  # fmt: skip
 """The commands that can solve an exercise."""
+SHOW = (
+    "-", "-h", "--expect", "--help", "--json", "--output", "--page", "--plot", "--report", "--save-influence", "--schema",
+    "--states", "--steps",
+)  # fmt: skip
+"""Options that show or write a result."""
 KEYS = ("command", "title", "text", "figure", "source", "draw", "ask")
 ASK = ("quantity", "where", "figures", "points", "unit", "label")
+MARKED = (
+    "student", "quantity", "unit", "answer", "value", "figures", "points", "given", "right", "verdict", "mistake", "of",
+)  # fmt: skip
+"""Columns of the tables of answers, of the key and of the marks."""
 MOST_FIGURES = 12
+SMALL = 1e-9
+"""A number below this share of others may be zero."""
 LISTED = 10_000
 """The largest number of values of a draw."""
 
@@ -103,9 +115,9 @@ class Exercise:
     warnings: list[str] = field(default_factory=list)
 
     @property
-    def keys(self) -> list[str]:
-        """The key columns that the questions name."""
-        return list(dict.fromkeys(key for ask in self.asks for key in ask.where))
+    def keys(self) -> dict[str, str]:
+        """The key columns that the questions name, and what they are called beside columns of the marks: `row_quantity`."""
+        return {key: f"row_{key}" if key in MARKED else key for ask in self.asks for key in ask.where}
 
     @property
     def points(self) -> Fraction:
@@ -183,8 +195,14 @@ def _command(place: _Place, text: str) -> tuple[str, ...]:
         raise place.error(
             "key command", name, f"a command that computes: {', '.join(COMMANDS)}{nearest(name, COMMANDS)}"
         )
+    # --plane=A:20mm as two words, so that an option is found in one way
+    words = [
+        part
+        for word in words
+        for part in (word.split("=", 1) if re.match(r"--[a-z][a-z-]*=", word) else (word,))
+    ]
     for word in words[1:]:
-        if word in ("-", "-o", "--output", "--json", "--expect", "--report", "--page", "--plot", "--steps"):
+        if word in SHOW or word.startswith("-o"):
             raise place.error(
                 "key command", word, "the options that solve the exercise, none that shows or writes"
             )
@@ -314,6 +332,11 @@ class Answer:
     unit: str
     is_angle: bool = False
 
+    @property
+    def turn(self) -> float:
+        """A turn in the unit of an angle."""
+        return 360.0 if unit_name(self.unit) == "deg" else tau
+
 
 @dataclass(eq=False, repr=False)
 class Solved:
@@ -343,12 +366,11 @@ class Solved:
         if value is None or isinstance(value, str) or not isfinite(value):
             raise DataError(f"{place}, key quantity: {ask.quantity} has no number in that row")
         unit = column.unit
-        number_asked = float(value)
+        number_asked = 0.0 if _is_zero(table, column, row) else float(value)
         if scale is not None:
             unit, factor = scale
             number_asked = float(Fraction(number_asked) * factor)
-        angle = unit_name(unit) in ("deg", "rad") and composed(unit) is not None
-        return Answer(ask, number_asked, unit, angle)
+        return Answer(ask, number_asked, unit, unit_name(unit) in ("deg", "rad"))
 
     def _column(self, place: str, ask: Ask) -> tuple[Table, Column, tuple[str, Fraction] | None]:
         """Return the table and column asked for, and what turns its numbers into the unit asked for."""
@@ -380,13 +402,14 @@ class Solved:
         cells = table.cells
         for key in ask.where:
             if key not in cells:
+                keys = table.keys or list(cells)
                 raise DataError(
-                    f"{place}, key where: found {quote(key)}, expected some of {', '.join(table.keys)}{nearest(key, table.keys)}"
+                    f"{place}, key where: found {quote(key)}, expected some of {', '.join(keys)}{nearest(key, keys)}"
                 )
         rows = [
             row
             for row in range(table.length)
-            if all(_same(cells[key][row], text) for key, text in ask.where.items())
+            if all(same(cells[key][row], text) for key, text in ask.where.items())
         ]
         if len(rows) == 1:
             return rows[0]
@@ -397,9 +420,21 @@ class Solved:
         )
 
 
-def _same(cell: object, text: str) -> bool:
+def _is_zero(table: Table, column: Column, row: int) -> bool:
+    """Whether a number is zero but for its rounding error, which is computed where others in its row are far larger."""
+    value: Any = column.values[row]
+    number = abs(remainder(value, 360.0)) if column.unit == "deg" else abs(float(value))
+    cells: list[Any] = [each.values[row] for each in table.columns if each is not column]
+    largest = max((abs(float(cell)) for cell in cells if isinstance(cell, (int, float))), default=inf)
+    if not number or column.error is None or number > SMALL * largest:
+        return not number
+    return bool(column.error()[row] >= number)
+
+
+def same(cell: object, text: str) -> bool:
+    """Whether a cell is the name or the number of a key."""
     if isinstance(cell, str) or not is_number(text):
-        return str(cell) == text
+        return str(plain(cell)) == text
     return cell is not None and abs(float(cell) - float(text)) <= 1e-9 * max(1.0, abs(float(text)))  # type: ignore[arg-type]
 
 

@@ -156,8 +156,7 @@ def _varied(variant: Variant) -> Mechanism:
     from cli.cases.axes import assigned
 
     described = variant.problem.workshop.described
-    words = variant.problem.command
-    texts = [words[k + 1] for k, word in enumerate(words[:-1]) if word == "--set"]
+    texts = variant.problem.parameters["set"]
     m: Mechanism = assigned(described.mechanism, described.bare, texts) if texts else described.mechanism
     return m
 
@@ -183,14 +182,7 @@ def rotor(variant: Variant) -> str:
     """Draw a rotor's masses seen along its axis, and from the side where they have axial positions."""
     import numpy as np
 
-    from cli.balance.rotors import read_rotors
-    from cli.read.rotor_options import from_options, from_table
-
-    words = variant.problem.command
-    planes = [words[k + 1] for k, word in enumerate(words[:-1]) if word == "--plane"]
-    files = [words[k + 1] for k, word in enumerate(words[:-1]) if word == "--planes"]
-    chosen = from_table(files[0]) if files else from_options(planes)
-    read = read_rotors(words[1], 9.80665, needs_z=chosen.several)
+    read, chosen = variant.problem.known_masses()
     table = read.table
     if len(read.names) > 1:
         return ""

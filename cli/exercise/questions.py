@@ -91,7 +91,7 @@ def accepted(candidates: Candidates) -> list[tuple[Decimal, Decimal]]:
     half = right.unit / 2
     values = [right.answer]
     if candidates.answer.is_angle:
-        turn = Decimal(360) if candidates.turn == 360.0 else rounded(candidates.turn, 15)
+        turn = Decimal(360) if candidates.answer.turn == 360.0 else rounded(candidates.answer.turn, 15)
         values += [right.answer - turn, right.answer + turn]
     return [(value, half) for value in values]
 
@@ -223,7 +223,7 @@ def _variant(variant: Variant, slips: Sequence[Candidates], drawing: str) -> dic
         questions[f"answer{k}"] = {
             "right": float(right.answer),
             "tolerance": float(right.unit / 2),
-            "turn": own.turn if own.answer.is_angle else None,
+            "turn": own.answer.turn if own.answer.is_angle else None,
             "mistakes": [
                 {"value": float(value), "tolerance": float(tolerance), "text": text}
                 for value, tolerance, text in expected_mistakes(own)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property, partial
@@ -12,20 +12,30 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cli.exercise.description import Answer, Solved, Value
-from cli.exercise.slips import Candidates, Load, Pairs, Slip, is_sum, joined, loads, of_loads, of_motion
-from cli.exercise.slips_of_rows import gravity, of_rotor, of_work
-from cli.exercise.solving import Problem
+from cli.exercise.description import Solved, Value
+from cli.exercise.slips import Candidates, Pairs, Slip, changes_of, finals, joined, other_gravities
+from cli.exercise.slips_of_rotors import of_rotor
+from cli.exercise.slips_of_sums import Load, is_sum, loads, of_ledger, of_loads, of_motion
+from cli.exercise.solving import Problem, Sheet
 from cli.exercise.variants import Variant
 from dalembert.errors import DataError
 from dalembert.quantities import is_number
-from dalembert.units import parted, unit_name
+from dalembert.units import G0, parted, unit_name
 
 MOST = 160
 """The largest number of slips that are tried."""
 TIMES = {"ten times too large": Decimal(10), "ten times too small": Decimal("0.1")}
 LIKELY = 12
 """The number of likeliest slips of which any two are tried together."""
+TWICE = {"radius": "diameter", "throw": "stroke"}
+"""Lengths that are taken for twice as long."""
+TERMS = ("mass", "inertia", "force", "fx", "fy", "torque", "unbalance", "weight", "reciprocating", "rotating")
+"""Quantities of a row that may be left out."""
+RANGES = ("--over", "--time", "--cases")
+"""Options that say at how many places a quantity is shown."""
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*")
+ANGLE = re.compile(r"(?<![\w.])([-+]?\d+\.?\d*)deg\b")
+SPEED = re.compile(r"(?<![\w.])([-+]?\d+\.?\d*)rpm\b")
 RESULTS = ("kg_m2_s", "J", "W", "rad_s3", "m_s3")
 
 
@@ -100,15 +110,15 @@ class Recomputed:
 
     def slips(self, k: int) -> list[Slip]:
         """Return the slips of a question: of its answer alone, of other assemblies, of the data."""
-        own = [*self._own(k), *self._siblings(k), *self._assemblies(k)]
+        answer = self.variant.answers[k]
+        own = [*finals(answer), *self._siblings(k), *self._assemblies(k)]
+        if self.variant.problem.exercise.command[0] == "trial":
+            # a tenth of the rotor's weight
+            own.append(Slip("the mass in place of the weight", answer.value / G0))
+            own += [Slip(text, answer.value * share) for text, share in other_gravities(G0)]
         data = [Slip(run.edit.text, value) for run in self.runs if (value := run.values[k]) is not None]
         # of two slips with one result the first is named: a phase counted the other way turns the angle of a correction
         return [*data, *own] if self.variant.problem.exercise.command[0] == "field" else [*own, *data]
-
-    def _own(self, k: int) -> Iterator[Slip]:
-        answer = self.variant.answers[k]
-        for text, change in finals(answer):
-            yield Slip(text, change(answer.value))
 
     def pairs(self, k: int) -> Pairs | None:
         """Return what two slips make of an answer: one in the data and one in the answer, or two of the likeliest in the data."""
@@ -117,7 +127,7 @@ class Recomputed:
         for run in self.runs:
             value = run.values[k]
             if value is not None and value != answer.value:
-                for text, change in finals(answer):
+                for text, change in changes_of(answer):
                     is_sign = run.edit.is_sign or text.endswith("wrong sign")
                     made.append((change(value), f"{run.edit.text} and {text}", is_sign))
         for one, other, values in self._pair_runs:
@@ -187,54 +197,38 @@ class Recomputed:
         problem = self.variant.problem
         yield from _options(problem)
         yield from self._drawn()
-        yield from _cells(problem)
+        yield from _columns(problem)
+        # of link states each power is a term, which the ledger has
+        if problem.exercise.command[0] != "work":
+            yield from _cells(problem)
 
     def _drawn(self) -> Iterator[Edit]:
         """Slips in the dimensions that the text names or the draw changes."""
         shop = self.variant.problem.workshop
 
-        def drawn(text: str, name: str, value: Value) -> Edit:
-            return Edit(text, name, lambda p: replace(p, drawn={**p.drawn, name: value}))
+        def drawn(text: str, values: Mapping[str, Value]) -> Edit:
+            return Edit(text, next(iter(values)), lambda p: replace(p, drawn={**p.drawn, **values}))
 
         mentioned = re.findall(r"\{([^{}\n]+)\}", shop.exercise.text)
-        names = [name for name in dict.fromkeys([*self.variant.drawn, *mentioned]) if ":" not in name]
+        speeds = [path for path in shop.dimensions if re.fullmatch(r"input(\.\d+)?\.speed", path)]
+        names = dict.fromkeys([*self.variant.drawn, *mentioned, *speeds])
         for name in names:
-            value = shop.datum(name, self.variant.drawn)
+            value = None if ":" in name else shop.datum(name, self.variant.drawn)
             if value is None or not value.number:
                 continue
-            for text, number in _slipped(name, value):
-                yield drawn(text, name, number)
-        g = gravity(self.variant)
+            for text, slipped in _slipped(name, value):
+                yield drawn(text, {name: slipped})
+        g = self.variant.problem.gravity
         if g and "gravity.y" in shop.dimensions:
-            for other in (9.81, 10.0):
-                if abs(other - g) > 1e-6 * g:
-                    value = Value(Decimal(str(-other)), "")
-                    yield drawn(f"g = {other:g} in place of {g:g}", "gravity.y", value)
+            field = complex(shop.described.mechanism.gravity)
+            for text, share in (("the mass in place of the weight", 1 / g), *other_gravities(g)):
+                x, y = (Value(Decimal(repr(part * share)), "") for part in (field.real, field.imag))
+                yield drawn(text, {"gravity.x": x, "gravity.y": y})
 
 
 def replace_further(problem: Problem, *words: str) -> Problem:
     """Return a problem with further words behind its command."""
     return replace(problem, further=[*problem.further, *words])
-
-
-def finals(answer: Answer) -> Iterator[tuple[str, Callable[[float], float]]]:
-    """Yield the slips in the answer itself."""
-    if answer.is_angle:
-        half = 180.0 if unit_name(answer.unit) == "deg" else np.pi
-        yield "180° off", lambda value: (value + half) % (2 * half)
-        yield "the angle is counted the other way", lambda value: -value % (2 * half)
-        yield "sine in place of cosine in the angle", lambda value: (half / 2 - value) % (2 * half)
-        if half == 180.0:
-            yield "radians in place of degrees", lambda value: value * np.pi / 180
-        else:
-            yield "degrees in place of radians", lambda value: value * 180 / np.pi
-        return
-    yield "the answer has the wrong sign", lambda value: -value
-    if re.search(r"(^|_)(omega|speed)", answer.ask.quantity) or unit_name(answer.unit) in ("rad_s", "rpm"):
-        share = 30 / np.pi if unit_name(answer.unit) == "rad_s" else np.pi / 30
-        yield "rpm in place of rad/s", lambda value: value * share
-    yield "the answer is ten times too large", lambda value: value * 10
-    yield "the answer is ten times too small", lambda value: value / 10
 
 
 def _slipped(name: str, value: Value) -> Iterator[tuple[str, Value]]:
@@ -257,58 +251,94 @@ def _slipped(name: str, value: Value) -> Iterator[tuple[str, Value]]:
 
 def _options(problem: Problem) -> Iterator[Edit]:
     """Slips in the options of the command."""
-    words = list(problem.words or problem.exercise.command)
+    words = problem.exercise.command
 
     def put(text: str, k: int, word: str) -> Edit:
         def apply(p: Problem) -> Problem:
-            own = list(p.words or p.exercise.command)
+            own = list(p.words or words)
             return replace(p, words=[*own[:k], word, *own[k + 1 :]])
 
         return Edit(text, k, apply)
 
     for k, word in enumerate(words):
-        if k and words[k - 1] == "--gravity":
-            for other in ("9.81", "10"):
-                changed = re.sub(r"(?<![\d.])(9\.81|9\.80665|10(?:\.0+)?)(?![\d.])", other, word)
-                if changed != word:
-                    yield put(
-                        f"g = {other} in place of {word.lstrip('0,-').rstrip(',0') or word}", k, changed
-                    )
-        if re.fullmatch(r"[\d.]+rpm", word):
-            yield put("rpm taken for rad/s", k, word.removesuffix("rpm") + "rad_s")
-        match = re.fullmatch(r"([\d.]+)deg", word)
-        if match:
-            yield put("degrees taken as radians", k, f"{match[1]}rad")
-    if problem.exercise.command[0] == "field":
+        option = words[k - 1]
+        if option == "--gravity" and (g := problem.gravity):
+            for text, share in (("the mass in place of the weight", 1 / g), *other_gravities(g)):
+                yield put(text, k, _times(word, share))
+        if option == "--radius":
+            yield put("the diameter in place of the radius", k, _times(word, 2.0))
+            yield put("half the radius, as if it were the diameter", k, _times(word, 0.5))
+        if option in RANGES:
+            continue
+        for match in SPEED.finditer(word):
+            yield put("rpm taken for rad/s", k, _with(word, match, f"{match[1]}rad_s"))
+        for match in ANGLE.finditer(word):
+            yield put(f"{match[0]}: degrees taken as radians", k, _with(word, match, f"{match[1]}rad"))
+            yield put(
+                f"{match[0]} is counted the other way", k, _with(word, match, f"{-Decimal(match[1])}deg")
+            )
+            yield put(
+                f"{match[0]}: sine in place of cosine", k, _with(word, match, f"{90 - Decimal(match[1])}deg")
+            )
+    if problem.exercise.command[0] in ("field", "index"):
         lag, text = "--phase-lag", "the phase is counted the other way"
         if lag in words:
-
-            def leading(p: Problem) -> Problem:
-                return replace(p, words=[word for word in p.words or p.exercise.command if word != lag])
-
-            yield Edit(text, lag, leading)
+            yield put(text, words.index(lag), "")
         else:
             yield Edit(text, lag, lambda p: replace_further(p, lag))
 
 
+def _times(word: str, factor: float) -> str:
+    return NUMBER.sub(lambda match: repr(float(match[0]) * factor), word)
+
+
+def _with(word: str, match: re.Match[str], text: str) -> str:
+    return word[: match.start()] + text + word[match.end() :]
+
+
+def _numbers(sheet: Sheet) -> Iterator[tuple[int, int, str, str, Decimal]]:
+    """Yield the numbers of a table that are not zero: row, column, quantity, unit, number."""
+    kept = sheet.column("trial_kept")
+    for c, title in enumerate(sheet.header):
+        quantity, unit = parted(title, further=("kg_m2",))
+        for r, row in enumerate(sheet.rows):
+            cell = row[c].strip().replace(",", ".")
+            if unit and c != kept and is_number(cell) and Decimal(cell):
+                yield r, c, quantity, unit, Decimal(cell)
+
+
+def _columns(problem: Problem) -> Iterator[Edit]:
+    """Slips in all cells of a column alike."""
+    for file, sheet in problem.sheets.items():
+        cells: dict[str, dict[tuple[str, int, int], str]] = {}
+        for r, c, quantity, unit, number in _numbers(sheet):
+            for text, value in _of_column(quantity, unit, number):
+                cells.setdefault(text, {})[file, r, c] = f"{value:f}"
+        for text, changed in cells.items():
+            if len(changed) > 1:
+                yield Edit(text, text, _put(changed))
+
+
+def _of_column(quantity: str, unit: str, number: Decimal) -> Iterator[tuple[str, Decimal]]:
+    what = quantity.replace("_", " ")
+    if unit == "deg":
+        yield f"{what}: degrees taken as radians", number * Decimal(180 / np.pi)
+    if unit == "rpm":
+        yield f"{what}: rpm taken for rad/s", number * Decimal(30 / np.pi)
+    if quantity in TWICE:
+        yield f"{what}: the {TWICE[quantity]} in its place", 2 * number
+
+
 def _cells(problem: Problem) -> Iterator[Edit]:
-    """Slips in the cells of the tables."""
+    """Slips in the cells of the tables, the likelier first."""
     kinds: list[list[Edit]] = [[], [], [], []]
     for file, sheet in problem.sheets.items():
-        names = sheet.names()
-        kept = sheet.column("trial_kept")
         if problem.exercise.command[0] == "field":
             kinds[0] += _trials_left_on(problem, file)
-        for r, row in enumerate(sheet.rows):
-            for c, text in enumerate(row):
-                quantity, unit = parted(sheet.header[c], further=("kg_m2",))
-                cell = text.strip().replace(",", ".")
-                if not unit or c == kept or not is_number(cell) or not Decimal(cell):
-                    continue
-                what = f"{quantity.replace('_', ' ')} of {names[r]}"
-                for kind, slip, value in _of_cell(quantity, unit, Decimal(cell)):
-                    place = (file, r, c)
-                    kinds[kind].append(Edit(f"the {what} {slip}", place, _put({place: f"{value:f}"})))
+        for r, c, quantity, unit, number in _numbers(sheet):
+            what, place = f"{quantity.replace('_', ' ')} of {sheet.called(r)}", (file, r, c)
+            for kind, slip, value in _of_cell(quantity, unit, number):
+                kinds[kind].append(Edit(f"{what}: {slip}", place, _put({place: f"{value:f}"})))
     for edits in kinds:
         yield from edits
 
@@ -320,28 +350,32 @@ def _put(cells: dict[tuple[str, int, int], str]) -> Callable[[Problem], Problem]
 def _of_cell(quantity: str, unit: str, number: Decimal) -> Iterator[tuple[int, str, Decimal]]:
     """Yield the slips of a cell: how likely (0 first), what, the number."""
     if unit == "deg":
-        yield 1, "is 180° off", number + 180
-        yield 1, "is counted the other way", -number
-        yield 2, "has degrees taken as radians", Decimal(repr(float(number) * 180 / np.pi))
-        yield 2, "has sine in place of cosine", 90 - number
+        yield 1, "180° off", number + 180
+        yield 1, "counted the other way", -number
+        yield 2, "degrees taken as radians", number * Decimal(180 / np.pi)
+        yield 2, "sine in place of cosine", 90 - number
         return
-    yield 1, "has the wrong sign", -number
+    yield 1, "wrong sign", -number
     for text, times in TIMES.items():
-        yield 3, f"is {text}", number * times
-    if "radius" in quantity:
-        yield 1, "is the diameter in place of the radius", 2 * number
-        yield 1, "is half the radius, as if it were a diameter", number / 2
+        yield 3, text, number * times
+    if quantity in TWICE:
+        yield 1, f"the {TWICE[quantity]} in its place", 2 * number
+        yield 1, f"half of it, as if it were the {TWICE[quantity]}", number / 2
     if unit == "rpm":
-        yield 1, "has rpm taken for rad/s", Decimal(repr(float(number) * 30 / np.pi))
-    if quantity in ("mass", "inertia"):
-        yield 2, "is left out", Decimal(0)
+        yield 1, "rpm taken for rad/s", number * Decimal(30 / np.pi)
+    if quantity in TERMS:
+        yield 2, "left out", Decimal(0)
 
 
 def _trials_left_on(problem: Problem, file: str) -> list[Edit]:
     """Trial masses that were left on taken as removed, or the reverse."""
     sheet = problem.sheets[file]
     mass = next(
-        (k for k, title in enumerate(sheet.header) if title.startswith(("trial_mass", "trial_unbalance"))),
+        (
+            k
+            for k, title in enumerate(sheet.header)
+            if title.lower().startswith(("trial_mass", "trial_unbalance"))
+        ),
         None,
     )
     if mass is None:
@@ -364,9 +398,6 @@ def _trials_left_on(problem: Problem, file: str) -> list[Edit]:
     return [Edit(text, "trial_kept", _put({(file, r, column): other for r in on or trials}))]
 
 
-PROVIDERS = {"work": of_work, "forces": of_work, "balance": of_rotor}
-
-
 def candidates(variant: Variant, again: Recomputed | None = None) -> list[Candidates]:
     """Return the slips of every question of a variant; `again`: its runs with slips in the data."""
     runs = again or Recomputed(variant)
@@ -374,13 +405,14 @@ def candidates(variant: Variant, again: Recomputed | None = None) -> list[Candid
 
 
 def _of_question(variant: Variant, k: int, runs: Recomputed) -> Candidates:
-    provider = PROVIDERS.get(variant.problem.exercise.command[0])
-    own = None if provider is None else provider(variant, k)
+    own = of_rotor(variant, k) if variant.problem.exercise.command[0] == "balance" else None
     if own is not None:
         return own
     answer = variant.answers[k]
-    parts, pairs = of_motion(variant, k)
-    loaded, two_loads = of_loads(answer, k, runs.loads) if is_sum(answer) else ([], lambda: None)
+    sums = [of_ledger(variant, k)]
+    if not sums[0][0]:
+        sums = [of_motion(variant, k), *([of_loads(answer, k, runs.loads)] if is_sum(answer) else [])]
+    singles = [slip for slips, _ in sums for slip in slips]
     return Candidates(
-        answer, [*parts, *loaded, *runs.slips(k)], joined([pairs, two_loads, partial(runs.pairs, k)])
+        answer, [*singles, *runs.slips(k)], joined([*(pairs for _, pairs in sums), partial(runs.pairs, k)])
     )

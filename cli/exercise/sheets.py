@@ -203,7 +203,7 @@ def table_text(header: Sequence[str], rows: Iterable[Sequence[str]]) -> bytes:
 def answers_csv(exercise: Exercise, students: Sequence[Student], variants: Sequence[Variant]) -> bytes:
     """Return the table of answers to be filled in."""
     others, keys = list(students[0].others), exercise.keys
-    header = ["student", *others, *keys, "quantity", "unit", "answer"]
+    header = ["student", *others, *keys.values(), "quantity", "unit", "answer"]
     rows = [
         [student.name, *student.others.values(), *_question(answer, keys), ""]
         for student, variant in zip(students, variants, strict=True)
@@ -212,7 +212,7 @@ def answers_csv(exercise: Exercise, students: Sequence[Student], variants: Seque
     return table_text(header, rows)
 
 
-def _question(answer: Answer, keys: Sequence[str]) -> list[str]:
+def _question(answer: Answer, keys: Iterable[str]) -> list[str]:
     return [*(answer.ask.where.get(key, "") for key in keys), answer.ask.quantity, answer.unit]
 
 
@@ -220,7 +220,18 @@ def key_csv(exercise: Exercise, students: Sequence[Student], variants: Sequence[
     """Return the key: the right answers rounded and whole, and the numbers of each student."""
     others, keys = list(students[0].others), exercise.keys
     drawn = [draw.name for draw in exercise.draws]
-    header = ["student", *others, *keys, "quantity", "unit", "answer", "value", "figures", "points", *drawn]
+    header = [
+        "student",
+        *others,
+        *keys.values(),
+        "quantity",
+        "unit",
+        "answer",
+        "value",
+        "figures",
+        "points",
+        *drawn,
+    ]
     rows = [
         [
             student.name, *student.others.values(), *_question(answer, keys), written(answer.value, answer.ask.figures),
@@ -245,7 +256,7 @@ def tables(
     keys = exercise.keys
     columns = [
         names("student", [student.name for student, _ in rows]),
-        *(names(key, [answer.ask.where.get(key) for _, answer in rows]) for key in keys),
+        *(names(header, [answer.ask.where.get(key) for _, answer in rows]) for key, header in keys.items()),
         names("quantity", [answer.ask.quantity for _, answer in rows]),
         names("unit", [answer.unit for _, answer in rows]),
         names("answer", [written(answer.value, answer.ask.figures) for _, answer in rows]),
@@ -253,7 +264,7 @@ def tables(
         names("figures", [answer.ask.figures for _, answer in rows]),
         names("points", [float(answer.ask.points) for _, answer in rows]),
     ]
-    table = Table(columns, ["student", *keys, "quantity"], "key[]")
+    table = Table(columns, ["student", *keys.values(), "quantity"], "key[]")
     return {"key": lambda: table}
 
 

@@ -6,31 +6,33 @@ more, and where there are so few pairs about the answer that a random number wou
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from decimal import Decimal
 from functools import cached_property
-from math import isfinite, remainder
-from typing import Any, NamedTuple
+from math import isfinite, pi, remainder
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.exercise.description import Answer, Value
-from cli.exercise.solving import Problem
-from cli.exercise.variants import Variant
+from cli.exercise.description import Answer
 from dalembert.figures import Right, Typed
-from dalembert.units import parted, unit_name
+from dalembert.units import unit_name
 
 Real = NDArray[np.float64]
 
+FEWEST = 2
+"""From so many digits on a slip is named: of random numbers of one digit it would be every sixth."""
 DIGITS = 4
 """From so many digits on two slips may be named."""
 CHANCE = 0.012
 """Two slips are named where less than this share of random numbers about the answer would meet a pair."""
 ABOUT = 0.2
 """What is about the answer: within this share of it."""
+MOST_PAIRED = 400
+"""The largest number of changes of which any two are tried together: of more, a random number would meet a pair."""
+GRAVITIES = (9.81, 10.0)
+"""Values of g in courses."""
 
 
 @dataclass(frozen=True)
@@ -115,12 +117,7 @@ class Candidates:
         """How far apart two values are; angles modulo a turn."""
         if not self.answer.is_angle:
             return value - other
-        return remainder(value - other, self.turn)
-
-    @property
-    def turn(self) -> float:
-        """A turn in the unit of an angle."""
-        return 360.0 if unit_name(self.answer.unit) == "deg" else 2 * np.pi
+        return remainder(value - other, self.answer.turn)
 
     def name(self, number: Typed, scale: float = 1.0) -> str | None:
         """Return the likely mistake behind a wrong answer; None where no slip reproduces it.
@@ -128,12 +125,16 @@ class Candidates:
         `scale`: the number's unit in the unit asked for.
         """
         a, size = float(number.value) * scale, abs(scale)
-        # zeros at the end of a whole number may stand for digits that were rounded
         figures = self.answer.ask.figures
-        own = 10.0 ** (number.value.adjusted() - figures + 1) * size
-        most = max(float(self.right.unit), own) / 2 * (1 + 1e-9)
-        halves = [float(half) * size for half in number.half_units]
-        halves = [half for half in halves if half <= most] or halves[:1]
+        if not a or number.digits < min(FEWEST, figures):
+            # zero, or a whole number that a slip makes
+            halves = [1e-9 * (abs(a) or abs(self.answer.value))]
+        else:
+            # zeros at the end of a whole number may stand for digits that were rounded
+            own = 10.0 ** (number.value.adjusted() - figures + 1) * size
+            most = max(float(self.right.unit), own) / 2 * (1 + 1e-9)
+            halves = [float(half) * size for half in number.half_units]
+            halves = [half for half in halves if half <= most] or halves[:1]
         near = [(abs(self.distance(slip.value, a)), k) for k, slip in enumerate(self.wrong)]
         for half in halves:
             hits = [k for off, k in near if off <= half * (1 + 1e-9)]
@@ -148,9 +149,9 @@ class Candidates:
         assert pairs is not None
         off = pairs.values - a
         if self.answer.is_angle:
-            off = off - self.turn * np.rint(off / self.turn)
+            off = off - self.answer.turn * np.rint(off / self.answer.turn)
         off = np.abs(off)
-        room = ABOUT * abs(a) if not self.answer.is_angle else ABOUT * self.turn / 4
+        room = ABOUT * abs(a) if not self.answer.is_angle else ABOUT * self.answer.turn / 4
         for among in (pairs.likely, np.ones(len(off), dtype=bool)):
             about = np.count_nonzero(off[among] <= room)
             if about * half > CHANCE * room:
@@ -190,14 +191,10 @@ def of_sum(
     `value_of`: the answer that follows from sums, in the unit asked for.
     """
     by = np.array([change.by for change in changes], dtype=complex)
-    singles = (
-        [Slip(c.text, float(v)) for c, v in zip(changes, value_of(total + by), strict=True)]
-        if len(by)
-        else []
-    )
+    singles = [Slip(c.text, float(v)) for c, v in zip(changes, value_of(total + by), strict=True)]
 
     def pairs() -> Pairs | None:
-        if len(by) < 2:
+        if not 2 <= len(by) <= MOST_PAIRED:
             return None
         i, j = np.triu_indices(len(by), 1)
         term = np.array([change.term for change in changes])
@@ -215,196 +212,31 @@ def of_sum(
     return singles, pairs
 
 
-AXES = "xyz"
-PARTS = {
-    "v": {"base_velocity_m_s": "velocity of {base}", "turning_velocity_m_s": "part ω × R", "relative_velocity_m_s": "relative velocity"},
-    "a": {
-        "base_m_s2": "acceleration of {base}",
-        "tangential_m_s2": "tangential part α × R",
-        "normal_m_s2": "normal part ω²·R",
-        "relative_m_s2": "relative acceleration",
-        "coriolis_m_s2": "Coriolis part 2ω × V_rel",
-    },
-}  # fmt: skip
-"""What the parts of a point's velocity and acceleration are called."""
+def finals(answer: Answer) -> list[Slip]:
+    """Return the slips in the answer itself."""
+    return [Slip(text, change(answer.value)) for text, change in changes_of(answer)]
 
 
-class Part(NamedTuple):
-    """A term of the sum that an answer is."""
-
-    name: str
-    value: float
-
-
-def way_of(variant: Variant) -> Sequence[Mapping[str, Any]]:
-    """Return the worked solution as JSON has it; empty where the command has none."""
-    way: Any = variant.worked.document.get("way")
-    return way or ()
-
-
-def of_motion(variant: Variant, number: int) -> tuple[list[Slip], Callable[[], Pairs | None]]:
-    """Return the slips of an answer that is a sum of such parts, and pairs of them; none of any other answer."""
-    answer = variant.answers[number]
-    parts = [part for part in _parts(variant, answer) if part.value]
-    total = sum(part.value for part in parts)
-    if len(parts) < 2 or not total:
-        return [], lambda: None
-    changes = [change for k, part in enumerate(parts) for change in _part_changes(k, part)]
-    factor = answer.value / total
-    return of_sum(answer, changes, complex(total), lambda sums: sums.real * factor)
+def changes_of(answer: Answer) -> Iterator[tuple[str, Callable[[float], float]]]:
+    """Yield the slips in an answer itself, and what each makes of a value."""
+    if answer.is_angle:
+        turn, is_degrees = answer.turn, answer.turn == 360.0
+        yield "180° off", lambda value: (value + turn / 2) % turn
+        yield "the angle is counted the other way", lambda value: -value % turn
+        yield "sine in place of cosine in the angle", lambda value: (turn / 4 - value) % turn
+        text = "radians in place of degrees" if is_degrees else "degrees in place of radians"
+        yield text, lambda value: value * (pi / 180 if is_degrees else 180 / pi)
+        return
+    yield "the answer has the wrong sign", lambda value: -value
+    if unit_name(answer.unit) in ("rad_s", "rpm"):
+        share = 30 / pi if unit_name(answer.unit) == "rad_s" else pi / 30
+        yield "rpm in place of rad/s", lambda value: value * share
+    yield "the answer is ten times too large", lambda value: value * 10
+    yield "the answer is ten times too small", lambda value: value / 10
 
 
-def _part_changes(k: int, part: Part) -> Iterator[Change]:
-    """What can go wrong with a part."""
-    yield Change(k, f"the {part.name} has the wrong sign", -2 * part.value, is_sign=True)
-    yield Change(k, f"the {part.name} is left out", -part.value)
-    if part.name.startswith("Coriolis"):
-        yield Change(k, f"the {part.name} lacks its factor 2", -part.value / 2)
-    yield Change(k, f"the {part.name} is ten times too large", 9 * part.value)
-    yield Change(k, f"the {part.name} is ten times too small", -0.9 * part.value)
-
-
-def _parts(variant: Variant, answer: Answer) -> Sequence[Part]:
-    command = variant.problem.exercise.command[0]
-    name = parted(answer.ask.quantity, further=("kg_m2_s", "J"))[0]
-    if command in ("mechanism", "forces"):
-        return _of_point(variant, name)
-    if command == "body" and answer.ask.where.get("axis", "x") in AXES:
-        return _of_body(variant, name, AXES.index(answer.ask.where.get("axis", "x")))
-    return ()
-
-
-def _topic(variant: Variant, name: str) -> Mapping[str, Any]:
-    return next((topic for topic in way_of(variant) if topic.get("topic") == name), {})
-
-
-def _of_point(variant: Variant, name: str) -> Sequence[Part]:
-    """The parts of a point's velocity or acceleration along an axis, in the one pose."""
-    match = re.fullmatch(r"(.+)_([va])([xy])", name)
-    if match is None:
-        return ()
-    point, kind, axis = match.groups()
-    every = [entry for entry in _topic(variant, "parts").get("points", ()) if entry["point"] == point]
-    # a point of several links has its parts on each: of the last, which the others lead to
-    if not every:
-        return ()
-    entry = every[-1]
-    base = entry.get("from") or "the base"
-    return [
-        Part(text.format(base=base), float(entry[key][AXES.index(axis)]))
-        for key, text in PARTS[kind].items()
-        if entry.get(key) is not None
-    ]
-
-
-def _of_body(variant: Variant, name: str, k: int) -> Sequence[Part]:
-    """The products in a component of H = I·ω, of Ḣ = (Ḣ)rel + Ω × H, and in the energy."""
-    momentum, rate = _topic(variant, "momentum"), _topic(variant, "rate of momentum")
-    if not momentum:
-        return ()
-    omega, tensor, h = momentum["omega_rad_s"], momentum["inertia_kg_m2"], momentum["momentum_kg_m2_s"]
-    if name == "momentum":
-        return [Part(f"term I_{AXES[k]}{a}·ω_{a}", tensor[k][j] * omega[j]) for j, a in enumerate(AXES)]
-    if name in ("momentum_rate", "inertia_moment"):
-        i, j = (k + 1) % 3, (k + 2) % 3
-        frame = rate["frame_omega_rad_s"]
-        return [
-            Part("relative rate (Ḣ)rel", rate["relative_N_m"][k]),
-            Part(f"term Ω_{AXES[i]}·H_{AXES[j]}", frame[i] * h[j]),
-            Part(f"term Ω_{AXES[j]}·H_{AXES[i]}", -frame[j] * h[i]),
-        ]
-    return ()
-
-
-Values = Sequence[float | None]
-LINEAR = re.compile(r"(_f[xy]|_moment|_contact_force|(^|_)input_(torque|force))$")
-"""Of the columns of `dalembert forces`: a sum over the loads."""
-WRONG = {
-    "has the wrong sign": -2.0,
-    "is left out": -1.0,
-    "is ten times too small": -0.9,
-    "is ten times too large": 9.0,
-}
-"""How often a load's part is added to the answer by a slip."""
-LOAD = re.compile(r"(?:forces\.(\d+)\.force|torques\.(\d+)\.torque)(?:\.[xy])?")
-
-
-class Load(NamedTuple):
-    """A load, and its part in every answer; None where it has none that can be told."""
-
-    name: str
-    parts: Values
-
-
-def loads(variant: Variant, run: Callable[[Problem], Values | None]) -> list[Load]:
-    """The loads of a mechanism with forces; none with friction, where the forces are no sums.
-
-    `run`: the answers of a problem; None where it has none.
-    """
-    problem = variant.problem
-    shop = problem.workshop
-    if problem.exercise.command[0] != "forces" or shop.mechanism is None or shop.described.mechanism.friction:
-        return []
-    whole = [answer.value for answer in variant.answers]
-    described = shop.described.mechanism
-    weightless = ["gravity.x", "gravity.y"] if described.gravity else []
-    result: list[Load] = []
-
-    def without(*paths: str) -> Values | None:
-        zero = {path: Value(Decimal(0), "") for path in paths}
-        return run(replace(problem, drawn={**problem.drawn, **zero}))
-
-    def add(name: str, more: Values | None, less: Values | None) -> None:
-        if more is not None and less is not None:
-            result.append(Load(name, _less(more, less)))
-
-    floating = without(*weightless) if weightless else whole
-    for link, own in described.links.items():
-        mass, inertia = f"links.{link}.mass", f"links.{link}.inertia"
-        if own.mass:
-            massless = without(mass, *weightless)
-            add(f"inertia force of link {link}", floating, massless)
-            if weightless and floating is not None and massless is not None:
-                add(f"weight of link {link}", _less(whole, without(mass)), _less(floating, massless))
-        if own.inertia:
-            add(f"inertia torque of link {link}", whole, without(inertia))
-    for name, paths in _applied(shop.dimensions).items():
-        add(name, whole, without(*paths))
-    return result
-
-
-def _applied(dimensions: Mapping[str, object]) -> dict[str, list[str]]:
-    """The paths of the applied forces and torques, by what they are called."""
-    paths: dict[str, list[str]] = {}
-    for path in dimensions:
-        match = LOAD.fullmatch(path)
-        if match is not None:
-            name = f"applied force {match[1]}" if match[1] else f"applied torque {match[2]}"
-            paths.setdefault(name, []).append(path)
-    return paths
-
-
-def _less(more: Values | None, less: Values | None) -> list[float | None]:
-    if more is None or less is None:
-        return []
-    return [None if a is None or b is None else a - b for a, b in zip(more, less, strict=True)]
-
-
-def of_loads(
-    answer: Answer, number: int, every: Sequence[Load]
-) -> tuple[list[Slip], Callable[[], Pairs | None]]:
-    """The slips of an answer that is a sum over the loads, and pairs of them."""
-    changes = [change for k, load in enumerate(every) for change in _load_changes(k, load, number)]
-    return of_sum(answer, changes, complex(answer.value), lambda sums: sums.real)
-
-
-def is_sum(answer: Answer) -> bool:
-    """Whether an answer is a sum over the loads."""
-    return LINEAR.search(parted(answer.ask.quantity)[0]) is not None
-
-
-def _load_changes(k: int, load: Load, number: int) -> Iterator[Change]:
-    part = load.parts[number] if load.parts else None
-    if part:
-        for text, times in WRONG.items():
-            yield Change(k, f"the {load.name} {text}", times * part, is_sign=times == -2.0)
+def other_gravities(g: float) -> Iterator[tuple[str, float]]:
+    """Yield the slips in g: 9.81 for 10 or the reverse, and what g is multiplied by."""
+    for other in GRAVITIES:
+        if abs(other / g - 1) > 1e-3:
+            yield f"g = {other:g} in place of {g:g}", other / g

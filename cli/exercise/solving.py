@@ -11,11 +11,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
-from functools import cached_property
+from functools import cache, cached_property
+from importlib import import_module
+from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cli.exercise.description import Exercise, Solved, Value, cell_of, value_of
+from cli.read.options import components
 from cli.show.output import result_of
 from dalembert.errors import DataError, quote
 from dalembert.hints import nearest
@@ -25,11 +28,15 @@ from dalembert.tables.sources import open_source
 from dalembert.units import composed, parted
 
 if TYPE_CHECKING:
-    pass
+    from cli.balance.rotors import Rotors
+    from cli.read.rotor_options import Planes
 
 MECHANISM = ("mechanism", "forces", "inspect", "equilibrium", "simulate", "tolerance")
 """Commands on a mechanism's file: they take --set."""
-_FILES = (".csv", ".toml", ".txt", *SUFFIXES)
+NAMES = ("name", "link", "part", "rotor", "cylinder", "run")
+"""Columns that may name the rows of a table."""
+_TABLES = (".csv", ".tsv", ".txt", *SUFFIXES)
+_FILES = (".toml", *_TABLES)
 
 
 @dataclass(eq=False, repr=False)
@@ -42,13 +49,12 @@ class Sheet:
 
     def row(self, name: str) -> int | None:
         """Return the row of a name: of a column that names rows, else the row's number."""
-        for title in ("name", "link", "part", "rotor", "plane", "cylinder", "run", "step"):
+        for title in (*NAMES, "plane", "step"):
             column = self.column(title)
-            if column is None:
-                continue
-            cells = [row[column] for row in self.rows]
-            if cells.count(name) == 1:
-                return cells.index(name)
+            if column is not None:
+                cells = [row[column] for row in self.rows]
+                if cells.count(name) == 1:
+                    return cells.index(name)
         if name.isdecimal() and 1 <= int(name) <= len(self.rows):
             return int(name) - 1
         return None
@@ -58,13 +64,25 @@ class Sheet:
         same = [k for k, each in enumerate(self.header) if each.strip().lower() == title.lower()]
         return same[0] if same else None
 
-    def names(self) -> list[str]:
-        """Return what rows are called."""
-        for title in ("name", "link", "part", "rotor", "cylinder", "run"):
+    @cached_property
+    def naming(self) -> str | None:
+        """The title of the column that names the rows; None where there is none."""
+        for title in NAMES:
             column = self.column(title)
             if column is not None and len({row[column] for row in self.rows}) == len(self.rows):
-                return [row[column] for row in self.rows]
-        return [str(k) for k in range(1, len(self.rows) + 1)]
+                return title
+        return None
+
+    @cached_property
+    def names(self) -> list[str]:
+        """What the rows are called."""
+        column = None if self.naming is None else self.column(self.naming)
+        return [str(k) if column is None else row[column] for k, row in enumerate(self.rows, 1)]
+
+    def called(self, row: int) -> str:
+        """Return what a row is called in a sentence: its name, or row 3, or cylinder 2."""
+        title = "row" if self.naming in (None, "name") else self.naming
+        return f"{title} {self.names[row]}" if self.names[row].isdecimal() else self.names[row]
 
     def text(self) -> str:
         """Return the table as CSV."""
@@ -97,12 +115,7 @@ class Workshop:
     @cached_property
     def tables(self) -> list[str]:
         """The tables that the command names."""
-        words = [
-            word
-            for word in self.exercise.command[1:]
-            if split_sheet(word)[0].lower().endswith((".csv", *SUFFIXES))
-        ]
-        return [word for word in words if not word.startswith("-")]
+        return [word for word in self.exercise.command[1:] if split_sheet(word)[0].lower().endswith(_TABLES)]
 
     @cached_property
     def mechanism(self) -> str | None:
@@ -148,7 +161,7 @@ class Workshop:
                     f"{where}: the mechanism has no such dimension{nearest(draw.name, self.dimensions)}"
                 )
             self._check_unit(where, draw.values, self.dimensions[draw.name].kind)
-        for name in placeholders - {draw.name for draw in self.exercise.draws}:
+        for name in sorted(placeholders - {draw.name for draw in self.exercise.draws}):
             raise DataError(f"{place}: key command: found {{{name}}}, expected a name of [draw]")
 
     def _check_cell(self, where: str, cell: tuple[str, str, str], values: Sequence[Value]) -> None:
@@ -161,7 +174,7 @@ class Workshop:
         sheet = self.sheet(file)
         if sheet.row(row) is None:
             raise DataError(
-                f"{where}: no row {quote(row)} in {file}: expected one of {', '.join(sheet.names())}"
+                f"{where}: no row {quote(row)} in {file}: expected one of {', '.join(sheet.names)}"
             )
         if sheet.column(column) is None:
             raise DataError(
@@ -332,7 +345,7 @@ class Problem:
             | set(self.added)
         )
         words = []
-        for word in self.words or self.exercise.command:
+        for word in filter(None, self.words or self.exercise.command):
             for name in _placeholders(word):
                 if name in self.drawn:
                     word = word.replace(f"{{{name}}}", self.drawn[name].option)
@@ -341,9 +354,7 @@ class Problem:
                 path = self.place / Path(word).with_suffix(".csv").name
                 path.write_text(self.sheets[word].text(), encoding="utf-8")
                 words.append(str(path))
-            elif (
-                split_sheet(word)[0].lower().endswith(_FILES) and not word.startswith("-") and "=" not in word
-            ):
+            elif split_sheet(word)[0].lower().endswith(_FILES) and "=" not in word:
                 words.append(str(self.exercise.folder / word))
             else:
                 words.append(word)
@@ -351,6 +362,32 @@ class Problem:
             if cell_of(name) is None and name in self.workshop.dimensions:
                 words += ["--set", f"{name}={value.option}"]
         return [*words, *self.further]
+
+    @cached_property
+    def parameters(self) -> Mapping[str, Any]:
+        """What the command's words say, by the names of its parameters."""
+        name, *rest = self.command
+        values: Mapping[str, Any] = _parser(name).make_context(name, rest).params
+        return values
+
+    @cached_property
+    def gravity(self) -> float:
+        """The g of the command or of the mechanism's file, m/s²; 0 where there is none."""
+        text = self.parameters.get("gravity")
+        if text is not None:
+            return hypot(*components("--gravity", text, "acceleration", text.count(",") + 1))
+        if self.workshop.mechanism is not None:
+            return abs(complex(self.workshop.described.mechanism.gravity))
+        return 0.0
+
+    def known_masses(self) -> tuple[Rotors, Planes]:
+        """Read the masses and the correction planes of `dalembert balance`."""
+        from cli.balance.rotors import read_rotors
+        from cli.read.rotor_options import from_options, from_table
+
+        own = self.parameters
+        planes = from_table(own["planes"]) if own["planes"] else from_options(own["plane"], sought=True)
+        return read_rotors(own["table"], self.gravity, needs_z=planes.several), planes
 
     def result(self, *further: str) -> Solved:
         """Run the command.
@@ -374,3 +411,12 @@ class Problem:
             reason = f": {result.warnings[0]}" if result.warnings else ""
             raise DataError(f"{self.exercise.file}: key command: no case of it can be solved{reason}")
         return Solved(self.exercise, tables, document, result)
+
+
+@cache
+def _parser(name: str) -> Any:
+    import typer
+
+    app = typer.Typer(add_completion=False)
+    app.command(name)(import_module(f"cli.{name}").run)
+    return typer.main.get_command(app)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import cached_property
-from math import isfinite, prod, radians, remainder
+from math import isfinite, prod, remainder, tau
 from random import Random
 from typing import Any
 
@@ -15,7 +15,6 @@ from cli.exercise.solving import Problem, Workshop
 from cli.show.output import options_of
 from dalembert.errors import DataError
 from dalembert.figures import Right
-from dalembert.units import unit_name
 
 MOST_CONDITION = 25.0
 """Largest condition number of the constraint Jacobian, with lengths divided by the mechanism's size."""
@@ -153,8 +152,6 @@ def _pose_trouble(document: Mapping[str, Any]) -> str:
 def _trouble(answer: Answer) -> str:
     """What is wrong with an answer for a question of figures."""
     what = answer.ask.quantity
-    if not answer.is_angle and abs(answer.value) < 1e-12:
-        return f"{what} is zero: it has no figures"
     right = Right(answer.value, answer.ask.figures)
     if not right.answer:
         return f"{what} is zero: it has no figures"
@@ -183,9 +180,7 @@ def _growth(workshop: Workshop, drawn: Mapping[str, Value], answers: Sequence[An
 def change(answer: Answer, other: Answer) -> float:
     """The share of itself by which an answer changes; an angle in radians, modulo a turn."""
     if answer.is_angle:
-        turn = 360.0 if unit_name(answer.unit) == "deg" else radians(360.0)
-        off = abs(remainder(other.value - answer.value, turn))
-        return radians(off) if turn == 360.0 else off
+        return abs(remainder(other.value - answer.value, answer.turn)) * tau / answer.turn
     size = abs(answer.value)
     off = abs(other.value - answer.value)
     return off / size if size and isfinite(off) else float("inf")

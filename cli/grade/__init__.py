@@ -33,12 +33,12 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """
     from cli.exercise.description import read_exercise
     from cli.exercise.solving import workshop
-    from cli.grade.marks import METHOD, mark_all, read_students, tables
+    from cli.grade.answers import read_students
+    from cli.grade.marks import METHOD, mark_all, tables
     from cli.show.result import Result
 
     exercise = read_exercise(options.file)
-    warnings: list[str] = []
-    students = read_students(exercise, options.answers, options.key, warnings)
+    students = read_students(exercise, options.answers, options.key)
     with workshop(exercise) as shop:
         marks = mark_all(exercise, shop, students)
     points = sum(mark.points for mark in marks)
@@ -49,5 +49,4 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
         notes=lambda: f"{exercise.title}: {len(students)} students, {points:g} of {of:g} points",
         method=METHOD,
         about={"title": f"Marks: {exercise.title}"},
-        warnings=warnings,
     )

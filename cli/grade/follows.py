@@ -6,15 +6,16 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from itertools import product
+from math import remainder
 
 import numpy as np
 
 from cli.exercise.description import Answer
 from cli.exercise.recomputed import Recomputed
-from cli.exercise.slips import WRONG, is_sum, way_of
-from cli.exercise.slips_of_rows import Range, carried, polar_range
+from cli.exercise.slips_of_rotors import Range, carried, polar_range
+from cli.exercise.slips_of_sums import WRONG, is_sum, way_of
 from cli.exercise.variants import Variant
-from dalembert.units import parted, unit_name
+from dalembert.units import parted
 
 Typed = Mapping[int, tuple[float, float]]
 """Of earlier questions by their number: the value typed, in the unit asked for, and half a unit of its last digit."""
@@ -77,8 +78,7 @@ class Follows:
         answer = self.variant.answers[k]
         if not answer.is_angle:
             return one - other
-        turn = 360.0 if unit_name(answer.unit) == "deg" else 2 * np.pi
-        return (one - other + turn / 2) % turn - turn / 2
+        return remainder(one - other, answer.turn)
 
     def _vector(self, k: int) -> tuple[str, str]:
         """What the number is a part of: size and angle, or the components, are one answer."""
@@ -210,8 +210,7 @@ def _trim(variant: Variant, k: int, typed: Typed, wrong: frozenset[int]) -> Rang
         if _name(its) in ("mass", "unbalance"):
             sizes, there = [end * abs(correction) / its.value for end in ends], there or j in wrong
         elif _name(its) == "angle":
-            unit = np.pi / 180 if unit_name(its.unit) == "deg" else 1.0
-            turns, there = [end * unit for end in ends], there or j in wrong
+            turns, there = [end * 2 * np.pi / its.turn for end in ends], there or j in wrong
     if not there:
         return None
     made = np.array([right - correction + s * np.exp(1j * t) for s, t in product(sizes, turns)])

@@ -1,188 +1,29 @@
-"""The answers of students as they typed them, the mark of each, and the tables of them."""
+"""The marks of the answers to an exercise: verdicts, likely mistakes, and the tables of them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
-from math import pi
-from pathlib import Path
 
-from cli.exercise.description import Answer, Ask, Exercise, Value, value_of
+from cli.exercise.description import Answer, Exercise
 from cli.exercise.recomputed import Recomputed, candidates
 from cli.exercise.slips import Candidates
 from cli.exercise.solving import Workshop
 from cli.exercise.variants import Variant
+from cli.grade.answers import Student, scale_of
 from cli.grade.follows import Follows
 from dalembert.errors import DataError, quote
 from dalembert.figures import Right, Typed, typed
-from dalembert.quantities import is_number
 from dalembert.results.columns import Table, names
-from dalembert.tables.table import Table as ReadTable
-from dalembert.tables.table import read
-from dalembert.units import composed
-
-
-@dataclass(eq=False, repr=False)
-class Student:
-    """A student: what was drawn, what was answered."""
-
-    name: str
-    others: dict[str, str] = field(default_factory=dict)
-    drawn: dict[str, Value] = field(default_factory=dict)
-    given: dict[int, tuple[str, str]] = field(default_factory=dict)
-    """Question -> the answer and its unit as typed."""
-
-
-OWN = ("student", "quantity", "unit", "answer")
-KEY = ("value", "figures", "points")
-
-
-def read_students(exercise: Exercise, answers: str, key: str | None, warnings: list[str]) -> list[Student]:
-    """Read the answers and the key.
-
-    Raises
-    ------
-    DataError
-        A column that is missing, a student or a question that is none, an answer that stands twice.
-    """
-    table = read(answers, texts=None)
-    columns = _columns(table, ("student", "quantity", "answer"))
-    students = _keyed(exercise, answers, key)
-    listed = students is not None
-    people: dict[str, Student] = students or {}
-    keys = [key for key in exercise.keys if key in columns]
-    unknown = _of_key(exercise) if listed else set()
-    others = [name for name in columns if name not in (*OWN, *exercise.keys, *unknown)]
-    for row, name in enumerate(columns["student"]):
-        if not name:
-            raise table.error(row, "student", name, "a student")
-        if listed and name not in people:
-            raise table.error(row, "student", name, f"a student of the key: {_some(people)}")
-        student = people.setdefault(name, Student(name))
-        for other in others:
-            student.others.setdefault(other, columns[other][row])
-        k = _question(exercise, table, row, columns, keys)
-        if k in student.given:
-            raise table.error(
-                row, "quantity", columns["quantity"][row], f"each question once (student {name})"
-            )
-        unit = columns["unit"][row] if "unit" in columns else ""
-        student.given[k] = (columns["answer"][row], unit)
-    return list(people.values())
-
-
-def _columns(table: ReadTable, needed: Sequence[str]) -> dict[str, list[str]]:
-    columns = {}
-    for name, cells in table.texts.items():
-        low = name.strip().lower()
-        columns[low if low in (*OWN, *KEY) else name] = cells
-    for name in needed:
-        if name not in columns:
-            raise DataError(f"{table.file}: no column {name}: expected one, found {', '.join(table.texts)}")
-    return columns
-
-
-def _of_key(exercise: Exercise) -> set[str]:
-    """The columns that a key has besides: where the key itself is handed in, they are no names."""
-    return {*KEY, *(draw.name for draw in exercise.draws)}
-
-
-def _some(names: Mapping[str, object]) -> str:
-    listed = list(names)
-    return ", ".join(listed[:6]) + (f" and {len(listed) - 6} more" if len(listed) > 6 else "")
-
-
-def _keyed(exercise: Exercise, answers: str, key: str | None) -> dict[str, Student] | None:
-    """Return the students of the key; None where there is no key and none is needed."""
-    path = key
-    if path is None:
-        beside = Path(answers).with_name("key.csv")
-        path = str(beside) if answers != "-" and beside.is_file() else None
-    if path is None:
-        if exercise.draws:
-            raise DataError(
-                f"{answers}: no key.csv beside it: expected --key key.csv with the numbers of each student, as "
-                "dalembert exercise wrote it"
-            )
-        return None
-    table = read(path, texts=None)
-    columns = _columns(table, ("student",))
-    for draw in exercise.draws:
-        if draw.name not in columns:
-            raise DataError(
-                f"{path}: no column {draw.name}: expected the numbers of [draw], as dalembert exercise wrote them"
-            )
-    people: dict[str, Student] = {}
-    for row, name in enumerate(columns["student"]):
-        drawn = {}
-        for draw in exercise.draws:
-            value = value_of(columns[draw.name][row])
-            if value is None:
-                raise table.error(row, draw.name, columns[draw.name][row], "a number with its unit")
-            drawn[draw.name] = value
-        if people.setdefault(name, Student(name, drawn=drawn)).drawn != drawn:
-            raise table.error(
-                row,
-                exercise.draws[0].name,
-                columns[exercise.draws[0].name][row],
-                f"the same numbers in all rows of student {name}",
-            )
-    return people
-
-
-def _question(
-    exercise: Exercise, table: ReadTable, row: int, columns: Mapping[str, list[str]], keys: Sequence[str]
-) -> int:
-    """Return which question a row answers."""
-    quantity = columns["quantity"][row]
-    there = [k for k, ask in enumerate(exercise.asks) if ask.quantity.lower() == quantity.lower()]
-    if not there:
-        expected = ", ".join(dict.fromkeys(ask.quantity for ask in exercise.asks))
-        raise table.error(row, "quantity", quantity, f"a quantity that is asked for: {expected}")
-    fitting = [k for k in there if all(_same(exercise.asks[k], key, columns[key][row]) for key in keys)]
-    if len(fitting) == 1:
-        return fitting[0]
-    missing = [key for key in exercise.keys if key not in keys]
-    if not fitting:
-        cells = ", ".join(f"{key} {quote(columns[key][row])}" for key in keys)
-        expected = "; ".join(_where(exercise.asks[k]) for k in there)
-        raise table.error(
-            row, keys[0], columns[keys[0]][row], f"a row that is asked for ({expected}); found {cells}"
-        )
-    raise DataError(
-        f"{table.file}: no column {', '.join(missing)}: expected {'it' if len(missing) == 1 else 'them'}, as "
-        f"{len(fitting)} questions ask for {quantity}"
-    )
-
-
-def _where(ask: Ask) -> str:
-    return ", ".join(f"{key} {text}" for key, text in ask.where.items()) or "no key"
-
-
-def _same(ask: Ask, key: str, cell: str) -> bool:
-    wanted = ask.where.get(key, "")
-    if cell == wanted:
-        return True
-    cell = cell.replace(",", ".")
-    return (
-        is_number(cell)
-        and is_number(wanted)
-        and abs(float(cell) - float(wanted)) <= 1e-9 * max(1.0, abs(float(wanted)))
-    )
-
 
 SHARES = {"right": Fraction(1), "carried": Fraction(1), "rounding": Fraction(1, 2), "figures": Fraction(1, 2)}
 """Share of the points, by verdict."""
 MOST_POWER = 60
 """No answer has a larger power of ten, up or down."""
 RANK = ("right", "rounding", "figures", "carried", "wrong")
-TURNS = {"deg": Decimal(360), "rad": Decimal("6.28318530717958647692528676655900576839")}
-JOINED = {"Nm": "N*m", "kNm": "kN*m", "Nmm": "N*mm", "mNm": "mN*m", "kgm": "kg*m", "gmm": "g*mm", "kgmm": "kg*mm", "kgm2": "kg*m2",
-          "kgm²": "kg*m2", "degree": "deg", "degrees": "deg", "º": "deg", "rads": "rad", "radians": "rad"}  # fmt: skip
-"""Units as people run them together."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -315,42 +156,14 @@ class Judge:
         return min(reading.half, float(Right(answer.value, answer.ask.figures).unit) / 2)
 
 
-def scale_of(unit: str, unit_of_question: str) -> Fraction | None:
-    """Return a unit in another one, 1 kJ = 1000 J; None where they do not measure the same.
-
-    >>> scale_of("kJ", "J"), scale_of("Nm", "N_m"), scale_of("kg", "N_m"), scale_of("", "")
-    (Fraction(1000, 1), Fraction(1, 1), None, Fraction(1, 1))
-    """
-    if unit == unit_of_question or not unit_of_question:
-        return Fraction(1) if unit == unit_of_question or not unit else None
-    unit = JOINED.get(unit, unit)
-    own, wanted = _measure(unit), _measure(unit_of_question)
-    if own is None or wanted is None or own[1] != wanted[1]:
-        return None
-    return own[0] / wanted[0]
-
-
-def _measure(unit: str) -> tuple[Fraction, object] | None:
-    scale = composed(unit)
-    if scale is None and unit[:1] in "kM" and unit[1:]:
-        # kJ, MW: a thousand or a million of a unit that is known
-        bare = composed(unit[1:])
-        if bare is not None:
-            (n, d), exponents = bare
-            return Fraction(n) / Fraction(d) * (1000 if unit[0] == "k" else 10**6), exponents
-    if scale is None:
-        return None
-    (n, d), exponents = scale
-    return Fraction(n) / Fraction(d), exponents
-
-
 def judge(answer: Answer, number: Typed, scale: Fraction) -> str:
     """Judge a number in its own unit; an angle counts modulo a turn."""
     right = Right(Fraction(answer.value) / scale, answer.ask.figures)
     verdict = right.verdict(number)
     if verdict == "right" or not answer.is_angle:
         return verdict
-    turn = Decimal(360) if _is_degrees(answer, scale) else TURNS["rad"]
+    own = Fraction(answer.turn) / scale
+    turn = Decimal(own.numerator) / own.denominator
     turns = ((right.value - number.value) / turn).to_integral_value()
     verdicts = [verdict, right.verdict(Typed(number.value + turns * turn))]
     if turns:
@@ -360,14 +173,6 @@ def judge(answer: Answer, number: Typed, scale: Fraction) -> str:
             else "wrong"
         )
     return min(verdicts, key=RANK.index)
-
-
-def _is_degrees(answer: Answer, scale: Fraction) -> bool:
-    """Whether a number of an angle is in degrees."""
-    size = composed(answer.unit)
-    assert size is not None
-    (n, d), _ = size
-    return abs(float(scale) * n / d - pi / 180) < 1e-9
 
 
 def mark_all(exercise: Exercise, shop: Workshop, students: Sequence[Student]) -> list[Mark]:
@@ -417,7 +222,7 @@ def marks_table(exercise: Exercise, students: Sequence[Student], marks: Sequence
     columns = [
         names("student", [mark.student.name for mark in marks]),
         *(names(other, [mark.student.others.get(other) for mark in marks]) for other in _others(students)),
-        *(names(key, [mark.answer.ask.where.get(key) for mark in marks]) for key in keys),
+        *(names(header, [mark.answer.ask.where.get(key) for mark in marks]) for key, header in keys.items()),
         names("quantity", [mark.answer.ask.quantity for mark in marks]),
         names("unit", [mark.answer.unit for mark in marks]),
         names("given", [mark.given for mark in marks]),
@@ -427,7 +232,7 @@ def marks_table(exercise: Exercise, students: Sequence[Student], marks: Sequence
         names("points", [mark.points for mark in marks]),
         names("mistake", [mark.mistake for mark in marks]),
     ]
-    return Table(columns, ["student", *keys, "quantity"], "marks[]")
+    return Table(columns, ["student", *keys.values(), "quantity"], "marks[]")
 
 
 def totals(exercise: Exercise, students: Sequence[Student], marks: Sequence[Mark]) -> Table:

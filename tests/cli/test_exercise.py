@@ -123,6 +123,16 @@ def test_a_roster_names_the_sheets_and_keeps_its_columns(dalembert: Dalembert, f
     ]
 
 
+@pytest.mark.parametrize("name", ["quantity", "Answer", "plane", "points", "rotor.csv:W1.weight_N"])
+def test_a_roster_has_no_column_of_the_answers(dalembert: Dalembert, folder: Path, name: str) -> None:
+    """Two columns of one name could not be read again."""
+    (folder / "class.csv").write_text(f"student,{name}\n1,2\n")
+    done = dalembert("exercise", "e.toml", "--students", "class.csv", "-o", "out")
+    assert done.returncode == 1
+    assert f"class.csv: column {name}: " in done.stderr
+    assert not (folder / "out").exists()
+
+
 def test_variants_keep_away_from_what_cannot_be_assembled(dalembert: Dalembert, folder: Path) -> None:
     (folder / "bar.toml").write_text(
         '[units]\nlength = "mm"\nangle = "deg"\n[ground]\nA = [0, 0]\nD = [300, 0]\n[links.crank]\npoints = { A = [0, 0], B = [100, 0] }\n'
@@ -233,6 +243,111 @@ def test_a_bad_exercise_is_one_line_and_writes_nothing(
     for part in said:
         assert part in done.stderr
     assert {path.name for path in folder.iterdir()} == {"rotor.csv", "e.toml"}
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        "--help",
+        "-h",
+        "-ox.csv",
+        "--output=x.csv",
+        "--plot=x.png",
+        "--json",
+        "--save-influence=x.csv",
+        "--steps",
+    ],
+)
+def test_a_command_that_shows_or_writes_is_refused(dalembert: Dalembert, folder: Path, option: str) -> None:
+    (folder / "e.toml").write_text(EXERCISE.replace("--gravity 10", f"--gravity 10 {option}"))
+    done = dalembert("exercise", "e.toml", "-o", "out")
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert f"key command: found '{option.partition('=')[0]}'" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "balance --gravity 10 --plane A:0mm:20mm --plane B:90mm:20mm rotor.csv",
+        "balance rotor.csv --gravity=10 --plane=A:0mm:20mm --plane=B:90mm:20mm",
+        "balance --planes=planes.csv --gravity=10 rotor.csv",
+        "dalembert balance rotor.csv --planes planes.csv --gravity 10",
+    ],
+)
+def test_the_order_of_a_commands_words_does_not_matter(
+    dalembert: Dalembert, folder: Path, command: str
+) -> None:
+    (folder / "planes.csv").write_text("plane,z_mm,radius_mm\nA,0,20\nB,90,20\n")
+    asks = '[[ask]]\nquantity = "mass_kg"\nwhere = { plane = "B" }\n'
+    (folder / "e.toml").write_text(f'command = "{command}"\n{asks}')
+    done = dalembert("exercise", "e.toml", "-o", "out")
+    assert done.returncode == 0, done.stderr
+    assert [row["answer"] for row in rows(folder / "out" / "key.csv")] == ["8.37"]
+    # W1 with the other sign: (−90·30·20·e^{i60°} + 60·50·65·e^{i210°})/(90·20·10), found among the slips of the rotor
+    (folder / "a.csv").write_text("student,plane,quantity,answer\n1,B,mass_kg,13.515\n")
+    done = dalembert("grade", "e.toml", "a.csv", "--json")
+    (mark,) = json.loads(done.stdout)["marks"]
+    assert mark["mistake"] == "the term of W1 has the wrong sign", done.stderr
+
+
+def test_a_radius_that_is_sought(dalembert: Dalembert, folder: Path) -> None:
+    """m·r = 8.371 kg · 20 mm = 8 kg · 20.93 mm."""
+    command = "balance rotor.csv --gravity 10 --plane A:0mm:? --plane B:90mm:? --mass A:7kg --mass B:8kg"
+    ask = '[[ask]]\nquantity = "radius_mm"\nwhere = { plane = "B" }\n'
+    (folder / "e.toml").write_text(f'command = "{command}"\n{ask}')
+    done = dalembert("exercise", "e.toml", "-o", "out")
+    assert done.returncode == 0, done.stderr
+    assert [row["answer"] for row in rows(folder / "out" / "key.csv")] == ["20.9"]
+
+
+PENDULUM = """
+gravity = [0, -9.81]
+[ground]
+O = [0, 0]
+[links.rod]
+points = { O = [0, 0] }
+mass = 2
+center = [0.5, 0]
+inertia = 0.1
+[input]
+link = "rod"
+angle = "-90 deg"
+"""
+
+
+def test_rows_without_a_key_and_a_key_that_is_called_quantity(dalembert: Dalembert, tmp_path: Path) -> None:
+    """A compound pendulum: T = 2π √((I + m·r²)/(m·g·r)); its mobility is a row of a table that has a column quantity."""
+    (tmp_path / "p.toml").write_text(PENDULUM)
+    period = f"{2 * math.pi * math.sqrt(0.6 / 9.81):.3g}"
+    for command, quantity, where, answer in (
+        ("equilibrium", "period_s", 'stable = "true"', period),
+        ("inspect", "value", 'quantity = "mobility"', "1.00"),
+    ):
+        (tmp_path / "e.toml").write_text(
+            f'command = "{command} p.toml"\n[[ask]]\nquantity = "{quantity}"\nwhere = {{ {where} }}\n'
+        )
+        done = dalembert("exercise", "e.toml", "-o", command)
+        assert done.returncode == 0, done.stderr
+        (row,) = rows(tmp_path / command / "key.csv")
+        assert (row["quantity"], row["answer"]) == (quantity, answer)
+        done = dalembert("grade", "e.toml", f"{command}/key.csv", "--json")
+        assert [mark["verdict"] for mark in json.loads(done.stdout)["marks"]] == ["right"], done.stderr
+    assert row["row_quantity"] == "mobility"
+
+
+def test_a_zero_that_computing_has_moved_is_zero(dalembert: Dalembert, tmp_path: Path) -> None:
+    """The torque that holds the hanging pendulum is m·g·r·cos(−90°), which computing makes 6e-16."""
+    (tmp_path / "p.toml").write_text(PENDULUM)
+    ask = '[[ask]]\nquantity = "input_torque_N_m"\n'
+    for angle, zero in (("-90deg", True), ("-89.99999999deg", False)):
+        (tmp_path / "e.toml").write_text(f'command = "forces p.toml --at {angle}"\n{ask}')
+        assert dalembert("exercise", "e.toml", "-o", angle).returncode == 0
+        (row,) = rows(tmp_path / angle / "key.csv")
+        assert (float(row["value"]) == 0) is zero
+    (tmp_path / "a.csv").write_text("student,quantity,answer\n1,input_torque_N_m,0\n")
+    (tmp_path / "e.toml").write_text(f'command = "forces p.toml --at -90deg"\n{ask}')
+    done = dalembert("grade", "e.toml", "a.csv", "--json")
+    assert [mark["verdict"] for mark in json.loads(done.stdout)["marks"]] == ["right"]
 
 
 def test_a_row_of_the_table_that_is_too_short(dalembert: Dalembert, folder: Path) -> None:

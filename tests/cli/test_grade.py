@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from cli.grade.answers import scale_of
 from tests.cli.test_exercise import EXERCISE, ROTOR
 from tests.conftest import Dalembert
 
@@ -241,3 +242,17 @@ def test_an_answer_in_its_own_unit_counts_as_in_the_other(dalembert: Dalembert, 
     )
     verdicts = [mark["verdict"] for mark in marks(dalembert, "w.toml", "a.csv")]
     assert verdicts == ["right", "right", "right", "right", "rounding", "right"]
+
+
+@pytest.mark.parametrize(
+    ("unit", "question", "scale"),
+    [
+        ("Nm", "N_m", 1), ("N-m", "N_m", 1), ("kNm", "N_m", 1000), ("Ncm", "N_m", 0.01), ("MNm", "N_m", 1e6), ("J", "N_m", 1),
+        ("m·s⁻¹", "m_s", 1), ("rad s⁻²", "rad_s2", 1), ("1/s", "rad_s", 1), ("s^-2", "rad_s2", 1), ("1/s", "m_s", None),
+        ("rad/sec", "rad_s", 1), ("RPM", "rpm", 1), ("Kg", "kg", 1), ("KG", "g", 1000), ("kgm²/s", "kg_m2_s", 1), ("gmm", "kg_m", 1e-6),
+        ("g-mm", "kg_m", 1e-6), ("oz-in", "oz_in", 1), ("Nm/s", "W", 1), ("degrees", "deg", 1), ("kg", "N", None), ("ft-lb", "N_m", None),
+    ],
+)  # fmt: skip
+def test_units_as_people_spell_them(unit: str, question: str, scale: float | None) -> None:
+    found = scale_of(unit, question)
+    assert (None if found is None else float(found)) == scale

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import json
 import random
 import re
 from pathlib import Path
@@ -219,3 +221,71 @@ def test_right_answers_have_no_mistake(questions: list[Candidates]) -> None:
                 Right(own.answer.value, own.answer.ask.figures).verdict(typed(written(slip.value, 12))[0])
                 != "right"
             )
+
+
+ROD = "part,shape,mass_kg,length_m,x_m\nrod,rod,4,1,0.1\n"
+FAN = "run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n0,1,3.4,116,,,\n1,1,1.8,42,A,2,30\n"
+SLIPPED = [
+    # the same command with the slip in it: exercise, question, row, slipped command, slipped table, what is named
+    ("body", ROD, "body t.csv --shaft=-500mm:500mm --speed 60rpm --gravity 0,-10,0", "bearing1_static_N", "axis=y", ("--gravity 0,-10,0", "--gravity 0,-9.81,0"), (), "g = 9.81 in place of 10"),
+    ("body", ROD, "body t.csv --shaft=-500mm:500mm --speed 60rpm --gravity 0,-9.81,0", "bearing1_static_N", "axis=y", ("--gravity 0,-9.81,0", "--gravity 0,-1,0"), (), "the mass in place of the weight"),
+    ("body", ROD, "body t.csv --shaft=-500mm:500mm --speed 60rpm", "bearing1_dynamic_N", "axis=x", ("60rpm", "60rad_s"), (), "rpm taken for rad/s"),
+    ("trial", "", "trial --rotor-mass 120kg --speed 1480rpm --radius 350mm", "mass_g", "", ("350mm", "700mm"), (), "the diameter in place of the radius"),
+    ("place", "", "place 83.5g@40deg --blades 3", "mass_g", "position=2", ("40deg", "40rad"), (), "40deg: degrees taken as radians"),
+    ("place", "", "place 83.5g@40deg --blades 3", "mass_g", "position=2", ("40deg", "50deg"), (), "40deg: sine in place of cosine"),
+    ("index", READINGS, "index t.csv", "amplitude_um", "part=rotor", ("t.csv", "t.csv --phase-lag"), (), "the phase is counted the other way"),
+    ("field", FAN, "field t.csv", "angle_deg", "", ("t.csv", "t.csv --phase-lag"), (), "the phase is counted the other way"),
+    ("field", FAN, "field t.csv", "angle_deg", "", (), ("A,2,30", "A,2,-30"), "trial angle of run 1: counted the other way"),
+    ("engine", CYLINDERS, "engine t.csv --speed 3000rpm", "force_max_N", "order=1", (), (",40,", ",80,"), "throw: the stroke in its place"),
+    ("engine", CYLINDERS, "engine t.csv --speed 3000rpm", "force_max_N", "order=1", (), ("0.6,", "0,"), "reciprocating of cylinder 2: left out"),
+    ("flywheel", TORQUE, "flywheel t.csv --speed 600rpm --fluctuation 0.02", "mean_torque_N_m", "", (), ("150,-80", "150,0"), "torque of row 3: left out"),
+    ("balance", ROTOR, "balance t.csv --plane A:0mm:20mm --plane B:90mm:20mm", "mass_kg", "plane=B", (), ("60,20", "3437.7467707849396,20", "210,", "12032.113697747288,"), "the angles of the masses: degrees taken as radians"),
+    ("balance", ROTOR, "balance t.csv --plane A:0mm:20mm --plane B:90mm:20mm", "mass_kg", "plane=A", (), ("90,30", "90,60", "60,50", "60,100"), "the diameters of the masses in place of their radii"),
+    ("balance", ROTOR.replace("60,20", "-60,20"), "balance t.csv --plane A:0mm:20mm --plane B:90mm:20mm", "angle_deg", "plane=A", (), ("-60,20", "-3437.7467707849396,20"), "the angle of W1: degrees taken as radians"),
+    ("forces", SLIDER, "forces t.toml", "B_ground_on_piston_fy_N", "", ("t.toml", "t.toml --set gravity.y=-1"), (), "the mass in place of the weight"),
+    ("forces", SLIDER, "forces t.toml --at 50deg", "input_torque_N_m", "", ("50deg", "50rad"), (), "50deg: degrees taken as radians"),
+    ("forces", SLIDER, "forces t.toml --at 50deg", "input_torque_N_m", "", ("50deg", "50deg --branch 2"), (), "the other assembly"),
+    ("forces", SLIDER.replace("140 rad/s", "1400 rpm"), "forces t.toml", "input_torque_N_m", "", ("t.toml", "t.toml --set input.speed=1400rad_s"), (), "input.speed: rpm taken for rad/s"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("command", "table", "words", "quantity", "where", "other", "cells", "named"), SLIPPED, ids=lambda each: str(each)[:12]
+)  # fmt: skip
+def test_the_command_with_a_slip_in_it(
+    dalembert: Dalembert, tmp_path: Path, command: str, table: str, words: str, quantity: str, where: str,
+    other: tuple[str, str], cells: tuple[str, ...], named: str,
+) -> None:  # fmt: skip
+    """What the command itself makes of the slip is answered, and the slip is named."""
+    file = tmp_path / ("t.toml" if ".toml" in words else "t.csv")
+    key, _, name = where.partition("=")
+    slipped = table
+    for old, new in zip(cells[::2], cells[1::2], strict=True):
+        assert old in slipped
+        slipped = slipped.replace(old, new)
+    file.write_text(slipped)
+    done = dalembert(*(words.replace(*other) if other else words).split())
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader(done.stdout.splitlines()))
+    (value,) = (row[quantity] for row in rows if not key or row[key] == name)
+    file.write_text(table)
+    row = f'where = {{ {key} = "{name}" }}\n' if key else ""
+    (tmp_path / "e.toml").write_text(
+        f'command = "{words}"\n[[ask]]\nquantity = "{quantity}"\n{row}figures = 4\n'
+    )
+    head = f"student,{key}{',' if key else ''}quantity,answer\n"
+    (tmp_path / "a.csv").write_text(
+        f"{head}1,{name}{',' if key else ''}{quantity},{written(float(value), 4)}\n"
+    )
+    (mark,) = json.loads(dalembert("grade", "e.toml", "a.csv", "--json").stdout)["marks"]
+    assert (mark["verdict"], mark["mistake"]) == ("wrong", named)
+
+
+def test_zero_and_a_single_figure_tell_nothing(questions: list[Candidates]) -> None:
+    """But for what a slip makes exactly."""
+    for own in questions:
+        assert own.name(typed("0")[0]) is None
+        for digit in range(1, 10):
+            answer = typed(f"{digit}e{typed(written(own.answer.value, 1))[0].value.adjusted()}")[0]
+            exact = [slip for slip in own.wrong if abs(slip.value - float(answer.value)) < 1e-8]
+            assert (own.name(answer) is not None) == bool(exact)

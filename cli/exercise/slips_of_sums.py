@@ -1,0 +1,287 @@
+"""Slips where an answer is a sum: of the parts of a motion, of the products of a momentum, of the loads, of their powers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from decimal import Decimal
+from typing import Any, NamedTuple
+
+from cli.exercise.description import Answer, Value, same
+from cli.exercise.slips import Change, Pairs, Slip, of_sum, other_gravities
+from cli.exercise.solving import Problem
+from cli.exercise.variants import Variant
+from dalembert.results.way import figures
+from dalembert.units import parted
+
+AXES = "xyz"
+PARTS = {
+    "v": {"base_velocity_m_s": "velocity of {base}", "turning_velocity_m_s": "part ω × R", "relative_velocity_m_s": "relative velocity"},
+    "a": {
+        "base_m_s2": "acceleration of {base}",
+        "tangential_m_s2": "tangential part α × R",
+        "normal_m_s2": "normal part ω²·R",
+        "relative_m_s2": "relative acceleration",
+        "coriolis_m_s2": "Coriolis part 2ω × V_rel",
+    },
+}  # fmt: skip
+"""What the parts of a point's velocity and acceleration are called."""
+
+
+class Part(NamedTuple):
+    """A part of a velocity, an acceleration or a momentum."""
+
+    name: str
+    value: float
+
+
+def way_of(variant: Variant) -> Sequence[Mapping[str, Any]]:
+    """Return the worked solution as JSON has it; empty where the command has none."""
+    way: Any = variant.worked.document.get("way")
+    return way or ()
+
+
+def of_motion(variant: Variant, number: int) -> tuple[list[Slip], Callable[[], Pairs | None]]:
+    """Return the slips of an answer that is a sum of such parts, and pairs of them; none of any other answer."""
+    answer = variant.answers[number]
+    parts = [part for part in _parts(variant, answer) if part.value]
+    total = sum(part.value for part in parts)
+    if len(parts) < 2 or not total:
+        return [], lambda: None
+    changes = [change for k, part in enumerate(parts) for change in _part_changes(k, part)]
+    factor = answer.value / total
+    return of_sum(answer, changes, complex(total), lambda sums: sums.real * factor)
+
+
+def _part_changes(k: int, part: Part) -> Iterator[Change]:
+    """What can go wrong with a part."""
+    yield Change(k, f"the {part.name} has the wrong sign", -2 * part.value, is_sign=True)
+    yield Change(k, f"the {part.name} is left out", -part.value)
+    if part.name.startswith("Coriolis"):
+        yield Change(k, f"the {part.name} lacks its factor 2", -part.value / 2)
+    yield Change(k, f"the {part.name} is ten times too large", 9 * part.value)
+    yield Change(k, f"the {part.name} is ten times too small", -0.9 * part.value)
+
+
+def _parts(variant: Variant, answer: Answer) -> Sequence[Part]:
+    command = variant.problem.exercise.command[0]
+    name = parted(answer.ask.quantity, further=("kg_m2_s", "J"))[0]
+    if command in ("mechanism", "forces"):
+        return _of_point(variant, name, answer.ask.where)
+    if command == "body" and answer.ask.where.get("axis", "x") in AXES:
+        return _of_body(variant, name, AXES.index(answer.ask.where.get("axis", "x")))
+    return ()
+
+
+def _topic(variant: Variant, name: str) -> Mapping[str, Any]:
+    return next((topic for topic in way_of(variant) if topic.get("topic") == name), {})
+
+
+def _of_point(variant: Variant, name: str, where: Mapping[str, str]) -> Sequence[Part]:
+    """The parts of a point's velocity or acceleration along an axis, in the pose that is asked for."""
+    match = re.fullmatch(r"(.+)_([va])([xy])", name)
+    if match is None:
+        return ()
+    point, kind, axis = match.groups()
+    topic = _topic(variant, "parts")
+    pose = _instant(topic["poses"], where) if "poses" in topic else topic
+    every = [entry for entry in pose.get("points", ()) if entry["point"] == point]
+    # a point of several links has its parts on each: of the last, which the others lead to
+    if not every:
+        return ()
+    entry = every[-1]
+    base = entry.get("from") or "the base"
+    return [
+        Part(text.format(base=base), float(entry[key][AXES.index(axis)]))
+        for key, text in PARTS[kind].items()
+        if entry.get(key) is not None
+    ]
+
+
+def _of_body(variant: Variant, name: str, k: int) -> Sequence[Part]:
+    """The products in a component of H = I·ω and of Ḣ = (Ḣ)rel + Ω × H."""
+    momentum, rate = _topic(variant, "momentum"), _topic(variant, "rate of momentum")
+    if not momentum:
+        return ()
+    omega, tensor, h = momentum["omega_rad_s"], momentum["inertia_kg_m2"], momentum["momentum_kg_m2_s"]
+    if name == "momentum":
+        return [Part(f"term I_{AXES[k]}{a}·ω_{a}", tensor[k][j] * omega[j]) for j, a in enumerate(AXES)]
+    if name in ("momentum_rate", "inertia_moment"):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        frame = rate["frame_omega_rad_s"]
+        return [
+            Part("relative rate (Ḣ)rel", rate["relative_N_m"][k]),
+            Part(f"term Ω_{AXES[i]}·H_{AXES[j]}", frame[i] * h[j]),
+            Part(f"term Ω_{AXES[j]}·H_{AXES[i]}", -frame[j] * h[i]),
+        ]
+    return ()
+
+
+Values = Sequence[float | None]
+LINEAR = re.compile(r"(_f[xy]|_moment|_contact_force|(^|_)input_(torque|force))$")
+"""Of the columns of `dalembert forces`: a sum over the loads."""
+WRONG = {
+    "has the wrong sign": -2.0,
+    "is left out": -1.0,
+    "is ten times too small": -0.9,
+    "is ten times too large": 9.0,
+}
+"""How often a load's part is added to the answer by a slip."""
+LOAD = re.compile(r"(?:forces\.(\d+)\.force|torques\.(\d+)\.torque)(?:\.[xy])?")
+
+
+class Load(NamedTuple):
+    """A load, and its part in every answer; None where it has none that can be told."""
+
+    name: str
+    parts: Values
+
+
+def loads(variant: Variant, run: Callable[[Problem], Values | None]) -> list[Load]:
+    """The loads of a mechanism with forces; none with friction, where the forces are no sums.
+
+    `run`: the answers of a problem; None where it has none.
+    """
+    problem = variant.problem
+    shop = problem.workshop
+    if problem.exercise.command[0] != "forces" or shop.mechanism is None or shop.described.mechanism.friction:
+        return []
+    whole = [answer.value for answer in variant.answers]
+    described = shop.described.mechanism
+    weightless = ["gravity.x", "gravity.y"] if described.gravity else []
+    result: list[Load] = []
+
+    def without(*paths: str) -> Values | None:
+        zero = {path: Value(Decimal(0), "") for path in paths}
+        return run(replace(problem, drawn={**problem.drawn, **zero}))
+
+    def add(name: str, more: Values | None, less: Values | None) -> None:
+        if more is not None and less is not None:
+            result.append(Load(name, _less(more, less)))
+
+    floating = without(*weightless) if weightless else whole
+    for link, own in described.links.items():
+        mass, inertia = f"links.{link}.mass", f"links.{link}.inertia"
+        if own.mass:
+            massless = without(mass, *weightless)
+            add(f"inertia force of link {link}", floating, massless)
+            if weightless and floating is not None and massless is not None:
+                add(f"weight of link {link}", _less(whole, without(mass)), _less(floating, massless))
+        if own.inertia:
+            add(f"inertia torque of link {link}", whole, without(inertia))
+    for name, paths in _applied(shop.dimensions).items():
+        add(name, whole, without(*paths))
+    return result
+
+
+def _applied(dimensions: Mapping[str, object]) -> dict[str, list[str]]:
+    """The paths of the applied forces and torques, by what they are called."""
+    paths: dict[str, list[str]] = {}
+    for path in dimensions:
+        match = LOAD.fullmatch(path)
+        if match is not None:
+            name = f"applied force {match[1]}" if match[1] else f"applied torque {match[2]}"
+            paths.setdefault(name, []).append(path)
+    return paths
+
+
+def _less(more: Values | None, less: Values | None) -> list[float | None]:
+    if more is None or less is None:
+        return []
+    return [None if a is None or b is None else a - b for a, b in zip(more, less, strict=True)]
+
+
+def of_loads(
+    answer: Answer, number: int, every: Sequence[Load]
+) -> tuple[list[Slip], Callable[[], Pairs | None]]:
+    """The slips of an answer that is a sum over the loads, and pairs of them."""
+    changes = [change for k, load in enumerate(every) for change in _load_changes(k, load, number)]
+    return of_sum(answer, changes, complex(answer.value), lambda sums: sums.real)
+
+
+def is_sum(answer: Answer) -> bool:
+    """Whether an answer is a sum over the loads."""
+    return LINEAR.search(parted(answer.ask.quantity)[0]) is not None
+
+
+def _load_changes(k: int, load: Load, number: int) -> Iterator[Change]:
+    part = load.parts[number] if load.parts else None
+    if part:
+        for text, times in WRONG.items():
+            yield Change(k, f"the {load.name} {text}", times * part, is_sign=times == -2.0)
+
+
+class Term(NamedTuple):
+    """A term of the ledger."""
+
+    name: str
+    power: float
+    is_weight: bool
+
+
+def of_ledger(variant: Variant, number: int) -> tuple[list[Slip], Callable[[], Pairs | None]]:
+    """Return the slips of an unknown load or effort, and pairs of them; none of any other answer, nor of several unknowns."""
+    answer = variant.answers[number]
+    terms = _ledger(variant, answer)
+    total = sum(term.power for term in terms)
+    if not total:
+        return [], lambda: None
+    # the answer is in proportion to the sum of the powers
+    factor = answer.value / total
+    changes = [change for k, term in enumerate(terms) for change in _term_changes(k, term)]
+    changes += _gravity(variant, terms)
+    return of_sum(answer, changes, complex(total), lambda sums: sums.real * factor)
+
+
+def _ledger(variant: Variant, answer: Answer) -> list[Term]:
+    """Return the terms of the instant that the question is about, where it has one unknown, which is asked for."""
+    command, asked, where = variant.problem.exercise.command[0], answer.ask.quantity, answer.ask.where
+    instant: Mapping[str, Any] = {}
+    if command == "work" and asked.startswith(("torque", "fx", "fy")):
+        instant = _instant(variant.solved.document.get("steps"), where)
+    if command == "forces" and asked.startswith(("input_torque", "input_force", "virtual_work")):
+        instant = _instant(_topic(variant, "ledger").get("poses"), where)
+    terms, unknown = [], []
+    for entry in instant.get("terms", ()):
+        if entry["kind"] == "unknown":
+            unknown.append(float(entry["power_W"] or 0.0))
+        elif entry["power_W"] and not entry.get("workless"):
+            name = (
+                entry["kind"]
+                if entry["kind"] in ("spring", "damper", "friction")
+                else f"{entry['kind']} of link {entry['link']}"
+            )
+            terms.append(Term(name, float(entry["power_W"]), entry["kind"] == "weight"))
+    return terms if len(unknown) == 1 and unknown[0] else []
+
+
+def _instant(listed: Any, where: Mapping[str, str]) -> Mapping[str, Any]:
+    """Return the instant that the question names by its step or its input; the only one, where it names none."""
+    instants = [{"step": str(k), **each} for k, each in enumerate(listed or (), 1)]
+    for key in ("step", "input_deg", "input_m"):
+        if key in where:
+            instants = [each for each in instants if same(each.get(key), where[key])]
+    return instants[0] if len(instants) == 1 else {}
+
+
+def _term_changes(k: int, term: Term) -> Iterator[Change]:
+    """What can go wrong with a term."""
+    power = term.power
+    yield Change(k, f"the {term.name} has the wrong sign", -2 * power, is_sign=True)
+    yield Change(k, f"the {term.name} is left out", -power)
+    small = f"{figures(abs(power))} W taken as {figures(abs(power) / 10)} W"
+    large = f"{figures(abs(power))} W taken as {figures(abs(power) * 10)} W"
+    yield Change(k, f"the power of the {term.name} is ten times too small ({small})", -0.9 * power)
+    yield Change(k, f"the power of the {term.name} is ten times too large ({large})", 9 * power)
+
+
+def _gravity(variant: Variant, terms: Sequence[Term]) -> Iterator[Change]:
+    """Another g in all weights; their masses in place of the weights."""
+    weight = sum(term.power for term in terms if term.is_weight)
+    g = variant.problem.gravity
+    if weight and g:
+        # no term of its own: it goes together with any
+        for text, share in other_gravities(g):
+            yield Change(len(terms), text, weight * (share - 1))
+        yield Change(len(terms), "the mass in place of the weight", weight * (1 / g - 1))
