@@ -183,6 +183,10 @@ def _modes(recorder: Recorder, modal: Modal) -> list[Number]:
 
 
 def _left(static: Number, couple: Number, made: list[Number], arms: Real) -> Outputs:
-    """Return the residual unbalance and couple after the corrections."""
+    """Return the residual unbalance and couple after the corrections, and the sizes of their terms."""
+    outputs: Outputs = {}
     levers = [w * float(arm) for w, arm in zip(made, arms, strict=True)]
-    return {"left static": abs(sum(made, static)), "left couple": abs(sum(levers, couple))}
+    for name, terms, total in (("static", made, static), ("couple", levers, couple)):
+        outputs[f"left {name}"] = abs(sum(terms, total))
+        outputs[f"terms {name}"] = sum(map(abs, terms), 0.0)
+    return outputs

@@ -239,7 +239,6 @@ class Formulas:
             "size": float(m.size),
             "n": self.poses.n,
             "comesBack": bool(iterated and len(m.inputs) == 1 and self.assembly.track.whole),
-            "rates": [bool(np.any(rate)) for rate in self.poses.rates[0]],
             "toml": toml_template(m, list(self.dimensions)),
         }
 
@@ -332,6 +331,8 @@ class Formulas:
             "follows": m.guess.at is None,
             "paths": [paths.get(rate) for rate in RATES],
             "rates": rates,
+            # whether the file has any, be they zero
+            "rated": any(getattr(entry, rate) is not None for rate in RATES[1:]),
             "sweep": packed(self.poses.inputs[:, j]),
         }
 

@@ -14,7 +14,8 @@ from cli.balance.rotors import DIMENSIONS, Balancing
 from cli.show.picture import blank
 from dalembert.errors import DataError
 from dalembert.page.typed import spelled, units
-from dalembert.units import from_si, to_si
+from dalembert.quantities import decimal_to_si
+from dalembert.units import UNITS, from_si, to_si
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, FigureBase
@@ -179,7 +180,10 @@ def sheet(b: Balancing) -> Page:
             mine.append(name)
             for column in columns:
                 key = f"{rotor}/{name}.{column}" if several else f"{name}.{column}"
-                values[key] = float(read[column].si[i])
+                # as the page reads what is typed
+                number = read[column]
+                factor = UNITS[number.dimension][number.unit]
+                values[key] = decimal_to_si(repr(float(number.values[i])), factor)
         rows.append(mine)
     listed = ",\n".join(tapes)
     script = f"{engine()}\nconst tapes = [\n{listed}\n];\n"

@@ -72,19 +72,22 @@ solveSheet = () => {
     });
     set("static.unbalance", "static size");
     set("static.angle", "static angle", true);
-    set("residual.static", "left static");
+    // rounding of nothing is nothing, as in the program
+    const left = (name, from) => {
+      const [rest] = out.get(`left ${from}`);
+      answers.set(`${prefix(rotor)}residual.${name}`, rest > 1e-12 * out.get(`terms ${from}`)[0] ? out.get(`left ${from}`) : [0, 0]);
+    };
+    left("static", "static");
     if (sheet.couple) {
       set("couple.unbalance", "couple size");
       set("couple.angle", "couple angle", true);
       // of a plane whose place is not stated there is none
-      if (sheet.placed) set("residual.couple", "left couple");
+      if (sheet.placed) left("couple", "couple");
     }
     sheet.modes?.names.forEach((name, k) => {
       set(`mode ${name}.unbalance`, `mode ${k} size`);
       set(`mode ${name}.angle`, `mode ${k} angle`, true);
-      // rounding of nothing is nothing, as in the program
-      if (out.get(`left mode ${k}`)[0] > 1e-12 * out.get(`terms mode ${k}`)[0]) set(`residual.mode ${name}`, `left mode ${k}`);
-      else answers.set(`${prefix(rotor)}residual.mode ${name}`, [0, 0]);
+      left(`mode ${name}`, `mode ${k}`);
     });
     rotor.tolerance?.names.forEach((name, p) => answers.set(`${prefix(rotor)}tolerance.${name}`, before.get(`before ${p}`) ?? before.get(`plane ${p} size`)));
   }

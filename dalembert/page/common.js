@@ -20,11 +20,20 @@ function svgIn(host) {
 function sized(svg, width, height) {
   for (const [key, value] of Object.entries({ width, height, viewBox: `0 0 ${width} ${height}` })) svg.setAttribute(key, value);
 }
-// a picture of words made anew at every pose
+const LETTER = [3.4, 8]; // half a letter's width; half the height that a line of words keeps clear
+// the words of a picture, made anew at every pose, each where nothing stands so far
 function texts(parent) {
   const pool = [];
   let used = 0;
+  let [width, height] = [Infinity, Infinity];
+  let taken = []; // middles and half sides of what stands in the picture
+  const free = ([u, v, w, h]) => taken.every(([x, y, a, b]) => Math.abs(u - x) > w + a || Math.abs(v - y) > h + b);
   return {
+    begin(...size) {
+      [width, height] = size;
+      taken = [];
+    },
+    take: (u, v, w, h = w) => taken.push([u, v, w, h]),
     put(x, y, text, kind) {
       const one = pool[used] ?? (pool[used] = put(parent, "text"));
       used++;
@@ -33,11 +42,34 @@ function texts(parent) {
       one.setAttribute("class", kind);
       one.textContent = text;
     },
+    // in the first free one of some places, within the picture; where none is, in the first if it must be there, else nowhere
+    set(text, places, kind, must = false) {
+      const most = Math.floor((width - 3) / 2 / LETTER[0]);
+      if (text.length > most) text = `${text.slice(0, most - 1)}…`;
+      const [w, h] = [LETTER[0] * text.length + 1.5, LETTER[1]];
+      const boxes = places.map(([u, v]) => [Math.min(Math.max(u, w), width - w), Math.min(Math.max(v, h), height - h), w, h]);
+      const box = boxes.find(free) ?? (must ? boxes[0] : null);
+      if (!box) return;
+      taken.push(box);
+      this.put(box[0], box[1], text, kind);
+    },
     done() {
       while (pool.length > used) pool.pop().remove();
       used = 0;
     },
   };
+}
+// upwards where there is none
+const direction = ([x, y]) => (x || y ? [x / Math.hypot(x, y), y / Math.hypot(x, y)] : [0, -1]);
+// how far aside the middle of a word stands: a long one farther to the left or right
+const aside = (text, [du, dv], gap) => [du * (gap + Math.max(0, LETTER[0] * (text.length - 2))), dv * gap];
+// places of a word around a point, nearest to a direction first
+function around([u, v], [c, s], gaps, text) {
+  return gaps.flatMap((gap) => [0, 1, -1, 2, -2, 3, -3, 4].map((eighth) => {
+    const [p, q] = [Math.cos((eighth * Math.PI) / 4), Math.sin((eighth * Math.PI) / 4)];
+    const [du, dv] = aside(text, [c * p - s * q, c * q + s * p], gap);
+    return [u + du, v + dv];
+  }));
 }
 function arrow(x, y, dx, dy) {
   const length = Math.hypot(dx, dy);

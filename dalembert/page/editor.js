@@ -80,11 +80,10 @@ function whyNot() {
   if (!state.chosen) return state.given?.open ? TEXTS.openAtGuess(state.given.open) : TEXTS.impossible;
   if (Number.isFinite(state.closed[shown])) return "";
   const found = machine.short(state, shown);
-  return found ? TEXTS.short(found[0], lengthText(found[1])) : TEXTS.open;
+  return found && Number.isFinite(found[1]) ? TEXTS.short(found[0], lengthText(found[1])) : TEXTS.open;
 }
 function tell(text = "") {
   say(text || [...wrong.values()].join("; ") || whyNot());
-  missing.textContent = whyNot() || TEXTS.open;
 }
 let waiting = 0;
 function listLimits() {
@@ -148,10 +147,9 @@ put(panel, "p", { class: "soft" }, `${TEXTS.howTo} ${TEXTS.digits}`);
 const positive = new Set(["mass", "inertia"]);
 function change(name, x, text) {
   const kind = kindOf(name);
-  const refused = Number.isNaN(x) ? TEXTS.wrong(name, text, `${shortest(present(name), model.units[kind], unitOf(kind))} ${unitOf(kind)}`) : x < 0 && positive.has(kind) ? TEXTS.negative(name, text) : "";
-  if (refused) {
-    wrong.set(name, refused);
-  } else {
+  const why = refusal(name, x, text, `${shortest(present(name), model.units[kind], unitOf(kind))} ${unitOf(kind)}`, positive.has(kind));
+  if (why) wrong.set(name, why);
+  else {
     if (!wrong.delete(name) || !Object.is(present(name), x)) remember();
     put_({ [name]: x });
   }
@@ -169,7 +167,7 @@ function numberRow(body, name) {
   // from half to one and a half of the first number; of what is zero some part of the size
   const first = present(name);
   const span = kind === "angle" && inputNames.includes(name) ? Math.PI : Math.abs(first) / 2 || (kind === "length" ? model.size / 4 : kind === "angle" ? 0.5 : 1);
-  const low = positive.has(kind) || kind !== "length" ? (first || !positive.has(kind) ? first - span : 0) : first - span;
+  const low = positive.has(kind) && !first ? 0 : first - span;
   range.addEventListener("input", () => {
     if (!range.dataset.held) remember();
     range.dataset.held = "1";
@@ -182,13 +180,10 @@ function numberRow(body, name) {
   fields.set(name, { input, range, units, unit, place: (x) => Math.round((400 * (x - low)) / (2 * span)) });
 }
 function listFields() {
-  for (const [name, { input, range, units, unit, place }] of fields) {
-    if (input === document.activeElement || wrong.has(name)) continue;
-    const text = shortest(present(name), units, unit);
-    if (input.value !== text) input.value = text;
-    input.removeAttribute("aria-invalid");
-    range.value = place(present(name));
-    input.parentNode.classList.toggle("changed", machine.kinds.has(name) && !Object.is(numbers[name], machine.own[name]));
+  for (const [name, field] of fields) {
+    if (!refreshed(field, name, present(name))) continue;
+    field.range.value = field.place(present(name));
+    field.input.parentNode.classList.toggle("changed", machine.kinds.has(name) && !Object.is(numbers[name], machine.own[name]));
   }
   listUndo();
 }
@@ -201,16 +196,7 @@ for (const path of machine.kinds.keys()) {
 for (const [head, names] of groupsOf) {
   const box = put(panel, "details", head === TEXTS.inputs || names.length < 7 ? { open: "" } : {});
   put(box, "summary", {}, head);
-  // rows are made when they are looked at
-  const fillBox = () => {
-    if (box.dataset.made || !box.open) return;
-    box.dataset.made = "1";
-    for (const name of names) numberRow(box, name);
-    listFields();
-  };
-  box.addEventListener("toggle", fillBox);
   for (const name of names) numberRow(box, name);
-  box.dataset.made = "1";
 }
 
 // --- handles ----------------------------------------------------------------------------------------------------------------
@@ -297,10 +283,11 @@ drawHandles = (stands) => {
     const far = Math.hypot(...way);
     const gap = Math.min(20, far);
     if (far > 1) [u, v] = [u + (gap * way[0]) / far, v + (gap * way[1]) / far];
-    group.setAttribute("transform", `translate(${u.toFixed(1)} ${v.toFixed(1)})`);
     const seen = gripped && Number.isFinite(u + v);
     group.style.display = seen ? "" : "none";
-    if (seen) taken.push([u, v, 6, 6]);
+    if (!seen) continue;
+    group.setAttribute("transform", `translate(${u.toFixed(1)} ${v.toFixed(1)})`);
+    words.take(u, v, 6);
   }
 };
 toggle("h", TEXTS.handles, true, (on) => (gripped = on));
@@ -316,11 +303,12 @@ window.dalembert = {
     }
     remember();
     for (const [name, x] of Object.entries(changed)) {
-      wrong.delete(name);
-      const kind = kindOf(name);
-      if (typeof x !== "number" || !Number.isFinite(x) || (x < 0 && positive.has(kind))) {
-        wrong.set(name, TEXTS.wrong(name, String(x), ""));
-      } else put_({ [name]: x });
+      const why = refusal(name, x, String(x), "", positive.has(kindOf(name)));
+      if (why) wrong.set(name, why);
+      else {
+        wrong.delete(name);
+        put_({ [name]: x });
+      }
     }
     update();
     return Boolean(state.rows && Number.isFinite(state.closed[shown]));

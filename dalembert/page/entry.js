@@ -8,12 +8,29 @@ function typed(text, units, unit) {
   const [, sign, digits, power = "0", own] = found;
   const name = own === "" ? unit : Object.keys(units ?? {}).find((each) => plainUnit(each) === plainUnit(own));
   if (own !== "" && name === undefined) return NaN;
-  const mantissa = `${sign === "-" || sign === "−" ? "-" : ""}${digits.replace(",", ".")}`;
+  const minus = sign === "-" || sign === "−" ? -1 : 1;
+  const decimal = `${digits.replace(",", ".")}e${power}`;
   const [by, over] = units?.[name] ?? [1, 1];
-  if (name === "deg") return Number(`${mantissa}e${power}`) * (Math.PI / 180);
+  if (over === 1) return minus * Number(decimal) * by;
+  if (!Number.isInteger(by) || !Number.isInteger(over)) return minus * Number(decimal) * (by / over);
+  return minus * scaled(decimal, by, over);
+}
+// a decimal number times a ratio of whole numbers, rounded once, as the program reads it
+function scaled(decimal, by, over) {
   const shift = Math.round(Math.log10(over / by));
+  const [mantissa, power] = decimal.split("e");
   if (10 ** shift === over / by) return Number(`${mantissa}e${Number(power) - shift}`);
-  return (Number(`${mantissa}e${power}`) * by) / over;
+  const [whole, part = ""] = mantissa.split(".");
+  const tens = Number(power) - part.length;
+  if (Math.abs(tens) > 400) return (Number(decimal) * by) / over;
+  const ten = 10n ** BigInt(Math.abs(tens));
+  const above = BigInt(whole + part) * BigInt(by) * (tens > 0 ? ten : 1n);
+  const below = BigInt(over) * (tens < 0 ? ten : 1n);
+  // more bits than a number keeps, and whether anything is left beyond them
+  const bits = above.toString(2).length - below.toString(2).length;
+  const more = BigInt(Math.max(0, 66 - bits));
+  const quotient = (above << more) / below;
+  return Number(quotient * below === above << more ? quotient : quotient | 1n) / 2 ** Number(more);
 }
 // the shortest text that is read back to the same bits
 function shortest(x, units, unit) {
@@ -44,20 +61,34 @@ function held(x, error) {
 function numberField(parent, name, units, unit, signed, write) {
   const input = put(parent, "input", { type: "text", inputmode: signed ? "text" : "decimal", autocapitalize: "off", autocomplete: "off", spellcheck: "false", enterkeyhint: "done", "data-name": name, "aria-label": name });
   input.addEventListener("input", (event) => {
-    const x = typed(input.value, units, unit);
-    input.setAttribute("aria-invalid", Number.isNaN(x));
     byHand = event.inputType ? name : "";
-    write(x, input.value);
+    write(typed(input.value, units, unit), input.value);
     byHand = "";
   });
   input.addEventListener("blur", () => (begun = ""));
   input.addEventListener("keydown", (event) => event.stopPropagation());
   return input;
 }
+// a field with its number of the moment; a wrong entry is marked. False where it stays as it is, for that or because it is typed in
+function refreshed(field, name, x) {
+  const { input, units, unit } = field;
+  if (wrong.has(name)) input.setAttribute("aria-invalid", "true");
+  else input.removeAttribute("aria-invalid");
+  if (wrong.has(name) || input === document.activeElement) return false;
+  if (!Object.is(field.x, x)) Object.assign(field, { x, text: shortest(x, units, unit) });
+  if (input.value !== field.text) input.value = field.text;
+  return true;
+}
 
 // --- undo: `snapshot`, `restore` and `anew` are the page's own ------------------------------------------------------------------
 const wrong = new Map(); // entries that are no number: what to say
 const past = [];
+// why what was entered, as it was written, is no number of its kind; empty where it is one
+function refusal(name, x, text, example, positive) {
+  if (!text.trim()) return TEXTS.blank(name);
+  if (typeof x !== "number" || !Number.isFinite(x)) return TEXTS.wrong(name, text, example);
+  return positive && x < 0 ? TEXTS.negative(name, text) : "";
+}
 let begun = ""; // the field whose entry is being typed and stands in `past` as it was before
 let byHand = ""; // the field in which a key was pressed just now
 function remember() {

@@ -61,23 +61,16 @@ function drawLoose(i) {
 function drawLink({ b, points, forces, lines, words }, spot, each, side) {
   const corners = points.map(spot);
   if (corners.length > 1) put(lines, "path", { class: `link ${corners.length > 2 ? "closed" : ""} ${classOf(b)}`, d: `M${corners.map((z) => fixed(...z)).join("L")}${corners.length > 2 ? "Z" : ""}` });
-  const taken = corners.map(([u, v]) => [u, v, 4, 4]);
+  words.begin(side, side);
+  for (const [u, v] of corners) words.take(u, v, 4);
   for (const [u, v] of corners) put(lines, "circle", { class: "pin", cx: u.toFixed(2), cy: v.toFixed(2), r: 3.5 });
   const tips = forces.map(({ place, force, k, n: name }) => {
     const [u, v] = spot(place);
     const [du, dv] = [each * force[0], -each * force[1]];
     put(lines, "path", { class: SHADES[k] ?? "load", d: arrow(u, v, du, dv) });
-    const r = Math.hypot(du, dv) || 1;
-    return { u: u + du, v: v + dv, way: [du / r, dv / r], text: `${name} ${four(Math.hypot(...force))} N`, kind: SHADES[k] ?? "load" };
+    return { tip: [u + du, v + dv], way: direction([du, dv]), text: `${name} ${four(Math.hypot(...force))} N`, kind: SHADES[k] ?? "load" };
   });
-  for (const { u, v, way, text, kind } of tips) {
-    const [w, h] = [3.3 * text.length, 8];
-    const turned = [0, 1, -1, 2, -2, 3, -3, 4].map((k) => [way[0] * Math.cos((k * Math.PI) / 4) - way[1] * Math.sin((k * Math.PI) / 4), way[0] * Math.sin((k * Math.PI) / 4) + way[1] * Math.cos((k * Math.PI) / 4)]);
-    const around = [12, 24, 38].flatMap((gap) => turned.map(([c, s]) => [Math.min(Math.max(u + c * (gap + 0.7 * w), w), side - w), Math.min(Math.max(v + s * gap, h), side - h)]));
-    const place = around.find(([x, y]) => taken.every(([p, q, a, c]) => Math.abs(x - p) > w + a || Math.abs(y - q) > h + c)) ?? around[0];
-    taken.push([...place, w, h]);
-    words.put(...place, text, kind);
-  }
+  for (const { tip, way, text, kind } of tips) words.set(text, around(tip, way, [12, 24, 38], text), kind, true);
 }
 if (whole.loose) {
   toggle("b", TEXTS.freeBodies, false, (on) => {

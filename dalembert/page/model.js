@@ -369,9 +369,9 @@ class Machine extends Way {
     return turns && x < 0 ? (x + TAU < TAU ? x + TAU : 0) : x + 0;
   }
 
-  // whether anything has a speed
+  // whether there are rates: the file has a speed, be it zero, or something moves
   moves(state) {
-    return this.model.inputs.some((_, j) => ["v", "a", "j"].some((name) => state.given[`${name}${j}`]));
+    return this.model.inputs.some(({ rated }, j) => rated || ["v", "a", "j"].some((name) => state.given[`${name}${j}`]));
   }
 
   // the numbers of the drawing that follow from the dimensions

@@ -170,14 +170,15 @@ function drawCentres(i) {
   for (const [k, [a, b]] of pairs.entries()) {
     const [x, y] = drawn.centres ? centre(a, b, i) : [NaN, NaN];
     const [u, v] = [px(x), py(y)];
-    const real = [...field(a, i), ...field(b, i)].every(Number.isFinite);
+    const fields = [...field(a, i), ...field(b, i)];
+    // what is at rest against each other has no centre
+    const real = fields.every(Number.isFinite) && fields.some((x) => x !== 0);
     const far = !(Math.hypot(x, y) < 1e6 * (right - left + high - low));
     centreCells?.[k].forEach((cell, axis) => (cell.textContent = real ? (far ? "∞" : short([x, y][axis] / lengths)) : "–"));
     if (!(u > -20 && u < width + 20 && v > -20 && v < height + 20)) continue;
     d += `M${fixed(u - 5, v - 5)}L${fixed(u + 5, v + 5)}M${fixed(u - 5, v + 5)}L${fixed(u + 5, v - 5)}`;
     const text = `${whole.bodies[a].name} / ${whole.bodies[b].name}`;
-    const aside = LETTER[0] * text.length + 8;
-    set(text, [[u, v - 11], [u, v + 12], [u + aside, v], [u - aside, v]], "centre");
+    words.set(text, around([u, v], [0, -1], [12], text), "centre");
   }
   crosses.setAttribute("d", d);
 }
@@ -231,12 +232,13 @@ function drawPolygon(i) {
     const key = fixed(X(x), Y(y));
     at_.set(key, [...(at_.get(key) ?? []), p]);
   }
+  polygon.words.begin(w, h);
   const middle = [X((xs[0] + xs[1]) / 2), Y((ys[0] + ys[1]) / 2)];
   for (const points of at_.values()) {
     const [x, y] = tips.get(points[0]);
-    const [u, v] = [X(x) - middle[0], Y(y) - middle[1]];
-    const r = Math.hypot(u, v) || 1;
-    polygon.words.put(X(x) + (14 * u) / r, Y(y) + (14 * (v || 1)) / r, points.map((p) => p.name).join(", "), "point");
+    const tip = [X(x), Y(y)];
+    const text = points.map((p) => p.name).join(", ");
+    polygon.words.set(text, around(tip, direction([tip[0] - middle[0], tip[1] - middle[1]]), [14, 26, 40], text), "point");
   }
   polygon.words.done();
 }
@@ -280,50 +282,31 @@ function fit() {
 // beside a point, on the side where none of its links leads away; a link's name in the middle of a plate or beside a bar;
 // where other names stand there, on another side, and nowhere if there is no room
 const neighbours = whole.points.map((_, k) => [...new Set(whole.bodies.slice(1).filter((b) => b.points.includes(k)).flatMap((b) => b.points))].filter((other) => other !== k));
-const LETTER = [3.4, 8]; // half a letter's width; a line's height
-let taken = []; // middles and half sides of what is written so far, of the pins and of the handles
-const free = ([u, v, w, h]) => taken.every(([x, y, a, b]) => Math.abs(u - x) > w + a || Math.abs(v - y) > h + b);
-function set(text, places, kind) {
-  const [w, h] = [LETTER[0] * text.length, LETTER[1]];
-  const box = places.map(([u, v]) => [Math.min(Math.max(u, w), width - w), v, w, h]).find(free);
-  if (!box) return;
-  taken.push(box);
-  words.put(box[0], box[1], text, kind);
-}
 function labels(stands, i) {
   if (!stands || !drawn.names) return;
   const places = whole.points.map((p) => [px(at(whole, p.x, i)), py(at(whole, p.y, i))]);
-  taken.push(...places.map(([u, v]) => [u, v, 5, 5]));
-  const unit = ([du, dv]) => [du / (Math.hypot(du, dv) || 1), dv / (Math.hypot(du, dv) || 1)];
-  // how far aside the middle of a name stands: a long one farther to the left or right
-  const aside = (label, [du, dv], gap) => [du * (gap + Math.max(0, LETTER[0] * (label.t.length - 2))), dv * gap];
+  for (const [u, v] of places) words.take(u, v, 5);
   const across = ([du, dv]) => (du > 0 ? [dv, -du] : [-dv, du]);
   for (const label of whole.labels.filter((one) => one.of === "point")) {
     const k = whole.points.findIndex((p) => p.name === label.t);
     const [u, v] = places[k];
-    const towards = neighbours[k].map((p) => unit([places[p][0] - u, places[p][1] - v]));
+    const towards = neighbours[k].map((p) => direction([places[p][0] - u, places[p][1] - v]));
     // the foot of a fixed pivot
     if (!label.b) towards.push([0, 1.4]);
     let way = [0, 1].map((axis) => -towards.reduce((sum, one) => sum + one[axis], 0));
     if (Math.hypot(...way) < 0.35) way = across(towards[0] ?? [-1, 0]);
-    const [c, d] = unit(way);
-    const around = [15, 26].flatMap((gap) => [0, 1, -1, 2, -2, 3, -3, 4].map((eighth) => {
-      const [p, q] = [Math.cos((eighth * Math.PI) / 4), Math.sin((eighth * Math.PI) / 4)];
-      const [du, dv] = aside(label, [c * p - d * q, c * q + d * p], gap);
-      return [u + du, v + dv];
-    }));
-    set(label.t, around, "point");
+    words.set(label.t, around([u, v], direction(way), [15, 26], label.t), "point");
   }
   for (const label of whole.labels.filter((one) => one.of === "link")) {
     const [u, v] = carried(stands[label.b], ...label.z).map((x, axis) => [px, py][axis](x));
     const ends = whole.bodies[label.b].points.map((p) => places[p]);
     const along = ends.length > 1 ? [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]] : [0, 50];
-    const side = across(unit(along)).map((x) => -x);
+    const side = across(direction(along)).map((x) => -x);
     const beside = [12, 22].flatMap((gap) => [1, -1].flatMap((sign) => [0, 0.2, -0.2].map((share) => {
-      const [du, dv] = aside(label, side.map((x) => sign * x), gap);
+      const [du, dv] = aside(label.t, side.map((x) => sign * x), gap);
       return [u + du + share * along[0], v + dv + share * along[1]];
     })));
-    set(label.t, ends.length > 2 ? [[u, v], ...beside] : beside, `body ${classOf(label.b)}`);
+    words.set(label.t, ends.length > 2 ? [[u, v], ...beside] : beside, `body ${classOf(label.b)}`);
   }
 }
 function legend() {
@@ -340,17 +323,18 @@ function legend() {
 function drawAll(i) {
   const [stands] = figures.map((figure) => drawFigure(figure, i));
   missing.style.display = stands ? "none" : "";
-  taken = [];
+  words.begin(width, height);
+  words.take(barAt[0], barAt[1], barAt[2], 12);
   drawHandles?.(stands);
   labels(stands, i);
   for (const [kind, draw] of Object.entries(drawers)) draw(i, drawn[kind === "force" ? "forces" : kind]);
   drawCentres(i);
-  words.put(...barText, "note");
+  words.put(barAt[0], barAt[1] - 6, barAt[3], "note");
   words.done();
   drawPolygon(i);
 }
 let drawHandles; // of a page that computes
-let barText;
+let barAt; // its middle, half its length, its words
 function resize() {
   width = Math.max(240, view.clientWidth);
   const margin = 34;
@@ -369,7 +353,7 @@ function resize() {
   const length = stepOf(0, width / scale, 5);
   const [x, y] = [14, height - 14];
   bar.setAttribute("d", `M${x} ${y - 4}V${y + 4}M${x} ${y}H${(x + length * scale).toFixed(1)}M${(x + length * scale).toFixed(1)} ${y - 4}V${y + 4}`);
-  barText = [x + (length * scale) / 2, y - 10, length < 1 ? `${short(1000 * length)} mm` : `${short(length)} m`];
+  barAt = [x + (length * scale) / 2, y - 4, (length * scale) / 2, length < 1 ? `${short(1000 * length)} mm` : `${short(length)} m`];
   drawTraces();
 }
 

@@ -180,11 +180,11 @@ function plot(column) {
       const under = data.x === undefined ? TEXTS.pose : whole.columns[data.x].header;
       for (const t of ticks(left, right, stepOf(left, right, Math.max(2, width / 70), under.endsWith("_deg")))) {
         put(svg, "line", { class: "grid", x1: px(t), x2: px(t), y1: margin.top, y2: height - margin.bottom });
-        put(svg, "text", { class: "tick", x: px(t), y: height - margin.bottom + 13, "text-anchor": "middle" }, short(t));
+        put(svg, "text", { class: "tick", x: px(t), y: height - margin.bottom + 15, "text-anchor": "middle" }, short(t));
       }
       for (const t of ticks(low, high, stepOf(low, high, 5))) {
         put(svg, "line", { class: "grid", x1: margin.left, x2: width - margin.right, y1: py(t), y2: py(t) });
-        put(svg, "text", { class: "tick", x: margin.left - 5, y: py(t) + 4, "text-anchor": "end" }, short(t));
+        put(svg, "text", { class: "tick", x: margin.left - 5, y: py(t) + 3, "text-anchor": "end" }, short(t));
       }
       put(svg, "text", { class: "tick", x: width - margin.right, y: height - 4, "text-anchor": "end" }, under);
       const jumps = /deg$/.test(whole.columns[k].header) ? 180 : Infinity;

@@ -22,14 +22,11 @@ function cell(parent, name, kind, unit, rules = {}) {
   return input;
 }
 function check(name, x, text, rules) {
-  const empty = Number.isNaN(x) && rules.empty && String(text).trim() === "";
   const of = inputs.get(name);
-  if (!empty && (typeof x !== "number" || !Number.isFinite(x))) {
-    wrong.set(name, text.trim() === "" ? TEXTS.blank(name) : TEXTS.wrong(name, text, of ? `10 ${of.unit}` : ""));
-    return;
-  }
-  if (x < 0 && rules.positive) {
-    wrong.set(name, TEXTS.negative(name, text));
+  const empty = Number.isNaN(x) && rules.empty && text.trim() === "";
+  const why = empty ? "" : refusal(name, x, text, `10 ${of.unit}`, rules.positive);
+  if (why) {
+    wrong.set(name, why);
     return;
   }
   const slack = rules.within ? 1e-9 * (rules.within[1] - rules.within[0]) : 0;
@@ -42,12 +39,8 @@ function check(name, x, text, rules) {
   values[name] = x;
 }
 function listCells() {
-  for (const [name, { input, units, unit }] of inputs) {
-    if (input === document.activeElement || wrong.has(name)) continue;
-    const text = Number.isNaN(values[name] ?? NaN) ? "" : shortest(values[name], units, unit);
-    if (input.value !== text) input.value = text;
-    input.removeAttribute("aria-invalid");
-    input.classList.toggle("changed", !Object.is(values[name], own[name]));
+  for (const [name, field] of inputs) {
+    if (refreshed(field, name, values[name] ?? NaN)) field.input.classList.toggle("changed", !Object.is(values[name], own[name]));
   }
   listUndo();
 }
@@ -87,7 +80,7 @@ tool(TEXTS.reset, () => {
 tool(TEXTS.copyRows, () => copied(csv()));
 tool(TEXTS.saveRows, () => saved(csv(), "text/csv", "csv"));
 tool(TEXTS.print, () => print());
-const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+const quoted = (text) => (/[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
 const inUnit = (x, kind, unit) => (Number.isNaN(x ?? NaN) ? "" : shortest(x, sheet.units[kind], unit));
 
 // vectors from one point to the next, and a last one that closes them
@@ -102,14 +95,21 @@ function polygon(parent, title, vectors, closing, label) {
   const [xs, ys] = [range(all.map(([x]) => x)), range(all.map(([, y]) => y))];
   const k = Math.min(240 / (xs[1] - xs[0] || 1e-300), 190 / (ys[1] - ys[0] || 1e-300));
   const at = ([x, y]) => [150 + k * (x - (xs[0] + xs[1]) / 2), 130 - k * (y - (ys[0] + ys[1]) / 2)];
+  const words = texts(svg);
+  words.begin(300, 260);
   const line = (a, b, kind, text) => {
     const [[x, y], [u, v]] = [at(a), at(b)];
     put(svg, "path", { class: kind, d: arrow(x, y, u - x, v - y) });
-    const length = Math.hypot(u - x, v - y);
-    if (length > 12) put(svg, "text", { x: ((x + u) / 2 + (9 * (v - y)) / length).toFixed(1), y: ((y + v) / 2 - (9 * (u - x)) / length).toFixed(1), class: "point" }, text);
+    if (Math.hypot(u - x, v - y) < 12) return;
+    const side = direction([v - y, x - u]);
+    const beside = [9, 18].flatMap((gap) => [0.5, 0.3, 0.7].flatMap((share) => [1, -1].map((sense) => {
+      const [du, dv] = aside(text, [sense * side[0], sense * side[1]], gap);
+      return [x + share * (u - x) + du, y + share * (v - y) + dv];
+    })));
+    words.set(text, beside, "point");
   };
-  vectors.forEach(([name], i) => line(corners[i], corners[i + 1], "share", name));
   line(corners.at(-1), all.at(-1), "closing", label);
+  vectors.forEach(([name], i) => line(corners[i], corners[i + 1], "share", name));
 }
 function start() {
   theme();

@@ -66,23 +66,29 @@ function drawTrace() {
   }
   trace.forEach((part, k) => part.setAttribute("d", d[k]));
 }
+// a name at the tip of an arrow from the centre
+function named(tip, text, kind) {
+  const [x, y] = seen(tip);
+  words.set(text, around([x, y], direction([x - width / 2, y - height / 2]), [11, 22], text), kind);
+}
 function drawAll(i) {
   drawBody(i);
-  for (const [k, e] of [[1, 0, 0], [0, 1, 0], [0, 0, 1]].entries()) {
-    axes[k].setAttribute("d", ray(times(1.35, e)));
-    const tip = times(1.12, turned(i, e));
-    own[k].setAttribute("d", drawn.axes ? ray(tip) : "");
-    if (!drawn.names) continue;
-    const [x, y] = seen(times(1.45, e));
-    words.put(x, y, "xyz"[k], "note");
-    if (drawn.axes) words.put(...seen(times(1.1, tip)).slice(0, 2), `body ${"xyz"[k]}`, "note");
-  }
-  const omega = turned(i, three(data.omega, i));
-  const rays = { velocity: omega, momentum: three(data.momentum, i) };
+  words.begin(width, height);
+  const rays = { velocity: turned(i, three(data.omega, i)), momentum: three(data.momentum, i) };
   for (const [kind, vector] of Object.entries(rays)) {
     const tip = times(1.3 / (longest[kind] || 1), vector);
     arrows[kind].setAttribute("d", drawn[kind] ? ray(tip) : "");
-    if (drawn[kind] && drawn.names && longest[kind]) words.put(...seen(times(1.08, tip)).slice(0, 2), kind === "velocity" ? "ω" : "H", "point");
+    if (drawn[kind] && drawn.names && longest[kind]) named(tip, kind === "velocity" ? "ω" : "H", "point");
+  }
+  const ends = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+  for (const [k, e] of ends.entries()) {
+    axes[k].setAttribute("d", ray(times(1.35, e)));
+    if (drawn.names) named(times(1.35, e), "xyz"[k], "note");
+  }
+  for (const [k, e] of ends.entries()) {
+    const tip = times(1.12, turned(i, e));
+    own[k].setAttribute("d", drawn.axes ? ray(tip) : "");
+    if (drawn.names && drawn.axes) named(tip, `body ${"xyz"[k]}`, "note");
   }
   const [x, y] = seen(path[i]);
   dot.setAttribute("cx", x);

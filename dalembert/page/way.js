@@ -36,9 +36,12 @@ class Way {
     this.n = model.n;
     this.sweep = model.inputs.map((input) => unpack(input.sweep, model.n));
     this.one = model.inputs.length === 1;
-    // rates that follow a law, and the time, are known at the poses of the sweep, not at the free one
-    const along = (packed) => Float64Array.of(...unpack(packed, model.n), NaN);
-    this.rates = model.inputs.map(({ rates }) => rates.map((rate) => rate.all ?? along(rate)));
+    // what changes along the sweep is known at its poses; the free one has the file's own rates, and no time
+    const along = (packed, free = NaN) => Float64Array.of(...unpack(packed, model.n), free);
+    this.rates = model.inputs.map(({ rates, rated, paths }) => {
+      if (rates.every((rate) => "all" in rate)) return rates.map((rate) => rate.all);
+      return rates.map((rate, k) => along(rate, rated ? (this.own[paths[k + 1]] ?? 0) : NaN));
+    });
     if (model.time) this.time = along(model.time);
     this.closed = model.groups.filter((g) => !g.start);
     this.iterated = model.groups.filter((g) => g.start);

@@ -75,11 +75,11 @@ class Opened:
         return [np.array(re.findall(r"(-?[\d.]+) (-?[\d.]+)", d), dtype=float) for d in found if d]
 
     def names_in_one_place(self) -> list[str]:
-        """Return the names in the drawing that lie over one another."""
+        """Return the words of pictures that lie over one another."""
         return list(
             self(
-                "const t = [...document.querySelectorAll('#view text.point, #view text.body, #view text.centre')]"
-                ".map((e) => [e.textContent, e.getBoundingClientRect()]);"
+                "const t = [...document.querySelectorAll('#view text:not(.missing), #extra text, #loose text, svg.polygon text')]"
+                ".map((e) => [e.textContent, e.getBoundingClientRect()]).filter(([, r]) => r.width);"
                 "return t.flatMap(([a, p], i) => t.slice(0, i).filter(([, q]) =>"
                 " Math.min(p.right, q.right) - Math.max(p.left, q.left) > 2 &&"
                 " Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top) > 3).map(([b]) => `${a} over ${b}`))"

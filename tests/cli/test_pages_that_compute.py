@@ -203,6 +203,7 @@ def test_where_it_cannot_be_assembled_it_says_what_is_missing(klann: Computing) 
     assert klann.put(links__crank__B__x=0.12)
     assert not klann.put(nothing=1.0)
     assert "nothing" in klann.alert
+    assert klann.faults() == []
 
 
 def test_options_and_file_give_the_same_mechanism(

@@ -1,0 +1,124 @@
+"""What stands in the fields of pages, what can be typed there, and words of pictures that keep apart."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.cli.test_pages_that_compute import EXAMPLES, Computing
+from tests.conftest import Dalembert
+
+CRANK = (
+    '[units]\nlength = "in"\n[ground]\nO = [0, 0]\n[links.crank]\npoints = { O = [0, 0], P = [138.3, 0] }\n'
+    '[input]\nlink = "crank"\n'
+)
+
+
+def shown(page: Computing, name: str) -> str:
+    return str(
+        page(
+            "return [...document.querySelectorAll('input[data-name]')].find((i) => i.dataset.name === arguments[0]).value",
+            name,
+        )
+    )
+
+
+def test_a_number_stands_in_its_field_as_in_the_file(
+    dalembert: Dalembert, tmp_path: Path, browser: Any
+) -> None:
+    """138.3 in are 3.51282 m with one rounding, in the program and in the page; a third of an inch comes back to its bits."""
+    (tmp_path / "m.toml").write_text(CRANK)
+    done = dalembert("mechanism", "m.toml", "--at", "0deg", "--page", "m.html", "--json")
+    x = json.loads(done.stdout)["poses"][0]["points"]["P"]["x_m"]
+    page = Computing(browser, tmp_path / "m.html")
+    assert page.get("links.crank.P.x") == x == 3.51282
+    assert shown(page, "links.crank.P.x") == "138.3"
+    page.type("links.crank.P.x", "-476.5565657 in")
+    assert page.get("links.crank.P.x") == -12.10453676878
+    assert page.put(links__crank__P__x=0.0254 / 3)
+    page.type("links.crank.P.x", shown(page, "links.crank.P.x"))
+    assert page.get("links.crank.P.x") == 0.0254 / 3
+    assert page.faults() == []
+
+
+def test_degrees_of_a_table_stand_as_in_the_file(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    rows = "name,unbalance_g_mm,angle_deg\nA,60,28.64789\nB,0.3,120.321137\n"
+    (tmp_path / "r.csv").write_text(rows)
+    assert dalembert("balance", "r.csv", "--plane", "P:20mm", "--page", "r.html").returncode == 0
+    page = Computing(browser, tmp_path / "r.html")
+    assert [shown(page, name) for name in ("A.angle", "B.angle", "B.unbalance")] == [
+        "28.64789",
+        "120.321137",
+        "0.3",
+    ]
+    assert page("return dalembert.csv()") == rows
+
+
+@pytest.mark.parametrize("text", ["1e400", "-1e400", "", "abc"])
+def test_what_is_no_number_is_marked_and_named(
+    text: str, dalembert: Dalembert, tmp_path: Path, browser: Any
+) -> None:
+    (tmp_path / "m.toml").write_text(CRANK)
+    assert dalembert("mechanism", "m.toml", "--at", "0deg", "--page", "m.html").returncode == 0
+    page = Computing(browser, tmp_path / "m.html")
+    for name in ("links.crank.P.x", "input", "links.crank.mass"):
+        page.type(name, text)
+        assert page.alert.startswith(f"{name}: ")
+        assert "expected a number" in page.alert
+        assert math.isnan(page.get(name))
+        assert math.isnan(page.get("P.x"))
+        marked = "return [...document.querySelectorAll('[aria-invalid=true]')].map((i) => i.dataset.name)"
+        assert page(marked) == [name]
+        page.button("undo")
+        assert page.alert == ""
+        assert page(marked) == []
+    assert page.faults() == []
+
+
+def test_a_pose_beside_the_cases_has_the_rates_of_the_file(
+    dalembert: Dalembert, tmp_path: Path, browser: Any
+) -> None:
+    """P turns with 2 rad/s in the file, at any other pace in the table; a speed of zero is a number, none at all is not."""
+    (tmp_path / "m.toml").write_text(CRANK.replace("138.3", "10") + "speed = 2\n")
+    (tmp_path / "c.csv").write_text("t_s,crank_deg\n0,0\n1,10\n2,40\n3,90\n")
+    assert dalembert("mechanism", "m.toml", "--cases", "c.csv", "--page", "m.html").returncode == 0
+    page = Computing(browser, tmp_path / "m.html")
+    assert page.get("crank.omega") != 2
+    assert page.put(input=0.0)
+    assert [page.get(name) for name in ("crank.omega", "crank.alpha", "P.vy")] == pytest.approx([2, 0, 0.508])
+    assert page.put(input__speed=0.0)
+    assert [page.get(name) for name in ("crank.omega", "P.vx", "P.ay")] == [0, 0, 0]
+    (tmp_path / "m.toml").write_text(CRANK)
+    assert dalembert("mechanism", "m.toml", "--at", "0deg", "--page", "m.html").returncode == 0
+    assert math.isnan(Computing(browser, tmp_path / "m.html").get("crank.omega"))
+
+
+@pytest.mark.slow
+def test_words_of_pictures_keep_apart(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """On a phone and on a screen, with all that can be drawn: velocities of many points, free bodies, polygons of unbalances."""
+    pump = ("--plane", "DE:0mm:120mm", "--plane", "NDE:300mm:120mm", "--page", "r.html")
+    assert dalembert("balance", EXAMPLES / "pump-rotor-api" / "rotor.csv", *pump).returncode == 0
+    for example in ("andrews/andrews", "stephenson-six-bar/stephenson"):
+        name = example.split("/")[0]
+        sweep = ("--over", "0deg:360deg:30deg", "--page", f"{name}.html")
+        assert dalembert("forces", EXAMPLES / f"{example}.toml", *sweep).returncode == 0
+    for width in (360, 1280):
+        size = {"width": width, "height": 800, "deviceScaleFactor": 1, "mobile": False}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        try:
+            for file in ("r", "andrews", "stephenson-six-bar"):
+                page = Computing(browser, tmp_path / f"{file}.html")
+                assert page.names_in_one_place() == []
+                if file == "r":
+                    continue
+                for key in "vaip":
+                    page.press(key)
+                for pose in range(0, 13, 3):
+                    page.set(pose)
+                    assert page.names_in_one_place() == []
+        finally:
+            browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
