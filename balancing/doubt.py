@@ -70,7 +70,7 @@ class Repeat(NamedTuple):
     difference: float
     """|difference| of the residuals."""
     probability: float
-    """NaN where nothing is left over to compare with."""
+    """NaN where there is no further reading to compare with."""
 
 
 def repeats(fit: JointFit, errors: Errors | None = None) -> Iterator[Repeat]:
@@ -126,7 +126,7 @@ class Drift(NamedTuple):
     rate: Complex
     """The rate of each channel, in readings per unit of time, (..., s); NaN if the times do not determine it."""
     deviation: Real
-    """Standard deviation of each component of the rate, (..., s); NaN where nothing is left over."""
+    """Standard deviation of each component of the rate, (..., s); NaN where there is no further reading."""
     probability: Real
     """The probability for all channels together, (...); NaN if untested."""
 

@@ -332,7 +332,7 @@ def _counted(time: Any, tacho: Any, rises: Marks) -> tuple[Any, Any, int, Any]:
     at = rises.at[within]
     if len(at) < 2:
         raise ValueError("the tacho has no whole turn from mark to mark")
-    # pulses and marks may coincide: between marks their whole number is told by the mean
+    # pulses and marks may coincide: between marks their whole number is that of the mean
     passed = np.interp(_floats(at), places, np.arange(len(places)))
     pulses = round(float(passed[-1] - passed[0]) / (len(at) - 1))
     odd = np.flatnonzero(np.abs(np.diff(passed) - pulses) > 0.5)

@@ -54,7 +54,7 @@ def measure(quick: bool) -> Iterator[Measurement]:
 
 @dataclass(frozen=True)
 class Work:
-    """A mechanism that is let go, and what its first input is at the end."""
+    """A mechanism that is released, and what its first input is at the end."""
 
     title: str
     mechanism: Mechanism
@@ -101,7 +101,7 @@ def _engines(
 
 
 def four_bar() -> Mechanism:
-    """A crank-rocker with masses, let go at 60°."""
+    """A crank-rocker with masses, released at 60°."""
     at = math.radians(60)
     return Mechanism(
         {"A": 0j, "D": 0.4 + 0j},

@@ -31,7 +31,7 @@ MODULES = tuple(
         "equilibria",
         "assemblies",
         "in_time",
-        "let_go",
+        "released",
         "tapes",
         "digits",
     )

@@ -155,7 +155,7 @@ def _near_sleeping(rng: np.random.Generator) -> Pairs:
 
 
 def _near_cusp(rng: np.random.Generator) -> Pairs:
-    """Let go without precession, but for a push of 1e-15 … 0.1: the axis comes to rest at the top of each nod."""
+    """Released without precession, but for a push of 1e-15 … 0.1: the axis comes to rest at the top of each nod."""
     I3, mgl = rng.uniform(0.2, 2), rng.uniform(0.3, 2)
     push = rng.normal(size=2) * 10.0 ** rng.uniform(-15, -1)
     return _top(rng, np.array([*push, rng.normal() * 4]), rng.uniform(0.05, 3), I3, mgl)

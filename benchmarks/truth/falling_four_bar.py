@@ -18,7 +18,7 @@ MASSES, INERTIAS, G = ("1", "2", "1.5"), ("0.1", "0.02", "0.008"), "9.81"
 
 
 def angle(t: Any, start: Any, digits: int = 30, points: int = 256) -> Any:
-    """The crank's angle, rad, at a time t after it was let go at rest at `start`, the coupler's joint above."""
+    """The crank's angle, rad, at a time t after it was released at rest at `start`, the coupler's joint above."""
     with mp.workdps(digits + 10):
         begin = mp.mpf(start)
         energy = _energies(begin)[1]

@@ -1,4 +1,4 @@
-"""Numbers of twice as many digits: each the sum of two floats, of which the second is rounding beside the first.
+"""Numbers of twice as many digits: each the sum of two floats, of which the second is below the rounding of the first.
 
 As T. J. Dekker, Numer. Math. 18 (1971) 224-242, section 4. The second run of a formula is in these numbers: what they
 and floats agree in are the digits that hold.

@@ -24,7 +24,7 @@ R = TypeVar("R")
 
 
 class Processes(Executor):
-    """Worker processes on this machine: when one dies, new ones take over.
+    """Worker processes on this machine: when one dies, new ones replace all.
 
     Parameters
     ----------

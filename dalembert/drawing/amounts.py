@@ -54,7 +54,7 @@ def dimensioned(size: float, least: float = 2e-3) -> tuple[float, str]:
 
 
 def quiet(values: ArrayLike, scale: float) -> NDArray[np.float64]:
-    """Return numbers without what rounding leaves of zero, or of a constant, beside the scale of their kind.
+    """Return numbers without what rounding leaves of zero, or of a constant, on the scale of their kind.
 
     >>> nothing, one, also_one = quiet([1e-15, 1.0, 1.0 + 2e-16], 1.0).tolist()
     >>> nothing, one == also_one

@@ -198,7 +198,7 @@ def test_an_error_wipes_the_progress_away(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_progress_of_one_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a terminal the time reached in each of its solutions, wiped at the end; in a pipe nothing."""
-    from tests.virtualwork.let_go import double_pendulum
+    from tests.virtualwork.released import double_pendulum
     from virtualwork.intime.run import simulate
 
     monkeypatch.setattr("cli.show.terminal.AFTER", -1.0)

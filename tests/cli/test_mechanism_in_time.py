@@ -122,7 +122,7 @@ def test_a_torque_over_time_is_refused_in_a_pose(dalembert: Dalembert, pendulum:
     assert dalembert("simulate", str(pendulum), "--time", "0:1:1").returncode == 0
 
 
-def test_variants_are_let_go_together(dalembert: Dalembert, pendulum: Path) -> None:
+def test_variants_are_released_together(dalembert: Dalembert, pendulum: Path) -> None:
     """Rows begin with the variant; each is what the file with that number gives."""
     vary = "--over", "links.bob.P.x=1:2:1", "--set", "links.bob.center.x=0.5"
     done = dalembert("simulate", pendulum, "--time", "0:1:0.5", *vary)
@@ -221,7 +221,7 @@ def test_the_first_row_is_as_it_was_given(dalembert: Dalembert, pendulum: Path) 
     assert shown == [60.0, 61.0]
 
 
-# a double pendulum let go above: no motion keeps a digit for a minute
+# a double pendulum released above: no motion keeps a digit for a minute
 CHAOS = (
     PENDULUM.replace("[input]", "[[input]]").replace("angle = 0", "angle = 115")
     + """

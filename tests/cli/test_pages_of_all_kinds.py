@@ -169,7 +169,7 @@ LET_GO = four_bar(
     body(2, (175, 0), 0.02),
     body(1.5, (125, 0), 0.008),
     lengths=(100, 350, 250, 400),
-    head='name = "let go"\ngravity = [0, -9.81]',
+    head='name = "released"\ngravity = [0, -9.81]',
     driven="rocker",
     at=99,
     rates="speed = 5",

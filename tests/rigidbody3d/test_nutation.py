@@ -47,7 +47,7 @@ def test_the_turning_points_and_the_period(seed: int) -> None:
 
 
 def test_a_pendulum_swings_at_half_its_period() -> None:
-    """Let go at 2 rad from hanging: 4 K(sin²(1 rad)) √(I/mgl) for the swing to and fro, and cos θ twice in it."""
+    """Released at 2 rad from hanging: 4 K(sin²(1 rad)) √(I/mgl) for the swing to and fro, and cos θ twice in it."""
     tilt = np.pi - 2.0
     top = Top([0.5, 0.5, 0.3], 2.0, [0.0, 0, 0], [np.cos(tilt / 2), np.sin(tilt / 2), 0, 0])
     exact = float(2 * mp.ellipk(mp.sin(1) ** 2) * mp.sqrt(mp.mpf("0.25")))

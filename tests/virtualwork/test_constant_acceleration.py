@@ -11,7 +11,7 @@ from dalembert.arithmetic import engines
 from dalembert.arithmetic.engines import floats
 from dalembert.arithmetic.loop import Calls
 from dalembert.arithmetic.recorded import Recorder
-from tests.virtualwork.let_go import G, block, rotor
+from tests.virtualwork.released import G, block, rotor
 from virtualwork import Force, Gear, Guess, Guide, Input, Link, Mechanism, Torque
 
 # each engine counts, and each sense

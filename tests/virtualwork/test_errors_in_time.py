@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.stress.let_go import LINKAGES, _linkage, _slider_crank
-from tests.virtualwork.let_go import G, block, double_pendulum, four_bar, pendulum
+from benchmarks.stress.released import LINKAGES, _linkage, _slider_crank
+from tests.virtualwork.released import G, block, double_pendulum, four_bar, pendulum
 from tests.virtualwork.test_fast_parallelograms import parallelogram
 from virtualwork import Friction, Gear, Guess, Guide, Input, Link, Mechanism, MechanismError, Rack, Spring
 from virtualwork.intime.run import Run

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from tests.virtualwork.let_go import G, block, double_pendulum, four_bar
+from tests.virtualwork.released import G, block, double_pendulum, four_bar
 from virtualwork import Force, Friction, Guide, Input, Link, Mechanism, Spring, Torque
 from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.gains import gains

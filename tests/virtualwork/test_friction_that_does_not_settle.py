@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.virtualwork.let_go import G
+from tests.virtualwork.released import G
 from virtualwork import Friction, Guess, Input, Link, Mechanism
 from virtualwork.formulas.friction import balanced
 

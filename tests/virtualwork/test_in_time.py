@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.truth import falling_four_bar
-from tests.virtualwork.let_go import G, block, double_pendulum, four_bar, holds, pendulum, rotor
+from tests.virtualwork.released import G, block, double_pendulum, four_bar, holds, pendulum, rotor
 from virtualwork import (
     Force,
     Gear,
@@ -177,7 +177,7 @@ def test_free_double_pendulum_keeps_energy_and_momentum() -> None:
 
 @pytest.mark.parametrize("driver", ["crank", "rocker"])
 def test_dead_points_of_the_input_are_passed(driver: str) -> None:
-    """The same motion let go with the crank as input, and with the rocker, which has dead points."""
+    """The same motion released with the crank as input, and with the rocker, which has dead points."""
     t = np.linspace(0, 5, 101)
     run = four_bar(driver).simulate(t, speed={"crank": 15.0, "rocker": four_bar_rate()}[driver])
     assert not run.warnings

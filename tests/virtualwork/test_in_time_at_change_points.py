@@ -260,7 +260,7 @@ def test_a_scissors_lift_falls_freely_through_its_flat_pose(driver: str) -> None
     assert -1.2 <= heights[-1] < -1.199
 
 
-def test_a_scissors_lift_let_go_flat() -> None:
+def test_a_scissors_lift_released_flat() -> None:
     """Its bars' angles lead on from there; the shoe's place stands at its limit."""
     run = lift("left", 0.0).simulate([0, 0.2, 0.4])
     assert run.motion.point("D").position[:, 1] == pytest.approx(-G / 2 * run.t**2, abs=1e-11)

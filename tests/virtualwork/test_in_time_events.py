@@ -8,7 +8,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from tests.virtualwork.let_go import G, pendulum, rotor
+from tests.virtualwork.released import G, pendulum, rotor
 from virtualwork import Torque
 from virtualwork.intime.passing import at, turns, zero
 
@@ -16,7 +16,7 @@ LOWEST = -math.pi / 2
 
 
 def when(amplitude: float, level: float) -> float:
-    """When a pendulum of 1 m, let go at an amplitude, first has an angle against its lowest place."""
+    """When a pendulum of 1 m, released at an amplitude, first has an angle against its lowest place."""
     with mp.workdps(40):
         k = mp.sin(mp.mpf(amplitude) / 2)
         # as near the amplitude as the level is itself a number

@@ -1,4 +1,4 @@
-"""Variants let go together against the same let go singly."""
+"""Variants released together against the same released singly."""
 
 from __future__ import annotations
 
@@ -158,8 +158,8 @@ def test_lanes_and_single_runs_end_alike_where_one_of_two_inputs_does() -> None:
         assert runs.angle[i, :n] == pytest.approx(one.angle, abs=1e-12)
 
 
-def test_an_event_ends_lanes_that_are_let_go_singly_too() -> None:
-    """A rocker that passes its dead point: no lane can, and each is let go alone."""
+def test_an_event_ends_lanes_that_are_released_singly_too() -> None:
+    """A rocker that passes its dead point: no lane can, and each is released alone."""
     family = four_bar("rocker").vary({"links.coupler.mass": [1.0, 2.0]})
     runs = family.simulate([0, 0.5, 1.0], speed=3.0, until={"rocker": 1.7})
     assert np.isfinite(runs.times).sum(axis=1).tolist() == [2, 2]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.virtualwork.let_go import G, block, double_pendulum, four_bar
+from tests.virtualwork.released import G, block, double_pendulum, four_bar
 from virtualwork import Force, Friction, Input, Link, Mechanism, Spring, Torque
 
 

@@ -139,8 +139,8 @@ def test_four_bars_by_their_forces(seed: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
-def test_four_bars_let_go(seed: int) -> None:
-    """Let go a ten-thousandth of a radian beside the position of rest it passes it a quarter of a period later."""
+def test_four_bars_released(seed: int) -> None:
+    """Released a ten-thousandth of a radian beside the position of rest it passes it a quarter of a period later."""
     m = four_bar(np.random.default_rng(1000 + seed))
     for rest in m.equilibria().found:
         if not rest.stable or rest.period is None:

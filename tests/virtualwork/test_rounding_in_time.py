@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.stress.random_linkages import four_bar
 from benchmarks.truth.mechanism import Exact
-from tests.virtualwork.let_go import G
+from tests.virtualwork.released import G
 from virtualwork import Friction, Guide, Input, Link, Mechanism, Spring
 from virtualwork.formulas.kinematics import Angle
 
@@ -59,7 +59,7 @@ def holds(seed: int, rubs: bool, free: float) -> None:
 
 @pytest.mark.parametrize("seed", [0, 3, 11])
 def test_rates_near_a_limit_round_as_those_of_the_pose(seed: int) -> None:
-    """Let go 1e-7 rad from its input's limit: the two ways through time begin alike, and the rates have lost seven digits."""
+    """Released 1e-7 rad from its input's limit: the two ways through time begin alike, and the rates have lost seven digits."""
     m, at = four_bar(np.random.default_rng(seed), 1e-7, 1.0, limit=True)
     run = m.simulate([0.0, 1e-9], angle=at, speed=0.0)
     exact = Exact(run.motion)

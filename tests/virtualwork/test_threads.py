@@ -14,7 +14,7 @@ import pytest
 
 from balancing import LogBalance, correct, joint_fit, least_squares, minimax
 from rigidbody3d import FreeBody, Motion
-from tests.virtualwork.let_go import four_bar
+from tests.virtualwork.released import four_bar
 from virtualwork import Force, Friction, Guess, Guide, Input, Link, Mechanism, Spring
 
 THREADS = 8

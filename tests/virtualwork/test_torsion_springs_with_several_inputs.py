@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.virtualwork.let_go import four_bar
+from tests.virtualwork.released import four_bar
 from tests.virtualwork.test_winding_with_several_inputs import swinging
 from virtualwork import Gear, Guess, Input, Link, Mechanism, TorsionSpring
 
@@ -74,7 +74,7 @@ def test_variants() -> None:
 
 
 def test_energy_is_kept_in_time() -> None:
-    """Let go at speed, the coupler passes half a turn from free: the spring's potential goes on with its torque."""
+    """Released at speed, the coupler passes half a turn from free: the spring's potential goes on with its torque."""
     gearless = sprung()
     heavy = Mechanism(
         gearless.ground,

@@ -24,7 +24,7 @@ from virtualwork.plan.steps import Plan, joints, relations
 
 # a singular value below this share of the largest is zero
 RANK = 1e-9
-# how far the pose is moved to tell a freedom from a singular pose: rad, or of the mechanism's size
+# how far the pose is moved to distinguish a freedom from a singular pose: rad, or of the mechanism's size
 STEP = 0.05
 
 

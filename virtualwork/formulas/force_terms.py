@@ -207,7 +207,7 @@ class ForceTerms:
         """The work of a force for a unit turn, or a unit of the slide, as a combination of real terms.
 
         Of the force's part in the body's own (e^{iθ})″ = (iα − ω²)e^{iθ} only α is left, e × (e)″ = α: this turns
-        I_G·α into (I_G + m|z|²)·α, the inertia about the point the body hangs on (Steiner).
+        I_G·α into (I_G + m|z|²)·α, the inertia about the point that carries the body (Steiner).
         """
         rest, lever = Combination(force), Combination()
         if slide is None and not along and body != GROUND:

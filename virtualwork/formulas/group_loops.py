@@ -211,7 +211,7 @@ class Topology:
         return self.recorder.tape({name: select(again, old, new) for name, old, new in pairs})
 
 
-# of a search beside the unknowns and the step to be taken: the gap and the longest entry of the undamped step that led
+# of a search, in addition to the unknowns and the step to be taken: the gap and the longest entry of the undamped step that led
 # there, the share of the step that is tried, the times that it may be, and the steps that may follow
 SEARCH = "gap", "longest", "factor", "tries", "left"
 

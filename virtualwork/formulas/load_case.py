@@ -181,7 +181,7 @@ class LoadCase:
         return tuple(sorted(keys))
 
     def acceleration(self, path: Path) -> Combination:
-        """The acceleration of a point: Σ z·(s e^{iθ})″, from the point its body hangs on.
+        """The acceleration of a point: Σ z·(s e^{iθ})″, from the point that carries its body.
 
         >>> from virtualwork import Input, Link, Mechanism
         >>> crank = Mechanism({"A": 0j}, {"crank": Link({"A": 0j})}, inputs=Input(link="crank"))

@@ -4,7 +4,7 @@ The order of solution places every body by one joint of a tree and closes loops 
 P = P[base] + Σ z·s·e^{iθ} bears on the base as it is, on each angle with its lever, (z s e^{iθ}) × F, on each slide
 along it. What bears on an angle θ or a slide of the tree, its generalized force Q, is so a sum whose coefficients hang
 on the mechanism alone. The links' inertia appears in it as in the equations of an open chain of links: a link's
-inertia about the point it hangs on, times α, and its mass times that point's acceleration.
+inertia about the point that carries it, times α, and its mass times that point's acceleration.
 
 - Virtual work needs nothing else: with κ = dθ/dq the effort is −Σ Q κ, Q of the loads alone.
 - The forces λ at the loop joints are the multipliers of the loops: for each unknown x of a group

@@ -223,7 +223,7 @@ class PoseForces:
         return minus(self.pose.omega(body), self.pose.omega(other))
 
     def slipping_rate(self, n: int) -> Number:
-        """The rate of a contact, or 0 where it is nothing beside the rates of all links: the parts do not move against each other."""
+        """The rate of a contact, or 0 where it is negligible against the rates of all links: the parts do not move against each other."""
         rate = self.rubbing_rate(n)
         if rate is None:
             return None

@@ -151,7 +151,7 @@ class JointForces:
     def beside(
         self, pose: LoadedPose, guide: int, tooth: Callable[[LoadedPose, int], Number] | None = None
     ) -> Number:
-        """What a guide bears because teeth push its link beside the guide's line: at the pitch point of the wheel."""
+        """The load of a guide whose link teeth push, off the guide's line: at the pitch point of the wheel."""
         tooth = tooth or self.tooth
         g, m = self.mechanism.guides[guide], self.mechanism
         total: Number = None

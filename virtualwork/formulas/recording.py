@@ -1,7 +1,7 @@
 """The formulas of one assembly, written down on a tape: positions, rates, loads, effort, joint forces.
 
 The same formulas as everywhere, handed recorded numbers. What depends on more than the pose enters as an input of the
-tape beside the inputs of the mechanism: the sign of a closed form where it turns over on the way, the unknowns of a
+tape in addition to the inputs of the mechanism: the sign of a closed form where it turns over on the way, the unknowns of a
 group that has none, the whole turns of an angle, the force that a table gives.
 
 Inputs of a tape

@@ -78,7 +78,7 @@ def run(
     engine : "python", "numpy" or "llvm"
         Chosen by the size of the work where not given.
     pairs : names of outputs
-        Each and the output after it are the parts of a complex number, and are laid one beside the other for it.
+        Each and the output after it are the parts of a complex number, and are laid side by side for it.
 
     Returns
     -------

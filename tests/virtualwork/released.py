@@ -1,4 +1,4 @@
-"""Mechanisms that the tests of motion under forces let go, and what is asked of a run."""
+"""Mechanisms that the tests of motion under forces release, and what is asked of a run."""
 
 from __future__ import annotations
 

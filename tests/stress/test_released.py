@@ -1,4 +1,4 @@
-"""Random linkages let go from rest: the error against the bodies' own coordinates, within the estimate."""
+"""Random linkages released from rest: the error against the bodies' own coordinates, within the estimate."""
 
 from __future__ import annotations
 
@@ -12,6 +12,6 @@ from benchmarks.stress.campaigns import replay
 @pytest.mark.parametrize(
     "seed", [36, 122, 126, 129, 0, *range(1, 36), *range(37, 122), *range(123, 126), *range(130, 240)]
 )
-def test_linkage_let_go(seed: int) -> None:
+def test_linkage_released(seed: int) -> None:
     for error, estimate in replay("released linkages", seed):
         assert error <= estimate

@@ -49,7 +49,7 @@ def _linkage(rng: np.random.Generator, kind: str) -> Mechanism:
 
 
 def _slider_crank(rng: np.random.Generator) -> Mechanism:
-    """A slider-crank, in line or not, let go by its crank or its rod."""
+    """A slider-crank, in line or not, released by its crank or its rod."""
     crank, rod = (10.0 ** rng.uniform(-1, 0, 2)).tolist()
     turned = float(rng.uniform(-math.pi, math.pi))
     middle = crank * complex(math.cos(turned), math.sin(turned))
@@ -90,7 +90,7 @@ def pairs_of(m: Mechanism, end: float, accuracy: float) -> Pairs:
     return found
 
 
-def _let_go(rng: np.random.Generator) -> Pairs:
+def _released(rng: np.random.Generator) -> Pairs:
     """Any kind, from rest anywhere, for a second or so at any accuracy."""
     kind = [*LINKAGES, "slider-crank"][int(rng.integers(len(LINKAGES) + 1))]
     accuracy = 10.0 ** rng.uniform(-10, -6)
@@ -103,5 +103,5 @@ def _let_go(rng: np.random.Generator) -> Pairs:
 
 
 CAMPAIGNS = {
-    "released linkages": ("from rest anywhere, against bodies with joint forces as multipliers", _let_go)
+    "released linkages": ("from rest anywhere, against bodies with joint forces as multipliers", _released)
 }
