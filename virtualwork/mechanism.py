@@ -98,6 +98,31 @@ class Mechanism(Numbered):
         """Read the TOML text of a description; `file` names it in messages, `folder` is where its tables lie."""
         return read_text(text, cls, file, folder, load)
 
+    def to_toml(self, length: str = "m", angle: str = "rad") -> str:
+        """Return the TOML text of this description; `from_toml_text` reads the same mechanism from it.
+
+        Parameters
+        ----------
+        length, angle : str
+            The units of bare lengths and angles.
+
+        Raises
+        ------
+        DescriptionError
+            A part has no text: a table beside the file, an end of a spring at a point without a name.
+
+        Examples
+        --------
+        >>> from virtualwork import Input, Link
+        >>> m = Mechanism({"O": 0j}, {"arm": Link({"O": 0j, "P": 2})}, inputs=Input(link="arm"))
+        >>> longer = m.changed({"links.arm.P.x": 2.5})
+        >>> "[links.arm]\\npoints = { O = [0, 0], P = [2.5, 0] }" in longer.to_toml()
+        True
+        """
+        from virtualwork.describe.text import toml_text
+
+        return toml_text(self, length, angle)
+
     @cached_property
     def assembly(self) -> Assembly:
         """The assembly that the guess chooses, ready to move."""
