@@ -30,7 +30,7 @@ class ExactFit(NamedTuple):
     gain: Vectors
     """(..., s, 1 + p, r)."""
     residual_sd: Doubled
-    """Of the runs alone, (...); NaN where no degree of freedom is left."""
+    """The standard deviation of the runs alone, (...); NaN where no degree of freedom is left."""
     sources: Vectors | None = None
     """(..., s, 1 + p, q), as those of `Foreknown`."""
 
