@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from balancing.balance import least_squares
 from balancing.dependence import design, directions
-from balancing.propagation import components, response
-from balancing.reading_errors import Errors, wider_draws
+from balancing.reading_errors import Errors, components, response, wider_draws
 from balancing.run_log import JointFit
 from dalembert.arithmetic.records import numbers, record
 
