@@ -20,7 +20,6 @@ if TYPE_CHECKING:
         unseen,
     )
     from balancing.doubt import Drift, drift, outlier_probability, phase_sense, repeats, robust_fit
-    from balancing.fixed_weights import place_weights
     from balancing.flywheel import TorqueCycle, torque_cycle
     from balancing.indexing import Indexed, index_balancing
     from balancing.influence import influence_coefficients
@@ -33,17 +32,17 @@ if TYPE_CHECKING:
     from balancing.rotor import by_size
     from balancing.rounding import influence_error
     from balancing.run_log import JointFit, Undetermined, determined, initial_alone, joint_fit
-    from balancing.severity import ZONE_BOUNDARIES, severity_zone
-    from balancing.stock import FewestWeights, fewest_from_stock, place_from_stock
     from balancing.synchronous import OncePerTurn, once_per_turn
     from balancing.tolerance import (
         GRADES,
+        ZONE_BOUNDARIES,
         allocate,
         api_unbalance,
         grade_value,
         journal_loads,
         mil_unbalance,
         permissible_unbalance,
+        severity_zone,
     )
     from balancing.trial import (
         ErrorBudget,
@@ -53,6 +52,7 @@ if TYPE_CHECKING:
         trial_unbalance,
     )
     from balancing.unbalance import initial_unbalance
+    from balancing.weights import FewestWeights, fewest_from_stock, place_from_stock, place_weights
 
 # A rotor with known masses needs none of what vibration needs: each module is loaded when one of its names is used.
 _HOMES = {
@@ -61,23 +61,22 @@ _HOMES = {
     "balancing.correction": "CoincidentPlanes Correction Unbalances correct",
     "balancing.dependence": "DependentPlanes DependentTrials condition_number plane_significance unseen",
     "balancing.doubt": "Drift drift outlier_probability phase_sense repeats robust_fit",
-    "balancing.fixed_weights": "place_weights",
     "balancing.flywheel": "TorqueCycle torque_cycle",
     "balancing.indexing": "Indexed index_balancing",
     "balancing.influence": "influence_coefficients",
     "balancing.run_log": "JointFit Undetermined determined initial_alone joint_fit",
     "balancing.limited": "Doubtful Infeasible NotConverged",
-    "balancing.severity": "ZONE_BOUNDARIES severity_zone",
     "balancing.modal": "ModalCorrection UnreachedMode modal_corrections shapes_at",
     "balancing.log_balance": "LogBalance region_factor spread",
     "balancing.next_run": "NextRun suggest_run",
     "balancing.synchronous": "OncePerTurn once_per_turn",
     "balancing.prior": "Prior fit_with_prior pooled_prior stored_prior",
     "balancing.placement": "Placement drill_depth place transfer",
-    "balancing.stock": "FewestWeights fewest_from_stock place_from_stock",
+    "balancing.weights": "FewestWeights fewest_from_stock place_from_stock place_weights",
     "balancing.rotor": "by_size",
     "balancing.rounding": "influence_error",
-    "balancing.tolerance": "GRADES allocate api_unbalance grade_value journal_loads mil_unbalance permissible_unbalance",
+    "balancing.tolerance": "GRADES ZONE_BOUNDARIES allocate api_unbalance grade_value journal_loads mil_unbalance permissible_unbalance "
+    "severity_zone",
     "balancing.trial": "ErrorBudget TrialEffect error_budget trial_effect trial_unbalance",
     "balancing.unbalance": "initial_unbalance",
 }

@@ -63,7 +63,7 @@ class Balance:
     """The limits of the residual that were requested, (s,)."""
 
     singular_values: Real | None = field(default=None, repr=False, compare=False)
-    """Of the scaled coefficients, (..., p), where they are known from the solution."""
+    """The singular values of the scaled coefficients, (..., p), where they are known from the solution."""
 
     def __repr__(self) -> str:
         largest = numbers(self.residual_max)

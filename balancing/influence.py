@@ -6,9 +6,14 @@ The vibration V_s at sensor s (and speed) answers linearly to the masses w_p in 
 
 A vibration, a mass, a coefficient is a complex number: size and phase, and both phases are counted in one common
 sense.
+
+An initial run with its trial runs has as many different loads as a fit has unknowns, one of them none (`Loads`). Runs with the
+same masses count as their mean, and the means leave nothing to spare: x₀ is the mean without masses, α what each load adds to it.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from balancing.dependence import DependentTrials, adjoint, columns_scaled, require_independent
 from dalembert.arithmetic.shapes import as_numbers, common_shape
 
+Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
@@ -82,3 +88,66 @@ def influence_coefficients(initial: ArrayLike, trials: ArrayLike, trial_masses: 
         q, r = np.linalg.qr(scaled)
         alpha = np.linalg.solve(r, adjoint(q) @ change)
     return np.asarray(np.swapaxes(alpha * scale[..., None], -1, -2))
+
+
+class Loads(NamedTuple):
+    """Runs with as many different loads as unknowns, the first of them none."""
+
+    masses: Complex
+    """(..., r, p)."""
+    first: NDArray[np.intp]
+    """A run of each load, (1 + p,)."""
+    of_run: NDArray[np.bool_]
+    """Which load each run has, (r, 1 + p)."""
+    present: NDArray[np.bool_]
+    often: Real
+    """The number of readings of each channel with each load, (..., 1 + p, s)."""
+
+    def means(self, of_rows: NDArray[np.float64 | np.complex128]) -> NDArray[np.float64 | np.complex128]:
+        """Return the means over the runs of each load, (..., r, s) -> (..., 1 + p, s)."""
+        read = np.where(self.present, of_rows, 0)
+        sums = [read[..., np.flatnonzero(mine), :].sum(axis=-2) for mine in self.of_run.T]
+        return np.asarray(np.stack(sums, axis=-2) / self.often)
+
+    def solve(self, readings: Complex) -> tuple[Complex, Complex, Real]:
+        """Return θ = (x₀, α), x₀ the mean without masses, its gain and the leverage of the readings.
+
+        Raises
+        ------
+        DependentTrials
+            The loads cannot distinguish the planes.
+        """
+        means = np.asarray(self.means(readings), dtype=complex)
+        on = self.masses[..., self.first[1:], :]
+        alpha = influence_coefficients(means[..., 0, :], means[..., 1:, :], on)
+        unknowns = np.concatenate([means[..., 0, :, None], alpha], axis=-1)
+        # θ = gain y: α = T⁻¹ (means with masses less the mean without)
+        undo = np.linalg.inv(on)
+        of_means = np.zeros((*undo.shape[:-2], *(undo.shape[-1] + 1,) * 2), dtype=complex)
+        of_means[..., 0, 0], of_means[..., 1:, 0], of_means[..., 1:, 1:] = 1.0, -undo.sum(axis=-1), undo
+        share = np.where(self.present, (self.of_run @ (1 / self.often)), 0.0)
+        gain = (of_means @ self.of_run.T)[..., None, :, :] * np.swapaxes(share, -1, -2)[..., None, :]
+        return np.asarray(unknowns + 0.0, dtype=complex), np.asarray(gain, dtype=complex), np.asarray(share)
+
+
+def loads_of(masses: Complex, present: NDArray[np.bool_]) -> Loads | None:
+    """Return the different loads of the runs; None if they are more or fewer than the unknowns, or if no run is without load."""
+    runs, planes = masses.shape[-2:]
+    if runs < 1 + planes:
+        return None
+    each = np.moveaxis(masses, -2, 0).reshape(runs, -1)
+    if runs == 1 + planes:
+        first = np.arange(runs)
+        number = first
+    else:
+        parts = np.concatenate([each.real, each.imag], axis=1) + 0.0
+        _, first, number = np.unique(parts, axis=0, return_index=True, return_inverse=True)
+        number = number.ravel()
+    bare = np.flatnonzero(~each[first].any(axis=1))
+    if len(first) != 1 + planes or len(bare) != 1:
+        return None
+    order = np.concatenate([bare, np.delete(np.arange(1 + planes), bare)])
+    order[1:] = order[1:][np.argsort(first[order[1:]], kind="stable")]
+    of_run = number[:, None] == order
+    count = np.stack([present[..., np.flatnonzero(mine), :].sum(axis=-2) for mine in of_run.T], axis=-2)
+    return Loads(masses, first[order], of_run, present, count.astype(float)) if count.all() else None

@@ -1,6 +1,6 @@
 """A log in numbers of 32 digits: the fit of its runs, with prior knowledge too, and the deviations of its corrections.
 
-The formulas of `balancing.run_log`, `balancing.prior`, `balancing.propagation` and `balancing.log_balance`; every decision, such as
+The formulas of `balancing.run_log`, `balancing.prior`, `balancing.reading_errors` and `balancing.log_balance`; every decision, such as
 the rank of a fit, is that of the floats.
 """
 
@@ -30,7 +30,7 @@ class ExactFit(NamedTuple):
     gain: Vectors
     """(..., s, 1 + p, r)."""
     residual_sd: Doubled
-    """Of the runs alone, (...); NaN where no degree of freedom is left."""
+    """The standard deviation of the runs alone, (...); NaN where no degree of freedom is left."""
     sources: Vectors | None = None
     """(..., s, 1 + p, q), as those of `Foreknown`."""
 
@@ -177,7 +177,7 @@ def correction_deviations(
 ) -> tuple[Doubled, Doubled]:
     """Return the deviations of least-squares corrections (..., p), as given, along themselves and across.
 
-    As `balancing.propagation` and `LogBalance.covariance` have them. `initial`: (..., s), the vibration without masses;
+    As `balancing.reading_errors` and `LogBalance.covariance` have them. `initial`: (..., s), the vibration without masses;
     `corrections`: all that is added to the rotor without masses; `given`: what is added to it as it stands.
     """
     alpha = fit.unknowns[..., 1:]

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from balancing.balance import least_squares
 from balancing.dependence import design, directions
-from balancing.propagation import components, response
-from balancing.reading_errors import Errors, wider_draws
+from balancing.reading_errors import Errors, components, response, wider_draws
 from balancing.run_log import JointFit
 from dalembert.arithmetic.records import numbers, record
 
@@ -76,7 +75,7 @@ class CoefficientSpread(NamedTuple):
     """Standard deviation along each coefficient and across it, (..., s, p); NaN where it is not known."""
     across: Real
     correlation: Complex
-    """Of the errors of each channel's planes, E δ_p δ̄_q/√(E|δ_p|² E|δ_q|²), (..., s, p, p)."""
+    """The correlation of the errors of each channel's planes, E δ_p δ̄_q/√(E|δ_p|² E|δ_q|²), (..., s, p, p)."""
     reading_sd: Real
     """√E|ε|² of the readings, (...); NaN where it is not known."""
     degrees_of_freedom: Real

@@ -40,7 +40,7 @@ class History(NamedTuple):
     i: int
     sensors: Sequence[str]
     runs: Sequence[str]
-    """Of each row of readings."""
+    """The run of each row of readings."""
     fit: JointFit
     """Without run-out."""
     chance: Real

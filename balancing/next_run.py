@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from balancing.dependence import adjoint, design
 from balancing.log_balance import LogBalance
-from balancing.propagation import response
+from balancing.reading_errors import response
 from dalembert.arithmetic.records import record
 
 Real = NDArray[np.float64]

@@ -26,9 +26,9 @@ Dials = NDArray[np.object_]
 """The polar axes of a picture: a row for each rotor."""
 
 MOST = 4
-"""So many rotors of a batch are drawn."""
+"""The largest number of rotors that are drawn."""
 NAMED = 16
-"""So many vectors of a dial are named."""
+"""The largest number of vectors of a dial that are named."""
 RIM_ROOM = 2.3
 """The reach of a dial with places, with room for the marks on the rim."""
 SENSE = "angles counter-clockwise as seen against +z"

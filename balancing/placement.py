@@ -1,4 +1,4 @@
-"""Corrections where masses can go: holes, blades, other radii and planes, drilling. Weights in stock: `stock.py`."""
+"""Corrections where masses can go: holes, blades, other radii and planes, drilling. Whole weights: `weights.py`."""
 
 from __future__ import annotations
 

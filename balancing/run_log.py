@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.dependence import DependentTrials, Unseen, adjoint, design, directions, threshold
-from balancing.loads import loads_of
+from balancing.influence import loads_of
 from balancing.qr import factors
 from balancing.reading_errors import Errors
 from dalembert.arithmetic.exact import EPS

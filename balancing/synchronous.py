@@ -15,7 +15,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 HARMONICS = 3
-"""So many orders are fitted beside one another, where a turn has samples enough."""
+"""The number of orders that are fitted together, where a turn has samples enough."""
 REFINED = 4
 """Steps of refinement in 32 digits, where one is not enough."""
 BLOCK = 8192
@@ -332,7 +332,7 @@ def _counted(time: Any, tacho: Any, rises: Marks) -> tuple[Any, Any, int, Any]:
     at = rises.at[within]
     if len(at) < 2:
         raise ValueError("the tacho has no whole turn from mark to mark")
-    # pulses and marks may coincide: between marks their whole number is that of the mean
+    # pulses and marks may coincide: their whole number between marks is the rounded mean
     passed = np.interp(_floats(at), places, np.arange(len(places)))
     pulses = round(float(passed[-1] - passed[0]) / (len(at) - 1))
     odd = np.flatnonzero(np.abs(np.diff(passed) - pulses) > 0.5)

@@ -33,7 +33,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
         ("log_picture",),
-        ("doubt", "fixed_weights", "next_run", "objective", "polygons", "stock"),
+        ("doubt", "next_run", "objective", "polygons", "weights"),
         (
             "amplitudes",
             "engine",
@@ -49,8 +49,8 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("sheet",),
         ("tapes",),
         ("optimality",),
-        ("limited", "loads", "log_again", "rounding"),
-        ("influence", "modal", "propagation", "qr", "second_run"),
+        ("limited", "log_again", "rounding"),
+        ("influence", "modal", "qr", "reading_errors", "second_run"),
         (
             "checked_data",
             "cone_problem",
@@ -59,9 +59,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "indexing",
             "phase",
             "picture",
-            "reading_errors",
             "rotor",
-            "severity",
             "synchronous",
         ),
         ("triangle",),

@@ -122,7 +122,7 @@ class Request:
     center: float | None
     tolerance: Tolerance | None
     modes: Modes | None = None
-    """Whose modal sums are to vanish, in place of force and couple alone."""
+    """The modes whose modal sums are to vanish, in place of force and couple alone."""
     masses: Mapping[str, float] = field(default_factory=dict)
     """Plane -> the mass that its correction is to have, kg: where the plane has no radius, that is sought."""
     carried: Carried | None = None

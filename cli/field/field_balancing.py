@@ -60,7 +60,7 @@ class Solved:
     corrections: Complex
     """(g, p), as given: with --from-here what to add to the rotor as it stands."""
     bound: Real | None = None
-    """Of the largest residual, as the dual problem proves it."""
+    """The smallest possible largest residual, (g,), as the dual problem proves it."""
     condition: Real = field(init=False)
     """(g,)."""
     unbalance: Complex | None = None
@@ -154,7 +154,7 @@ class FieldBalancing:
         self.max_mass = _limits_in(request.max_mass, runs) or runs.max_mass
         """Limit of each plane, SI; the key "" is for all."""
         self.ceiling = _ceiling_in(request.max_residual, runs)
-        """Of the residuals, in the table's amplitude unit."""
+        """The limit of the residuals, in the table's amplitude unit."""
         self.predict = _masses_at(request.predict, runs)
         """Plane -> mass of a run to be predicted, SI; the key "" is the only plane."""
         self.limited = bool(request.objective == "minimax" or self.max_mass or self.ceiling is not None)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from balancing import plane_significance, trial_effect
 from balancing.doubt import LEVEL
-from balancing.stock import ENOUGH
+from balancing.weights import ENOUGH
 from cli.field.field_balancing import FieldBalancing, Solved
 from cli.field.rotor import Rotor
 from cli.read.runs.runs import SHOWN

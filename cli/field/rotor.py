@@ -88,7 +88,7 @@ class LastRun(NamedTuple):
     on: Complex
     """What was on the rotor, SI, (p,)."""
     vibration: Complex
-    """As read, run-out off, (s,); NaN where a sensor was not read."""
+    """The readings less the run-out, (s,); NaN where a sensor was not read."""
 
 
 class Reading(NamedTuple):

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 EXAMPLE = "blades"
 FIRST, FLAT = "0deg", "180deg"
-"""The defaults of --first and --drill-point."""
+"""Default angle of the first blade, default point angle of the drill."""
 OPTIONS = """
 Arguments:
   corrections MASS@ANGLE ...  Corrections to ADD, such as 83.5g@308.87deg; or a FILE that dalembert field wrote (CSV, JSON, workbook).

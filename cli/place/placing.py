@@ -21,7 +21,7 @@ from balancing import (
     place_weights,
     transfer,
 )
-from balancing.stock import ENOUGH
+from balancing.weights import ENOUGH
 from cli.read import options
 from dalembert.angles import degrees, in_turn, phasor
 from dalembert.errors import DataError, quote

@@ -221,7 +221,7 @@ class SecondRun:
 
     def _placed(self, share: Share, goal: Vectors) -> tuple[Doubled, Doubled]:
         """Return the masses of a plane and their angles in degrees, (n,) each."""
-        from balancing.fixed_weights import angles_again
+        from balancing.weights import angles_again
         from cli.read.exact import writtens
         from dalembert.arithmetic.doubled import PI, Doubled
         from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array

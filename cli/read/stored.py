@@ -71,7 +71,7 @@ class Coefficients(NamedTuple):
     covariance: Complex | None
     """E δδᴴ of each channel, (s, p, p); None where the file states none."""
     reading_sd: float
-    """Of the readings that they come from, as vectors; NaN where the file does not state it."""
+    """The standard deviation of the readings that they come from, as vectors; NaN where the file does not state it."""
     degrees_of_freedom: float
     """Complex, of that and of the covariance; inf where the file does not state it."""
 

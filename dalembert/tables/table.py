@@ -35,7 +35,7 @@ class Numbers:
     """A column of numbers in the file's own unit; NaN where an allowed blank or mark stands."""
 
     header: str
-    """As the file writes it."""
+    """The header as the file writes it."""
     unit: str
     values: NDArray[np.float64]
     dimension: str

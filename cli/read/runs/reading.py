@@ -222,7 +222,7 @@ class MassColumns:
     per: str
     """`mass` or `unbalance`."""
     rotor: Rows
-    """Of each row."""
+    """The rotor of each row."""
 
     @cached_property
     def stated(self) -> Flags:
@@ -374,7 +374,7 @@ def turned(angle: float, unit: str) -> complex:
 
 
 def turned_exactly(angle: float, unit: str) -> Vectors:
-    """The same in 32 digits."""
+    """e^{iφ} of an angle in 32 digits."""
     from cli.read.exact import turns
 
     return turns(Numbers("", unit, np.array([angle]), "angle"))[0]

@@ -113,7 +113,7 @@ class _Listed:
         self.count = np.bincount(rotor[self.first], minlength=rotors)
         self.start = np.cumsum(self.count) - self.count
         self.place = self.number - self.start[rotor]
-        """Of each row the place within its rotor."""
+        """The place of each row within its rotor."""
 
     def of(self, rotors: Rows) -> Rows:
         """Return the numbers that these rotors have, (g, …): each of them as many."""
@@ -140,11 +140,11 @@ class Sorted:
         self.warnings: list[str] = []
         self.runs = _Listed(self.rotor, rows.run[self.order], len(rows.of.rotors))
         self.run = self.runs.number
-        """Of each row its rotor's run."""
+        """The run of each row, numbered through all rotors."""
         out = np.array([name in excluded for name in rows.runs])
         self.takes_part = ~out[self.runs.code]
         self.read = np.ones(len(out[self.runs.code]), dtype=bool)
-        """Of which runs the readings count."""
+        """Whether the readings of a run count."""
         self._on()
 
     def _on(self) -> None:

@@ -121,7 +121,7 @@ class Group:
     fit: balancing.JointFit = field(init=False)
     """Initial vibration and coefficients: of all runs together, or the coefficients are stored, or of amplitudes alone."""
     amplitude_fits: list[list[balancing.AmplitudeFit]] = field(init=False, default_factory=list)
-    """Of the four-run method, rotor by rotor, plane by plane."""
+    """The fits of the four-run method, rotor by rotor, plane by plane."""
     before: Before | None = None
     """Where stored coefficients take part in the fit."""
 
@@ -270,7 +270,7 @@ class Runs:
     table: Table
     rotors: list[str]
     mass_unit: str
-    """Of the trials: a mass's or an unbalance's."""
+    """The unit of the trial masses, or unbalances."""
     other_masses: bool = False
     """Whether the stored coefficients are per mass and the runs have unbalances, or the other way."""
     fitted: bool = False
