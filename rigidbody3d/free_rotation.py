@@ -108,7 +108,10 @@ class FreeRotation:
         dyz = np.where(self._large, d23, d12)
         hx, hz = np.where(self._large, H1, H3), np.where(self._large, H3, H1)
         sign = np.where(hz < 0, -1.0, 1.0)
-        self._ax, self._ay, self._az = np.sqrt(cz / d13), sign * np.sqrt(cz / dyz), sign * np.sqrt(cx / d13)
+        # on the separatrix itself Hx keeps its sign too
+        other = np.where((hx < 0) & np.isinf(self._p.quarter), -1.0, 1.0)
+        self._ax, self._az = other * np.sqrt(cz / d13), sign * np.sqrt(cx / d13)
+        self._ay = other * sign * np.sqrt(cz / dyz)
         self._sign = sign
         cn, sn = hx / self._ax, H2 / self._ay
         size = np.hypot(cn, sn)

@@ -3,7 +3,7 @@
 Each shape is named by its field's word and lies along its own axes: a rod, cylinder, cone or tube along z
 (the cone's apex at +z), the normal of a disk, ring or plate along z. The tensors are those of the tables
 (as in the appendices of Beer and Johnston, and of Meriam and Kraige), with the hollow ones in product form: they hold
-down to walls without thickness.
+down to walls without thickness, and arcs down to a straight wire.
 """
 
 from __future__ import annotations
@@ -49,11 +49,24 @@ def _hollow(radius: Array, inner: Array) -> Array:
 
 
 def _arc(radius: Array, angle: Array) -> Moments:
-    half = angle / 2
-    s = np.sin(half) / half
-    c = np.sin(angle) / (2 * angle)
-    x2, y2 = radius**2 * (0.5 + c - s * s), radius**2 * (0.5 - c)
-    return y2, x2, x2 + y2
+    """The variances of cos φ and sin φ over an arc: up to a half turn by their series, where the closed forms cancel."""
+    half: Any = angle / 2
+    bent = half > 1.5
+    mean = np.sin(half) / half
+    double = np.sin(angle) / (2 * angle)
+    x2: Any = 0.0
+    y2: Any = 0.0
+    short: Any = 0.0
+    term: Any = np.where(bent, 0.0, half * half)
+    square = term
+    for k in range(1, 25):
+        # (−half²)ᵏ/(2k + 1)!, of which 1 − sin(half)/half, 1 − sin(angle)/angle and what they make are sums
+        term = term / 6 if k == 1 else -term * square / (2 * k * (2 * k + 1))
+        short = short + term
+        y2 = y2 + term * (4.0**k / 2)
+        x2 = x2 - term * (4.0**k / 2 - 2)
+    x2, y2 = np.where(bent, 0.5 + double - mean * mean, x2 - short * short), np.where(bent, 0.5 - double, y2)
+    return radius**2 * y2, radius**2 * x2, radius**2 * (x2 + y2)
 
 
 SHAPES: dict[str, Shape] = {

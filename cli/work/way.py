@@ -49,10 +49,11 @@ def entries(w: WorkBalance, index: int) -> Iterator[Entry]:
             if load is None or not solved.determined[place, j] or k is None:
                 continue
             turns = cell.quantity == "torque"
-            whole = load if turns else load * (1.0 if cell.quantity == "fx" else 1j)
+            direction = 1j if cell.quantity == "fy" else 1.0
             rate = omegas[k] if turns else velocities[k]
-            power = (whole * rate.conjugate()).real
-            yield _entry(cell.link, "unknown", whole, rate, power, power != 0, fastest, of)
+            along = (direction * rate.conjugate()).real
+            whole = load * direction
+            yield _entry(cell.link, "unknown", whole, rate, load * along, along != 0, fastest, of)
 
 
 def _entry(

@@ -214,3 +214,16 @@ def test_gravity_without_masses_is_said(dalembert: Dalembert) -> None:
     assert done.stdout.splitlines()[1] == "1,a,-1.5"
     assert "--gravity: there is no column mass_*" in done.stderr
     assert not dalembert("work", "-", stdin=table).stderr
+
+
+def test_an_unknown_that_comes_out_as_zero_still_does_work(dalembert: Dalembert) -> None:
+    for table in ("link,fx_N,vx_m_s,vy_m_s\na,?,1,2\n", "link,torque_N_m,omega_rad_s\na,?,1\n"):
+        done = dalembert("work", "-", "--steps", "--json", stdin=table)
+        ((term,),) = (step["terms"] for step in json.loads(done.stdout)["way"][0]["steps"])
+        assert term["power_W"] == 0
+        assert term["workless"] is None
+    # a force across its way does none
+    table = "link,fx_N,fy_N,vx_m_s,torque_N_m,omega_rad_s\na,3,4,0,?,1\nb,,5,2,,\n"
+    ledger = json.loads(dalembert("work", "-", "--steps", "--json", stdin=table).stdout)["way"][0]["steps"][0]
+    whys = [term["workless"] for term in ledger["terms"]]
+    assert whys == ["at rest", "perpendicular to the displacement", None]

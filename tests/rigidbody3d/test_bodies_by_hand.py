@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mpmath as mp
 import numpy as np
 import pytest
 
@@ -46,6 +47,16 @@ def test_one_shape_at_many_places() -> None:
     whole = compose(rod)
     assert whole.mass == pytest.approx(0.9, rel=1e-15)
     np.testing.assert_allclose(whole.center, [1.0, 2 / 3, 1 / 3], rtol=1e-15)
+
+
+@pytest.mark.parametrize("angle", [1e-6, 0.01, 1.0, 2.9, 3.1, 6.2])
+def test_an_arc_keeps_its_digits_down_to_a_straight_wire(angle: float) -> None:
+    with mp.workdps(50):
+        a = mp.mpf(angle)
+        across = (1 - mp.sin(a) / a) / 2
+        along = 1 - across - (mp.sin(a / 2) / (a / 2)) ** 2
+        true = [float(across), float(along), float(across + along)]
+    np.testing.assert_allclose(inertia_of("arc", 1.0, radius=1.0, angle=angle).diagonal(), true, rtol=2e-15)
 
 
 def test_parts_of_unlike_shapes_are_composed() -> None:

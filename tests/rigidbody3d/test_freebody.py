@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 import pytest
@@ -141,12 +142,18 @@ def test_exactly_on_the_separatrix_it_comes_to_the_middle_axis() -> None:
     np.testing.assert_allclose(state.momentum, np.broadcast_to(body.momentum, (3, 3)), rtol=4e-15)
 
 
-def test_exactly_on_the_separatrix_against_taylor() -> None:
-    I, w = [1.0, 2.0, 2.25], [0.75, 0.2, 1.0]
-    omega, q = taylor(I, w, 9.0)
-    state = FreeBody(I, w).at(9.0)
-    assert attitude_error(state.attitude, q) < 2e-14
-    assert omega_error(state.omega, omega) < 2e-14
+@pytest.mark.parametrize("signs", list(product((1, -1), repeat=3)))
+def test_exactly_on_the_separatrix_against_taylor(signs: tuple[int, int, int]) -> None:
+    # ω1 and ω3 keep their signs, ω2 goes from one end to the other
+    I, w = [1.0, 2.0, 2.25], [sign * x for sign, x in zip(signs, (0.75, 0.2, 1.0), strict=True)]
+    for t in (-2.0, 9.0):
+        omega, q = taylor(I, w, t)
+        state = FreeBody(I, w).at(t)
+        assert attitude_error(state.attitude, q) < 2e-14
+        assert omega_error(state.omega, omega) < 2e-14
+        assert (state.error_estimate("omega") < 2e-14).all()
+    far = FreeBody(I, w).at([-200.0, 200.0]).omega
+    np.testing.assert_array_equal(np.sign(far[:, 1]), [-signs[0] * signs[2], signs[0] * signs[2]])
 
 
 def test_a_thin_rod_spins_and_tumbles() -> None:
