@@ -14,7 +14,7 @@ import numpy as np
 
 from cli.formats.drawing import Travel, bodies_of, start_of
 from cli.formats.drawn import Body, Groups, unused
-from cli.formats.robots.robot import BLOCK, WORLD
+from cli.formats.robot import BLOCK, WORLD
 from dalembert.errors import DataError
 from virtualwork.describe.meshes import Mesh
 from virtualwork.describe.parts import GROUND, TorsionSpring
