@@ -220,10 +220,6 @@ class Skeleton:
                 f"{', '.join(lost)}: no chain of pins and guides joins it to the ground: not exported"
             )
 
-    def world(self, body: str, z: complex) -> complex:
-        """Return where a place of a body stands, m."""
-        return self.bodies[body].world(z)
-
     def free_points(self, name: str) -> dict[str, complex]:
         """Return the named points of a link that no joint holds, in its axes; none is called as a body is."""
         held = {*self.m.pins, *(j.point for j in self.joints)}
