@@ -133,7 +133,7 @@ def _inertias(file: str) -> Result:
     from pathlib import Path
 
     from cli.body.inertias import checks, table, warnings
-    from cli.formats.robots import read_robot
+    from cli.formats import read_robot
     from cli.show.result import Result
     from dalembert.tables.files import read_bytes
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.formats.robots.robot import DIAGONAL_FIRST, PLACES, ROWS, Inertial, Robot, RobotLink, symmetric
+from cli.formats.robot import DIAGONAL_FIRST, PLACES, ROWS, Inertial, Robot, RobotLink, symmetric
 from dalembert.errors import DataError
 from dalembert.results.columns import Table, names, number, vector
 from rigidbody3d import inertia

@@ -21,7 +21,7 @@ from cli.formats.drawn import (
 )
 from virtualwork import Mechanism
 from virtualwork.describe import MechanismError
-from virtualwork.describe.parts import Gear, Guess, Guide, Input, Link, Rack
+from virtualwork.describe.parts import Guess, Guide, Input, Link, Rack
 from virtualwork.describe.text import AsWritten, Table, document, written
 from virtualwork.motion import Motion
 
@@ -53,7 +53,7 @@ def _parts(d: Drawing, origins: dict[str, complex], every_point: bool) -> dict[s
             Guide(s.point, s.link, s.on, complex(s.through - origins[s.on]), s.angle, s.turned)
             for s in d.slides
         ],
-        "gears": [Gear((m.a, m.b), m.ratio, m.arm) for m in d.meshes],
+        "gears": d.gears,
         "racks": [Rack(r.gear, r.slide.point, r.radius) for r in d.racks],
         "inputs": [
             Input(e.link, e.on, value=e.at) if e.slide is None else Input(slider=e.slide.point, value=e.at)

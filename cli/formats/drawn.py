@@ -9,16 +9,18 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
-from typing import Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from dalembert.errors import DataError, quote
-from dalembert.units import to_si
+from dalembert.units import LARGEST, to_si
+
+if TYPE_CHECKING:
+    from virtualwork.describe.meshes import Gear
 
 GROUND = "ground"
-LARGEST = 1e60
 # places nearer than this share of the drawing's size are one place
 SAME = 1e-9
 Thing = TypeVar("Thing", bound=Hashable)
@@ -151,16 +153,6 @@ class Slide:
 
 
 @dataclass
-class Mesh:
-    """Two gears: (ω_b − ω_arm) = ratio·(ω_a − ω_arm)."""
-
-    a: str
-    b: str
-    ratio: float
-    arm: str
-
-
-@dataclass
 class Toothed:
     """A wheel and a rack: the slide grows by radius·(θ_gear − θ_on), `on` the body that carries it."""
 
@@ -218,7 +210,7 @@ class Drawing:
     """Each body's points are in axes of its own, which the file gives; False: in the ground's, as they are drawn."""
     bodies: dict[str, Body] = field(default_factory=lambda: {GROUND: Body()})
     slides: list[Slide] = field(default_factory=list)
-    meshes: list[Mesh] = field(default_factory=list)
+    gears: list[Gear] = field(default_factory=list)
     racks: list[Toothed] = field(default_factory=list)
     drives: list[Drive] = field(default_factory=list)
     spare: list[Drive] = field(default_factory=list)
@@ -275,8 +267,7 @@ class Drawing:
         """Give bodies other names, wherever joints, inputs and loads name them."""
         for s in self.slides:
             s.link, s.on = new(s.link), new(s.on)
-        for m in self.meshes:
-            m.a, m.b, m.arm = new(m.a), new(m.b), new(m.arm)
+        self.gears = [renamed(g, new) for g in self.gears]
         for r in self.racks:
             r.gear = new(r.gear)
         for e in (*self.drives, *self.spare):
@@ -293,7 +284,7 @@ class Drawing:
         for names in self.pins().values():
             yield from [((GROUND, n), 1) for n in names] if GROUND in names else [(tuple(names), 1)]
         yield from (((s.link, s.on), 1) for s in self.slides)
-        yield from (((m.a, m.b, m.arm), 1) for m in self.meshes)
+        yield from (((*g.links, g.arm), 1) for g in self.gears)
         yield from (((r.gear, r.slide.link, r.slide.on), 1) for r in self.racks)
         yield from ((e.pair, 2) for e in self.drives)
 
@@ -332,6 +323,12 @@ class Drawing:
         """Return a point's name that no body uses yet."""
         used = {p for body in self.bodies.values() for p in body.points}
         return unused(wanted, used)
+
+
+def renamed(gear: Gear, new: Callable[[str], str]) -> Gear:
+    """Return a gear of the same links by other names."""
+    first, second = map(new, gear.links)
+    return replace(gear, links=(first, second), arm=new(gear.arm))
 
 
 def pins_of(

@@ -115,8 +115,8 @@ def file_bytes(
         data = picture(draw(m, inputs, travel, length, metres), suffix, comment, metres)
         several = travel.motion is None
         return data, ["curves are left out: they need one input, and it has several"] if several else []
-    from cli.formats.robots import mjcf, sdf, urdf
-    from cli.formats.robots.skeleton import Skeleton
+    from cli.formats import mjcf, sdf, urdf
+    from cli.formats.skeleton import Skeleton
 
     writers = {".urdf": urdf.write, ".sdf": sdf.write, ".xml": mjcf.write}
     return writers[suffix](Skeleton(m, inputs, travel), comment)

@@ -14,7 +14,6 @@ from cli.formats.drawn import (
     Drive,
     Exact,
     Groups,
-    Mesh,
     Slide,
     apart,
     centers,
@@ -25,6 +24,7 @@ from cli.formats.drawn import (
     unused,
 )
 from dalembert.errors import DataError
+from virtualwork.describe.meshes import Gear
 
 ATTRIBUTE = re.compile(r"""([A-Za-z_][\w.-]*)\s*=\s*("[^"<]*"|'[^'<]*')""")
 DEEPEST = 20
@@ -313,4 +313,4 @@ class _Reader:
             d.leave(what, "no link holds the centres of both")
             return
         sense = 1.0 if ratio.attributes.get("type", "").lower() == "chain" else -1.0
-        d.meshes.append(Mesh(first, second, sense * sizes[0] / sizes[1], radii[2]))
+        d.gears.append(Gear((first, second), sense * sizes[0] / sizes[1], radii[2]))

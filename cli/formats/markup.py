@@ -14,9 +14,9 @@ from xml.parsers.expat.errors import codes
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cli.formats.drawn import LARGEST
 from dalembert.errors import DataError, quote
 from dalembert.tables.files import load
+from dalembert.units import LARGEST
 
 LARGEST_FILE = 10_000_000  # bytes
 DEEPEST = 100

@@ -17,7 +17,6 @@ from cli.formats.drawn import (
     Drawing,
     Drive,
     Exact,
-    Mesh,
     Slide,
     Toothed,
     apart,
@@ -28,6 +27,7 @@ from cli.formats.drawn import (
     place,
 )
 from dalembert.errors import DataError, quote
+from virtualwork.describe.meshes import Gear
 
 TYPES = ("R", "P", "RP", "G")
 GROUNDS = {"gnd", "grnd", "grond", "gound", "groud", "0"}
@@ -186,7 +186,7 @@ def mesh(d: Drawing, a: str, b: str, at: Exact, what: str) -> None:
     """
     if _rack(d, a, b, at) or _rack(d, b, a, at):
         return
-    best: tuple[float, Mesh] | None = None
+    best: tuple[float, Gear] | None = None
     for p, q, arm in centers(d, a, b):
         zp, zq = d.bodies[a].points[p], d.bodies[b].points[q]
         between = apart(zp, zq)
@@ -197,7 +197,7 @@ def mesh(d: Drawing, a: str, b: str, at: Exact, what: str) -> None:
         off = abs(to_a.real * uy - to_a.imag * ux) / between
         ra, rb = (to.real * ux + to.imag * uy for to in (to_a, to_b))
         if ra * rb != 0 and (best is None or off < best[0]):
-            best = off, Mesh(a, b, ra / rb, arm)
+            best = off, Gear((a, b), ra / rb, arm)
     if best is None:
         d.leave(f"{what} ({a}, {b})", "no link holds a pin of both, and none slides where the other turns")
         return
@@ -205,7 +205,7 @@ def mesh(d: Drawing, a: str, b: str, at: Exact, what: str) -> None:
         d.notes.append(
             f"{what}: its pitch point is off the line of the centres: the nearest point of the line is used"
         )
-    d.meshes.append(best[1])
+    d.gears.append(best[1])
 
 
 def _rack(d: Drawing, wheel: str, rack: str, at: Exact) -> bool:

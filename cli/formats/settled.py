@@ -103,9 +103,9 @@ def _drop_what_is_rigid(d: Drawing) -> None:
     for s in [s for s in d.slides if s.link == s.on]:
         d.slides.remove(s)
         d.leave(f"slide at {s.point}", "both sides are one body")
-    for m in [m for m in d.meshes if len({m.a, m.b, m.arm}) < 3]:
-        d.meshes.remove(m)
-        d.leave(f"gears {m.a}, {m.b}", "they are one body, or one of them is the arm")
+    for g in [g for g in d.gears if len({*g.links, g.arm}) < 3]:
+        d.gears.remove(g)
+        d.leave(f"gears {', '.join(g.links)}", "they are one body, or one of them is the arm")
     slides = list(map(id, d.slides))
     for r in list(d.racks):
         # a wheel in a slot may roll along a rack
@@ -136,9 +136,9 @@ def _drop_what_dangles(d: Drawing) -> None:
             d.leave(name, alone if holds[name] else "it has no joint")
         d.slides = [s for s in d.slides if {s.link, s.on} <= d.bodies.keys()]
         d.racks = [r for r in d.racks if {r.gear, r.slide.link, r.slide.on} <= d.bodies.keys()]
-        for m in [m for m in d.meshes if not {m.a, m.b, m.arm} <= d.bodies.keys()]:
-            d.meshes.remove(m)
-            d.notes.append(f"gears {m.a}, {m.b}: left out with their link")
+        for g in [g for g in d.gears if not {*g.links, g.arm} <= d.bodies.keys()]:
+            d.gears.remove(g)
+            d.notes.append(f"gears {', '.join(g.links)}: left out with their link")
         for load in [a for a in d.loads if not {name for name, _ in a.ends} <= d.bodies.keys()]:
             d.loads.remove(load)
             d.notes.append(f"load on {', '.join(name for name, _ in load.ends)}: left out with its link")
@@ -168,7 +168,7 @@ def _part(d: Drawing, names: set[str], drives: list[Drive]) -> Drawing:
         d,
         bodies={GROUND: ground} | bodies,
         slides=slides,
-        meshes=[m for m in d.meshes if m.a in names or m.b in names],
+        gears=[g for g in d.gears if not names.isdisjoint(g.links)],
         racks=[r for r in d.racks if r.gear in names],
         drives=drives,
         spare=[e for e in d.spare if set(e.pair) <= {GROUND, *names}],
@@ -222,9 +222,9 @@ class _Speeds:
             rows.append(self.along(s, np.pi / 2)[None])
             if s.turned is not None:
                 rows.append((self.turns(s.link) - self.turns(s.on))[None])
-        for m in d.meshes:
-            a, b, arm = (self.turns(name) for name in (m.a, m.b, m.arm))
-            rows.append((b - arm - m.ratio * (a - arm))[None])
+        for g in d.gears:
+            a, b, arm = (self.turns(name) for name in (*g.links, g.arm))
+            rows.append((b - arm - g.ratio * (a - arm))[None])
         for r in d.racks:
             turned = self.turns(r.gear) - self.turns(r.slide.on)
             rows.append((self.along(r.slide, 0.0) - r.radius / self.size * turned)[None])

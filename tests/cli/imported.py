@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cli.formats import read
 from cli.formats.description import described
-from cli.formats.import_command import read
 from cli.formats.settled import settle
 from virtualwork import Mechanism
 

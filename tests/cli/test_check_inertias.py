@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cli.body.inertias import Check, checks
-from cli.formats.robots import read_robot
+from cli.formats import read_robot
 from tests.conftest import Dalembert
 
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")

@@ -10,9 +10,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from cli.formats import read
 from cli.formats.description import described
 from cli.formats.export_command import file_bytes
-from cli.formats.import_command import read
 from cli.formats.settled import settle
 from dalembert.errors import DataError
 from tests.cli.exported import EXAMPLES, FILES, FOUR_BAR, MASSIVE, PLANETARY, exported, home, moved

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cli.formats.drawing import Travel
-from cli.formats.robots.skeleton import Joint, Skeleton
+from cli.formats.skeleton import Joint, Skeleton
 from dalembert.errors import DataError
 from tests.cli.exported import FILES, FOUR_BAR, MASSIVE, exported, home, moved
 from virtualwork import Mechanism

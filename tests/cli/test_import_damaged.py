@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cli.formats.import_command import read
+from cli.formats import read
 from dalembert.errors import DataError
 from tests.cli.imported import taken
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cli.formats import read
 from cli.formats.description import described
-from cli.formats.import_command import read
 from cli.formats.settled import settle
 from dalembert.errors import DataError
 from tests.conftest import Dalembert
@@ -156,7 +156,7 @@ def test_springs_of_mjcf_ask_for_mujocos_effort() -> None:
 def test_mujoco_agrees_with_what_is_read_of_poses() -> None:
     """Every way to write an orientation, nested frames and defaults, against MuJoCo's own reader."""
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads its own format: pip install mujoco")
-    from cli.formats.robots import read_robot
+    from cli.formats import read_robot
 
     text = """<mujoco><compiler angle="degree" eulerseq="zyX"/>
 <default><default class="s"><site pos="0 0 0.1"/></default></default><worldbody>
@@ -185,7 +185,7 @@ def test_mujoco_agrees_with_what_is_read_of_poses() -> None:
 @pytest.mark.parametrize("total", [-1, 14])
 def test_masses_that_follow_from_shapes_are_mujocos(total: int) -> None:
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads its own format: pip install mujoco")
-    from cli.formats.robots import read_robot
+    from cli.formats import read_robot
 
     shapes = [
         '<geom size=".1"/>',

@@ -150,6 +150,25 @@ def test_a_path_that_names_no_number_is_refused_with_what_there_is(path, said):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("path", "number", "point"),
+    [
+        *(("links.crank.mass", number, False) for number in (float("nan"), float("inf"), "3 kg", None, 1j, (1, 2))),
+        *(("ground.A", number, True) for number in ((1, 2, 3), (1,), "xy", (1, float("nan")), 1j * float("inf"))),
+    ],
+)  # fmt: skip
+def test_what_is_no_number_is_refused_at_its_path(path, number, point):
+    with pytest.raises(DescriptionError) as error:
+        M.changed({path: number})
+    expected = "a point (x, y) or x + iy of finite numbers" if point else "a finite number"
+    assert str(error.value) == f"'{path}': found {number!r}, expected {expected}"
+
+
+def test_a_point_takes_two_numbers_a_complex_one_or_x_alone():
+    for number in ((0.3, 0), [0.3, 0.0], np.array([0.3, 0]), 0.3 + 0j, 0.3, np.float64(0.3)):
+        assert M.changed({"ground.A": number}).ground["A"] == 0.3
+
+
 def test_several_inputs_and_slides_have_paths_and_units_of_their_own():
     m = Mechanism(
         {"O": 0j},

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
+from numbers import Real
 from typing import Any, TypeVar
 
+from dalembert.arithmetic.recorded import Constant
 from dalembert.hints import nearest
-from dalembert.units import LISTED
+from dalembert.units import LARGEST, LISTED
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description, listed
 from virtualwork.describe.forms import Nested
@@ -208,10 +210,26 @@ def parts_with(m: Description, numbers: Mapping[str, Any]) -> dict[str, Any]:
     parts: dict[Any, Any] = {f.name: getattr(m, f.name) for f in fields(m)}
     for path, number in numbers.items():
         places = named(m, path, every)
-        pair = (number.real, number.imag) if isinstance(number, complex) and len(places) == 2 else number
-        for dimension, part in zip(places, pair if len(places) == 2 else (number,), strict=True):
+        for dimension, part in zip(places, _finite(path, number, len(places)), strict=True):
             first, *rest = dimension.where
             parts[first] = _with(parts[first], tuple(rest), part)
+    return parts
+
+
+def _finite(path: str, number: Any, count: int) -> tuple[Any, ...]:
+    """One number, or the two of a point; numbers that vary pass.
+
+    Raises
+    ------
+    DescriptionError
+    """
+    if count == 2 and isinstance(number, complex | Real):
+        number = number.real, number.imag
+    parts = tuple(number) if count == 2 and isinstance(number, Iterable) else (number,)
+    finite = (isinstance(x, Constant) or (isinstance(x, Real) and abs(float(x)) <= LARGEST) for x in parts)
+    if len(parts) != count or not all(finite):
+        expected = "a finite number" if count == 1 else "a point (x, y) or x + iy of finite numbers"
+        raise DescriptionError(f"'{path}': found {number!r}, expected {expected}")
     return parts
 
 

@@ -115,7 +115,7 @@ class Scalar(Form):
         return entry.file.units.number(value, self.dimension(entry.slides), where)
 
     def check(self, value: Any, where: str, part: Any, names: Names) -> None:
-        if not self.negative and value < 0:
+        if not self.negative and not value >= 0:
             raise DescriptionError(f"{where}: found {value}, but it must not be negative")
 
     def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:

@@ -8,6 +8,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from cli.formats import sdf
 from cli.formats.drawn import GROUND
 from cli.formats.markup import (
     At,
@@ -22,8 +23,7 @@ from cli.formats.markup import (
     spatial,
     stated,
 )
-from cli.formats.robots import sdf
-from cli.formats.robots.robot import (
+from cli.formats.robot import (
     ROWS,
     Array,
     Inertial,
@@ -40,7 +40,7 @@ from cli.formats.robots.robot import (
 from dalembert.errors import DataError
 
 if TYPE_CHECKING:
-    from cli.formats.robots.skeleton import Branching, Skeleton
+    from cli.formats.skeleton import Branching, Skeleton
     from virtualwork.describe.parts import Belt, Gear
 
 KINDS: dict[str, Kind] = {**sdf.KINDS, "spherical": "ball"}

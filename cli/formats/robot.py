@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cli.formats.markup import At
 from dalembert.errors import DataError
+
+if TYPE_CHECKING:
+    from virtualwork.describe.meshes import Gear
 
 Array = NDArray[np.float64]
 Kind = Literal["turn", "slide", "ball", "fixed", "other"]
@@ -101,7 +104,7 @@ class Spring:
 
 @dataclass
 class Robot:
-    """A robot of a file; `gears` are (a, b, ratio, arm), `couplings` sums of joint coordinates that stay as they are."""
+    """A robot of a file; `couplings` are sums of joint coordinates that stay as they are."""
 
     file: str
     format: str
@@ -109,7 +112,7 @@ class Robot:
     links: dict[str, RobotLink] = field(default_factory=dict)
     joints: dict[str, RobotJoint] = field(default_factory=dict)
     couplings: list[tuple[str, list[tuple[str, float]]]] = field(default_factory=list)
-    gears: list[tuple[str, str, float, str]] = field(default_factory=list)
+    gears: list[Gear] = field(default_factory=list)
     motors: list[Motor] = field(default_factory=list)
     springs: list[Spring] = field(default_factory=list)
     ground: str = WORLD

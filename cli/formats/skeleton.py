@@ -14,7 +14,7 @@ import numpy as np
 
 from cli.formats.drawing import Travel, bodies_of, start_of
 from cli.formats.drawn import Body, Groups, unused
-from cli.formats.robots.robot import BLOCK, WORLD
+from cli.formats.robot import BLOCK, WORLD
 from dalembert.errors import DataError
 from virtualwork.describe.meshes import Mesh
 from virtualwork.describe.parts import GROUND, TorsionSpring
@@ -219,10 +219,6 @@ class Skeleton:
             raise DataError(
                 f"{', '.join(lost)}: no chain of pins and guides joins it to the ground: not exported"
             )
-
-    def world(self, body: str, z: complex) -> complex:
-        """Return where a place of a body stands, m."""
-        return self.bodies[body].world(z)
 
     def free_points(self, name: str) -> dict[str, complex]:
         """Return the named points of a link that no joint holds, in its axes; none is called as a body is."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from cli.formats.drawn import GROUND
 from cli.formats.markup import At, add, child, children, digits, document, include, named, spatial
-from cli.formats.robots.robot import (
+from cli.formats.robot import (
     DIAGONAL_FIRST,
     LIGHT,
     WORLD,
@@ -31,7 +31,7 @@ from cli.formats.robots.robot import (
 from dalembert.errors import DataError, quote
 
 if TYPE_CHECKING:
-    from cli.formats.robots.skeleton import Branching, Joint, Skeleton
+    from cli.formats.skeleton import Branching, Joint, Skeleton
 
 PLURAL = {"gear": "gears", "belt": "belt", "rack": "rack"}
 # MuJoCo takes nothing lighter

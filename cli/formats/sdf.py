@@ -10,7 +10,7 @@ import numpy as np
 
 from cli.formats.drawn import GROUND
 from cli.formats.markup import At, add, child, children, digits, document, named, placed, plain, stated, text
-from cli.formats.robots.robot import (
+from cli.formats.robot import (
     LIGHT,
     ROWS,
     WORLD,
@@ -29,8 +29,8 @@ from cli.formats.robots.robot import (
 from dalembert.errors import DataError
 
 if TYPE_CHECKING:
-    from cli.formats.robots.skeleton import Joint, Skeleton
-    from virtualwork.describe.parts import Belt, Gear
+    from cli.formats.skeleton import Joint, Skeleton
+    from virtualwork.describe.meshes import Belt, Gear
 
 KINDS: dict[str, Kind] = {
     "revolute": "turn",
@@ -218,7 +218,10 @@ def read_joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
         reference = resolved(text(e, "gearbox_reference_body") or text(e, "reference_body") or WORLD)
         ratio = at.number("gearbox_ratio", text(e, "gearbox_ratio") or "1")
         sense = float(np.sign(_axis(at, axis, frame, None) @ _axis(at, child(e, "axis2"), frame, None)))
-        robot.gears.append((parent, below, -ratio * (sense or 1.0), reference))
+        # a check of inertias loads no mechanism
+        from virtualwork.describe.meshes import Gear
+
+        robot.gears.append(Gear((parent, below), -ratio * (sense or 1.0), reference))
         return
     kind = KINDS.get(type_, "other")
     direction = np.zeros(3) if kind in ("fixed", "ball") else _axis(at, axis, frame, model)

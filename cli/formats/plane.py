@@ -18,15 +18,16 @@ from cli.formats.drawn import (
     Drive,
     Groups,
     Load,
-    Mesh,
     Slide,
     Toothed,
     pins_of,
+    renamed,
     together,
     unused,
 )
-from cli.formats.robots.robot import BLOCK, Motor, Robot, RobotJoint, RobotLink, Spring, plane_of
+from cli.formats.robot import BLOCK, Motor, Robot, RobotJoint, RobotLink, Spring, plane_of
 from dalembert.errors import DataError
+from virtualwork.describe.meshes import Gear
 
 # two ends of a joint nearer than this share of the robot's size are one place
 SAME = 1e-6
@@ -203,7 +204,7 @@ class _Layer:
         """Return whether a body has no use but in a slot: without mass, in one slide, with no gear or spring on it."""
         body, robot = self.d.bodies[name], self.robot
         slides = [s for s in self.slides.values() if name in (s.link, s.on)]
-        others = [link for a, b, _, arm in robot.gears for link in (a, b, arm)]
+        others = [link for g in robot.gears for link in (*g.links, g.arm)]
         others += [link for spring in robot.springs for link, _ in spring.ends]
         return (
             name.startswith(BLOCK)
@@ -284,8 +285,7 @@ class _Layer:
 
     def _couplings(self) -> None:
         d = self.d
-        for a, b, ratio, arm in self.robot.gears:
-            d.meshes.append(Mesh(self.name(a), self.name(b), ratio, self.name(arm)))
+        d.gears += [renamed(gear, self.name) for gear in self.robot.gears]
         for name, terms in self.robot.couplings:
             if self._rack(terms, name):
                 continue
@@ -303,7 +303,7 @@ class _Layer:
                 arm = next((body for body in d.bodies if body not in shares), GROUND)
             pair = [body for body in shares if body != arm]
             b, a = pair[:2]
-            d.meshes.append(Mesh(a, b, -shares[a] / shares[b], arm))
+            d.gears.append(Gear((a, b), -shares[a] / shares[b], arm))
 
     def _rack(self, terms: list[tuple[str, float]], where: str) -> bool:
         """Add a rack where one slide and the angle of a body against its guide stay in step."""
