@@ -54,7 +54,7 @@ def _run(
     from cli.exercise.recomputed import candidates
     from cli.exercise.sheets import answers_csv, filled, key_csv, put, sheet_page, solutions, tables
     from cli.exercise.solving import workshop
-    from cli.exercise.variants import variants
+    from cli.exercise.variants import several, variants
     from cli.show.output import options_of
     from cli.show.result import Result
 
@@ -94,7 +94,7 @@ def _run(
             tables=tables(exercise, people, drawn),
             head={"title": exercise.title, "folder": folder, "variants": made, "files": sorted(files)},
             notes=lambda: (
-                f"wrote {len(files)} files to {folder}: {made} variant{'s' * (made != 1)} for {len(people)} student{'s' * (len(people) != 1)}\n"
+                f"wrote {len(files)} files to {folder}: {several(made, 'variant')} for {several(len(people), 'student')}\n"
             ),
             warnings=warnings,
         )

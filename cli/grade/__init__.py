@@ -30,6 +30,7 @@ def _run(file: str, answers: str, key: str | None = None) -> Result:
     """
     from cli.exercise.description import read_exercise
     from cli.exercise.solving import workshop
+    from cli.exercise.variants import several
     from cli.grade.answers import read_students
     from cli.grade.marks import METHOD, mark_all, tables
     from cli.show.result import Result
@@ -43,7 +44,7 @@ def _run(file: str, answers: str, key: str | None = None) -> Result:
     return Result(
         tables=tables(exercise, students, marks),
         companions=["totals"],
-        notes=lambda: f"{exercise.title}: {len(students)} students, {points:g} of {of:g} points",
+        notes=lambda: f"{exercise.title}: {several(len(students), 'student')}, {points:g} of {of:g} points",
         method=METHOD,
         about={"title": f"Marks: {exercise.title}"},
     )
