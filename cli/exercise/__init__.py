@@ -61,7 +61,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     from cli.exercise.recomputed import candidates
     from cli.exercise.sheets import answers_csv, filled, key_csv, put, sheet_page, solutions, tables
     from cli.exercise.solving import workshop
-    from cli.exercise.variants import variants
+    from cli.exercise.variants import several, variants
     from cli.show.output import options_of
     from cli.show.result import Result
 
@@ -106,7 +106,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
                 "files": sorted(files),
             },
             notes=lambda: (
-                f"wrote {len(files)} files to {options.folder}: {made} variant{'s' * (made != 1)} for {len(people)} student{'s' * (len(people) != 1)}\n"
+                f"wrote {len(files)} files to {options.folder}: {several(made, 'variant')} for {several(len(people), 'student')}\n"
             ),
             warnings=warnings,
         )

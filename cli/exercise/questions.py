@@ -207,7 +207,7 @@ def prairielearn(
         "info.json": _json(info),
         "variants.json": _json(every),
         "server.py": SERVER,
-        "question.html": _prairielearn_question(exercise),
+        "question.html": _prairielearn_question(exercise, variants[0]),
     }
     return {f"{folder}/{file}": text.encode() for file, text in files.items()}
 
@@ -244,11 +244,11 @@ def weights(exercise: Exercise) -> list[int]:
     return [int(ask.points * whole) for ask in exercise.asks]
 
 
-def _prairielearn_question(exercise: Exercise) -> str:
+def _prairielearn_question(exercise: Exercise, variant: Variant) -> str:
     parts = ["<pl-question-panel>\n  {{{params.problem}}}\n</pl-question-panel>\n"]
-    for k, (ask, weight) in enumerate(zip(exercise.asks, weights(exercise), strict=True), 1):
-        caption = html.escape(f"{label(ask)}, {figures_text(ask.figures)}")
-        unit = html.escape(unit_text(ask.unit or _unit(exercise, k - 1)))
+    for k, (answer, weight) in enumerate(zip(variant.answers, weights(exercise), strict=True), 1):
+        caption = escaped(html.escape(f"{label(answer.ask)}, {figures_text(answer.ask.figures)}"))
+        unit = html.escape(unit_text(answer.unit))
         suffix = f' suffix="{unit}"' if unit else ""
         parts.append(
             f"<p>{caption}:</p>\n"
@@ -258,10 +258,13 @@ def _prairielearn_question(exercise: Exercise) -> str:
     return "\n".join(parts)
 
 
-def _unit(exercise: Exercise, k: int) -> str:
-    from dalembert.units import parted
+def escaped(text: str) -> str:
+    """Return HTML without braces and dollars, which templates take for variables and formulas.
 
-    return parted(exercise.asks[k].quantity, further=("kg_m2_s", "J", "W", "rad_s3", "m_s3"))[1]
+    >>> escaped("a {b} $c$")
+    'a &#123;b&#125; &#36;c&#36;'
+    """
+    return text.replace("{", "&#123;").replace("}", "&#125;").replace("$", "&#36;")
 
 
 VERSION = "// Numbas version: finer_feedback_settings"
@@ -302,13 +305,9 @@ def numbas(
     return {"numbas.exam": f"{VERSION}\n{json.dumps(exam, ensure_ascii=False, indent=1)}\n".encode()}
 
 
-def content(text: str) -> str:
-    """Return HTML in which Numbas finds no variable and no formula.
-
-    >>> content("a {b} $c$")
-    'a &#123;b&#125; &#36;c&#36;'
-    """
-    return text.replace("{", "&#123;").replace("}", "&#125;").replace("$", "&#36;")
+def _content(text: str) -> str:
+    """Return HTML in which Numbas looks for no variable and no formula: braces and dollars are not its own."""
+    return f'<div nosubvars="nosubvars" class="mathjax_ignore tex2jax_ignore">{escaped(text)}</div>'
 
 
 def _number(least: Decimal, most: Decimal, marks: float) -> dict[str, object]:
@@ -316,10 +315,19 @@ def _number(least: Decimal, most: Decimal, marks: float) -> dict[str, object]:
         "type": "numberentry", "useCustomName": False, "customName": "", "marks": marks, "scripts": {},
         "customMarkingAlgorithm": "", "extendBaseMarkingAlgorithm": True, "unitTests": [], "showCorrectAnswer": True,
         "showFeedbackIcon": True, "variableReplacements": [], "variableReplacementStrategy": "originalfirst",
-        "minValue": plain(least), "maxValue": plain(most), "correctAnswerFraction": False, "allowFractions": False,
+        "minValue": _limit(least, most - least), "maxValue": _limit(most, most - least), "correctAnswerFraction": False, "allowFractions": False,
         "mustBeReduced": False, "mustBeReducedPC": 0, "precisionType": "none", "precision": "0", "precisionPartialCredit": 0,
         "notationStyles": STYLES, "correctAnswerStyle": "plain",
     }  # fmt: skip
+
+
+def _limit(number: Decimal, room: Decimal) -> str:
+    """Write a limit; Numbas gives those of floats room of 1e-12, those of decimals none.
+
+    >>> _limit(Decimal("1.225"), Decimal("0.01")), _limit(Decimal("-1.225e-9"), Decimal("1e-11"))
+    ('1.225', 'dec("-1.225E-9")')
+    """
+    return plain(number) if room > Decimal("1e-9") else f'dec("{number}")'
 
 
 def _part(own: Candidates) -> dict[str, object]:
@@ -339,14 +347,14 @@ def _part(own: Candidates) -> dict[str, object]:
     alternatives += [
         {
             **_number(at - room, at + room, 0.0),
-            "alternativeFeedbackMessage": content(f"<p>Likely mistake: {html.escape(text)}.</p>"),
+            "alternativeFeedbackMessage": _content(f"<p>Likely mistake: {html.escape(text)}.</p>"),
             "useAlternativeFeedback": True,
         }
         for at, room, text in expected_mistakes(own)
     ]
     return {
         **_number(value - half, value + half, marks),
-        "prompt": content(f"<p>{html.escape(question)}</p>"),
+        "prompt": _content(f"<p>{html.escape(question)}</p>"),
         "alternatives": alternatives,
     }
 
@@ -356,7 +364,7 @@ def _numbas_question(
 ) -> dict[str, object]:
     return {
         "name": name, "tags": [], "metadata": {"description": "", "licence": "None specified"},
-        "statement": content(problem_html(variant, drawing)), "advice": "", "rulesets": {}, "extensions": [],
+        "statement": _content(problem_html(variant, drawing)), "advice": "", "rulesets": {}, "extensions": [],
         "builtin_constants": {"e": True, "pi,π": True, "i": True, "j": False}, "constants": [], "variables": {},
         "variablesTest": {"condition": "", "maxRuns": 100}, "ungrouped_variables": [], "variable_groups": [], "functions": {},
         "preamble": {"js": "", "css": ""}, "parts": [_part(own) for own in slips], "partsMode": "all", "maxMarks": 0,

@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cli.exercise.data import DataTable
 from cli.exercise.description import Solved, Value
 from cli.exercise.slips import Candidates, Pairs, Slip, changes_of, finals, joined, other_gravities
 from cli.exercise.slips_of_rotors import of_rotor
 from cli.exercise.slips_of_sums import Load, is_sum, loads, of_ledger, of_loads, of_motion
-from cli.exercise.solving import Problem, Sheet
+from cli.exercise.solving import Problem
 from cli.exercise.variants import Variant
 from dalembert.errors import DataError
-from dalembert.quantities import is_number
 from dalembert.units import G0, parted, unit_name
 
 MOST = 160
@@ -296,22 +296,21 @@ def _with(word: str, match: re.Match[str], text: str) -> str:
     return word[: match.start()] + text + word[match.end() :]
 
 
-def _numbers(sheet: Sheet) -> Iterator[tuple[int, int, str, str, Decimal]]:
+def _numbers(table: DataTable) -> Iterator[tuple[int, int, str, str, Decimal]]:
     """Yield the numbers of a table that are not zero: row, column, quantity, unit, number."""
-    kept = sheet.column("trial_kept")
-    for c, title in enumerate(sheet.header):
-        quantity, unit = parted(title, further=("kg_m2",))
-        for r, row in enumerate(sheet.rows):
-            cell = row[c].strip().replace(",", ".")
-            if unit and c != kept and is_number(cell) and Decimal(cell):
-                yield r, c, quantity, unit, Decimal(cell)
+    for c in range(len(table.header)):
+        quantity, unit = table.quantity(c)
+        for r in range(len(table.rows) if unit else 0):
+            number = table.number(r, c)
+            if number:
+                yield r, c, quantity, unit, number
 
 
 def _columns(problem: Problem) -> Iterator[Edit]:
     """Slips in all cells of a column alike."""
-    for file, sheet in problem.sheets.items():
+    for file, table in problem.tables.items():
         cells: dict[str, dict[tuple[str, int, int], str]] = {}
-        for r, c, quantity, unit, number in _numbers(sheet):
+        for r, c, quantity, unit, number in _numbers(table):
             for text, value in _of_column(quantity, unit, number):
                 cells.setdefault(text, {})[file, r, c] = f"{value:f}"
         for text, changed in cells.items():
@@ -332,11 +331,11 @@ def _of_column(quantity: str, unit: str, number: Decimal) -> Iterator[tuple[str,
 def _cells(problem: Problem) -> Iterator[Edit]:
     """Slips in the cells of the tables, the likelier first."""
     kinds: list[list[Edit]] = [[], [], [], []]
-    for file, sheet in problem.sheets.items():
+    for file, table in problem.tables.items():
         if problem.exercise.command[0] == "field":
             kinds[0] += _trials_left_on(problem, file)
-        for r, c, quantity, unit, number in _numbers(sheet):
-            what, place = f"{quantity.replace('_', ' ')} of {sheet.called(r)}", (file, r, c)
+        for r, c, quantity, unit, number in _numbers(table):
+            what, place = f"{quantity.replace('_', ' ')} of {table.called(r)}", (file, r, c)
             for kind, slip, value in _of_cell(quantity, unit, number):
                 kinds[kind].append(Edit(f"{what}: {slip}", place, _put({place: f"{value:f}"})))
     for edits in kinds:
@@ -369,27 +368,23 @@ def _of_cell(quantity: str, unit: str, number: Decimal) -> Iterator[tuple[int, s
 
 def _trials_left_on(problem: Problem, file: str) -> list[Edit]:
     """Trial masses that were left on taken as removed, or the reverse."""
-    sheet = problem.sheets[file]
+    table = problem.tables[file]
+    quantities = [table.quantity(k)[0].lower() for k in range(len(table.header))]
     mass = next(
-        (
-            k
-            for k, title in enumerate(sheet.header)
-            if title.lower().startswith(("trial_mass", "trial_unbalance"))
-        ),
-        None,
+        (k for k, each in enumerate(quantities) if each.startswith(("trial_mass", "trial_unbalance"))), None
     )
     if mass is None:
         return []
-    column = sheet.column("trial_kept")
-    trials = [r for r, row in enumerate(sheet.rows) if row[mass].strip()]
+    column = table.column("trial_kept")
+    trials = [r for r, row in enumerate(table.rows) if row[mass].strip()]
     if column is None:
-        kept = ["yes" if r in trials else "" for r in range(len(sheet.rows))]
+        kept = ["yes" if r in trials else "" for r in range(len(table.rows))]
 
         def further(p: Problem) -> Problem:
             return replace(p, added={file: ("trial_kept", kept)})
 
         return [Edit("a trial mass is taken as left on", "trial_kept", further)]
-    on = {r for r in trials if sheet.rows[r][column].strip().lower() in ("yes", "ja", "y", "1", "true")}
+    on = {r for r in trials if table.rows[r][column].strip().lower() in ("yes", "ja", "y", "1", "true")}
     other, text = (
         ("", "a trial mass that was left on is taken as removed")
         if on

@@ -13,8 +13,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from cli.exercise.data import DataTable
 from cli.exercise.description import Answer, Ask, Exercise, Value, cell_of, unit_text
-from cli.exercise.solving import Sheet, Workshop
+from cli.exercise.solving import Workshop
 from cli.exercise.variants import Variant
 from cli.show.commands import ShowOptions
 from cli.show.report import html_part, report
@@ -127,7 +128,7 @@ def problem_html(variant: Variant, drawing: str) -> str:
     workshop = variant.problem.workshop
     parts = [paragraphs(workshop, variant.drawn)]
     shown = set(re.findall(r"\{([^{}\n]+)\}", workshop.exercise.text))
-    parts += [sheet_html(sheet) for sheet in variant.problem.sheets.values()]
+    parts += [table_html(table) for table in variant.problem.tables.values()]
     left = [
         (name, value) for name, value in variant.drawn.items() if name not in shown and cell_of(name) is None
     ]
@@ -139,14 +140,13 @@ def problem_html(variant: Variant, drawing: str) -> str:
     return "".join(parts)
 
 
-def sheet_html(sheet: Sheet) -> str:
+def table_html(table: DataTable) -> str:
     """Return a table of data."""
 
-    def head(title: str) -> str:
-        name, unit = parted(title, further=("kg_m2", "kg_m2_s"))
-        return html.escape(
-            f"{name.replace('_', ' ')} [{unit_written(unit)}]" if unit else title.replace("_", " ")
-        )
+    def head(column: int) -> str:
+        name, unit = table.quantity(column)
+        text = f"{name} [{unit_written(unit)}]" if unit else table.header[column]
+        return html.escape(text.replace("_", " "))
 
     def cell(text: str) -> str:
         number = re.fullmatch(r"\s*[-−]?[\d.,]+(?:[eE][-+]?\d+)?\s*", text) is not None
@@ -156,9 +156,9 @@ def sheet_html(sheet: Sheet) -> str:
             else f"<td>{html.escape(text)}</td>"
         )
 
-    rows = "".join(f"<tr>{''.join(map(cell, row))}</tr>\n" for row in sheet.rows)
-    header = "".join(f"<th>{head(title)}</th>" for title in sheet.header)
-    dense = ' class="dense"' if len(sheet.header) > 8 else ""
+    rows = "".join(f"<tr>{''.join(map(cell, row))}</tr>\n" for row in table.rows)
+    header = "".join(f"<th>{head(k)}</th>" for k in range(len(table.header)))
+    dense = ' class="dense"' if len(table.header) > 8 else ""
     return f'<div class="wide"><table{dense}><thead><tr>{header}</tr></thead><tbody>{rows}</tbody></table></div>\n'
 
 

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import csv
-import io
+import re
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from decimal import Decimal
-from fractions import Fraction
 from functools import cache, cached_property
 from importlib import import_module
 from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cli.exercise.data import DataTable, converted
 from cli.exercise.description import Exercise, Solved, Value, cell_of, value_of
 from cli.read.options import components
 from cli.show.output import result_of
@@ -25,7 +24,6 @@ from dalembert.hints import nearest
 from dalembert.quantities import is_number
 from dalembert.tables.files import SUFFIXES, read_bytes, split_sheet
 from dalembert.tables.sources import open_source
-from dalembert.units import composed, parted
 
 if TYPE_CHECKING:
     from cli.balance.rotors import Rotors
@@ -33,64 +31,8 @@ if TYPE_CHECKING:
 
 MECHANISM = ("mechanism", "forces", "inspect", "equilibrium", "simulate", "tolerance")
 """Commands on a mechanism's file: they take --set."""
-NAMES = ("name", "link", "part", "rotor", "cylinder", "run")
-"""Columns that may name the rows of a table."""
 _TABLES = (".csv", ".tsv", ".txt", *SUFFIXES)
 _FILES = (".toml", *_TABLES)
-
-
-@dataclass(eq=False, repr=False)
-class Sheet:
-    """A table of the exercise as its file has it: header and cells."""
-
-    file: str
-    header: list[str]
-    rows: list[list[str]]
-
-    def row(self, name: str) -> int | None:
-        """Return the row of a name: of a column that names rows, else the row's number."""
-        for title in (*NAMES, "plane", "step"):
-            column = self.column(title)
-            if column is not None:
-                cells = [row[column] for row in self.rows]
-                if cells.count(name) == 1:
-                    return cells.index(name)
-        if name.isdecimal() and 1 <= int(name) <= len(self.rows):
-            return int(name) - 1
-        return None
-
-    def column(self, title: str) -> int | None:
-        """Return the place of a column."""
-        same = [k for k, each in enumerate(self.header) if each.strip().lower() == title.lower()]
-        return same[0] if same else None
-
-    @cached_property
-    def naming(self) -> str | None:
-        """The title of the column that names the rows; None where there is none."""
-        for title in NAMES:
-            column = self.column(title)
-            if column is not None and len({row[column] for row in self.rows}) == len(self.rows):
-                return title
-        return None
-
-    @cached_property
-    def names(self) -> list[str]:
-        """What the rows are called."""
-        column = None if self.naming is None else self.column(self.naming)
-        return [str(k) if column is None else row[column] for k, row in enumerate(self.rows, 1)]
-
-    def called(self, row: int) -> str:
-        """Return what a row is called in a sentence: its name, or row 3, or cylinder 2."""
-        title = "row" if self.naming in (None, "name") else self.naming
-        return f"{title} {self.names[row]}" if self.names[row].isdecimal() else self.names[row]
-
-    def text(self) -> str:
-        """Return the table as CSV."""
-        stream = io.StringIO()
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(self.header)
-        writer.writerows(self.rows)
-        return stream.getvalue()
 
 
 @dataclass(eq=False, repr=False)
@@ -99,18 +41,26 @@ class Workshop:
 
     exercise: Exercise
     folder: Path
-    sheets: dict[str, Sheet] = field(default_factory=dict)
+    read: dict[str, DataTable] = field(default_factory=dict)
 
-    def sheet(self, name: str) -> Sheet:
+    def table(self, name: str) -> DataTable:
         """Return a table of the exercise."""
-        if name not in self.sheets:
-            path = str(self.exercise.folder / name)
-            source = open_source(path, {}, None)
+        if name not in self.read:
+            source = open_source(str(self.exercise.folder / name), {}, None)
             header = list(source.header)
             # cells that a short row lacks are blank
             rows = [[*cells, *[""] * (len(header) - len(cells))] for _, cells in source.rows()]
-            self.sheets[name] = Sheet(name, header, rows)
-        return self.sheets[name]
+            self.read[name] = DataTable(header, rows)
+        return self.read[name]
+
+    def cell(self, name: str) -> tuple[str, int, int] | None:
+        """Return file, row and column of a table's cell by its name: `rotor.csv:W1.mass_kg`; None where there is none."""
+        parts = cell_of(name)
+        if parts is None or parts[0] not in self.tables:
+            return None
+        table = self.table(parts[0])
+        row, column = table.row(parts[1]), table.column(parts[2])
+        return None if row is None or column is None else (parts[0], row, column)
 
     @cached_property
     def tables(self) -> list[str]:
@@ -171,17 +121,18 @@ class Workshop:
                 f"{where}: found the file {quote(file)}, expected one that the command reads: "
                 f"{', '.join(self.tables) or 'it reads no table'}{nearest(file, self.tables)}"
             )
-        sheet = self.sheet(file)
-        if sheet.row(row) is None:
+        table = self.table(file)
+        if table.row(row) is None:
             raise DataError(
-                f"{where}: no row {quote(row)} in {file}: expected one of {', '.join(sheet.names)}"
+                f"{where}: no row {quote(row)} in {file}: expected one of {', '.join(table.names)}"
             )
-        if sheet.column(column) is None:
+        place = table.column(column)
+        if place is None:
             raise DataError(
-                f"{where}: no column {quote(column)} in {file}: expected one of {', '.join(sheet.header)}"
-                f"{nearest(column, sheet.header)}"
+                f"{where}: no column {quote(column)} in {file}: expected one of {', '.join(table.header)}"
+                f"{nearest(column, table.header)}"
             )
-        unit = parted(column)[1]
+        unit = table.quantity(place)[1]
         for value in values:
             if value.unit and converted(value, unit) is None:
                 raise DataError(
@@ -201,18 +152,16 @@ class Workshop:
 
     def datum(self, name: str, drawn: Mapping[str, Value]) -> Value | None:
         """Return a datum by the name that stands in braces in the text; None where there is none."""
+        cell = self.cell(name)
+        if cell is not None:
+            file, row, column = cell
+            unit = self.table(file).quantity(column)[1]
+            if name in drawn:
+                return Value(drawn[name].number, drawn[name].unit or unit)
+            number = self.table(file).number(row, column)
+            return None if number is None else Value(number, unit)
         if name in drawn:
-            value = drawn[name]
-            cell = cell_of(name)
-            return value if value.unit or cell is None else Value(value.number, parted(cell[2])[1])
-        cell = cell_of(name)
-        if cell is not None and cell[0] in self.tables:
-            sheet = self.sheet(cell[0])
-            row, column = sheet.row(cell[1]), sheet.column(cell[2])
-            if row is None or column is None:
-                return None
-            text = sheet.rows[row][column].strip().replace(",", ".")
-            return Value(Decimal(text), parted(cell[2])[1]) if is_number(text) else None
+            return drawn[name]
         if name in self.dimensions:
             return self._dimension(name)
         return None
@@ -251,8 +200,6 @@ class Workshop:
 
 
 def _placeholders(word: str) -> list[str]:
-    import re
-
     return re.findall(r"\{([A-Za-z_]\w*)\}", word)
 
 
@@ -268,23 +215,6 @@ def workshop(exercise: Exercise) -> Iterator[Workshop]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def converted(value: Value, unit: str) -> str | None:
-    """Return a drawn value as a cell in a column's unit, exactly; None where the units do not fit."""
-    if not value.unit:
-        return f"{value.number:f}"
-    own, wanted = composed(value.unit), composed(unit) if unit else None
-    if own is None or wanted is None or own[1] != wanted[1]:
-        return None
-    if own[0] == wanted[0]:
-        return f"{value.number:f}"
-    (n, d), (wn, wd) = own[0], wanted[0]
-    if isinstance(n, int) and isinstance(d, int) and isinstance(wn, int) and isinstance(wd, int):
-        number = Fraction(value.number) * Fraction(n, d) / Fraction(wn, wd)
-        exact = Decimal(number.numerator) / Decimal(number.denominator)
-        return f"{exact:f}"
-    return repr(float(value.number) * n / d * wd / wn)
-
-
 @dataclass(eq=False, repr=False)
 class Problem:
     """The exercise with the numbers of one student, perhaps with a slip in them."""
@@ -293,7 +223,7 @@ class Problem:
     drawn: dict[str, Value]
     cells: dict[tuple[str, int, int], str] = field(default_factory=dict)
     """Further cells of tables: file, row, column -> text."""
-    added: dict[str, tuple[str, Sequence[str]]] = field(default_factory=dict)
+    added: dict[str, tuple[str, list[str]]] = field(default_factory=dict)
     """A further column of a table: its title and cells."""
     words: Sequence[str] = ()
     """The command's words, where they are not the exercise's own."""
@@ -311,36 +241,29 @@ class Problem:
         return Path(tempfile.mkdtemp(dir=self.workshop.folder))
 
     @cached_property
-    def sheets(self) -> dict[str, Sheet]:
+    def tables(self) -> dict[str, DataTable]:
         """The tables with this student's numbers."""
-        sheets = {}
-        for name in self.workshop.tables:
-            own = self.workshop.sheet(name)
-            sheets[name] = Sheet(name, own.header, [list(row) for row in own.rows])
+        shop = self.workshop
+        cells: dict[str, dict[tuple[int, int], str]] = {name: {} for name in shop.tables}
         for name, value in self.drawn.items():
-            cell = cell_of(name)
-            if cell is None:
-                continue
-            sheet = sheets[cell[0]]
-            row, column = sheet.row(cell[1]), sheet.column(cell[2])
-            assert row is not None
-            assert column is not None
-            text = converted(value, parted(cell[2])[1])
-            assert text is not None
-            sheet.rows[row][column] = text
-        for (name, r, c), text in self.cells.items():
-            sheets[name].rows[r][c] = text
-        for name, (title, further) in self.added.items():
-            own = sheets[name]
-            rows = [[*cells, text] for cells, text in zip(own.rows, further, strict=True)]
-            sheets[name] = Sheet(name, [*own.header, title], rows)
-        return sheets
+            place = shop.cell(name)
+            if place is not None:
+                file, row, column = place
+                text = converted(value, shop.table(file).quantity(column)[1])
+                assert text is not None
+                cells[file][row, column] = text
+        for (file, row, column), text in self.cells.items():
+            cells[file][row, column] = text
+        return {
+            name: shop.table(name).changed(changed, dict([self.added[name]] if name in self.added else []))
+            for name, changed in cells.items()
+        }
 
     @cached_property
     def command(self) -> list[str]:
         """The words of the command, files in place."""
         changed = (
-            {cell[0] for name in self.drawn if (cell := cell_of(name))}
+            {cell[0] for name in self.drawn if (cell := self.workshop.cell(name))}
             | {name for name, *_ in self.cells}
             | set(self.added)
         )
@@ -352,7 +275,7 @@ class Problem:
             if word in changed:
                 # a folder of its own: the tables of other students and slips stay as they are
                 path = self.place / Path(word).with_suffix(".csv").name
-                path.write_text(self.sheets[word].text(), encoding="utf-8")
+                path.write_text(self.tables[word].text(), encoding="utf-8")
                 words.append(str(path))
             elif split_sheet(word)[0].lower().endswith(_FILES) and "=" not in word:
                 words.append(str(self.exercise.folder / word))

@@ -88,10 +88,19 @@ def variants(workshop: Workshop, count: int, seed: int, warnings: list[str]) -> 
         )
     if len(result) < count:
         warnings.append(
-            f"{exercise.file}: [draw]: {len(result)} variants for {count} students: some have the same numbers"
-            + (f" ({refused} variants cannot be used; the last: {reason})" if refused else "")
+            f"{exercise.file}: [draw]: {several(len(result), 'variant')} for {count} students: some have the same numbers"
+            + (f" ({several(refused, 'variant')} cannot be used; the last: {reason})" if refused else "")
         )
     return [result[k % len(result)] for k in range(count)]
+
+
+def several(count: int, noun: str) -> str:
+    """Return a number of things in words.
+
+    >>> several(1, "variant"), several(3, "student")
+    ('1 variant', '3 students')
+    """
+    return f"{count} {noun}{'s' * (count != 1)}"
 
 
 def _orders(exercise: Exercise, random: Random) -> Iterator[dict[str, Value]]:

@@ -33,6 +33,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """
     from cli.exercise.description import read_exercise
     from cli.exercise.solving import workshop
+    from cli.exercise.variants import several
     from cli.grade.answers import read_students
     from cli.grade.marks import METHOD, mark_all, tables
     from cli.show.result import Result
@@ -46,7 +47,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     return Result(
         tables=tables(exercise, students, marks),
         companions=["totals"],
-        notes=lambda: f"{exercise.title}: {len(students)} students, {points:g} of {of:g} points",
+        notes=lambda: f"{exercise.title}: {several(len(students), 'student')}, {points:g} of {of:g} points",
         method=METHOD,
         about={"title": f"Marks: {exercise.title}"},
     )

@@ -431,8 +431,10 @@ def test_numbas_exam(dalembert: Dalembert, folder: Path) -> None:
     )
     key = rows(folder / "out" / "key.csv")
     for k, question in enumerate(group["questions"]):
-        # braces would be variables, dollars formulas
+        # braces would be variables, dollars formulas; within nosubvars it looks for neither, after HTML is read either
         assert not set("{}$") & set(question["statement"])
+        for text in (question["statement"], *(part["prompt"] for part in question["parts"])):
+            assert text.startswith('<div nosubvars="nosubvars" class="mathjax_ignore ')
         for part, row in zip(question["parts"], key[3 * k : 3 * k + 3], strict=True):
             assert part["type"] == "numberentry"
             assert part["marks"] == float(row["points"])
@@ -493,3 +495,31 @@ def test_a_page_where_the_command_has_none(dalembert: Dalembert, tmp_path: Path)
     assert done.returncode == 2
     assert "which has no page" in " ".join(done.stderr.split())
     assert not (tmp_path / "week").exists()
+
+
+@pytest.mark.parametrize(
+    ("table", "column"),
+    [
+        ("name;weight_N;radius_mm;angle_deg;z_mm\nW1;90,5;30;60;20\nW2;60;50;210;65\n", "weight_N"),
+        ("name,weight [N],radius [mm],angle [deg],z [mm]\nW1,90.5,30,60,20\nW2,60,50,210,65\n", "weight_N"),
+        ("name,weight [N],radius [mm],angle [deg],z [mm]\nW1,90.5,30,60,20\nW2,60,50,210,65\n", "weight [N]"),
+    ],
+)
+def test_tables_as_people_have_them(dalembert: Dalembert, folder: Path, table: str, column: str) -> None:
+    """A drawn weight stands in a table with decimal commas, and below a header with its unit in brackets."""
+    (folder / "rotor.csv").write_text(table)
+    (folder / "e.toml").write_text(
+        'command = "balance rotor.csv --plane A:0mm:20mm --plane B:90mm:20mm --gravity 10"\n'
+        f'text = "W1 = {{rotor.csv:W1.{column}}}"\n[draw]\n"rotor.csv:W1.{column}" = "80.5N:90.5N:5N"\n'
+        '[[ask]]\nquantity = "mass_kg"\nwhere = { plane = "B" }\nfigures = 5\n'
+    )
+    done = dalembert("exercise", "e.toml", "--students", 3, "-o", "out")
+    assert done.returncode == 0, done.stderr
+    for row in rows(folder / "out" / "key.csv"):
+        weight = row[f"rotor.csv:W1.{column}"]
+        sheet = (folder / "out" / f"sheet-{row['student']}.html").read_text()
+        assert f"W1 = {weight}" in sheet
+        # in N·mm²: two moments at 60° and 210°
+        first, second = float(weight.removesuffix(" N")) * 30 * 20, 60 * 50 * 65
+        moment = math.sqrt(first**2 + second**2 + 2 * first * second * math.cos(math.radians(150)))
+        assert float(row["answer"]) == pytest.approx(moment / (90 * 20 * 10), rel=1e-4)
