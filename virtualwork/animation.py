@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -130,7 +131,7 @@ class Series:
                 }
                 for f in self.forces
             ],
-            "fine": len(self._fine) if paths else 0,
+            "fine": self.fine_inputs[2] if paths and self.fine_inputs else 0,
             "timed": not unit,
             **self._free(names),
         }
@@ -200,22 +201,25 @@ class Series:
 
     def _paths(self, names: list[str]) -> dict[str, list[Any]]:
         """Return the paths of points where the poses themselves are too few to draw them."""
-        m, q = self.mechanism, self.poses.inputs
-        self._fine = np.empty(0)
-        if len(m.inputs) != 1 or not self.fine:
+        if not self.fine_inputs:
             return {}
+        m, poses = self.mechanism, self.poses.again(np.linspace(*self.fine_inputs)[:, None])
+        places = {name: poses.point(*m.points[name], 0, name) for name in names}
+        return {name: [packed(part, exact=False) for part in (z.real, z.imag)] for name, z in places.items()}
+
+    @cached_property
+    def fine_inputs(self) -> tuple[float, float, int] | None:
+        """The first and the last input of a path that is drawn finer than the poses, and how many; None where they are enough."""
+        m, q = self.mechanism, self.poses.inputs
+        if len(m.inputs) != 1 or not self.fine:
+            return None
         slide = m.inputs[0].is_slide
         low, high = float(np.nanmin(q)), float(np.nanmax(q))
         if low == high and not slide:
             high = low + 2 * np.pi
         turns = 1.0 if slide else (high - low) / (2 * np.pi)
         count = int(np.clip(np.ceil(FINE * turns), FINE if slide else 2, 8 * FINE))
-        if low == high or len(q) >= count:
-            return {}
-        self._fine = np.linspace(low, high, count)
-        poses = self.poses.again(self._fine[:, None])
-        places = {name: poses.point(*m.points[name], 0, name) for name in names}
-        return {name: [packed(part, exact=False) for part in (z.real, z.imag)] for name, z in places.items()}
+        return None if low == high or len(q) >= count else (low, high, count)
 
 
 def _pairs(points: Sequence[complex]) -> list[float]:

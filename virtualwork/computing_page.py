@@ -30,7 +30,7 @@ from virtualwork.drawing import Drawing, draw
 from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.forces import Forces
 from virtualwork.formulas.forces import Effort, Over, Rub, Slip
-from virtualwork.formulas.kinematics import Angle
+from virtualwork.formulas.kinematics import Angle, Point
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.loops import Closed, Margin, Twist
 from virtualwork.formulas.pose_forces import PoseForces
@@ -99,7 +99,10 @@ class Computed(Series):
         return self._index[name]
 
     def _paths(self, names: list[str]) -> dict[str, list[Any]]:
-        self._fine = np.empty(0)
+        """No path: the page computes those that its poses are too few for."""
+        assert self.of is not None
+        if self.fine_inputs:
+            self.of.traced = names
         return {}
 
 
@@ -121,6 +124,8 @@ class Formulas:
         self.mechanism: Description = assembly.mechanism
         self.dimensions = dimensions(self.mechanism)
         self.keys: dict[Quantity, int] = {}
+        self.traced: list[str] = []
+        """Points whose paths need more poses than the page has."""
         self._rows = 0
 
     @cached_property
@@ -189,6 +194,9 @@ class Formulas:
             "short": written.short,
             "drawn": written.recording.recorder.tape(dict(drawn)),
         }
+        if self.traced:
+            places = [Point(self.mechanism.points[name][0], 0j, name, 0) for name in self.traced]
+            found["paths"] = written.tape((*places, every))
         found |= profiles(written.mechanism, written.recording.recorder)
         if self._bears:
             system = self._bears.system.items()
@@ -399,6 +407,7 @@ def computing_page(
             "units": units(["length", "angle", *(d.kind for d in formulas.dimensions.values())]),
             "bare": dict(bare_units or {}),
             "first": list(map(float, poses.inputs[0] if first is None else first)),
+            **({"fine": series.fine_inputs, "traced": formulas.traced} if formulas.traced else {}),
         }
         return f"{engine()}\nconst tapes = {tapes};\n", {"model": model}
 

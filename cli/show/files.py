@@ -204,29 +204,43 @@ def _grid(table: Table) -> Grid:
     return Grid(list(table.cells), rows, [not has_names(values) for values in table.cells.values()])
 
 
+_MARKDOWN = {**{c: f"\\{c}" for c in "\\|<"}, "\n": " "}
+_LATEX = {
+    **{c: f"\\{c}" for c in "&%$#_{}"},
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "\\": r"\textbackslash{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "\n": " ",
+}
+
+
+def _escaped(text: str, signs: Mapping[str, str]) -> str:
+    return "".join(signs.get(sign, sign) for sign in text)
+
+
 def markdown(grid: Grid) -> str:
     """A table in Markdown."""
     header, rows, numbers = grid
 
     def line(row: list[str]) -> str:
-        return "| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |\n"
+        return "| " + " | ".join(_escaped(cell, _MARKDOWN) for cell in row) + " |\n"
 
     rule = ["---:" if number else "---" for number in numbers]
     return "".join(map(line, [header, rule, *rows]))
-
-
-_LATEX = {**{c: f"\\{c}" for c in "&%$#_{}"}, "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
 
 
 def _latex(grid: Grid) -> str:
     """A tabular, to be put into a document by `\\input`."""
     header, rows, numbers = grid
 
-    def escaped(cell: str) -> str:
-        return re.sub(r"[&%$#_{}~^]", lambda match: _LATEX[match.group()], cell.replace("\\", "/"))
+    def cell(text: str) -> str:
+        # behind the end of a line [ and * are no text
+        return ("{}" if text.startswith(("[", "*")) else "") + _escaped(text, _LATEX)
 
     def line(row: list[str]) -> str:
-        return " & ".join(map(escaped, row)) + r" \\" + "\n"
+        return " & ".join(map(cell, row)) + r" \\" + "\n"
 
     form = "".join("r" if number else "l" for number in numbers)
     body = f"\\hline\n{line(header)}\\hline\n{''.join(map(line, rows))}\\hline\n"

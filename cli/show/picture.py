@@ -35,6 +35,7 @@ def drawn(draw: Callable[[], Figure], suffix: str) -> bytes:
         raise needs("--plot", "matplotlib", "plot") from None
     matplotlib.use("Agg")
     matplotlib.rcParams["svg.hashsalt"] = "dalembert"  # the same picture is the same file
+    matplotlib.rcParams["text.parse_math"] = False  # names are names, with $ too
     stream = io.BytesIO()
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(suffix)
     draw().savefig(stream, format=suffix, dpi=150, metadata=metadata)

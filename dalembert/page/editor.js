@@ -91,7 +91,9 @@ function listLimits() {
   const stands = !wrong.size && state.chosen && state.closed.some(Number.isFinite);
   const found = stands ? machine.limits(numbers).map(([q]) => q) : [];
   const unit = unitOf(inputKind(0));
-  $("limits").textContent = !machine.one || !stands ? "" : found.length ? TEXTS.limits(found.map((q) => `${short(Number(shortest(q, model.units[inputKind(0)], unit)))} ${unit}`).join(", ")) : TEXTS.noLimits;
+  const shownLimits = found.map((q) => `${short(Number(shortest(q, model.units[inputKind(0)], unit)))} ${unit}`);
+  const none = model.inputs[0].slides ? TEXTS.noLimitsOfSlide : TEXTS.noLimits;
+  $("limits").textContent = !machine.one || !stands ? "" : found.length ? TEXTS.limits(shownLimits.join(", ")) : none;
 }
 
 // --- buttons --------------------------------------------------------------------------------------------------------------

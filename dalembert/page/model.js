@@ -1,5 +1,6 @@
 // A mechanism that is computed anew: its tapes with the numbers of the moment. No formula of mechanics stands here.
 const SERIES = [0.03, 0.16, 14]; // rad: beside a change point the quantities are interpolated, over so far, from so many poses
+const SLIDES = [1, 2, 4]; // sizes of the mechanism within which the limits of a slide are looked for
 
 class Machine extends Way {
   // what does not change along the input
@@ -89,8 +90,8 @@ class Machine extends Way {
     }
   }
 
-  // all that enters the tapes at inputs, one array for each input of the mechanism; `pose`: with its rates
-  #entering(state, inputs, pose) {
+  // what places enter by at inputs, one array for each input of the mechanism; `pose`: with its rates
+  #closing(state, inputs, pose) {
     const given = { ...state.given };
     if (pose !== undefined) Object.assign(given, lane(given, pose));
     inputs.forEach((q, j) => (given[`q${j}`] = q));
@@ -111,6 +112,12 @@ class Machine extends Way {
         keys.forEach((key) => (given[key] = given[key].map((x, l) => (open[l] <= 1e-11 * this.model.size ? x : NaN))));
       }
     } else if (this.iterated.length + this.winding.length && !this.one) this.#alongLines(state, given, inputs);
+    return given;
+  }
+
+  // all that enters the tapes at inputs
+  #entering(state, inputs, pose) {
+    const given = this.#closing(state, inputs, pose);
     if (this.tapes.twists) this.#wind(state, given, inputs);
     if (this.tapes.over && pose === undefined) this.#load(given, this.tapes.over.run(given, inputs[0].length));
     if (!this.tapes.over || pose === undefined) {
@@ -247,7 +254,7 @@ class Machine extends Way {
     state.chosen = Object.values(numbers).every(Number.isFinite) && this.#choose(given, at);
     if (!state.chosen) return state;
     if (this.one) {
-      const known = inputs[0].filter(Number.isFinite);
+      const known = [...inputs[0].filter(Number.isFinite), ...(this.model.fine?.slice(0, 2) ?? [])];
       this.look(state, Math.min(at[0], known.reduce((a, b) => Math.min(a, b), Infinity)), Math.max(at[0], known.reduce((a, b) => Math.max(a, b), -Infinity)));
     }
     state.entering = this.#entering(state, inputs);
@@ -256,6 +263,16 @@ class Machine extends Way {
     state.closed = out.pop();
     state.rows = out;
     return state;
+  }
+
+  // the paths of points where the sweep has too few poses to draw them, x and y of each by its name
+  paths(state) {
+    const [low, high, count] = this.model.fine;
+    const q = Float64Array.from({ length: count }, (_, i) => low + ((high - low) * i) / (count - 1));
+    const out = this.tapes.paths.run(this.#closing(state, [q], 0), count);
+    const closed = out.pop();
+    for (const row of out) for (let l = 0; l < count; l++) if (!Number.isFinite(closed[l])) row[l] = NaN;
+    return new Map(this.model.traced.map((name, k) => [name, [out[2 * k], out[2 * k + 1]]]));
   }
 
   // poses beside a change point: a polynomial through poses on both sides
@@ -326,14 +343,24 @@ class Machine extends Way {
     }
   }
 
-  // the limits of the input over the turn from the guess: [input, side on which it is assembled, group]
+  // the limits of the input over the turn from the guess: [input, side on which it is assembled, group]; of a slide those around it
   limits(numbers) {
     const [given, at] = [this.#given(numbers), this.#start(numbers)];
     const state = { given, at, flips: new Map(), limits: [], unknowns: new Map(), numbers };
     if (!this.one || !this.#choose(given, at)) return [];
-    const length = this.model.inputs[0].slides ? this.model.size : TAU;
-    this.look(state, this.iterated.length ? at[0] - length : at[0], at[0] + length);
-    return state.limits.sort((a, b) => a[0] - b[0]);
+    const [start] = at;
+    if (!this.model.inputs[0].slides) {
+      this.look(state, this.iterated.length ? start - TAU : start, start + TAU);
+      return state.limits.sort((a, b) => a[0] - b[0]);
+    }
+    let around = [];
+    for (const reach of SLIDES) {
+      this.look(state, start - reach * this.model.size, start + reach * this.model.size);
+      const ends = state.limits.sort((a, b) => a[0] - b[0]);
+      around = [ends.findLast(([q, side]) => side > 0 && q < start), ends.find(([q, side]) => side < 0 && q > start)].filter(Boolean);
+      if (around.length === 2) break;
+    }
+    return around;
   }
 
   // the first loop of a pose that does not close, and by how much, m; null where that is not known
@@ -397,8 +424,9 @@ function begin(data) {
   recompute(series);
   // the original, as a ghost where numbers have changed
   const columns = series.columns.map((c) => ({ ...c, values: c.values.slice() }));
+  const points = series.points.map((p) => ({ ...p }));
   const { shapes, bodies } = structuredClone({ shapes: series.shapes, bodies: series.bodies });
-  data.series.push({ ...series, columns, shapes, bodies, name: TEXTS.original, hidden: () => !changes().length });
+  data.series.push({ ...series, columns, points, shapes, bodies, name: TEXTS.original, hidden: () => !changes().length });
 }
 const changes = () => Object.keys(numbers).filter((path) => !Object.is(numbers[path], machine.own[path]));
 function recompute(series) {
@@ -411,6 +439,8 @@ function recompute(series) {
       for (let l = 0; l <= machine.n; l++) column.values[l] = inUnit(l < machine.n ? machine.sweep[column.input][l] : freePose[column.input], si);
     } else for (let l = 0; l <= machine.n; l++) column.values[l] = inUnit(machine.value(state, column, l), si);
   }
+  const paths = machine.tapes.paths && state.rows ? machine.paths(state) : null;
+  for (const point of series.points) point.path = paths?.get(point.name);
   if (!state.rows) return;
   redraw(machine, state, series);
 }

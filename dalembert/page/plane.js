@@ -263,7 +263,7 @@ function drawTraces() {
   }
 }
 for (const series of data.series) {
-  for (const p of series.points) p.path = p.path?.map((one) => unpack(one, series.fine));
+  if (series.fine) for (const p of series.points) p.path = p.path?.map((one) => unpack(one, series.fine));
 }
 // numbers have changed: what was measured over all poses
 function refresh() {

@@ -80,6 +80,7 @@ const TEXTS = {
   open: "cannot be assembled at this input",
   limits: (list) => `Limits of the input: ${list}`,
   noLimits: "The input turns without a limit.",
+  noLimitsOfSlide: "The input slides without a limit.",
   noFile: "this mechanism has no file: one of its parts cannot be written into TOML",
   beside: (files) => `needs in its folder: ${files}`,
   digits: "All digits shown are confirmed by a second computation with 32 digits.",

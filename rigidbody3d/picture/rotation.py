@@ -58,8 +58,8 @@ def rotation(
     figure = sheet(11, 8.0, figure)
     upper, lower = figure.subfigures(2, 1, height_ratios=(1, 1.9), squeeze=False)[:, 0]
     axes = upper.subplots()
-    curves = [Curve(f"$\\omega_{letter}$", part) for letter, part in zip("xyz", omega.T, strict=True)]
-    ends = panel(axes, time, curves, "$\\omega$ in body axes", "rad/s", float(np.abs(omega).max(initial=0.0)))
+    curves = [Curve(f"ω{letter}", part) for letter, part in zip("xyz", omega.T, strict=True)]
+    ends = panel(axes, time, curves, "ω in body axes", "rad/s", float(np.abs(omega).max(initial=0.0)))
     axes.set_xlabel("time, s")
     if len(time) > 1:
         axes.set_xlim(time[0], time[-1])
@@ -114,7 +114,7 @@ def _curve(axes: Axes3D, omega: Array) -> None:
     axes.plot(*omega.T, color="tab:red", lw=2)
     axes.scatter(*omega[0], color="tab:red", s=18)
     for name in "xyz":
-        getattr(axes, f"set_{name}label")(f"$\\omega_{name}$", labelpad=2)
+        getattr(axes, f"set_{name}label")(f"ω{name}", labelpad=2)
         axes.locator_params(axis=name, nbins=4)
         getattr(axes, f"{name}axis").get_major_formatter().set_useOffset(False)
     _settle(axes)

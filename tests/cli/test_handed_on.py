@@ -79,6 +79,19 @@ def test_text_documents(dalembert: Dalembert, tmp_path: Path) -> None:
     assert r"a|b\_\% & A & 0 & 20 & " in latex
 
 
+def test_names_with_signs_of_the_form(dalembert: Dalembert, tmp_path: Path) -> None:
+    """A cell that begins with [ would be an argument of the line's end before it; `<i>` is no markup."""
+    rows = 'rotor,name,unbalance_g_mm,angle_deg\n[1],w,1,0\n"<i>*2*",w,1,90\n"a\\b\n`c`",w,1,90\n'
+    for name in ("out.md", "out.tex"):
+        done = dalembert("balance", "-", "--plane", "A:20mm", "-o", name, stdin=rows)
+        assert done.returncode == 0, done.stderr
+    markdown, latex = ((tmp_path / f"out.{s}").read_text() for s in ("md", "tex"))
+    names = [line.split(" | ")[0].lstrip("| ") for line in markdown.splitlines()[4:7]]
+    assert names == ["[1]", r"\<i>*2*", r"a\\b `c`"]
+    names = [line.split(" & ")[0] for line in latex.splitlines() if " & A & " in line][:3]
+    assert names == ["{}[1]", r"\textless{}i\textgreater{}*2*", r"a\textbackslash{}b `c`"]
+
+
 def test_no_known_suffix(dalembert: Dalembert, tmp_path: Path) -> None:
     done = dalembert(*BALANCE, "-o", "out.doc", stdin=ROTOR)
     assert done.returncode == 2

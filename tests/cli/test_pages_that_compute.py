@@ -232,6 +232,41 @@ def test_limits_are_those_of_inspect(dalembert: Dalembert, tmp_path: Path, brows
     assert found == pytest.approx(expected, abs=1e-9)
 
 
+def test_limits_of_a_slide_are_those_around_it(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """The shoe of a scissors lift slides from one stretched end to the other: 1.2 m both ways."""
+    file = EXAMPLES / "scissors-lift" / "lift.toml"
+    assert dalembert("mechanism", file, "--over", "0.4m:1.1m:0.1m", "--page", "m.html").returncode == 0
+    page = Computing(browser, tmp_path / "m.html")
+    assert page("return dalembert.limits()") == pytest.approx([-1.2, 1.2], abs=1e-12)
+    time.sleep(0.3)
+    assert page.text("limits") == "Limits of the input: -1.2 m, 1.2 m"
+    # without a limit it does not turn
+    file = EXAMPLES / "sledge" / "sledge.toml"
+    assert dalembert("mechanism", file, "--page", "m.html").returncode == 0
+    page = Computing(browser, tmp_path / "m.html")
+    assert page("return dalembert.limits()") == []
+
+
+def test_a_path_is_drawn_finer_than_a_few_poses(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """P of a crank of 60 mm runs over a half circle, also after the crank was made shorter; three poses are its sweep."""
+    (tmp_path / "m.toml").write_text(
+        '[ground]\nO = [0, 0]\n[links.crank]\npoints = { O = [0, 0], P = [0.06, 0] }\n[input]\nlink = "crank"\n'
+    )
+    assert dalembert("mechanism", "m.toml", "--over", "0deg:180deg:90deg", "--page", "m.html").returncode == 0
+    page = Computing(browser, tmp_path / "m.html")
+    assert len(page("return dalembert.curve('P.x')")) == 3
+    for share in (1, 0.5):
+        assert page.put(links__crank__P__x=0.06 * share)
+        path = page.paths("#view .trace:not(.ghost)")[0]
+        assert len(path) >= 90
+        middle = (path[0] + path[-1]) / 2
+        radii = np.hypot(*(path - middle).T)
+        assert radii == pytest.approx(np.full(len(path), radii[0]), rel=1e-3)
+        length = np.hypot(*np.diff(page.paths("#view g:not(.ghost) > g > .link")[0], axis=0)[0])
+        assert radii[0] == pytest.approx(length, rel=1e-3)
+    assert page.faults() == []
+
+
 def test_what_it_cannot_compute_it_replays_and_says_so(
     dalembert: Dalembert, tmp_path: Path, browser: Any
 ) -> None:

@@ -95,3 +95,16 @@ def test_a_picture_can_be_handed_on(
     assert faults(draw(name, words)) == []
     # matplotlib's own remarks would stand on the user's terminal
     assert [record.message for record in caplog.records] == []
+
+
+def test_names_with_dollars_are_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`$x^{$` is no formula, nor is a plane `A$\\frac$`."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.csv").write_text("name,unbalance_g_mm,angle_deg\n$x^{$,10,20\n")
+    call = ["dalembert", "balance", "r.csv", "--plane", "A$\\frac$:20mm", "--plot", "r.svg", "-o", "o.csv"]
+    monkeypatch.setattr("sys.argv", call)
+    with contextlib.suppress(SystemExit):
+        main()
+    picture = (tmp_path / "r.svg").read_text()
+    assert "<!-- $x^{$ -->" in picture
+    assert "A$\\frac$ -->" in picture
