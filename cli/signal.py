@@ -83,7 +83,7 @@ def read_recording(path: str, pulses: int) -> Recording:
     # below lines of a title the header is the line with these
     expected = {"t": "time", "time": "time", **dict.fromkeys(MARKS, "number")}
     source = open_source(path, expected, ())
-    file, header = source.file, [each.name for each in source.headings]
+    file, header = source.file, _without_volts([each.name for each in source.headings])
     marks = sorted((name.lower() for name in header if name.lower() in MARKS), key=MARKS.index)
     if not marks:
         raise DataError(
@@ -97,9 +97,8 @@ def read_recording(path: str, pulses: int) -> Recording:
     time = "time" if any(name.lower().startswith("time_") for name in header) else "t"
     units = _vibration(file, header, (time, *marks))
     unit = next(iter(units.values()))
-    table = read(
-        path, numbers={time: "time", **dict.fromkeys(marks, "number"), **dict.fromkeys(units, "amplitude")}
-    )
+    numbers = {time: "time", **dict.fromkeys(marks, "number"), **dict.fromkeys(units, "amplitude")}
+    table = read(path, numbers=numbers, headers=_without_volts)
     t = table.require(time, "time")
     signal = np.stack([table.numbers[name].values for name in units], axis=1)
     tacho = others[0] if others else None
@@ -126,6 +125,21 @@ def read_recording(path: str, pulses: int) -> Recording:
         )
     exact = partial(_exact, table, (time, mark, tacho), list(units), pulses)
     return Recording(sensors, unit, result, table.warnings, exact)
+
+
+def _without_volts(header: list[str]) -> list[str]:
+    """Return a header in which a mark has no unit: `keyphasor_V` is keyphasor.
+
+    >>> _without_volts(["t_s", "keyphasor_V", "A_mV"])
+    ['t_s', 'keyphasor', 'A_mV']
+    """
+    from dalembert.units import AMPLITUDES, find_unit
+
+    parts = [(name, *name.rpartition("_")[::2]) for name in header]
+    return [
+        mark if mark.lower() in MARKS and find_unit("amplitude", unit) in AMPLITUDES["voltage"] else name
+        for name, mark, unit in parts
+    ]
 
 
 def _vibration(file: str, header: list[str], others: tuple[str, ...]) -> dict[str, str]:

@@ -128,12 +128,12 @@ class Rows:
         return values, [v if has else ABSENT for v, has in zip(values.tolist(), there, strict=True)]
 
 
-def masses(b: FieldBalancing, values: Complex, place: str | None = "") -> list[Column]:
+def masses(b: FieldBalancing, values: Complex) -> list[Column]:
     """Return size and angle of masses or unbalances."""
     per, unit = b.runs.per, b.runs.mass_unit
     return [
-        number(per, per, np.abs(values), unit, place=place),
-        number("angle", "angle", degrees(values), place=place),
+        number(per, per, np.abs(values), unit),
+        number("angle", "angle", degrees(values)),
     ]
 
 

@@ -241,7 +241,10 @@ def tolerance_of(
         whole = needed("--permissible", permissible, "unbalance", positive=True)
         return Tolerance(None, whole, planes)
     if grade is None:
-        refuse("is for a tolerance: expected --grade or --permissible too", bearings=bearings)
+        refuse(
+            "expected --grade or --permissible for a tolerance, or --speed for their forces",
+            bearings=bearings,
+        )
         refuse("is for a tolerance: expected --grade too", speed=speed, rotor_mass=rotor_mass)
         return None
     standard = grade.strip().upper().removesuffix("-STD-167-1")

@@ -45,9 +45,7 @@ def read_runout(path: str, runs: Runs) -> dict[str, complex]:
     def exact() -> dict[str, Vectors]:
         from cli.read.exact import vectors
 
-        each = vectors(
-            _converted(amplitude.decimals, "amplitude", amplitude.unit, runs.amplitude_unit), phase
-        )
+        each = vectors(_converted(amplitude.decimals, amplitude.unit, runs.amplitude_unit), phase)
         return {sensor: each[i] for i, sensor in enumerate(sensors)}
 
     runs.exact_runout = exact
@@ -57,9 +55,9 @@ def read_runout(path: str, runs: Runs) -> dict[str, complex]:
     return out
 
 
-def _converted(sizes: list[Fraction], dimension: str, unit: str, to: str) -> list[Fraction]:
-    """Convert exact numbers from one unit to another."""
-    factor = exactly("1", UNITS[dimension][unit]) / exactly("1", UNITS[dimension][to])
+def _converted(sizes: list[Fraction], unit: str, to: str) -> list[Fraction]:
+    """Convert exact amplitudes from one unit to another."""
+    factor = exactly("1", UNITS["amplitude"][unit]) / exactly("1", UNITS["amplitude"][to])
     return [size * factor for size in sizes]
 
 
@@ -132,7 +130,7 @@ class Stored:
         sizes = replace(size, values=np.nan_to_num(size.values)).decimals
         sizes = [x / exactly("1", UNITS["per"][size.unit]) for x in sizes]
         if self.amplitude_unit:
-            sizes = _converted(sizes, "amplitude", self.amplitude_unit, runs.amplitude_unit)
+            sizes = _converted(sizes, self.amplitude_unit, runs.amplitude_unit)
         return sizes
 
     def exact_coefficients(
@@ -152,7 +150,6 @@ class Stored:
         if "reading_sd" in table.numbers and (value := table.numbers["reading_sd"].values[at[0, 0]]) > 0:
             (exactly_sd,) = _converted(
                 [Fraction(repr(float(value)))],
-                "amplitude",
                 self.amplitude_unit or runs.amplitude_unit,
                 runs.amplitude_unit,
             )

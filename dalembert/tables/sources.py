@@ -94,6 +94,12 @@ class Source:
         """Yield (line, cells) of every row of data."""
         return islice(self.everything(), self.above + 1 + self.units_below, None)
 
+    def is_filled(self, column: int) -> bool:
+        """Whether a column has a header, or a cell that is not blank."""
+        return bool(self.headings[column].written) or any(
+            cells[column].strip() for _, cells in self.rows() if column < len(cells)
+        )
+
     def error(self, index: int, column: str, value: str, expected: str) -> DataError:
         """Make the one line for a cell of a row of data; `column` as the header spells it."""
         line, _ = next(islice(self.rows(), index, None))
@@ -294,4 +300,4 @@ def delimiter(text: str) -> str:
         counts = Counter(line.count(mark) for line in first if mark in line)
         return max(counts.values(), default=0)
 
-    return max("\t;,", key=alike) if any(map(alike, "\t;,")) else ","
+    return max("\t;,|", key=alike) if any(map(alike, "\t;,|")) else ","

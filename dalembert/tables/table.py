@@ -249,14 +249,19 @@ def read(
         for name, (index, unit) in found.items()
     ]
     used = {column.place for column in columns}
-    extra = [each for index, each in enumerate(source.headings) if index not in used]
+    extra = [
+        each for index, each in enumerate(source.headings) if index not in used and source.is_filled(index)
+    ]
     missed = {name: dimension for name, dimension in dimensions.items() if name not in found}
     missed_texts = [name for name in texts if name not in found]
     if extra:
-        names = ", ".join(quote(each.written) if each.written else "without a header" for each in extra)
+        named = [quote(each.written) for each in extra if each.written]
+        bare = len(extra) - len(named)
+        what = [f"the column{'s' * (len(named) > 1)} {', '.join(named)}"] if named else []
+        what += [f"{bare} column{'s' * (bare > 1)} without a header"] if bare else []
         offered = offers(extra, missed, missed_texts)
         source.warnings.append(
-            f"{source.file}: ignored the column{'s' * (len(extra) > 1)} {names}"
+            f"{source.file}: ignored {' and '.join(what)}"
             + (f"; to read: {' '.join(offered)}" if offered else "")
         )
     source.check_cells(used)

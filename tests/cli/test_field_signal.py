@@ -47,6 +47,16 @@ def test_the_command_gives_the_rows_of_a_log(dalembert: Dalembert, tmp_path: Pat
     assert (bad.returncode, "expected a unit without _pp" in bad.stderr) == (1, True)
 
 
+def test_a_mark_in_volts(dalembert: Dalembert) -> None:
+    rows = [f"{k / 1000},{5 * (k % 50 < 5)},{np.cos(2 * np.pi * k / 50)}" for k in range(200)]
+    results = [
+        dalembert("signal", "-", stdin="\n".join([f"t_s,{mark},A_um", *rows]) + "\n").stdout
+        for mark in ("mark", "keyphasor_V", "Tacho [mV]")
+    ]
+    assert results[0].startswith("sensor,speed_rpm")
+    assert results == results[:1] * 3
+
+
 def test_a_tacho_with_several_pulses(dalembert: Dalembert, tmp_path: Path) -> None:
     t = np.arange(4000) / 4000
     angle = 2 * np.pi * 10 * t + 0.3

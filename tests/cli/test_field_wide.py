@@ -207,3 +207,11 @@ def test_words_of_a_wide_sheet_that_hold_the_trial_mass(dalembert: Dalembert) ->
     plain = rotor(dalembert("field", "-", "--json", stdin=LONG))
     for lines in (ones, each):
         assert rotor(dalembert("field", "-", "--json", stdin="\n".join(lines) + "\n")) == plain
+
+
+def test_plane_and_kept_without_trial(dalembert: Dalembert) -> None:
+    """They were ignored with a warning: both trial masses were in one plane, and none stayed on."""
+    done = dalembert(
+        "field", "-", "--json", stdin=LONG.replace("trial_plane", "plane").replace("trial_kept", "kept")
+    )
+    assert document(done) == document(dalembert("field", "-", "--json", stdin=LONG))

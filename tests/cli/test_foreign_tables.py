@@ -26,6 +26,7 @@ SAME = {
     "an angle with its sign": "mass_g,radius_mm,angle_°\n90.5,30,60\n60,50.25,210\n",
     "a title": "Rotor 7; hall 2\n\nmass_g;radius_mm;angle_deg\n90,5;30;60\n60;50,25;210\n",
     "a title with words of quantities": "Mass\nmass [g],radius [mm],angle [°]\n90.5,30,60\n60,50.25,210\n",
+    "strokes between cells": "mass [g]|radius [mm]|angle [°]\n90,5|30|60\n60|50,25|210\n",
     "a first column without a header": ",mass_g,radius_mm,angle_deg\nW1,90.5,30,60\nW2,60,50.25,210\n",
     "a header shorter than its rows": "mass_g,radius_mm,angle_deg\nW1,90.5,30,60\nW2,60,50.25,210\n",
 }
@@ -152,3 +153,12 @@ def test_a_column_name_may_add_how_an_amplitude_is_read(dalembert):
     done = dalembert("field", "-", "--column", "amplitude_um=Schwing [mm/s]", stdin=rows)
     assert done.returncode == 1
     assert "expected 'um'" in done.stderr
+
+
+def test_columns_without_a_header(dalembert: Dalembert) -> None:
+    """Those without any cell, as spreadsheets leave them at the end, are none; of others their number is said."""
+    empty = "mass_g,radius_mm,angle_deg,,\n90.5,30,60,,\n60,50.25,210,,\n"
+    done = dalembert("balance", "-", *PLANE, stdin=empty)
+    assert (done.returncode, done.stderr) == (0, "")
+    done = dalembert("balance", "-", *PLANE, stdin=empty.replace("60,,", "60,x,y"))
+    assert done.stderr == "warning: standard input: ignored 2 columns without a header\n"

@@ -168,7 +168,7 @@ def test_a_missing_folder_is_named_by_the_file_that_was_asked_for(
         (("--speed", "3000rpm"), "expected --grade too"),
         (("--rotor-mass", "12kg"), "expected --grade too"),
         (("--permissible", "30g_mm", "--speed", "3000rpm"), "goes with --grade"),
-        (("--bearings", "0mm:90mm"), "expected --grade or --permissible too"),
+        (("--bearings", "0mm:90mm"), "expected --grade or --permissible for a tolerance"),
     ],
 )
 def test_a_speed_without_a_grade_is_not_ignored(

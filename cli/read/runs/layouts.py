@@ -46,7 +46,7 @@ def runs_layout(path: str) -> Layout:
     def headers(header: list[str]) -> list[str]:
         nonlocal of_log
         of_log = is_log(header)
-        return headed(header) if of_log else header
+        return headed(header) if of_log else _trial_names(header)
 
     table = read(
         path,
@@ -61,6 +61,19 @@ def runs_layout(path: str) -> Layout:
     if states and all(states) and "trial_mass" not in table.cells:
         _states_are_masses(table, [match for match in states if match])
     return Layout(table, of_log)
+
+
+def _trial_names(header: list[str]) -> list[str]:
+    """Return a header in which `plane` and `kept` are those of the trial masses.
+
+    >>> _trial_names(["run", "plane", "kept", "trial_mass_g"])
+    ['run', 'trial_plane', 'trial_kept', 'trial_mass_g']
+    """
+    lower = [name.lower() for name in header]
+    return [
+        f"trial_{name}" if name in ("plane", "kept") and f"trial_{name}" not in lower else written
+        for written, name in zip(header, lower, strict=True)
+    ]
 
 
 def is_log(header: list[str]) -> bool:

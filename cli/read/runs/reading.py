@@ -45,12 +45,12 @@ class Measured(NamedTuple):
 
 def read_measured(
     path: str,
-    influence: Sequence[str] = (),
+    influence: Sequence[str],
     *,
-    fit: bool = False,
-    exclude: Collection[str] = (),
-    four_run: bool = False,
-    against: bool = False,
+    fit: bool,
+    exclude: Collection[str],
+    four_run: bool,
+    against: bool,
 ) -> Measured:
     """Read the runs.
 
