@@ -160,8 +160,10 @@ class Equations:
             with suppress(Lost):
                 self._cover(float(end))
         low, high = self._covered
-        careful = (not low <= x <= high or self._crossing(x) is not None for x in q[:, 0].tolist())
-        return np.array(list(careful), dtype=bool)
+        careful = ~((q[:, 0] >= low) & (q[:, 0] <= high))
+        if self._crossings:
+            careful |= np.array([self._crossing(x) is not None for x in q[:, 0].tolist()], dtype=bool)
+        return careful
 
     def _by_poses(self, t: float, q: Floats, v: Floats) -> tuple[Reals, Reals]:
         """M (k, k) and h (k,) at a state, from the effort of k + 1 motions through its pose."""
@@ -220,6 +222,11 @@ class Equations:
     def plain(self) -> bool:
         """Whether the tape of the motion depends on the state alone: on nothing that has to be looked up."""
         return set(state_names(self.k)).issuperset(self.rates.inputs)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether the accelerations are smooth in the state: there is no change point near which they are interpolated."""
+        return not self._crossings
 
     @property
     def rates(self) -> Tape:

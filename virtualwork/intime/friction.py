@@ -180,6 +180,11 @@ class Rubbing(Equations):
         """False: friction is found by iteration."""
         return False
 
+    @property
+    def smooth(self) -> bool:
+        """False: friction jumps where a joint comes to rest."""
+        return False
+
     # --- friction at a state --------------------------------------------------------------------------------------
     def __call__(self, t: float, q: Floats, v: Floats) -> Floats:
         """The accelerations at a state in this mode, and the power."""

@@ -19,7 +19,18 @@ from virtualwork.formulas.numbers import EPS, Reals, real_array
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.intime.coordinates import Coordinates
 from virtualwork.intime.equations import Equations
-from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, UNKNOWN, apart, rounding, share, spread
+from virtualwork.intime.estimate import (
+    FIRST,
+    GAIN,
+    LEAST,
+    TRIES,
+    UNKNOWN,
+    input_error,
+    share,
+    solutions_apart,
+    unavoidable,
+    unavoidable_rounding,
+)
 from virtualwork.intime.explicit import DormandPrince
 from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.implicit import Radau
@@ -109,8 +120,11 @@ class Run:
         nodes = self.coarse.nodes[self.coarse.nodes <= self.fine.end]
         some = nodes[np.unique(np.linspace(0, len(nodes) - 1, min(len(nodes), NODES)).astype(int))]
         t = np.union1d(some, self.t)
-        q, gap, faster = _apart(self.fine, self.coarse, t)
-        least, gap, faster = _least(self.fine, t), *(np.maximum.accumulate(x, axis=0) for x in (gap, faster))
+        q, gap, faster = solutions_apart(self.fine, self.coarse, t)
+        least, gap, faster = (
+            unavoidable(self.fine, t),
+            *(np.maximum.accumulate(x, axis=0) for x in (gap, faster)),
+        )
         shares = self.share + np.divide(least, gap, out=np.zeros_like(gap), where=gap > 0)
         wrong, rates = np.maximum(gap * shares, least) + 4 * EPS * np.abs(q), faster * shares
         units = np.eye(q.shape[1])
@@ -273,6 +287,7 @@ def _simulated(
     if fine.stiff:
         # what is stiff somewhere is from the beginning
         fine = travel(own, start, end, tolerance, levels, Radau(), accuracy, progress=reports())
+    first = fine
     for tries in range(TRIES):
         coarse, method = fine, fine.legs[0].method
         # near change points every solution is interpolated from other poses
@@ -282,14 +297,15 @@ def _simulated(
         # nothing is asked below rounding
         finer = max(LEAST, tolerance / (GAIN + 1))
         fine = travel(ways, start, last, finer, levels, method, accuracy, coarse, reports())
+        fine.first = first
         if last < end and fine.ended == "end":
             fine.ended = coarse.ended
         coarse.backwards()
         part = 1.0 if equations.crosses or coarse.folds or fine.folds else share(tolerance)
         found = reached(t, fine.end)
-        error = _error(fine, coarse, found, part)
+        error = input_error(fine, coarse, found, part)
         worst = float((error / scale).max())
-        least = float((_least(fine, fine.nodes) / scale).max())
+        least = float((unavoidable_rounding(fine, fine.nodes) / scale).max())
         if worst <= accuracy or least > accuracy or tolerance <= LEAST or fine.steps > MOST / 2:
             break
         tolerance = finer
@@ -300,32 +316,12 @@ def _simulated(
     return replace(run, warnings=(*equations.warnings, *_said(run, accuracy, worst, until, t)))
 
 
-def _error(fine: Travel, coarse: Travel, t: Reals, part: float) -> Reals:
-    """How far the inputs may be from the truth at times, (n, k)."""
-    nodes = coarse.nodes[coarse.nodes <= fine.end]
-    error = spread(*_apart(fine, coarse, nodes)[:2], part) + _least(fine, nodes)
-    # between two nodes that of the later one
-    return np.asarray(error[np.minimum(np.searchsorted(nodes, t), len(nodes) - 1)])
-
-
-def _apart(fine: Travel, coarse: Travel, nodes: Reals) -> tuple[Reals, Reals, Reals]:
-    """The inputs of the finer solution at nodes of the coarser, how far the two lie apart there, and their speeds, (n, k) each."""
-    (q, v, *_), (other, rate, *_) = fine.at(nodes), coarse.at(nodes)
-    return q, apart(nodes, q - other, v - rate), np.abs(v - rate)
-
-
-def _least(fine: Travel, t: Reals) -> Reals:
-    """What no shorter steps make smaller: rounding, and interpolation near change points, (n, k)."""
-    q, v, a, _ = fine.at(t)
-    return np.asarray(np.maximum(rounding(t, q, v, a), fine.noise(t)) + fine.blur(t)[:, None])
-
-
 def _arrives(fine: Travel, coarse: Travel, levels: Levels, part: float) -> bool:
     """Whether an input comes to its level at the last time, but for the error of the motion."""
     if not levels:
         return False
     t = fine.nodes
-    gap, error = fine.at(t)[0], _error(fine, coarse, t, part)
+    gap, error = fine.at(t)[0], input_error(fine, coarse, t, part)
     for j, level in levels.items():
         beside = np.abs(gap[:, j] - level) <= error[:, j]
         if beside[-1] and not beside.all():

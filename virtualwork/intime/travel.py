@@ -41,6 +41,8 @@ class Travel:
 
     legs: list[Path] = field(default_factory=list)
     ended: str = ""
+    # the first solution, whose nodes tell well enough how the motion makes what rounds grow; its own where there is none
+    first: Travel | None = None
 
     @property
     def end(self) -> float:
@@ -131,6 +133,18 @@ class Travel:
                 before, place = squares[-1], way[-1]
         nodes, whole = np.concatenate(t), np.concatenate(places)
         return np.stack([np.interp(times, nodes, of) for of in whole.T], axis=1)
+
+    def grown(self, times: Reals) -> Reals:
+        """What the motion makes of the rounding of all steps before, the largest so far, at times between nodes too, (n, k).
+
+        Through several sets of coordinates it is not followed: 0.
+        """
+        legs = (self.first or self).legs
+        leg = legs[0]
+        if len(legs) > 1:
+            return np.zeros((len(times), leg.equations.k))
+        largest = np.maximum.accumulate(leg.grown, axis=0)
+        return np.stack([np.interp(times, leg.nodes.t, of) for of in largest.T], axis=1)
 
     @property
     def halves(self) -> Floats:
