@@ -34,9 +34,8 @@ from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.recording import Recording
 from virtualwork.intime.crossing import OTHER, Crossing, crossings, narrowed, nearest
-from virtualwork.intime.entering import Placed
+from virtualwork.intime.entering import Placed, ends, kinks, place, reader
 from virtualwork.intime.powers import motion_of, state_names
-from virtualwork.intime.tables import ends, kinks, place, reader
 from virtualwork.intime.watch import Floats, Value, Watch
 
 # of a turn: how far beyond an input its change points are looked for
