@@ -30,7 +30,7 @@ class Placed:
     """The poses of an assembly, closed on its branch one after the other.
 
     With a `tape`, a step of Newton's method on the unknowns of all groups without a closed form, and what else enters
-    it (`known`), they are followed from pose to pose; the branch itself is asked where that leads too far, and wherever
+    it (`known`), they are followed from pose to pose; the branch itself closes them where that leads too far, and wherever
     it `crosses` another.
 
     Examples
@@ -99,12 +99,12 @@ class Placed:
         given = {name: of(0.0, q, q) for name, of in self.known.items()}
         for _ in range(LIMIT):
             try:
-                found = self._step(
+                solved = self._step(
                     *(given[name] if name in given else now[name] for name in self.tape.inputs)
                 )
             except (ZeroDivisionError, ValueError, OverflowError):
                 return None
-            before, now = now, dict(zip(self.tape.names, found, strict=True))
+            before, now = now, dict(zip(self.tape.names, solved, strict=True))
             if not all(abs(value - self._x[name]) <= FAR * self.scale[name] for name, value in now.items()):
                 return None
             if all(abs(value - before[name]) <= CLOSE * self.scale[name] for name, value in now.items()):
@@ -216,7 +216,7 @@ def kinks(load: Tabled, plan: Plan, name: str) -> Watch | None:
 
 
 def ends(load: Tabled, plan: Plan, t: float, q: Floats, v: Floats) -> str:
-    """A sentence where a table ends at a state; else empty."""
+    """The sentence on a table that ends at a state; else empty."""
     of, (first, last) = place(load, plan), (load.table[0][0], load.table[-1][0])
     if of is None or load.periodic:
         return ""

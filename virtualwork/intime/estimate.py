@@ -16,7 +16,7 @@ import numpy as np
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.intime.travel import Travel
 
-# the tolerance of a step over the accuracy asked for
+# the tolerance of a step over the requested accuracy
 FIRST = 0.1
 # what the error of steps half as long is less by, one; of the estimate
 GAIN, SAFETY = 255.0, 10.0
@@ -91,11 +91,11 @@ def solutions_apart(fine: Travel, coarse: Travel, nodes: Reals) -> tuple[Reals, 
 
 
 def unavoidable(fine: Travel, t: Reals) -> Reals:
-    """What no shorter steps make smaller: rounding and what the motion makes of it, and interpolation near change points, (n, k)."""
+    """The error that no shorter steps make smaller, (n, k): rounding, as the motion makes it grow, and interpolation near change points."""
     return np.maximum(unavoidable_rounding(fine, t), fine.grown(t))
 
 
 def unavoidable_rounding(fine: Travel, t: Reals) -> Reals:
-    """The same without what the motion makes of rounding."""
+    """Rounding by itself, and interpolation near change points, (n, k)."""
     q, v, a, _ = fine.at(t)
     return np.asarray(np.maximum(rounding(t, q, v, a), fine.noise(t)) + fine.blur(t)[:, None])

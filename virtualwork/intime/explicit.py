@@ -197,7 +197,7 @@ class RecordedStep:
         return step(rates, self.t, self.q, self.v, self.rates, h)
 
     def tape(self, outputs: Mapping[str, Number]) -> Tape:
-        """The tape of what is found."""
+        """The tape of outputs and calls."""
         return self.recorder.tape({**outputs, **self._calls.outputs})
 
 

@@ -231,14 +231,14 @@ def travel(
         The inputs themselves.
     until : mapping of an input's number to its value
     method : Method
-        Where it is found to be stiff, the implicit one goes on.
+        Where it proves stiff, the implicit one goes on.
     accuracy : float
         What is wanted: a level that ends the motion is met so nearly, where the motion turns back there; where a loop is so nearly folded, and no other coordinate leads on, that rounding of the rates
         is more than it, rounding decides how the motion goes on.
     like : Travel, optional
         Each of its steps is done in two halves.
     """
-    found, scale = Travel(), coordinates.equations.scale
+    way, scale = Travel(), coordinates.equations.scale
     sides = dict.fromkeys(until, 0)
     plan = [] if like is None else like.halves
     t, q, v = start
@@ -252,21 +252,21 @@ def travel(
             try:
                 equations, v = equations.going_on(t, q, v, ended)
             except Lost:
-                found.ended = NO_FURTHER
-                return found
+                way.ended = NO_FURTHER
+                return way
             # in the mode of this leg, out of which the next one comes
             coordinates, left = coordinates.of(equations), equations.left(ended, before)
-            idle = idle + 1 if found.legs and not found.legs[-1].steps else 0
+            idle = idle + 1 if way.legs and not way.legs[-1].steps else 0
             if idle > MODES * (1 + len(equations.mode)):
-                found.ended = CHATTERS
-                return found
+                way.ended = CHATTERS
+                return way
         below = FOLDING if not coordinates.folds(q) else coordinates.margin(q) / BETTER
         monitor = Monitor(coordinates, inputs, below, bool(until) and not coordinates.own, q[0])
         ends = [
             monitor.until(j, level, sides[j], float(noise(level, scale[j])), accuracy * scale[j])
             for j, level in until.items()
         ]
-        if not found.legs:
+        if not way.legs:
             # levels at which the motion begins
             left |= {
                 watch.name: level
@@ -276,22 +276,22 @@ def travel(
         watches = [*ends, *equations.watches()]
         most = MOST if like is None else MOST + 2 * like.steps
         path = Path(coordinates, method, inputs)
-        way = path, end, tolerance, watches, equations.stops, monitor, most - found.steps, left, plan
-        Walk(*way, progress).go(t, q, v, work)
-        found.legs.append(path)
-        found.ended = path.ended
+        arguments = path, end, tolerance, watches, equations.stops, monitor, most - way.steps, left, plan
+        Walk(*arguments, progress).go(t, q, v, work)
+        way.legs.append(path)
+        way.ended = path.ended
         if isinstance(equations, Rubbing):
             fastest, gain = gains(path, fastest)
             if gain is not None:
                 path.cut(gain[0])
-                found.ended = path.ended = GAINS.format(gain[1])
-                return found
+                way.ended = path.ended = GAINS.format(gain[1])
+                return way
         if path.ended.startswith("until"):
-            found.ended = "until"
-            return found
+            way.ended = "until"
+            return way
         sides = {j: watch.side for j, watch in zip(until, ends, strict=True)}
-        if path.ended in ("end", "budget") or len(found.legs) > CHANGES:
-            return found
+        if path.ended in ("end", "budget") or len(way.legs) > CHANGES:
+            return way
         if path.ended == "undecided":
             # the last node lies where that has been
             path.drop()
@@ -302,11 +302,11 @@ def travel(
         if path.ended == "stiff":
             method = Radau()
             continue
-        found.ended = equations.outside(t, q, v) if path.ended == "lost" else ""
-        if found.ended:
+        way.ended = equations.outside(t, q, v) if path.ended == "lost" else ""
+        if way.ended:
             # a table over time reads a little beyond its end
             path.back(equations.stops)
-        other = None if found.ended else coordinates.better(q, inputs)
+        other = None if way.ended else coordinates.better(q, inputs)
         if (
             other is None
             and coordinates.margin(q) * accuracy < EPS
@@ -314,11 +314,11 @@ def travel(
         ):
             path.ended = "undecided" if path.ended == "folding" else path.ended
         if path.ended == "undecided":
-            found.ended = UNDECIDED
-            return found
+            way.ended = UNDECIDED
+            return way
         if other is None and path.ended == "lost":
-            found.ended = found.ended or NO_FURTHER
-            return found
+            way.ended = way.ended or NO_FURTHER
+            return way
         if other is not None:
             motion = coordinates.motion(np.array([q]), np.array([v]))
             coordinates, q = other
@@ -331,7 +331,7 @@ def travel(
 
 
 class Joined:
-    """What `Motion` has, asked of every part and put together row by row.
+    """The attributes of `Motion`, requested of every part and joined row by row.
 
     Arrays are joined along their poses, pairs, lists and mappings of them part by part; whatever else a motion gives is joined in the same way.
 
@@ -356,7 +356,7 @@ class Joined:
         return self._joined([getattr(of, name) for _, of in self._parts])
 
     def __call__(self, *args: Any, **keywords: Any) -> Any:
-        """Call what was asked of every part."""
+        """Call the attribute of every part."""
         return self._joined([of(*args, **keywords) for _, of in self._parts])
 
     def _joined(self, answers: list[Any]) -> Any:

@@ -2,7 +2,7 @@
 
 The formulas are recorded once with the varied dimensions as inputs of the tape. What a lane cannot do is done singly,
 as `Mechanism.simulate` does it: loops that fold, change points on the way, stiff dampers, friction, tables, variants
-whose branch is not told by a comparison.
+whose branch no comparison decides.
 """
 
 from __future__ import annotations
@@ -42,18 +42,18 @@ MOST = 20_000
 RESTING, HELD = 5e-3, 1 << 16
 # rounds between two looks, at first and later
 SOON, LATER = 16, 128
-# what is found of each variant over its times
+# the results of each variant over its times
 FOUND = ("angle", "speed", "acceleration", "error_estimate", "energy", "work")
 
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """What `Variants.simulate` has found: every array has a leading axis of variants.
+    """The result of `Variants.simulate`: every array has a leading axis of variants.
 
     Attributes
     ----------
     t : array (n,)
-        The times asked for, s.
+        The requested times, s.
     times : array (v, n)
         Those of each variant: where its motion ends before the last, that of its end comes after those before it, and
         what follows is NaN. So is all of a variant that cannot be simulated.
@@ -64,8 +64,8 @@ class Runs:
     energy, work : array (v, n)
         Kinetic energy and that of gravity and springs, and the work of what stores none, J.
     unknown : array (v, n)
-        From when on no digit is known.
-    warnings : dict of a variant's place to what must be said of it
+        Whether no digit of the inputs holds, nor any after that time.
+    warnings : dict of a variant's place to its warnings
     """
 
     family: Family
@@ -104,7 +104,7 @@ class Runs:
         )
 
     def put(self, rows: Any, times: Reals, **columns: Reals) -> None:
-        """Keep the results of some variants at their times (…, n), which may be less than those asked for."""
+        """Keep the results of some variants at their times (…, n), which may be fewer than the requested ones."""
         n = times.shape[-1]
         for name, values in {"times": times, **columns}.items():
             of = getattr(self, name)
