@@ -321,7 +321,7 @@ class FamilyMotion(NamedParts[PointOfFamily, LinkOfFamily, SlideRates]):
 # --- the solutions of parts that a process keeps for further requests -------------------------------------------------
 _lock = threading.Lock()
 _solvers: dict[tuple[str, int], Solver] = {}
-# parts whose solutions a process keeps for further questions
+# so many parts
 PARTS = 16
 
 
@@ -334,7 +334,7 @@ def answer(
 ) -> tuple[list[Any], dict[int, str]]:
     """Quantities of a part, and why some of its variants have none; what a process has solved of it is kept.
 
-    `family` names what has been asked of which variants, and `number` the part; `out` is where to write them.
+    `family` names the request and its variants, and `number` the part; `out` is where to write them.
     """
     with _lock:
         solver = _solvers.get((family, number))

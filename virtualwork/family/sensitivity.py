@@ -31,7 +31,7 @@ from virtualwork.formulas.recording import NAMES
 # number of poses in which it is checked whether a quantity varies
 LOOKED_AT = 8
 GOLDEN = (5**0.5 - 1) / 2
-# relative: what is read from decimals, turned to radians, or found by iteration; and by how much it is moved to see what that does
+# relative: what is read from decimals, turned to radians, or computed by iteration; and by how much it is moved to see what that does
 OFF, NUDGE = 4 * EPS, 2.0**-30
 # what an input's own numbers are called on the tape
 ENTERS = dict(zip(("value", "speed", "acceleration", "jerk"), NAMES, strict=True))
@@ -102,14 +102,14 @@ class Sensitivities:
             for name, slope in zip(names, row, strict=True)
         }
         with np.errstate(all="ignore"):
-            found, _ = compared(tape, second.entering(tape.inputs, given), answers)
-        each = iter(np.broadcast_to(error, self.poses.n) for error in found)
+            estimates, _ = compared(tape, second.entering(tape.inputs, given), answers)
+        each = iter(np.broadcast_to(error, self.poses.n) for error in estimates)
         return [[next(each) for _ in names] for _ in keys]
 
-    def _with_lengths(self, asked: Sequence[Dimension]) -> tuple[Dimension, ...]:
+    def _with_lengths(self, requested: Sequence[Dimension]) -> tuple[Dimension, ...]:
         """Return dimensions, and all others but those of inputs."""
         own = (d for d in dimensions(self.assembly.mechanism).values() if d.where[0] != "inputs")
-        return tuple(dict.fromkeys((*asked, *own)))
+        return tuple(dict.fromkeys((*requested, *own)))
 
     def _entering(self, dimensions: Sequence[Dimension]) -> list[str]:
         """Return the names of dimensions on the tape: an input's own numbers enter as those of every input do."""
@@ -210,10 +210,10 @@ def _moved(tape: Tape, entering: Mapping[str, Any], values: Mapping[str, Any]) -
         lanes[name] = np.tile(np.broadcast_to(x, n), (len(inputs), 1))
         lanes[name][i] *= 1 + NUDGE
         lanes[name] = lanes[name].ravel()
-    found = run(Tape(tuple(operations), tape.outputs), lanes)
+    moved = run(Tape(tuple(operations), tape.outputs), lanes)
     return {
         name: OFF
         / NUDGE
-        * np.abs(np.reshape(np.broadcast_to(found[name], n * len(inputs)), (-1, n)) - x).sum(axis=0)
+        * np.abs(np.reshape(np.broadcast_to(moved[name], n * len(inputs)), (-1, n)) - x).sum(axis=0)
         for name, x in values.items()
     }

@@ -49,8 +49,8 @@ class Spread:
 def spread(slopes: Sequence[Reals], limits: Sequence[float]) -> Spread:
     """The worst case and the standard deviation of a number, from its slopes and the limits of the dimensions.
 
-    >>> found = spread([np.array([3.0]), np.array([-4.0])], [3.0, 3.0])
-    >>> found.worst, found.sd, found.shares[:, 0]
+    >>> effect = spread([np.array([3.0]), np.array([-4.0])], [3.0, 3.0])
+    >>> effect.worst, effect.sd, effect.shares[:, 0]
     (array([21.]), array([5.]), array([0.36, 0.64]))
     """
     moved = np.abs(np.asarray(slopes)) * np.asarray(limits)[:, None]
@@ -160,8 +160,8 @@ def drawn(
 def summary(values: Reals, nominal: Reals, turn: float | None = None) -> Drawn:
     """Mean, standard deviation and quantiles of drawn values (draws, n); of an angle beside its nominal value, within a turn.
 
-    >>> found = summary(np.array([[359.0], [0.0], [np.nan]]), np.array([0.0]), 360.0)
-    >>> float(found.mean[0]), round(float(found.sd[0]), 3)
+    >>> sample = summary(np.array([[359.0], [0.0], [np.nan]]), np.array([0.0]), 360.0)
+    >>> float(sample.mean[0]), round(float(sample.sd[0]), 3)
     (359.5, 0.707)
     """
     apart = values - nominal
