@@ -49,6 +49,11 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
         if not value:
             raise bad(flag, f"missing: expected {example}")
     cases = Cases.of(options)
+    if cases.varied is not None and show.form == ".toml":
+        raise bad(
+            "-o",
+            f"'{show.output}': expected one mechanism, such as --set NAME=VALUE makes, or a table (.csv)",
+        )
     cases.refuse_inputs("the rows of the target have the inputs: expected a dimension, links.crank.B.x=...")
     with naming(options.file):
         targets = aims(cases.mechanism, options.target, options.want, options.weight, cases.warnings)

@@ -25,7 +25,7 @@ from dalembert.results.columns import ABSENT, Column, Table, names, number
 from dalembert.results.way import Topic, figures
 from dalembert.tables.files import read_bytes
 from virtualwork.describe import DescriptionError
-from virtualwork.describe.dimensions import Dimension, value
+from virtualwork.describe.dimensions import Dimension, dimensions, value
 from virtualwork.describe.units import Units
 
 if TYPE_CHECKING:
@@ -93,7 +93,8 @@ class Fitted(Case):
         """Return the warnings: fewer solutions than requested, and doubts about each solution."""
         solutions, lines = self.solutions, []
         if len(solutions) < self.study.best:
-            lines.append(f"fit: {len(solutions)} distinct of the {self.study.best} solutions of --best")
+            some = "1 distinct solution" if len(solutions) == 1 else f"{len(solutions)} distinct solutions"
+            lines.append(f"fit: --best {self.study.best} finds {some}")
         lines += self.best.remarks
         for i, other in enumerate(self.best.others, 2):
             lines += [f"solution {i}: {remark}" for remark in other.remarks]
@@ -322,24 +323,37 @@ def _places(fit: Fit[Mechanism]) -> dict[str, Callable[[], Table]]:
 
 
 def _text(file: str, fit: Fit[Mechanism], bare: Mapping[str, str]) -> str:
-    """Return the file's own text with the fitted numbers."""
+    """Return the file's own text with the fitted numbers, and those that --set changed."""
     import tomlkit
 
     from virtualwork import Mechanism
 
     name, data = read_bytes(file)
-    document = tomlkit.parse(data.decode("utf-8-sig"))
-    for dimension, si in zip(fit.dimensions, fit.values.tolist(), strict=True):
+    text = data.decode("utf-8-sig")
+    document = tomlkit.parse(text)
+
+    def read(text: str) -> Mechanism:
+        return Mechanism.from_toml_text(
+            text, name, Path() if file == "-" else Path(file).parent, partial(beside, [])
+        )
+
+    own = read(text)
+    new = {d: si for path, d in dimensions(own).items() if (si := _si(fit.mechanism, path)) != _si(own, path)}
+    for dimension, si in new.items():
         _write(document, dimension, si, Units(dict(bare)))
     text = tomlkit.dumps(document)
-    folder = Path() if file == "-" else Path(file).parent
-    again = Mechanism.from_toml_text(text, name, folder, partial(beside, []))
-    for path, si in fit.parameters.items():
-        if not math.isclose(float(value(again, path).real), si, rel_tol=WRITTEN, abs_tol=1e-15):
+    again = read(text)
+    for dimension, si in new.items():
+        if not math.isclose(_si(again, dimension.path), si, rel_tol=WRITTEN, abs_tol=1e-15):
             raise DataError(
-                f"{name}: {path}: it does not stand in the file as a number that could be replaced"
+                f"{name}: {dimension.path}: it does not stand in the file as a number that could be replaced"
             )
     return text
+
+
+def _si(m: Mechanism, path: str) -> float:
+    """Return a dimension of a mechanism, SI."""
+    return float(value(m, path).real)
 
 
 def _write(document: Any, dimension: Dimension, si: float, units: Units) -> None:
@@ -352,6 +366,9 @@ def _write(document: Any, dimension: Dimension, si: float, units: Units) -> None
         if where[0] == "cams":
             # the keys of a segment are not its fields
             rest = tuple(int(word) - 1 if word.isdigit() else word for word in path[2:])
+        elif where[0] == "inputs":
+            # an input's value is called by what it is
+            rest = (path[-1],)
     elif where[0] == "links":
         link, weight = document["links"][where[1]], where[2] in ("mass", "center", "inertia")
         of, rest = (link, where[2:]) if weight else (link["points"], where[3:])

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,15 +11,16 @@ import numpy as np
 from cli.cases import poses, remarks
 from cli.cases.analysis import Analysis
 from cli.cases.case import Case, Study
-from cli.cases.poses import cells, keys_of
+from cli.cases.poses import bounds_of, cells, keys_of
 from cli.cases.study import METHOD
 from cli.read.options import processes
+from cli.tolerance.way import way
 from dalembert.dataclass import dataclass
 from dalembert.errors import DataError
-from dalembert.results.columns import Column, Table, finite, names
+from dalembert.results.columns import Column, Table, names
 from dalembert.results.way import Topic
 from virtualwork.describe.dimensions import Dimension
-from virtualwork.family.tolerance import Drawn, Spread, drawn, drawn_numbers, limits, spread, summary
+from virtualwork.family.tolerance import Drawn, Spread, drawn, drawn_numbers, limits, rounded, spread, summary
 from virtualwork.formulas.kinematics import Point
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.quantities import Component
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 # how far a drawn standard deviation may be from the linear one, in its sampling errors and by its size
 SURE, APART = 5.0, 0.02
 NAMES = ("p0.135", "p99.865")
+FULL = "numbers of drawn mechanisms are printed in full: --digits cuts what rounds, and their errors are those of the sample"
 
 
 @dataclass
@@ -94,6 +96,21 @@ class Tolerances(Case):
         }
 
     @cached_property
+    def rounded(self) -> dict[str, tuple[Reals, Reals]]:
+        """The rounding errors of worst case and standard deviation of first order, by header: the slopes computed twice."""
+        slopes = list(self.slopes.values())
+        errors = self.analysis.motions[0].sensitivities.errors(self.keys, list(self.limits), slopes)
+        by_key, sizes = dict(zip(self.keys, errors, strict=True)), list(self.limits.values())
+        return {
+            each.header: rounded(
+                self.linear[each.header],
+                [np.degrees(error) if each.in_degrees else error for error in by_key[each.key]],
+                sizes,
+            )
+            for each in self.numbers
+        }
+
+    @cached_property
     def drawn(self) -> tuple[dict[str, Drawn], float]:
         """From drawn mechanisms, by header; and which share of them is assembled in every pose."""
         m, motion, q = self.analysis.mechanism, self.analysis.motions[0], self.analysis.inputs.whole
@@ -139,7 +156,7 @@ class Tolerances(Case):
         if not self.draws:
             return []
         samples, whole = self.drawn
-        lines = []
+        lines = [FULL] if self.study.show.digits else []
         sampling = SURE / np.sqrt(2 * max(self.draws - 1, 1))
         # a uniform distribution between the limits is wider than a normal one of a third of them
         wider = np.sqrt(3.0) if self.study.distribution == "uniform" else 1.0
@@ -172,25 +189,27 @@ class Tolerances(Case):
             if header not in self.linear:
                 continue
 
-            def of(name: str, values: Reals, *lead: str, shown: str, base: Column = column) -> Column:
-                place = (*lead, "columns", base.header, name)
-                return Column(f"{base.name}_{shown}", base.unit, cells(values), place=place)
+            def of(
+                name: str, values: Reals, error: Callable[[], Reals] | None, *lead: str, base: Column = column
+            ) -> Column:
+                place, shown = (*lead, "columns", base.header, name), "_".join((base.name, *lead, name))
+                bounds = None if error is None else lambda: bounds_of(error())
+                return Column(shown, base.unit, cells(values), bounds, place)
 
             effect = self.linear[header]
-            columns += [
-                of(name, values, shown=name) for name, values in (("worst", effect.worst), ("sd", effect.sd))
-            ]
+            for i, name in enumerate(("worst", "sd")):
+                columns.append(of(name, getattr(effect, name), partial(self._rounded, header, i)))
             if self.draws:
                 sample = self.drawn[0][header]
-                columns += [
-                    of(name, values, "drawn", shown=f"drawn_{name}")
-                    for name, values in _sample(sample).items()
-                ]
+                columns += [of(name, values, None, "drawn") for name, values in _sample(sample).items()]
                 further += [
-                    of(f"{name}_error", values, "drawn", shown=f"drawn_{name}_error")
+                    of(f"{name}_error", values, None, "drawn")
                     for name, values in zip(NAMES, sample.errors, strict=True)
                 ]
         return Table(columns, base.keys, "tolerance", by_column=True, documented=further)
+
+    def _rounded(self, header: str, i: int) -> Reals:
+        return self.rounded[header][i]
 
     def further(self) -> dict[str, Callable[[], Table]]:
         """Return the largest shares of the variance, and how the mechanisms were drawn."""
@@ -300,52 +319,7 @@ def _sample(sample: Drawn) -> dict[str, Reals]:
 _FIELDS = ("mean", "sd", "quantiles", "errors")
 
 
-# --- the worked solution ----------------------------------------------------------------------------------------------
-def way(
-    analysis: Analysis,
-    shown: Sequence[Component],
-    slopes_of: Mapping[Quantity, Sequence[Any]],
-    limits: Mapping[Dimension, float],
-) -> list[Topic]:
-    """Return the one topic: the terms at the first pose that is assembled."""
-    whole = analysis.motions[0].assembled
-    if not shown or not whole.any():
-        return [
-            Topic("terms", ["None of the numbers shown varies with [tolerances]."], "Terms", {"terms": []})
-        ]
-    i = int(np.argmax(whole))
-    rows: list[tuple[str, str, float, float, float, float]] = []
-    sums: list[tuple[str, float, float]] = []
-    for each in shown:
-        slopes = [float(np.broadcast_to(each.of(slope), len(whole))[i]) for slope in slopes_of[each.key]]
-        terms = [slope * limit for slope, limit in zip(slopes, limits.values(), strict=True)]
-        variance = sum((term / 3) ** 2 for term in terms)
-        for d, slope, limit, term in zip(limits, slopes, limits.values(), terms, strict=True):
-            share = (term / 3) ** 2 / variance if variance else 0.0
-            rows.append((each.header, d.path, slope, limit, term, share))
-        sums.append((each.header, sum(map(abs, terms)), variance**0.5))
-    columns = zip(*((*row[:2], *map(finite, row[2:])) for row in rows), strict=True)
-    titles = ("column", "path", "slope", "limit", "term", "share")
-    table = Table(
-        [names(title, values) for title, values in zip(titles, columns, strict=True)],
-        ("column", "path"),
-        "terms[]",
-    )
-    of_all = zip(*((header, finite(worst), finite(sd)) for header, worst, sd in sums), strict=True)
-    total = Table(
-        [names(title, values) for title, values in zip(("column", "worst", "sd"), of_all, strict=True)],
-        ("column",),
-        "sums[]",
-    )
-    at = f"At {analysis.pose_text(i)}: " if len(whole) > 1 else ""
-    text = (
-        f"{at}Δq = Σ (∂q/∂d)·δd to first order, slopes exact: worst case Σ |∂q/∂d|·limit, "
-        "standard deviation √Σ (∂q/∂d·limit/3)²; limits in SI, slopes in the column's unit per SI unit:"
-    )
-    return [Topic("terms", [text, table, "Sums:", total], "Terms of each dimension")]
-
-
-# --- the picture ------------------------------------------------------------------------------------------------------
+# --- the picture ----------------------------------------------------------------------------------------------------
 # of the picture's width: a band that is narrower is drawn wider
 SEEN = 0.02
 BARS = 10

@@ -116,6 +116,27 @@ def test_a_bad_option_is_named_and_nothing_is_written(dalembert, target, tmp_pat
     assert not (tmp_path / "fitted.toml").exists()
 
 
+def test_the_file_is_written_with_what_was_set(dalembert, target, tmp_path):
+    """A dimension that --set changes is that of the fitted mechanism: the file has it too, and meets the target."""
+    sets = ("--set", "ground.D.x=90", "--set", "links.rocker.C.x=85", "--set", "input.angle=20")
+    found = dalembert(*FIT, *FREE, *sets, "-o", "fitted.toml", "--json")
+    assert found.returncode == 0, found.stderr
+    fit = json.loads(found.stdout)["fit"]
+    text = (tmp_path / "fitted.toml").read_text()
+    assert "D = [90.0, 0]  # held" in text
+    again = dalembert("mechanism", "fitted.toml", "--over", "0:330:30", "--only", "H")
+    pairs = zip(rows(again.stdout), rows(target.read_text()), strict=True)
+    squares = [(float(a[x]) - float(b[x])) ** 2 for a, b in pairs for x in ("H_x_m", "H_y_m")]
+    assert (2 * sum(squares) / len(squares)) ** 0.5 == pytest.approx(fit["rms_m"], rel=1e-9)
+
+
+def test_a_file_of_several_variants_is_refused(dalembert, target, tmp_path):
+    found = dalembert(*FIT, *FREE, "--over", "ground.D.x=90:100:10", "-o", "fitted.toml")
+    assert found.returncode == 2
+    assert "'fitted.toml': expected one mechanism" in found.stderr
+    assert not (tmp_path / "fitted.toml").exists()
+
+
 @pytest.mark.parametrize(
     ("table", "said"),
     [
@@ -168,7 +189,7 @@ def test_the_options_of_the_search(dalembert, target, tmp_path):
     fit = json.loads(found.stdout)["fit"]
     assert fit["starts"] == 16
     assert "<svg" in (tmp_path / "fit.svg").read_text()
-    told = "fit: 1 distinct of the 3 solutions of --best"
+    told = "fit: --best 3 finds 1 distinct solution"
     others = fit.get("others", [])
     assert all(each["max_m"] >= fit["max_m"] for each in others)
     assert (told in found.stderr) == (not others)

@@ -98,6 +98,7 @@ def test_a_picture(dalembert: Dalembert, pendulum: Path, tmp_path: Path) -> None
         (("--time", "1:0:-0.1"), 2, "rising"),
         (("--time", "0:1:0.1", "--accuracy", "fine"), 2, "--accuracy"),
         (("--time", "0:1:0.1", "--until", "bab=3"), 2, "no input drives 'bab'"),
+        (("--time", "0:1:0.1", "--until", "bob=3", "--until", "bob=4"), 2, "bob is given twice"),
         (("--time", "0:1:0.1", "--check"), 2, "--check is now dalembert inspect"),
         (("--until", "bob=3"), 2, "such as --time 0:10:0.01"),
         (("--time", "0:1:0.1", "--only", "Q"), 1, "no link or point is named 'Q'"),

@@ -180,3 +180,39 @@ def test_a_pose_that_cannot_be_assembled_is_status_1_with_its_picture_too(dalemb
     assert done.returncode == 1
     assert "cannot be assembled" in done.stderr
     assert "RuntimeWarning" not in done.stderr
+
+
+def test_digits_of_worst_case_and_standard_deviation(dalembert, file):
+    """At 0° x is r + l: 0.05 mm and 0.1 mm of limits are 0.15 mm, to the last digit; drawn numbers are as they are, with a word."""
+    text = """
+[units]
+length = "mm"
+[ground]
+A = [0, 0]
+[links.crank]
+points = { A = [0, 0], B = [50, 0] }
+[links.rod]
+points = { B = [0, 0], C = [150, 0] }
+[[slots]]
+point = "C"
+angle = 0
+[input]
+link = "crank"
+[guess]
+at = 0
+rod = -0.1
+[tolerances]
+"links.crank.B.x" = "0.05 mm"
+"links.rod.C.x" = "0.1 mm"
+"""
+    call = ("tolerance", "-", "--at", "0rad", "--at", "1rad", "--only", "C.x,rod.angle", "--digits")
+    found = dalembert(*call, stdin=text)
+    assert (found.returncode, found.stderr) == (0, "")
+    first, second = rows(found.stdout)
+    assert first["C_x_worst_m"] == "0.00015"
+    assert 10 < len(second["C_x_worst_m"].replace("0.000", "")) < 17
+    drawn = dalembert(*call, "--draws", "50", stdin=text)
+    assert "numbers of drawn mechanisms are printed in full" in drawn.stderr
+    row = rows(drawn.stdout)[1]
+    # an angle lies within its turn, drawn or not
+    assert abs(float(row["rod_angle_drawn_mean_deg"]) - float(row["rod_angle_deg"])) < 0.1

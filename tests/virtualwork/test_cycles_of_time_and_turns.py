@@ -12,8 +12,8 @@ from scipy.optimize import minimize_scalar
 from tests.virtualwork.mechanisms import four_bar, slider_crank
 from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism, TorsionSpring
 from virtualwork.motion import Motion
-from virtualwork.study.between import largest
 from virtualwork.study.cycle import Cycle
+from virtualwork.study.sweep import largest
 
 G = 9.81
 

@@ -188,3 +188,43 @@ def test_estimates_that_were_too_small(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(60))
 def test_errors_are_within_their_estimates(seed: int) -> None:
     assert held(seed) <= 1.0
+
+
+def swung(angle: float, speed: float, t: float) -> Any:
+    """A pendulum's angle, from +x, at a time, from an angle within a turn of its rest: elliptic functions in 40 digits."""
+    from mpmath import asin, ellipf, ellipfun, ellipk, mp, mpf, nint, sign, sin, sqrt
+
+    with mp.workdps(40):
+        start, omega = mpf(angle) + mp.pi / 2, sqrt(mpf(G))
+        turns = nint(start / (2 * mp.pi))
+        start -= 2 * mp.pi * turns
+        # the square of the sine of half the largest angle, had it one
+        m = sin(start / 2) ** 2 + mpf(speed) ** 2 / (4 * omega**2)
+        if m < 1:
+            first = ellipf(asin(sin(start / 2) / sqrt(m)), m)
+            first = 2 * ellipk(m) - first if speed < 0 else first
+            half = asin(sqrt(m) * ellipfun("sn", first + omega * t, m=m))
+        else:
+            along = ellipf(start / 2, 1 / m) + sign(speed) * omega * sqrt(m) * t
+            over = nint(along / (2 * ellipk(1 / m)))
+            half = asin(ellipfun("sn", along - 2 * over * ellipk(1 / m), m=1 / m)) + over * mp.pi
+        return 2 * half + (2 * turns - mpf(1) / 2) * mp.pi
+
+
+@pytest.mark.parametrize("accuracy", [1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize(
+    ("off", "speed"), [(0.0, 1e-3), (0.0, -3e-6), (1e-4, 1e-5), (-1e-2, 0.0), (0.0, 2.0)]
+)
+def test_what_rounds_beside_an_upper_rest_grows(off: float, speed: float, accuracy: float) -> None:
+    """It grows e times in every √(l/g): what two solutions differ by is one sample of that, and may be much less than the error."""
+    angle = np.pi / 2 + off
+    t = np.linspace(0.0, 10.0, 21)
+    run = pendulum().simulate(t, angle=angle, speed=speed, accuracy=accuracy)
+    alone = [abs(float(swung(angle, speed, x) - q)) for x, q in zip(t.tolist(), run.angle[:, 0], strict=True)]
+    assert (np.array(alone) <= run.error_estimate[:, 0]).all()
+    # and many together
+    family = pendulum().vary({"links.bob.mass": [1.0, 2.0]})
+    together = family.simulate(t, angle=angle, speed=speed, accuracy=accuracy)
+    for q, error in zip(together.angle[..., 0], together.error_estimate[..., 0], strict=True):
+        off_by = [abs(float(swung(angle, speed, x) - y)) for x, y in zip(t.tolist(), q, strict=True)]
+        assert (np.array(off_by) <= error).all()

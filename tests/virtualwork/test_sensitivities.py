@@ -10,6 +10,7 @@ from virtualwork import Force, Friction, Guess, Guide, Input, Link, Mechanism, M
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.dimensions import changed, dimensions, value
 from virtualwork.describe.parts import Polar
+from virtualwork.formulas.kinematics import Point
 
 KINDS = ["four-bar", "slider-crank", "inverted slider-crank", "Watt", "Stephenson", "triad"]
 FOUR = {"crank": 0.04, "coupler": 0.12, "rocker": 0.08, "ground": 0.1, "along": 0.06, "turn": 0.5}
@@ -209,3 +210,37 @@ def rubbing():
         gravity=-9.81j,
         friction=[Friction("B", 0.1, 0.01)],
     )
+
+
+def test_rounding_of_derivatives_of_a_slider_crank() -> None:
+    """x = r cos θ + √(l² − r² sin² θ), its numbers decimals of a file: the estimates hold, and are close."""
+    text = """
+    [ground]
+    A = [0, 0]
+    [links.crank]
+    points = { A = [0, 0], B = [0.0507, 0] }
+    [links.rod]
+    points = { B = [0, 0], C = [0.1501, 0] }
+    [[slots]]
+    point = "C"
+    angle = 0
+    [input]
+    link = "crank"
+    [guess]
+    at = 0
+    rod = -0.1
+    """
+    motion = Mechanism.from_toml_text(text).motion(np.linspace(0.1, 6.1, 13))
+    every, key = motion.sensitivities, Point("rod", 0.1501 + 0j, "C", 0)
+    paths = [every.dimension(path) for path in ("links.crank.B.x", "links.rod.C.x")]
+    slopes = every.of([key], paths)
+    (errors,), pairs = every.errors([key], paths, slopes), []
+    with mp.workdps(40):
+        r, l = mp.mpf("0.0507"), mp.mpf("0.1501")
+        for i, q in enumerate(motion.poses.inputs[:, 0].tolist()):
+            root = mp.sqrt(l**2 - (r * mp.sin(mp.mpf(q))) ** 2)
+            truth = mp.cos(mp.mpf(q)) - r * mp.sin(mp.mpf(q)) ** 2 / root, l / root
+            for exact, slope, error in zip(truth, slopes[0], errors, strict=True):
+                pairs.append((float(abs(exact - slope[i].real)), error[i]))
+    assert all(off <= error for off, error in pairs)
+    assert np.median([error for _, error in pairs]) <= 1.2 * np.median([off for off, _ in pairs])

@@ -38,7 +38,7 @@ NEAR, DOUBTED = 1e-12, 0.1
 NODES, FARTHER = 24, (8.0, 5.0)
 # of the radicand: where branches are no farther apart they meet
 MEETING = 1e-18
-# quantities whose estimates are asked for one after the other
+# quantities whose estimates are requested one after the other
 ASKED = (Point, Angle, Slide)
 
 Values = Callable[[Sequence[Quantity]], Sequence[Any]]
@@ -73,8 +73,10 @@ class Estimates:
         new = [key for key in dict.fromkeys(keys) if key not in self._known]
         if new and self._known and self.n >= MANY_POSES and all(isinstance(key, ASKED) for key in new):
             # who asks again for an estimate will ask for those of all that he has: a second run has most of it in common
-            asked = (key for key in self.poses.requested if isinstance(key, ASKED) and key not in self._known)
-            new = list(dict.fromkeys((*new, *asked)))
+            others = (
+                key for key in self.poses.requested if isinstance(key, ASKED) and key not in self._known
+            )
+            new = list(dict.fromkeys((*new, *others)))
         values = dict(zip(new, self._values(new), strict=True)) if new else {}
         for key in filter(self._lost, new):
             value = values.pop(key)

@@ -35,12 +35,12 @@ from virtualwork.plan.steps import Joint
 
 @guarded
 class ForceErrors:
-    """Estimates of the rounding errors of forces, under the names of these; each is formed when first asked for."""
+    """Estimates of the rounding errors of forces, under the names of these; each is formed on its first request."""
 
     def __init__(self, dynamics: Dynamics) -> None:
         self.dynamics, self.n, self.lock = dynamics, dynamics.poses.n, dynamics.lock
         self.mechanism = dynamics.poses.mechanism
-        # forces that are asked for estimates are those of a motion
+        # forces with estimates are those of a motion
         self._poses = cast(Lanes, dynamics.poses)
         self.estimates = Estimates(self._poses, self._values)
 

@@ -2,7 +2,7 @@
 
 The formulas are written down once with the dimensions as inputs of the tape. An evaluation is one run of it: the branch on
 which each loop closes, as the design's own guess has it; the quantities; and a look along the way from the guess to the
-poses, where another branch might be met. Derivatives, if asked for, are a second one with a sweep backwards. Where the
+poses, where another branch might be met. Derivatives, if requested, are a second one with a sweep backwards. Where the
 branch is not decided so simply, more is done; at worst the design is described alone.
 """
 
@@ -341,7 +341,7 @@ class Alone:
 
 def table(quantities: Iterable[NDArray[Any]]) -> Reals:
     """Quantities as rows of real numbers, (rows, ...): two of what is complex."""
-    return np.stack([row for found in quantities for row in parts(found)])
+    return np.stack([row for quantity in quantities for row in parts(quantity)])
 
 
 def place_key(m: Description, name: str) -> Quantity:

@@ -13,6 +13,7 @@ array([1., 2., 3.])
 from __future__ import annotations
 
 import math
+import threading
 import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
@@ -29,8 +30,7 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, by_path, changed, dimensions, named, value
-from virtualwork.family.part import ASSEMBLED, LANES, Part, room
-from virtualwork.family.solver_cache import answer, forget
+from virtualwork.family.part import ASSEMBLED, LANES, Part, Solver, room
 from virtualwork.formulas.forces import Effort, Reaction
 from virtualwork.formulas.numbers import Number, Reals, real_array, xy
 from virtualwork.formulas.poses import as_inputs, check_rate
@@ -316,3 +316,38 @@ class FamilyMotion(NamedParts[PointOfFamily, LinkOfFamily, SlideRates]):
         if not any(j.name == joint and on in j.bodies for j in joints(self.part.mechanism)):
             raise DescriptionError(f"link '{on}' has no joint at '{joint}'")
         return self.vector(Reaction(joint, on))
+
+
+# --- the solutions of parts that a process keeps for further requests -------------------------------------------------
+_lock = threading.Lock()
+_solvers: dict[tuple[str, int], Solver] = {}
+# so many parts
+PARTS = 16
+
+
+def answer(
+    family: str,
+    number: int,
+    part: Part,
+    keys: Sequence[Quantity],
+    out: Sequence[NDArray[Any]] | None = None,
+) -> tuple[list[Any], dict[int, str]]:
+    """Quantities of a part, and why some of its variants have none; what a process has solved of it is kept.
+
+    `family` names the request and its variants, and `number` the part; `out` is where to write them.
+    """
+    with _lock:
+        solver = _solvers.get((family, number))
+        if solver is None:
+            while len(_solvers) >= PARTS:
+                _solvers.pop(next(iter(_solvers)), None)
+            before = next((s for (name, _), s in list(_solvers.items()) if name == family), None)
+            solver = _solvers[family, number] = Solver(part, before)
+    return solver.values(keys, out), solver.reasons
+
+
+def forget(family: str) -> None:
+    """Let what this process keeps of a family go."""
+    # called wherever a family is collected, in the midst of `answer` too: it must not wait for the lock
+    for key in [key for key in list(_solvers) if key[0] == family]:
+        _solvers.pop(key, None)

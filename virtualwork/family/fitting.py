@@ -196,26 +196,26 @@ class _Problem(Generic[D]):
         met: list[_Refined] = []
         wanted = 2 * best if best > 1 else 1
         for count, most, steps in ROUNDS:
-            found: list[_Refined] = []
+            solutions: list[_Refined] = []
             # each part has what it needs for itself, on threads too
             work = ((self.own() if executor else self, *start, steps) for start in begun[: max(most, wanted)])
             with closing(in_parts(_refined, work, executor, max(count, wanted))) as refined:
                 for each in refined:
                     evaluations += each.evaluations
-                    found.append(each)
+                    solutions.append(each)
                     if each.largest < MET and each.keeps:
                         met = self._distinct([*met, each])
-                    enough = len(found) >= max(count, wanted)
-                    if len(met) >= best or (enough and min(f.largest for f in found) > NEARLY):
+                    enough = len(solutions) >= max(count, wanted)
+                    if len(met) >= best or (enough and min(f.largest for f in solutions) > NEARLY):
                         break
-            found = self._distinct([*met, *found])
+            solutions = self._distinct([*met, *solutions])
             if len(met) >= best:
                 break
-            begun = [(each.x, each.inputs) for each in found]
-        if not any(each.keeps for each in found):
-            raise MechanismError(self._unmet(found, starts))
-        found = [each for each in found if each.keeps]
-        fits = [self._fit(each, starts, evaluations) for each in found[:best]]
+            begun = [(each.x, each.inputs) for each in solutions]
+        if not any(each.keeps for each in solutions):
+            raise MechanismError(self._unmet(solutions, starts))
+        solutions = [each for each in solutions if each.keeps]
+        fits = [self._fit(each, starts, evaluations) for each in solutions[:best]]
         there = [each for each in fits if each is not None]
         if not there:
             raise MechanismError(
@@ -250,7 +250,7 @@ class _Problem(Generic[D]):
     def refined(self, x: Reals, inputs: Sequence[Reals], steps: int) -> _Refined:
         """One start, by a trust region within the bounds.
 
-        Every loop stays on its first branch, for on the way the guess may not decide; what is found counts
+        Every loop stays on its first branch, for on the way the guess may not decide; the result counts
         as its own guess has it.
         """
         before = self.evaluations

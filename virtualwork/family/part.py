@@ -275,13 +275,13 @@ class Solver:
         """Work out some variants on the tape; and which of all are better described alone."""
         assert self.written is not None
         v, n = len(self.part.values[rows]), self.part.shape[1]
-        asked = list(dict.fromkeys(key for key in keys if key != ASSEMBLED))
-        tape = self.written.tested(asked, [ASSEMBLED] if ASSEMBLED in keys else [])
+        requested = list(dict.fromkeys(key for key in keys if key != ASSEMBLED))
+        tape = self.written.tested(requested, [ASSEMBLED] if ASSEMBLED in keys else [])
         # straight to their place where that is in one piece
         together = isinstance(rows, slice)
         to = [x[rows] for x in out] if together else room(keys, v, n)
         first = dict(zip(reversed(keys), reversed(to), strict=True))
-        rows_of = [part for key in asked for part in parts(first[key])]
+        rows_of = [part for key in requested for part in parts(first[key])]
         sound = np.empty(v, dtype=bool)
         run_grid(tape, {name: self._entering(name, rows) for name in tape.inputs}, (v, n), [*rows_of, sound])
         for key, x in zip(keys, to, strict=True):
@@ -310,12 +310,12 @@ class Solver:
         written = self.written
         closed = {key: Closed(key.groups(written.recording)) for key in keys}
         margins = written.margins if any(key.is_force for key in keys) else []
-        asked = [key for key in keys if key != ASSEMBLED]
+        requested = [key for key in keys if key != ASSEMBLED]
         whole = list(dict.fromkeys(closed.values()))
-        tape = written.tape((*asked, *whole, *margins))
+        tape = written.tape((*requested, *whole, *margins))
         table = run_grid(tape, {name: self._entering(name, rows) for name in tape.inputs}, (v, n))
         outputs = Outputs(tape, np.reshape(table, (-1, v * n)))
-        lanes = {key: key.of_rows(outputs, v * n).reshape(v, n) for key in (*asked, *whole, *margins)}
+        lanes = {key: key.of_rows(outputs, v * n).reshape(v, n) for key in (*requested, *whole, *margins)}
         near = np.zeros(v, dtype=bool)
         for key in margins:
             near |= (np.abs(lanes[key]) < NEAR).any(axis=1)
@@ -394,9 +394,9 @@ class Solver:
             self._poses[i] = poses
         poses = self._poses[i]
         if poses is not None:
-            asked = [key for key in keys if key != ASSEMBLED]
+            requested = [key for key in keys if key != ASSEMBLED]
             with np.errstate(all="ignore"):
-                found = dict(zip(asked, poses.values(asked), strict=True))
+                found = dict(zip(requested, poses.values(requested), strict=True))
                 for key, values in zip(keys, out, strict=True):
                     values[i] = np.where(poses.assembled, 0.0, np.nan) if key == ASSEMBLED else found[key]
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from dalembert.arithmetic.doubled import Doubled
 from dalembert.arithmetic.engines import run
 from dalembert.arithmetic.engines.doubled import Answer, compared
 from dalembert.arithmetic.exact import EPS
@@ -20,16 +21,17 @@ from dalembert.arithmetic.tape import Operation, Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.dimensions import Dimension, dimensions, named, value
+from virtualwork.digits.second_run import SecondRun, parts
 from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.formulas.lanes import Lanes
-from virtualwork.formulas.numbers import leave_out
+from virtualwork.formulas.numbers import Reals, leave_out
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import NAMES
 
 # number of poses in which it is checked whether a quantity varies
 LOOKED_AT = 8
 GOLDEN = (5**0.5 - 1) / 2
-# relative: what is read from decimals, turned to radians, or found by iteration; and by how much it is moved to see what that does
+# relative: what is read from decimals, turned to radians, or computed by iteration; and by how much it is moved to see what that does
 OFF, NUDGE = 4 * EPS, 2.0**-30
 # what an input's own numbers are called on the tape
 ENTERS = dict(zip(("value", "speed", "acceleration", "jerk"), NAMES, strict=True))
@@ -82,6 +84,33 @@ class Sensitivities:
                 leave_out(slope, nowhere)
         return slopes
 
+    def errors(
+        self, keys: Sequence[Quantity], dimensions: Sequence[Dimension], slopes: Sequence[Sequence[Any]]
+    ) -> list[list[Reals]]:
+        """Estimates of the rounding errors of derivatives that `of` has given, (n,) each: by what those in 32 digits differ from them.
+
+        Every number of the description enters, with a file's decimals exact: what its differences round is an error too.
+        """
+        every, enters = tuple(dimensions), self._with_lengths(dimensions)
+        names, second = self._entering(every), SecondRun(self.poses)
+        tape = self._formulas(enters).slopes(tuple(keys), tuple(names))
+        given = {name: Doubled(x) for name, x in self._given(tape, enters).items() if name in tape.inputs}
+        given = {name: second.exact.known.get(name, x) for name, x in given.items() if "." in name}
+        answers = {
+            Answer(tuple(f"d({part})/d({name})" for part in key.names)): parts(key, slope)
+            for key, row in zip(keys, slopes, strict=True)
+            for name, slope in zip(names, row, strict=True)
+        }
+        with np.errstate(all="ignore"):
+            estimates, _ = compared(tape, second.entering(tape.inputs, given), answers)
+        each = iter(np.broadcast_to(error, self.poses.n) for error in estimates)
+        return [[next(each) for _ in names] for _ in keys]
+
+    def _with_lengths(self, requested: Sequence[Dimension]) -> tuple[Dimension, ...]:
+        """Return dimensions, and all others but those of inputs."""
+        own = (d for d in dimensions(self.assembly.mechanism).values() if d.where[0] != "inputs")
+        return tuple(dict.fromkeys((*requested, *own)))
+
     def _entering(self, dimensions: Sequence[Dimension]) -> list[str]:
         """Return the names of dimensions on the tape: an input's own numbers enter as those of every input do."""
         return [
@@ -112,8 +141,7 @@ class Sensitivities:
         every = tuple(limits)
         # of no simple ratio to each other: derivatives do not cancel
         steps = [limit * (1 + GOLDEN * i % 1) for i, limit in enumerate(limits.values(), 1)]
-        own_lengths = tuple(d for d in dimensions(self.assembly.mechanism).values() if d.where[0] != "inputs")
-        enters = tuple(dict.fromkeys((*every, *own_lengths)))
+        enters = self._with_lengths(every)
         tape = self._formulas(enters).along(
             tuple(keys), tuple(zip(self._entering(every), steps, strict=True))
         )
@@ -182,10 +210,10 @@ def _moved(tape: Tape, entering: Mapping[str, Any], values: Mapping[str, Any]) -
         lanes[name] = np.tile(np.broadcast_to(x, n), (len(inputs), 1))
         lanes[name][i] *= 1 + NUDGE
         lanes[name] = lanes[name].ravel()
-    found = run(Tape(tuple(operations), tape.outputs), lanes)
+    moved = run(Tape(tuple(operations), tape.outputs), lanes)
     return {
         name: OFF
         / NUDGE
-        * np.abs(np.reshape(np.broadcast_to(found[name], n * len(inputs)), (-1, n)) - x).sum(axis=0)
+        * np.abs(np.reshape(np.broadcast_to(moved[name], n * len(inputs)), (-1, n)) - x).sum(axis=0)
         for name, x in values.items()
     }

@@ -29,7 +29,7 @@ class Target:
         `slides.B`: travels (n,), m. `effort.crank`: the input's torque (n,), N·m, or force, N, at the description's own
         speed and acceleration.
     inputs : array (n,), optional
-        Rad or m; without it the input at each row is found too, in the order of the rows.
+        Rad or m; without it the input at each row is free, in the order of the rows.
     weights : mapping of name to number, or array (n,)
         A row of weight w counts as if it stood w times; 1 where not given. Lengths are counted in sizes of the
         mechanism, angles in radians, efforts in shares of the largest that is wanted or that there is.

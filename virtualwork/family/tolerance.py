@@ -19,7 +19,7 @@ import numpy as np
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, dimensions, named, value
 from virtualwork.family.family import Family
-from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.formulas.quantity import Quantity
 
 # draws of one stream of random numbers
@@ -49,8 +49,8 @@ class Spread:
 def spread(slopes: Sequence[Reals], limits: Sequence[float]) -> Spread:
     """The worst case and the standard deviation of a number, from its slopes and the limits of the dimensions.
 
-    >>> found = spread([np.array([3.0]), np.array([-4.0])], [3.0, 3.0])
-    >>> found.worst, found.sd, found.shares[:, 0]
+    >>> effect = spread([np.array([3.0]), np.array([-4.0])], [3.0, 3.0])
+    >>> effect.worst, effect.sd, effect.shares[:, 0]
     (array([21.]), array([5.]), array([0.36, 0.64]))
     """
     moved = np.abs(np.asarray(slopes)) * np.asarray(limits)[:, None]
@@ -59,6 +59,19 @@ def spread(slopes: Sequence[Reals], limits: Sequence[float]) -> Spread:
     with np.errstate(invalid="ignore", divide="ignore"):
         shares = np.where(total > 0, variances / total, np.where(np.isnan(total), np.nan, 0.0))
     return Spread(moved.sum(axis=0), np.sqrt(total), shares)
+
+
+def rounded(effect: Spread, errors: Sequence[Reals], limits: Sequence[float]) -> tuple[Reals, Reals]:
+    """The rounding errors of worst case and standard deviation, (n,) each, from those of the slopes.
+
+    >>> effect = spread([np.array([3.0]), np.array([-4.0])], [3.0, 3.0])
+    >>> worst, sd = rounded(effect, [np.array([1e-9]), np.array([1e-9])], [3.0, 3.0])
+    >>> worst.round(12), sd.round(12)
+    (array([6.e-09]), array([1.414e-09]))
+    """
+    moved = np.asarray(errors) * np.asarray(limits)[:, None]
+    own = len(limits) * EPS
+    return moved.sum(axis=0) + own * effect.worst, np.sqrt(((moved / 3) ** 2).sum(axis=0)) + own * effect.sd
 
 
 def limits(m: Description, requested: Mapping[str, float]) -> dict[Dimension, float]:
@@ -145,11 +158,11 @@ def drawn(
 
 
 def summary(values: Reals, nominal: Reals, turn: float | None = None) -> Drawn:
-    """Mean, standard deviation and quantiles of drawn values (draws, n); of an angle beside its nominal value.
+    """Mean, standard deviation and quantiles of drawn values (draws, n); of an angle beside its nominal value, within a turn.
 
-    >>> found = summary(np.array([[359.0], [1.0], [np.nan]]), np.array([0.0]), 360.0)
-    >>> float(found.mean[0]), round(float(found.sd[0]), 3)
-    (0.0, 1.414)
+    >>> sample = summary(np.array([[359.0], [0.0], [np.nan]]), np.array([0.0]), 360.0)
+    >>> float(sample.mean[0]), round(float(sample.sd[0]), 3)
+    (359.5, 0.707)
     """
     apart = values - nominal
     if turn is not None:
@@ -173,4 +186,8 @@ def summary(values: Reals, nominal: Reals, turn: float | None = None) -> Drawn:
             aside = np.ceil(np.sqrt(count * p * (1 - p))).astype(int)
             ends = [np.clip(low + side * aside, 0, last) for side in (-1, 1)]
             errors[i] = (ordered[ends[1], poses] - ordered[ends[0], poses]) / 2
-    return Drawn(nominal + mean, sd, nominal + quantiles, errors)
+    mean, quantiles = nominal + mean, nominal + quantiles
+    if turn is not None:
+        # of what lies a rounding below zero the rest is the whole turn
+        mean, quantiles = (np.mod(np.mod(x, turn), turn) for x in (mean, quantiles))
+    return Drawn(mean, sd, quantiles, errors)

@@ -168,9 +168,9 @@ class VariedFormulas:
         """The tape of a Newton step of each group without a closed form: how far its loops are open, then its next unknowns."""
         of, outputs = self.recording, {}
         for group in (g for g in self.plan.groups if g.kind == "Newton"):
-            found = unknowns(of.solved(group.name), of.st)
+            solved = unknowns(of.solved(group.name), of.st)
             outputs[f"open {group.name}"] = of.open_loops[group.name]
-            outputs |= {f"next {group.name} {i}": x for i, x in enumerate(found)}
+            outputs |= {f"next {group.name} {i}": x for i, x in enumerate(solved)}
         return of.recorder.tape(outputs)
 
     def told(self, samples: int) -> Tape:

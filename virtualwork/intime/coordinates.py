@@ -231,7 +231,7 @@ def opened(assembly: Assembly, at: Floats) -> float:
 
 @dataclass
 class Monitor:
-    """What a path is asked at every node: whether its coordinates fold, and what the inputs are there."""
+    """The check of a path at every node: whether its coordinates fold, and what the inputs are there."""
 
     coordinates: Coordinates
     near: Floats

@@ -49,7 +49,7 @@ class Crossing:
         self.smooth = True
         # how far it has been seen to miss each quantity
         self.missed: Floats = []
-        # the quantities at the nodes, where they were asked for
+        # the quantities at the nodes, once they were computed
         self._values: list[Floats] = []
         # Chebyshev's points in the square of the distance: the extrapolation inwards makes least of what is rounded
         middle, half = 0.5 * (1 + INNER**2), 0.5 * (1 - INNER**2)
@@ -106,9 +106,9 @@ class Crossing:
 
 
 def narrowed(f: Callable[[float], Floats], at: float, widest: float, least: Floats) -> Crossing:
-    """The crossing at an input whose poses tell most of quantities close to it; from no farther off than `widest`.
+    """The crossing at an input whose poses know most of quantities close to it; from no farther off than `widest`.
 
-    Gaps are relative to at least `least` of each quantity; where that is 0, what vanishes cannot be told from rounding.
+    Gaps are relative to at least `least` of each quantity; where that is 0, what vanishes cannot be distinguished from rounding.
     """
     best, lowest, smooth = Crossing(at, widest), math.inf, False
     for j in range(NARROWINGS):
@@ -132,7 +132,7 @@ def crossings(
 ) -> list[Crossing]:
     """The crossings at change points, those within rounding of each other as one; `unit`: 1 rad, or a size.
 
-    `settled` makes one at an input, with poses from no farther off than given; `share` of how far off poses are taken as
+    `settled` makes one at an input, with poses from no farther off than `widest`; `share` of how far off poses are taken as
     a rule: with others the interpolation errs in another way.
     """
     places: list[float] = []

@@ -1,8 +1,9 @@
-"""What the tapes of a motion cannot decide by themselves at a pose: unknowns without a closed form, and whole turns."""
+"""What the tapes of a motion cannot decide by themselves: unknowns without a closed form, whole turns, loads given by tables."""
 
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -14,9 +15,11 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.formulas.group_loops import unknowns
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.loaded_pose import Setting
+from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.positions import State, principal, unwound
 from virtualwork.formulas.winding import NODES
-from virtualwork.intime.watch import Floats, Value
+from virtualwork.intime.watch import Floats, Rate, Value, Watch
+from virtualwork.plan.steps import Plan
 
 # Newton's steps from one pose to the next; rad or sizes: a change from which one more step leaves rounding alone, and
 # how far off the last pose may be to begin from
@@ -27,7 +30,7 @@ class Placed:
     """The poses of an assembly, closed on its branch one after the other.
 
     With a `tape`, a step of Newton's method on the unknowns of all groups without a closed form, and what else enters
-    it (`known`), they are followed from pose to pose; the branch itself is asked where that leads too far, and wherever
+    it (`known`), they are followed from pose to pose; the branch itself closes them where that leads too far, and wherever
     it `crosses` another.
 
     Examples
@@ -96,12 +99,12 @@ class Placed:
         given = {name: of(0.0, q, q) for name, of in self.known.items()}
         for _ in range(LIMIT):
             try:
-                found = self._step(
+                solved = self._step(
                     *(given[name] if name in given else now[name] for name in self.tape.inputs)
                 )
             except (ZeroDivisionError, ValueError, OverflowError):
                 return None
-            before, now = now, dict(zip(self.tape.names, found, strict=True))
+            before, now = now, dict(zip(self.tape.names, solved, strict=True))
             if not all(abs(value - self._x[name]) <= FAR * self.scale[name] for name, value in now.items()):
                 return None
             if all(abs(value - before[name]) <= CLOSE * self.scale[name] for name, value in now.items()):
@@ -152,3 +155,74 @@ class Placed:
 def _one(x: Any) -> float:
     """The number of one pose, which may stand in an array."""
     return float(np.ravel(x)[0])
+
+
+# --- loads given by tables ------------------------------------------------------------------------------------------
+# of a table's span: how far beyond its ends it is read, for a step may reach there by its rounding
+EDGE = 1e-12
+
+
+def place(load: Tabled, plan: Plan) -> tuple[Value, Rate] | None:
+    """What a table is over and its derivative, where it is the time, or a sum of inputs or of their speeds; else None."""
+    if load.axis == "time":
+        return lambda t, q, v: t, lambda t, q, v, a: 1.0
+    if load.axis == "input":
+        return lambda t, q, v: q[0], lambda t, q, v, a: v[0]
+    angle = plan.angles[load.body]
+    if not angle.by_inputs:
+        return None
+    const, terms = angle.const, angle.inputs
+    if load.axis == "angle":
+        return (
+            lambda t, q, v: const + sum(c * q[j] for j, c in terms),
+            lambda t, q, v, a: sum(c * v[j] for j, c in terms),
+        )
+    return (
+        lambda t, q, v: sum(c * v[j] for j, c in terms),
+        lambda t, q, v, a: sum(c * a[j] for j, c in terms),
+    )
+
+
+def reader(load: Tabled, at: Value, *, imaginary: bool) -> Value:
+    """One component of what a table gives, of what it is over; NaN outside."""
+    places = [x for x, _ in load.table]
+    values = [y.imag if imaginary else y.real for _, y in load.table]
+    rows = zip(values[:-1], values[1:], places[:-1], places[1:], strict=True)
+    slopes = [(b - a) / (y - x) for a, b, x, y in rows]
+    first, span = places[0], places[-1] - places[0]
+
+    def value(t: float, q: Floats, v: Floats) -> float:
+        x = at(t, q, v)
+        if load.periodic:
+            x = first + (x - first) % span
+        i = bisect_right(places, x) - 1
+        if not 0 <= i < len(slopes):
+            if not -EDGE * span <= x - first <= (1 + EDGE) * span:
+                return math.nan
+            i = min(max(i, 0), len(slopes) - 1)
+        return values[i] + slopes[i] * (x - places[i])
+
+    return value
+
+
+def kinks(load: Tabled, plan: Plan, name: str) -> Watch | None:
+    """The rows of a table, that no step may pass; None of a table over the time, or over what depends on more."""
+    of = place(load, plan)
+    if of is None or load.axis == "time":
+        return None
+    rows = [x for x, _ in load.table]
+    period = rows[-1] - rows[0] if load.periodic else None
+    return Watch(name, *of, rows[:-1] if period else rows, period, linear=True)
+
+
+def ends(load: Tabled, plan: Plan, t: float, q: Floats, v: Floats) -> str:
+    """The sentence on a table that ends at a state; else empty."""
+    of, (first, last) = place(load, plan), (load.table[0][0], load.table[-1][0])
+    if of is None or load.periodic:
+        return ""
+    at, near = of[0](t, q, v), 1e-6 * (last - first)
+    if first + near < at < last - near:
+        return ""
+    end = last if at > first + near else first
+    unit = {"time": "s", "speed": "rad/s"}.get(load.axis, "rad")
+    return f"the table of the {load.kind} on {load.body} ends at {end:.6g} {unit}"

@@ -34,18 +34,17 @@ from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.recording import Recording
 from virtualwork.intime.crossing import OTHER, Crossing, crossings, narrowed, nearest
-from virtualwork.intime.entering import Placed
+from virtualwork.intime.entering import Placed, ends, kinks, place, reader
 from virtualwork.intime.powers import motion_of, state_names
-from virtualwork.intime.tables import ends, kinks, place, reader
 from virtualwork.intime.watch import Floats, Value, Watch
 
 # of a turn: how far beyond an input its change points are looked for
 AHEAD = 1.0
-# beyond what is known no step looks farther
+# beyond the inputs that were looked over no step goes farther
 FAR = 64.0
 # how near a change point a fold is its own
 NEAR = 0.1
-# rad, or of a slide's size: how far beyond where it ended is asked whether it could not be looked farther
+# rad, or of a slide's size: how far beyond its end a motion is tested for inputs that lie too far from the guess
 NEXT = 1e-6
 # a speed of the input, rad/s or m/s, beside whose forces all others are small
 FAST = 1e4
@@ -108,7 +107,7 @@ class Equations:
         return result
 
     def _plain(self, t: float, q: Floats, v: Floats) -> Floats:
-        """The same away from change points."""
+        """The accelerations and the power away from change points."""
         try:
             return list(self._function(*self._filled(self.rates, t, q, v)))
         except (ZeroDivisionError, ValueError, OverflowError):
@@ -139,14 +138,14 @@ class Equations:
         self._begun.add((t, *q, *v))
 
     def many(self, t: Reals, q: Reals, v: Reals) -> Reals:
-        """The same of many states, (n, k + 1); NaN where there are none."""
+        """The accelerations and the power at many states, (n, k + 1); NaN where there are none."""
         out = np.full((len(q), self.k + 1), np.nan)
         careful = self._careful(q)
         rows = np.flatnonzero(~careful)
         if len(rows):
-            found = self._run(self.rates, t[rows], q[rows], v[rows])
+            values = self._run(self.rates, t[rows], q[rows], v[rows])
             for j, name in enumerate(self.rates.names):
-                out[rows, j] = found[name]
+                out[rows, j] = values[name]
         for i in np.flatnonzero(careful):
             try:
                 out[i] = self(float(t[i]), q[i].tolist(), v[i].tolist())
@@ -160,8 +159,10 @@ class Equations:
             with suppress(Lost):
                 self._cover(float(end))
         low, high = self._covered
-        careful = (not low <= x <= high or self._crossing(x) is not None for x in q[:, 0].tolist())
-        return np.array(list(careful), dtype=bool)
+        careful = ~((q[:, 0] >= low) & (q[:, 0] <= high))
+        if self._crossings:
+            careful |= np.array([self._crossing(x) is not None for x in q[:, 0].tolist()], dtype=bool)
+        return careful
 
     def _by_poses(self, t: float, q: Floats, v: Floats) -> tuple[Reals, Reals]:
         """M (k, k) and h (k,) at a state, from the effort of k + 1 motions through its pose."""
@@ -185,13 +186,13 @@ class Equations:
         return sorted({x for load in self._tables if load.axis == "time" for x, _ in load.table})
 
     def outside(self, t: float, q: Floats, v: Floats) -> str:
-        """Which table ends at a state, or that it lies too far from the guess; empty where neither is so."""
+        """Why a motion cannot go on from a state: a table ends there, or it lies too far from the guess; empty otherwise."""
         every = (ends(load, self.assembly.plan, t, q, v) for load in self._tables)
         try:
             self._cover(q[0] + math.copysign(NEXT * self.scale[0], v[0]))
         except Lost as lost:
             return str(lost)
-        return next((said for said in every if said), "")
+        return next(filter(None, every), "")
 
     # --- the tape ---------------------------------------------------------------------------------------------
     @cached_property
@@ -222,13 +223,18 @@ class Equations:
         return set(state_names(self.k)).issuperset(self.rates.inputs)
 
     @property
+    def smooth(self) -> bool:
+        """Whether the accelerations are smooth in the state: there is no change point near which they are interpolated."""
+        return not self._crossings
+
+    @property
     def rates(self) -> Tape:
         """The tape of accelerations and power; of (t, q, q̇) alone where this is `plain`."""
         return self._recorded[0]
 
     @property
     def called(self) -> tuple[tuple[str, ...], Callable[..., Sequence[float]]]:
-        """What a step gives its calls of the rates, by name, and what is called.
+        """The names of the arguments with which a step calls the rates, and the function that it calls.
 
         Raises
         ------
@@ -253,20 +259,20 @@ class Equations:
         for i, crossing in enumerate(near):
             if crossing is not None:
                 n = len(crossing.nodes)
-                given = np.full(n, t[i]), np.array(crossing.nodes)[:, None], np.tile(v[i], (n, 1))
-                found = self._run(tape, *given)["energy"]
-                (out[i],) = crossing.interpolated(found[:, None].tolist(), float(q[i, 0]))
+                nodes = np.full(n, t[i]), np.array(crossing.nodes)[:, None], np.tile(v[i], (n, 1))
+                beside = self._run(tape, *nodes)["energy"]
+                (out[i],) = crossing.interpolated(beside[:, None].tolist(), float(q[i, 0]))
         return out
 
     def _run(self, tape: Tape, t: Reals, q: Reals, v: Reals) -> Mapping[str, Any]:
         if self.plain:
-            given = dict(zip(state_names(self.k), (t, *q.T, *v.T), strict=True))
+            entering = dict(zip(state_names(self.k), (t, *q.T, *v.T), strict=True))
         else:
             states = zip(t.tolist(), q.tolist(), v.tolist(), strict=True)
             filled = np.array([self._filled(tape, *state) for state in states])
-            given = dict(zip(tape.inputs, filled.T.copy(), strict=True))
+            entering = dict(zip(tape.inputs, filled.T.copy(), strict=True))
         with np.errstate(all="ignore"):
-            return run(tape, given)
+            return run(tape, entering)
 
     @cached_property
     def _fillers(self) -> dict[str, Value]:
@@ -311,7 +317,7 @@ class Equations:
 
     @cached_property
     def _placed(self) -> Placed:
-        """What enters the tapes of poses, found one pose after another."""
+        """What enters the tapes of poses, one pose after the other."""
         larger = [g for g in self.assembly.plan.groups if g.kind == "Newton"]
         if not larger or self.assembly.geared:
             return Placed(self.assembly)
@@ -354,7 +360,7 @@ class Equations:
         self._covered = (low, high) if track.active and not track.settled else EVERYWHERE
 
     def _settled(self, at: float, widest: float) -> Crossing:
-        """The crossing at a change point, found once."""
+        """The crossing at a change point, made once."""
         if (at, widest) not in self._known:
             # of an input that moves fast a change of its speed by itself within a radian, or a size
             least = [0.0, FAST**2 / self.scale[0]]

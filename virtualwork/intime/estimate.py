@@ -3,7 +3,8 @@
 The errors of the steps add up, and the motion itself makes them grow. With steps half as long those of a method of
 order 8 add up to 1/256 of what they were (E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations
 I, §II.4 and II.8), so the distance of the two solutions is 255 times the error of the finer one. The estimate is ten
-times what follows, for the steps are not small without end; rounding, which halves do not make smaller, is added.
+times what follows, for the steps are not small without end; rounding, which halves do not make smaller, is added, as the
+motion makes it grow (`growth`).
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.intime.travel import Travel
 
-# the tolerance of a step over the accuracy asked for
+# the tolerance of a step over the requested accuracy
 FIRST = 0.1
 # what the error of steps half as long is less by, one; of the estimate
 GAIN, SAFETY = 255.0, 10.0
@@ -71,3 +73,29 @@ def rounding(t: Reals, q: Reals, v: Reals, a: Reals) -> Reals:
 
     ways = summed(np.abs(v)) + summed(summed(np.abs(a)))
     return np.asarray(ROUNDINGS * EPS * (np.maximum.accumulate(np.abs(q), axis=-2) + ways))
+
+
+# --- of two solutions ---------------------------------------------------------------------------------------------
+def input_error(fine: Travel, coarse: Travel, t: Reals, part: float) -> Reals:
+    """How far the inputs may be from the truth at times, (n, k)."""
+    nodes = coarse.nodes[coarse.nodes <= fine.end]
+    error = spread(*solutions_apart(fine, coarse, nodes)[:2], part) + unavoidable(fine, nodes)
+    # between two nodes that of the later one
+    return np.asarray(error[np.minimum(np.searchsorted(nodes, t), len(nodes) - 1)])
+
+
+def solutions_apart(fine: Travel, coarse: Travel, nodes: Reals) -> tuple[Reals, Reals, Reals]:
+    """The inputs of the finer solution at nodes of the coarser, how far the two lie apart there, and their speeds, (n, k) each."""
+    (q, v, *_), (other, rate, *_) = fine.at(nodes), coarse.at(nodes)
+    return q, apart(nodes, q - other, v - rate), np.abs(v - rate)
+
+
+def unavoidable(fine: Travel, t: Reals) -> Reals:
+    """The error that no shorter steps make smaller, (n, k): rounding, as the motion makes it grow, and interpolation near change points."""
+    return np.maximum(unavoidable_rounding(fine, t), fine.grown(t))
+
+
+def unavoidable_rounding(fine: Travel, t: Reals) -> Reals:
+    """Rounding by itself, and interpolation near change points, (n, k)."""
+    q, v, a, _ = fine.at(t)
+    return np.asarray(np.maximum(rounding(t, q, v, a), fine.noise(t)) + fine.blur(t)[:, None])

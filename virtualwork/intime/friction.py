@@ -2,8 +2,8 @@
 
 In a pin of radius r the friction torque is −μ r |R| against its turning, in a guide the force −μ |N| against its slide.
 R and N depend on the accelerations and on the friction itself, both linearly: with φ the friction of every joint that
-rubs, M·q̈ + h = Cᵀφ and R = P + Q φ, where C holds the joints' own rates over the inputs' speeds. What slides is found
-by iteration, as in every pose (`formulas.friction`). What sticks has the φ that keeps it at rest, and breaks away where
+rubs, M·q̈ + h = Cᵀφ and R = P + Q φ, where C holds the joints' own rates over the inputs' speeds. The φ of what slides
+follows by iteration, as in every pose (`formulas.friction`). What sticks has the φ that keeps it at rest, and breaks away where
 that is more than μ r |R|.
 
 Which joints slide, and which way, is a mode. It lasts as long as no sliding joint comes to rest and no sticking one
@@ -44,7 +44,7 @@ GROWN = 1e6
 TOGETHER = 1e-9
 # of the largest rate, or of a joint's largest friction: what rounding may make of zero
 NOISE = 1e-12
-# states of which is remembered what the tape says
+# states whose values are kept
 RECENT = 64
 # ways in which a sticking joint may break away
 WAYS = (" +1", " -1")
@@ -102,8 +102,8 @@ class Rubbing(Equations):
 
     def slid_at(self, t: Reals, q: Reals, v: Reals) -> Reals:
         """The rates of the joints over what they are relative to, in many states: (joints, n)."""
-        found = self._run(self.rates, t, q, v)
-        rates = np.array([found[f"rate {n}"] for n in range(len(self.sizes))])
+        values = self._run(self.rates, t, q, v)
+        rates = np.array([values[f"rate {n}"] for n in range(len(self.sizes))])
         return np.asarray(rates / np.array(self.sizes)[:, None])
 
     @property
@@ -128,7 +128,7 @@ class Rubbing(Equations):
         return motion_of(recording, self.k, rubs, result)
 
     def values(self, t: float, q: Floats, v: Floats) -> Values:
-        """What the tape says at a state.
+        """The outputs of the tape at a state.
 
         Raises
         ------
@@ -145,19 +145,19 @@ class Rubbing(Equations):
 
     @cached_property
     def _recent(self) -> dict[tuple[float, ...], Values]:
-        """What several watches ask of the same states."""
+        """The values at states that several watches request."""
         return {}
 
     def _values(self, t: float, q: Floats, v: Floats) -> Values:
         self._cover(q[0])
         try:
-            found = self._function(*self._filled(self.rates, t, q, v))
+            outputs = self._function(*self._filled(self.rates, t, q, v))
         except (ZeroDivisionError, ValueError, OverflowError):
             raise Lost from None
-        if any(x - x != 0.0 for x in found):
+        if any(x - x != 0.0 for x in outputs):
             # NaN and infinity
             raise Lost
-        k, c, rest = self.k, len(self.arms), iter(found)
+        k, c, rest = self.k, len(self.arms), iter(outputs)
         a, per = list(islice(rest, k)), [list(islice(rest, k)) for _ in range(c)]
         joints = [[list(islice(rest, 1 + c)) for _ in QUANTITIES] for _ in range(c)]
         forces = [[complex(*pair) for pair in zip(x, y, strict=True)] for x, y, *_ in joints]
@@ -178,6 +178,11 @@ class Rubbing(Equations):
     @property
     def plain(self) -> bool:
         """False: friction is found by iteration."""
+        return False
+
+    @property
+    def smooth(self) -> bool:
+        """False: friction jumps where a joint comes to rest."""
         return False
 
     # --- friction at a state --------------------------------------------------------------------------------------
@@ -230,10 +235,10 @@ class Rubbing(Equations):
                 return phi
         if change <= NEARLY * max(map(abs, phi)):
             return phi
-        found = None if values.near else values.followed(self.mode, self.arms, inverse)
-        if found is None:
+        followed = None if values.near else values.followed(self.mode, self.arms, inverse)
+        if followed is None:
             raise Lost
-        return found
+        return followed
 
     # --- modes ----------------------------------------------------------------------------------------------------
     def tendency(self, t: float, q: Floats, direction: float) -> float:
@@ -352,7 +357,7 @@ class Rubbing(Equations):
     def _decided(self, t: float, q: Floats, v: Floats, resting: Sequence[int]) -> Mode:
         """The mode of several degrees of freedom in which the motion goes on where some joints rest.
 
-        Friction of a resting joint is what keeps it at rest, at most μ r |R|: found joint by joint, over and over.
+        Friction of a resting joint is what keeps it at rest, at most μ r |R|: computed joint by joint, over and over.
         """
         values = self.values(t, q, v)
         signs = list(values.signs)

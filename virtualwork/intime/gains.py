@@ -1,4 +1,4 @@
-"""Friction takes energy and gives none: every path is asked for it, and is cut before a joint whose friction drives it."""
+"""Friction takes energy and gives none: every path is checked, and is cut before a joint whose friction drives it."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ from virtualwork.intime.powers import names, state_names
 
 # an error that is surely enough, and is no zero
 SMALL = 1e-30
-# rounds between two looks at what has been found
+# rounds between two looks at the nodes
 ROUNDS = 256
 Lanes = Mapping[str, Any]
 
@@ -176,7 +176,7 @@ def _nodes(k: int, kept: Reals) -> Nodes:
 
 
 class March(NamedTuple):
-    """What a march has found: the nodes at the ends of rounds, (rounds, n); and the last state, (n,) each.
+    """The result of a march: the nodes at the ends of rounds, (rounds, n); and the last state, (n,) each.
 
     A round in which a lane took no step repeats its last node.
     """

@@ -1,7 +1,7 @@
 """The first level that a step passes, and the step that ends there.
 
 Where a quantity turns, and where it passes a level, its polynomial over the step says (`passing`). The polynomial is
-not as exact as the method: the time is that of the method's own steps, and a turn close to the level is asked of them too.
+not as exact as the method: the time is that of the method's own steps, and a turn close to the level is computed by them too.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from virtualwork.intime.passing import DEGREE, SAMPLED, at, basis, offsets, spee
 from virtualwork.intime.path import Path
 from virtualwork.intime.watch import Floats, Step, Watch, sign
 
-# of the range of a quantity over a step: a turn so near its level is asked of the method itself
+# of the range of a quantity over a step: a turn so near its level is computed by the method itself
 NEAR = 0.05
 # of what it comes to over a step: on which side of its own level it lies there is not known
 OWN = 1e-9

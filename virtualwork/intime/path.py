@@ -18,6 +18,7 @@ from virtualwork.formulas.positions import unwound
 from virtualwork.intime.coordinates import Coordinates
 from virtualwork.intime.equations import Equations
 from virtualwork.intime.explicit import TINY, DormandPrince
+from virtualwork.intime.growth import grown
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.marching import Nodes, loop, over
 from virtualwork.intime.watch import Floats
@@ -88,8 +89,9 @@ class Path:
     def cut(self, node: int) -> None:
         """Take away a node and all after it, but for the first."""
         del self.rows[max(1, node) :]
-        # it is that of every step
-        self.__dict__.pop("noise", None)
+        # they are those of every step
+        for name in ("noise", "grown"):
+            self.__dict__.pop(name, None)
 
     def back(self, stops: Sequence[float]) -> None:
         """Take away the nodes that lie beyond the last of some times by no more than rounding of it."""
@@ -184,6 +186,23 @@ class Path:
         """
         h = np.diff(self.nodes.t)[:, None]
         return np.asarray(DEVIATIONS * self.noise * float(np.linalg.norm(self.method.stages[1])) * h)
+
+    @cached_property
+    def grown(self) -> Reals:
+        """What the motion makes of the rounding of all steps before, (n, k); 0 where it is not smooth, or steps are implicit.
+
+        Friction and change points: see `Equations.smooth`.
+        """
+        nodes, k = self.nodes, self.equations.k
+        if self.method.stable == np.inf or not self.equations.smooth or not self.steps:
+            return np.zeros_like(nodes.q)
+
+        def rates(t: Reals, q: Reals, v: Reals) -> Reals:
+            return self.equations.many(t, q.T, v.T)[:, :k].T
+
+        scale = np.array(self.equations.scale)
+        states = (x.T for x in (nodes.q, nodes.v, nodes.rates[:, :k], self.noise_of_speeds))
+        return grown(rates, scale, nodes.t, *states).T
 
     # --- the inputs -----------------------------------------------------------------------------------------------
     @cached_property

@@ -1,4 +1,4 @@
-"""The motion of what is recorded as tapes: accelerations, the power of what stores nothing, and the energies."""
+"""The motion of a recording as tapes: accelerations, the power of what stores nothing, and the energies."""
 
 from __future__ import annotations
 
@@ -29,9 +29,8 @@ def motion_of(
 ) -> tuple[Tape, Tape]:
     """The tapes of accelerations and power, and of the energies, of k inputs that move.
 
-    The effort hangs linearly on the accelerations and on what is called `frictions`. Where these are given, the
-    accelerations and quantities (`more`) are those without them, and beside each stands how it changes with each:
-    `NAME FRICTION`.
+    The effort depends linearly on the accelerations and on the inputs `frictions`. With these, the accelerations and
+    quantities (`more`) are those without friction, and beside each stands its derivative to each friction: `NAME FRICTION`.
     """
     with recording.lock:
         return _motion_of(recording, k, frictions, more or {})

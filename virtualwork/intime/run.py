@@ -19,7 +19,18 @@ from virtualwork.formulas.numbers import EPS, Reals, real_array
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.intime.coordinates import Coordinates
 from virtualwork.intime.equations import Equations
-from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, UNKNOWN, apart, rounding, share, spread
+from virtualwork.intime.estimate import (
+    FIRST,
+    GAIN,
+    LEAST,
+    TRIES,
+    UNKNOWN,
+    input_error,
+    share,
+    solutions_apart,
+    unavoidable,
+    unavoidable_rounding,
+)
 from virtualwork.intime.explicit import DormandPrince
 from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.implicit import Radau
@@ -41,7 +52,7 @@ if TYPE_CHECKING:
 @guarded
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What `Mechanism.simulate` has found.
+    """The result of `Mechanism.simulate`.
 
     Attributes
     ----------
@@ -54,7 +65,7 @@ class Run:
     work : array (n,)
         Of what stores no energy, since the first time, J.
     ended : str
-        Why it ends before the last time asked for; empty where it does not.
+        Why it ends before the last time; empty where it does not.
     warnings : tuple of str
     """
 
@@ -92,7 +103,7 @@ class Run:
 
     @property
     def unknown(self) -> NDArray[np.bool_]:
-        """(n,): from when on no digit is known."""
+        """(n,): whether no digit of the inputs holds, nor any after that time."""
         scale = np.array(self.fine.legs[0].equations.scale)
         return np.asarray((self.error_estimate / scale).max(axis=1) > UNKNOWN)
 
@@ -109,8 +120,11 @@ class Run:
         nodes = self.coarse.nodes[self.coarse.nodes <= self.fine.end]
         some = nodes[np.unique(np.linspace(0, len(nodes) - 1, min(len(nodes), NODES)).astype(int))]
         t = np.union1d(some, self.t)
-        q, gap, faster = _apart(self.fine, self.coarse, t)
-        least, gap, faster = _least(self.fine, t), *(np.maximum.accumulate(x, axis=0) for x in (gap, faster))
+        q, gap, faster = solutions_apart(self.fine, self.coarse, t)
+        least, gap, faster = (
+            unavoidable(self.fine, t),
+            *(np.maximum.accumulate(x, axis=0) for x in (gap, faster)),
+        )
         shares = self.share + np.divide(least, gap, out=np.zeros_like(gap), where=gap > 0)
         wrong, rates = np.maximum(gap * shares, least) + 4 * EPS * np.abs(q), faster * shares
         units = np.eye(q.shape[1])
@@ -156,7 +170,7 @@ class Run:
     def plot(self, figure: FigureBase | None = None) -> NDArray[np.object_]:
         """Draw inputs, speeds and energy over time and the mechanism at instants; return the axes.
 
-        The curves are drawn through more times than those asked for. Without a figure it is a new one of pyplot's;
+        The curves are drawn through more times than those of the run. Without a figure it is a new one of pyplot's;
         without matplotlib (the extra `plot`) an ImportError.
         """
         from virtualwork.intime.picture import Course, draw, fine_times
@@ -216,8 +230,8 @@ class Run:
         from virtualwork.animation import Series
         from virtualwork.picture.paper import shapes_of
 
-        home = self.fine.legs[0].coordinates
-        poses = home.motion(self.angle, self.speed, self.acceleration, self.t).poses
+        first = self.fine.legs[0].coordinates
+        poses = first.motion(self.angle, self.speed, self.acceleration, self.t).poses
         drawing = shapes_of(self.first_motion.poses, self.motion.poses)
         # beyond a dead point the inputs have another pose
         fine = len(self.fine.legs) == 1
@@ -243,14 +257,14 @@ def simulate(
 
 def _simulated(
     assembly: Assembly,
-    times: ArrayLike,
+    requested: ArrayLike,
     angle: ArrayLike | None,
     speed: ArrayLike | None,
     accuracy: float,
     until: Mapping[str, float] | None,
     progress: Callable[[float, float, int], None] | None,
 ) -> Run:
-    m, t = assembly.mechanism, rising(times)
+    m, t = assembly.mechanism, rising(requested)
     k = len(m.inputs)
     q = _state("angle", angle, [e.value for e in m.inputs], list(m.at), k)
     v = _state("speed", speed, [e.speed for e in m.inputs], [0.0] * k, k)
@@ -273,51 +287,33 @@ def _simulated(
     if fine.stiff:
         # what is stiff somewhere is from the beginning
         fine = travel(own, start, end, tolerance, levels, Radau(), accuracy, progress=reports())
+    first = fine
     for tries in range(TRIES):
         coarse, method = fine, fine.legs[0].method
         # near change points every solution is interpolated from other poses
         ways = own if tries % 2 else own.otherwise()
         # no farther than both go
         last = coarse.end if coarse.ended == UNDECIDED else end
-        # nothing is asked below rounding
+        # no tolerance lies below rounding
         finer = max(LEAST, tolerance / (GAIN + 1))
         fine = travel(ways, start, last, finer, levels, method, accuracy, coarse, reports())
+        fine.first = first
         if last < end and fine.ended == "end":
             fine.ended = coarse.ended
         coarse.backwards()
         part = 1.0 if equations.crosses or coarse.folds or fine.folds else share(tolerance)
-        found = reached(t, fine.end)
-        error = _error(fine, coarse, found, part)
+        times = reached(t, fine.end)
+        error = input_error(fine, coarse, times, part)
         worst = float((error / scale).max())
-        least = float((_least(fine, fine.nodes) / scale).max())
+        least = float((unavoidable_rounding(fine, fine.nodes) / scale).max())
         if worst <= accuracy or least > accuracy or tolerance <= LEAST or fine.steps > MOST / 2:
             break
         tolerance = finer
     if fine.ended == "end" and _arrives(fine, coarse, levels, part):
         fine.ended = "until"
     _refuse_lost_energy(fine, max(accuracy, worst))
-    run = Run(assembly, found, *fine.at(found), error, fine, coarse, part)
-    return replace(run, warnings=(*equations.warnings, *_said(run, accuracy, worst, until, t)))
-
-
-def _error(fine: Travel, coarse: Travel, t: Reals, part: float) -> Reals:
-    """How far the inputs may be from the truth at times, (n, k)."""
-    nodes = coarse.nodes[coarse.nodes <= fine.end]
-    error = spread(*_apart(fine, coarse, nodes)[:2], part) + _least(fine, nodes)
-    # between two nodes that of the later one
-    return np.asarray(error[np.minimum(np.searchsorted(nodes, t), len(nodes) - 1)])
-
-
-def _apart(fine: Travel, coarse: Travel, nodes: Reals) -> tuple[Reals, Reals, Reals]:
-    """The inputs of the finer solution at nodes of the coarser, how far the two lie apart there, and their speeds, (n, k) each."""
-    (q, v, *_), (other, rate, *_) = fine.at(nodes), coarse.at(nodes)
-    return q, apart(nodes, q - other, v - rate), np.abs(v - rate)
-
-
-def _least(fine: Travel, t: Reals) -> Reals:
-    """What no shorter steps make smaller: rounding, and interpolation near change points, (n, k)."""
-    q, v, a, _ = fine.at(t)
-    return np.asarray(np.maximum(rounding(t, q, v, a), fine.noise(t)) + fine.blur(t)[:, None])
+    run = Run(assembly, times, *fine.at(times), error, fine, coarse, part)
+    return replace(run, warnings=(*equations.warnings, *_warnings(run, accuracy, worst, until, t)))
 
 
 def _arrives(fine: Travel, coarse: Travel, levels: Levels, part: float) -> bool:
@@ -325,7 +321,7 @@ def _arrives(fine: Travel, coarse: Travel, levels: Levels, part: float) -> bool:
     if not levels:
         return False
     t = fine.nodes
-    gap, error = fine.at(t)[0], _error(fine, coarse, t, part)
+    gap, error = fine.at(t)[0], input_error(fine, coarse, t, part)
     for j, level in levels.items():
         beside = np.abs(gap[:, j] - level) <= error[:, j]
         if beside[-1] and not beside.all():
@@ -371,7 +367,7 @@ def drift(energy: Reals, work: Reals) -> Reals:
 
 
 def rising(times: ArrayLike) -> Reals:
-    """Times that a motion can be asked at.
+    """Times of a motion, checked.
 
     Raises
     ------
@@ -384,10 +380,10 @@ def rising(times: ArrayLike) -> Reals:
 
 
 def _state(
-    name: str, requested: ArrayLike | None, own: Sequence[float | None], home: Sequence[float], k: int
+    name: str, requested: ArrayLike | None, own: Sequence[float | None], guess: Sequence[float], k: int
 ) -> Floats:
     if requested is None:
-        return [float(at if value is None else value) for value, at in zip(own, home, strict=True)]
+        return [float(at if value is None else value) for value, at in zip(own, guess, strict=True)]
     value = real_array(name, requested)
     if value.ndim > 1 or (value.ndim == 1 and len(value) != k) or not np.isfinite(value).all():
         raise ValueError(f"{name}: expected {k} finite number{'s' if k > 1 else ''}, found {requested!r}")
@@ -412,14 +408,14 @@ def reached(t: Reals, end: float) -> Reals:
 
 
 def not_met(until: Iterable[str], last: float) -> str:
-    """What is said where no input has its value up to the last time."""
+    """The warning where no input has its value up to the last time."""
     return f"{', '.join(until)}: the event is not met before {last:g} s"
 
 
-def _said(
+def _warnings(
     run: Run, accuracy: float, worst: float, until: Mapping[str, float] | None, requested: Reals
 ) -> list[str]:
-    """What must be said of the answer."""
+    """The warnings of a run."""
     warnings = []
     if run.fine.ended == "end" and until:
         warnings.append(not_met(until, float(requested[-1])))

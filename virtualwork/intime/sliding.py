@@ -16,7 +16,7 @@ Mode = tuple[int, ...]
 
 
 class Values(NamedTuple):
-    """What the tape says at one state; complex R = P + Q·φ, accelerations a + A·φ, of the joints' rates s + S·φ."""
+    """The outputs of the tape at one state; complex R = P + Q·φ, accelerations a + A·φ, of the joints' rates s + S·φ."""
 
     a: Floats
     per: list[Floats]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.intime.coordinates import BETTER, FOLDING, Coordinates, Monitor, measured
@@ -16,7 +17,6 @@ from virtualwork.intime.equations import TURN, Lost
 from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.gains import gains
 from virtualwork.intime.implicit import Radau
-from virtualwork.intime.joined import Joined
 from virtualwork.intime.path import Method, Path, followed
 from virtualwork.intime.walk import MOST, Walk
 from virtualwork.intime.watch import Floats, noise
@@ -41,6 +41,8 @@ class Travel:
 
     legs: list[Path] = field(default_factory=list)
     ended: str = ""
+    # the first solution, whose nodes tell well enough how the motion makes what rounds grow; its own where there is none
+    first: Travel | None = None
 
     @property
     def end(self) -> float:
@@ -132,6 +134,18 @@ class Travel:
         nodes, whole = np.concatenate(t), np.concatenate(places)
         return np.stack([np.interp(times, nodes, of) for of in whole.T], axis=1)
 
+    def grown(self, times: Reals) -> Reals:
+        """What the motion makes of the rounding of all steps before, the largest so far, at times between nodes too, (n, k).
+
+        Through several sets of coordinates it is not followed: 0.
+        """
+        legs = (self.first or self).legs
+        leg = legs[0]
+        if len(legs) > 1:
+            return np.zeros((len(times), leg.equations.k))
+        largest = np.maximum.accumulate(leg.grown, axis=0)
+        return np.stack([np.interp(times, leg.nodes.t, of) for of in largest.T], axis=1)
+
     @property
     def halves(self) -> Floats:
         """The times of the nodes, and in the middle between them."""
@@ -217,14 +231,14 @@ def travel(
         The inputs themselves.
     until : mapping of an input's number to its value
     method : Method
-        Where it is found to be stiff, the implicit one goes on.
+        Where it proves stiff, the implicit one goes on.
     accuracy : float
         What is wanted: a level that ends the motion is met so nearly, where the motion turns back there; where a loop is so nearly folded, and no other coordinate leads on, that rounding of the rates
         is more than it, rounding decides how the motion goes on.
     like : Travel, optional
         Each of its steps is done in two halves.
     """
-    found, scale = Travel(), coordinates.equations.scale
+    way, scale = Travel(), coordinates.equations.scale
     sides = dict.fromkeys(until, 0)
     plan = [] if like is None else like.halves
     t, q, v = start
@@ -238,21 +252,21 @@ def travel(
             try:
                 equations, v = equations.going_on(t, q, v, ended)
             except Lost:
-                found.ended = NO_FURTHER
-                return found
+                way.ended = NO_FURTHER
+                return way
             # in the mode of this leg, out of which the next one comes
             coordinates, left = coordinates.of(equations), equations.left(ended, before)
-            idle = idle + 1 if found.legs and not found.legs[-1].steps else 0
+            idle = idle + 1 if way.legs and not way.legs[-1].steps else 0
             if idle > MODES * (1 + len(equations.mode)):
-                found.ended = CHATTERS
-                return found
+                way.ended = CHATTERS
+                return way
         below = FOLDING if not coordinates.folds(q) else coordinates.margin(q) / BETTER
         monitor = Monitor(coordinates, inputs, below, bool(until) and not coordinates.own, q[0])
         ends = [
             monitor.until(j, level, sides[j], float(noise(level, scale[j])), accuracy * scale[j])
             for j, level in until.items()
         ]
-        if not found.legs:
+        if not way.legs:
             # levels at which the motion begins
             left |= {
                 watch.name: level
@@ -262,22 +276,22 @@ def travel(
         watches = [*ends, *equations.watches()]
         most = MOST if like is None else MOST + 2 * like.steps
         path = Path(coordinates, method, inputs)
-        way = path, end, tolerance, watches, equations.stops, monitor, most - found.steps, left, plan
-        Walk(*way, progress).go(t, q, v, work)
-        found.legs.append(path)
-        found.ended = path.ended
+        arguments = path, end, tolerance, watches, equations.stops, monitor, most - way.steps, left, plan
+        Walk(*arguments, progress).go(t, q, v, work)
+        way.legs.append(path)
+        way.ended = path.ended
         if isinstance(equations, Rubbing):
             fastest, gain = gains(path, fastest)
             if gain is not None:
                 path.cut(gain[0])
-                found.ended = path.ended = GAINS.format(gain[1])
-                return found
+                way.ended = path.ended = GAINS.format(gain[1])
+                return way
         if path.ended.startswith("until"):
-            found.ended = "until"
-            return found
+            way.ended = "until"
+            return way
         sides = {j: watch.side for j, watch in zip(until, ends, strict=True)}
-        if path.ended in ("end", "budget") or len(found.legs) > CHANGES:
-            return found
+        if path.ended in ("end", "budget") or len(way.legs) > CHANGES:
+            return way
         if path.ended == "undecided":
             # the last node lies where that has been
             path.drop()
@@ -288,11 +302,11 @@ def travel(
         if path.ended == "stiff":
             method = Radau()
             continue
-        found.ended = equations.outside(t, q, v) if path.ended == "lost" else ""
-        if found.ended:
+        way.ended = equations.outside(t, q, v) if path.ended == "lost" else ""
+        if way.ended:
             # a table over time reads a little beyond its end
             path.back(equations.stops)
-        other = None if found.ended else coordinates.better(q, inputs)
+        other = None if way.ended else coordinates.better(q, inputs)
         if (
             other is None
             and coordinates.margin(q) * accuracy < EPS
@@ -300,11 +314,11 @@ def travel(
         ):
             path.ended = "undecided" if path.ended == "folding" else path.ended
         if path.ended == "undecided":
-            found.ended = UNDECIDED
-            return found
+            way.ended = UNDECIDED
+            return way
         if other is None and path.ended == "lost":
-            found.ended = found.ended or NO_FURTHER
-            return found
+            way.ended = way.ended or NO_FURTHER
+            return way
         if other is not None:
             motion = coordinates.motion(np.array([q]), np.array([v]))
             coordinates, q = other
@@ -314,3 +328,48 @@ def travel(
                 coordinates = coordinates.of(coordinates.equations.in_mode(equations.mode, direction))
                 # from rest it is decided again
                 ended = ended if any(v) else ""
+
+
+class Joined:
+    """The attributes of `Motion`, requested of every part and joined row by row.
+
+    Arrays are joined along their poses, pairs, lists and mappings of them part by part; whatever else a motion gives is joined in the same way.
+
+    Examples
+    --------
+    >>> from virtualwork import Input, Link, Mechanism
+    >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 2})}, inputs=Input(link="crank"))
+    >>> parts = [(np.array([1, 2]), crank.motion([0.0, 1.0], speed=3.0)), (np.array([0]), crank.motion(0.5, speed=1.0))]
+    >>> Joined(parts, 3).link("crank").omega
+    array([1., 3., 3.])
+    """
+
+    def __init__(self, parts: Sequence[tuple[NDArray[np.intp], Any]], n: int) -> None:
+        self._parts, self._n = parts, n
+
+    def __repr__(self) -> str:
+        return f"Joined({self._parts[0][1]!r}, {self._n} poses)"
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return self._joined([getattr(of, name) for _, of in self._parts])
+
+    def __call__(self, *args: Any, **keywords: Any) -> Any:
+        """Call the attribute of every part."""
+        return self._joined([of(*args, **keywords) for _, of in self._parts])
+
+    def _joined(self, answers: list[Any]) -> Any:
+        first = answers[0]
+        if isinstance(first, np.ndarray):
+            out = np.empty((self._n, *first.shape[1:]), first.dtype)
+            for (rows, _), part in zip(self._parts, answers, strict=True):
+                out[rows] = part
+            return out
+        if isinstance(first, (tuple, list)) and all(isinstance(part, np.ndarray) for part in first):
+            return type(first)(self._joined(list(parts)) for parts in zip(*answers, strict=True))
+        if isinstance(first, dict):
+            return {key: self._joined([part[key] for part in answers]) for key in first}
+        if first is None or isinstance(first, (bool, str, float, list)):
+            return first
+        return Joined([(rows, of) for (rows, _), of in zip(self._parts, answers, strict=True)], self._n)

@@ -2,7 +2,7 @@
 
 The formulas are recorded once with the varied dimensions as inputs of the tape. What a lane cannot do is done singly,
 as `Mechanism.simulate` does it: loops that fold, change points on the way, stiff dampers, friction, tables, variants
-whose branch is not told by a comparison.
+whose branch no comparison decides.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from virtualwork.intime.control import first_steps
 from virtualwork.intime.coordinates import FOLDING
 from virtualwork.intime.ends import events, passed, sides
 from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, apart, rounding, share, spread
+from virtualwork.intime.growth import grown
 from virtualwork.intime.marching import Nodes, beginning, follow, march, over
 from virtualwork.intime.powers import motion_of, names
 from virtualwork.intime.run import drift, levels_of, not_met, reached, rising, simulate
@@ -37,20 +38,22 @@ Mask = NDArray[np.bool_]
 Rows = NDArray[np.intp]
 # steps of one variant; beyond them it is done singly
 MOST = 20_000
+# of the largest speed of a motion: one that comes so near a rest may make rounding grow; steps of which that is computed at a time
+RESTING, HELD = 5e-3, 1 << 16
 # rounds between two looks, at first and later
 SOON, LATER = 16, 128
-# what is found of each variant over its times
+# the results of each variant over its times
 FOUND = ("angle", "speed", "acceleration", "error_estimate", "energy", "work")
 
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """What `Variants.simulate` has found: every array has a leading axis of variants.
+    """The result of `Variants.simulate`: every array has a leading axis of variants.
 
     Attributes
     ----------
     t : array (n,)
-        The times asked for, s.
+        The requested times, s.
     times : array (v, n)
         Those of each variant: where its motion ends before the last, that of its end comes after those before it, and
         what follows is NaN. So is all of a variant that cannot be simulated.
@@ -61,8 +64,8 @@ class Runs:
     energy, work : array (v, n)
         Kinetic energy and that of gravity and springs, and the work of what stores none, J.
     unknown : array (v, n)
-        From when on no digit is known.
-    warnings : dict of a variant's place to what must be said of it
+        Whether no digit of the inputs holds, nor any after that time.
+    warnings : dict of a variant's place to its warnings
     """
 
     family: Family
@@ -101,7 +104,7 @@ class Runs:
         )
 
     def put(self, rows: Any, times: Reals, **columns: Reals) -> None:
-        """Keep the results of some variants at their times (…, n), which may be less than those asked for."""
+        """Keep the results of some variants at their times (…, n), which may be fewer than the requested ones."""
         n = times.shape[-1]
         for name, values in {"times": times, **columns}.items():
             of = getattr(self, name)
@@ -272,7 +275,7 @@ class _Lanes:
             coarse, nodes = nodes, self.halved(rows, nodes)
             times = self.times(rows, nodes, alone)
             past = np.isnan(times)
-            error = self._error(coarse, nodes, times, share(tolerance))
+            error = self._error(rows, coarse, nodes, times, share(tolerance))
             error[past] = np.nan
             for j, level in self.levels.items():
                 beside = np.abs(nodes.q[-1, :, j] - level) <= error[:, -1, j]
@@ -351,14 +354,39 @@ class _Lanes:
                     row[: len(its)], row[len(its) :] = its, np.nan
         return result
 
-    def _error(self, coarse: Nodes, fine: Nodes, times: Reals, of: float) -> Reals:
+    def _error(self, rows: Rows, coarse: Nodes, fine: Nodes, times: Reals, of: float) -> Reals:
         """The error of the inputs at all times, (lanes, n, k): that of the coarser way's next node."""
         q, v, a = (np.swapaxes(x[::2], 0, 1) for x in (fine.q, fine.v, fine.rates[..., :-1]))
         gap = apart(coarse.t.T, q - np.swapaxes(coarse.q, 0, 1), v - np.swapaxes(coarse.v, 0, 1))
-        result = spread(q, gap, of) + rounding(coarse.t.T, q, v, a)
+        least = np.maximum(rounding(coarse.t.T, q, v, a), self._grown(rows, coarse))
+        result = spread(q, gap, of) + least
         at = np.stack([(coarse.t < x).sum(axis=0) for x in times.T], axis=1)
         at = np.minimum(at, len(coarse.t) - 1)
         return np.asarray(result[np.arange(len(result))[:, None], at])
+
+    def _grown(self, rows: Rows, nodes: Nodes) -> Reals:
+        """What the motions make of rounding, the largest so far, (lanes, rounds, k); 0 of those that never come near a rest.
+
+        Speeds and accelerations along a motion are themselves a solution of the equation of small changes: where they do not
+        shrink far, nothing grows far from there.
+        """
+        scale = self.scale[rows]
+        steps = (np.diff(nodes.t, axis=0) > 0).sum(axis=0)
+        step = (nodes.t[-1] - nodes.t[0]) / np.maximum(steps, 1)
+        moving = ((np.abs(nodes.v) + step[:, None] * np.abs(nodes.rates[..., :-1])) / scale).max(axis=2)
+        near = np.flatnonzero((steps > 0) & (moving.min(axis=0) < RESTING * moving.max(axis=0)))
+        result = np.zeros((len(rows), *nodes.q.shape[::2]))
+        for lanes in np.array_split(near, max(1, len(near) * len(nodes.t) // HELD)) if len(near) else ():
+            part, of = nodes.at(np.s_[:, lanes]), rows[lanes]
+
+            def rates(t: Reals, q: Reals, v: Reals, of: Rows = of) -> Reals:
+                flat = (x.reshape(self.k, -1).T for x in (q, v))
+                return self._run(self.rates, np.tile(of, len(t)), *flat)[:, : self.k].T.reshape(q.shape)
+
+            q, v, a = (np.moveaxis(x, -1, 0) for x in (part.q, part.v, part.rates[..., :-1]))
+            size = grown(rates, scale[lanes].T, part.t, q, v, a, 0.0 * q[:, 1:])
+            result[lanes] = np.maximum.accumulate(size, axis=1).T
+        return result
 
     def _folds(self, rows: Rows, nodes: Nodes) -> Mask:
         """In which lanes a loop folds on the way."""

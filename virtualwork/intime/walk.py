@@ -74,7 +74,7 @@ class Walk:
     budget: int
     left: Mapping[str, float]
     plan: Sequence[float]
-    # told how far it has come
+    # called with the time reached
     progress: Callable[[float], None] | None = None
     # by how much the next step may be longer, and how many have been limited by the method's stability
     grow: float = GROW

@@ -15,8 +15,7 @@ from virtualwork.formulas.loaded_pose import LoadedPose
 from virtualwork.formulas.loads import OWN
 from virtualwork.formulas.numbers import EPS, Number, Reals, minus, plus
 from virtualwork.plan.steps import path_reads
-from virtualwork.study.between import ALIKE, largest
-from virtualwork.study.sweep import FINE, SAME, Sweep
+from virtualwork.study.sweep import ALIKE, FINE, SAME, Sweep, largest
 
 # of the sweep: how far from its largest value the effort is compared; what falls less than so many times as much twice as far
 # away has a kink

@@ -172,7 +172,7 @@ def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int 
         winds a torsion spring up is searched a turn either way of the guess; half a turn where it cannot go round.
     samples : int
         How finely the range of one input is looked through for sign changes, more finely where a body turns faster;
-        every root is then found to rounding.
+        every root is then exact to rounding.
 
     Returns
     -------
@@ -330,7 +330,7 @@ def _refine(
 
 
 def _judged(assembly: Assembly, inputs: Reals, scale: float) -> Equilibria:
-    """Stability and potential of the positions found; those that are none (a pole between two signs) are dropped."""
+    """Stability and potential of positions; those that are none (a pole between two signs) are dropped."""
     if not len(inputs):
         return Equilibria(())
     rest = Rest(assembly, inputs)

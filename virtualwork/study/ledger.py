@@ -213,22 +213,22 @@ def ledger(scene: Scene, j: int = 0) -> tuple[dict[str, Reals], list[str], list[
 
 def absent(scene: Scene) -> list[str]:
     """Which terms of eq. (5) the scene does not have, and why: they are never formed."""
-    m, found = scene.mechanism, []
+    m, remarks = scene.mechanism, []
     massless = [body for body, r in scene.rigid.items() if not r.mass]
     if massless:
-        found.append(f"{', '.join(massless)}: no weight and no inertia force, for there is no mass")
+        remarks.append(f"{', '.join(massless)}: no weight and no inertia force, for there is no mass")
     flat = [body for body, r in scene.rigid.items() if r.mass and not r.inertia]
     if flat:
-        found.append(f"{', '.join(flat)}: no inertia torque, for there is no inertia")
+        remarks.append(f"{', '.join(flat)}: no inertia torque, for there is no inertia")
     if not m.gravity:
-        found.append("no weights: gravity is zero")
+        remarks.append("no weights: gravity is zero")
     if not scene.moves:
-        found.append("no inertia loads, no damping, no friction: speed and acceleration are zero")
+        remarks.append("no inertia loads, no damping, no friction: speed and acceleration are zero")
     for what, entries in (
         ("applied forces", m.forces),
         ("applied torques", m.torques),
         ("springs", m.springs),
     ):
         if not entries:
-            found.append(f"no {what} in the file")
-    return found
+            remarks.append(f"no {what} in the file")
+    return remarks

@@ -1,0 +1,160 @@
+"""How far the motion itself carries the rounding of its steps apart.
+
+What rounds in one step is a small change of the state (q, q̇), which the motion makes grow or shrink as the linear equation
+along it says, δ̈ = ∂a/∂q δ + ∂a/∂q̇ δ̇: about an upper rest e times in every √(l/g). Two solutions do not tell how far: both have
+rounded, each in its own way, and what they differ by is one sample. So the variance of the state goes along the motion,
+P → Φ P Φᵀ + R in every step, with Φ the flow of the equation and R what rounds (A. H. Jazwinski, Stochastic Processes and
+Filtering Theory, 1970, §4.2). Φ is the exponential of Magnus's exponent of order 4, from Gauss's two nodes of the step
+(S. Blanes et al., Physics Reports 470 (2009) 151, eq. 254).
+
+Matrices stand with their rows and columns first, (2k, 2k, n, …), so that products are done for all steps at once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.intime.passing import DEGREE, offsets, speeds, weights
+
+# halvings of a step for its exponential, and terms of the series
+HALVINGS, TERMS = 2, 5
+# Gauss's two nodes of a step
+GAUSS = 0.5 - math.sqrt(3) / 6, 0.5 + math.sqrt(3) / 6
+# of the arguments of the accelerations in a stage
+ROUNDINGS = 3.0
+# how far from a state accelerations are looked at for their slopes, as a share of what errors of the inputs are relative to
+BESIDE = 2.0**-24
+Rates = Callable[[Reals, Reals, Reals], Reals]
+"""The accelerations (k, m, …) at states: times (m, …), inputs and speeds (k, m, …)."""
+
+
+def grown(f: Rates, scale: Reals, t: Reals, q: Reals, v: Reals, a: Reals, noise: Reals) -> Reals:
+    """The standard deviation of the inputs at the nodes of a way, (k, n, …), as rounding in all steps before leaves it.
+
+    At most the `scale`.
+
+    Parameters
+    ----------
+    f : Rates
+    scale : array (k,) or (k, …)
+        What errors of the inputs are relative to.
+    t : array (n, …)
+    q, v, a : array (k, n, …)
+        The inputs, their speeds and accelerations.
+    noise : array (k, n − 1, …)
+        What rounding of the accelerations makes of the speeds over each step.
+
+    Examples
+    --------
+    q̈ = q: a rounding of the start grows with the hyperbolic cosine of the time.
+
+    >>> t = np.linspace(0, 20, 41)
+    >>> q, v = np.cosh(t)[None], np.sinh(t)[None]
+    >>> size = grown(lambda t, q, v: q, np.ones(1), t, q, v, q, 0 * q[:, 1:])[0, -1] / (EPS * np.cosh(20))
+    >>> bool(0.5 < size < 20)
+    True
+    """
+    k, h = len(q), np.diff(t, axis=0)
+    (first, stirred), (last, more) = (_linear(f, scale, *_inside(share, t, q, v, a)) for share in GAUSS)
+    rounds = np.hypot(noise, ROUNDINGS * EPS * h * np.maximum(stirred, more))
+    turning = math.sqrt(3) / 12 * h * h * (_times(last, first) - _times(first, last))
+    flow = _exponential(0.5 * h * (first + last) + turning)
+    start = 0.5 * EPS * np.abs(np.concatenate([q[:, 0], v[:, 0]]))
+    with np.errstate(all="ignore"):
+        variances = _along(flow, np.concatenate([0.0 * rounds, rounds]) ** 2, start**2)
+    # beyond it the equation is not linear, and two solutions lie as far apart as they can
+    return np.minimum(np.sqrt(variances[:k]), scale[:, None])
+
+
+def _inside(share: float, t: Reals, q: Reals, v: Reals, a: Reals) -> tuple[Reals, Reals, Reals]:
+    """Times, inputs and speeds at a share of every step, by Hermite's polynomial of degree 5."""
+    h = np.diff(t, axis=0)
+    # a step of no length moves nothing, whatever stands inside
+    h = np.where(h > 0, h, 1.0)
+    ends = v[:, :-1], a[:, :-1], v[:, 1:], a[:, 1:]
+    c = offsets(*ends[:2], h, np.diff(q, axis=1), *ends[2:])
+    of = weights(np.array(share), DEGREE)
+    place, speed = (np.tensordot(of, np.array(x), 1) for x in (c, speeds(*ends[:2], h, c, *ends[2:])))
+    return np.asarray(t[:-1] + share * h), np.asarray(q[:, :-1] + place), speed
+
+
+def _linear(f: Rates, scale: Reals, t: Reals, q: Reals, v: Reals) -> tuple[Reals, Reals]:
+    """The matrix of the linear equation at states, (2k, 2k, m, …), and what rounding of these makes of the accelerations, (k, m, …)."""
+    k = len(q)
+    state = np.concatenate([q, v])
+    here, result = f(t, q, v), np.zeros((2 * k, *state.shape))
+    for j in range(2 * k):
+        by = BESIDE * scale[j % k]
+        moved = state.copy()
+        moved[j] += by
+        # a place that cannot be assembled says nothing
+        slope = (f(t, moved[:k], moved[k:]) - here) / by
+        result[k:, j] = np.where(np.isfinite(slope), slope, 0.0)
+        if j >= k:
+            result[j - k, j] = 1.0
+    return result, np.einsum("ij...,j...->i...", np.abs(result[k:]), np.abs(state))
+
+
+def _times(a: Reals, b: Reals) -> Reals:
+    return np.asarray(np.einsum("ij...,jk...->ik...", a, b))
+
+
+def _exponential(a: Reals) -> Reals:
+    """The exponential of matrices, by its series for a quarter of them."""
+    one = np.zeros_like(a)
+    one[range(len(a)), range(len(a))] = 1.0
+    part, term = one + a / 2**HALVINGS, a / 2**HALVINGS
+    for i in range(2, TERMS + 1):
+        term = _times(term, a) / (2**HALVINGS * i)
+        part = part + term
+    for _ in range(HALVINGS):
+        part = _times(part, part)
+    return np.asarray(part)
+
+
+def _along(flow: Reals, rounds: Reals, start: Reals) -> Reals:
+    """The variances (m, n, …) of P → Φ P Φᵀ + R from the start (m, …) on, of the flows (m, m, n − 1, …).
+
+    Steps are taken side by side in as many runs as there are steps in each, from nothing; what each run begins with follows.
+    """
+    m, n, *lanes = flow.shape[1:]
+    length = max(1, math.isqrt(n))
+    runs = -(-n // length)
+    padding = [(0, 0)] * len(lanes)
+    rest = (0, runs * length - n), *padding
+    flow = np.pad(flow, ((0, 0), (0, 0), *rest)).reshape(m, m, runs, length, *lanes)
+    rounds = np.pad(rounds, ((0, 0), *rest)).reshape(m, runs, length, *lanes)
+    through, spread = [flow[:, :, :, 0]], [_diagonal(rounds[:, :, 0])]
+    for i in range(1, length):
+        through.append(_times(flow[:, :, :, i], through[-1]))
+        spread.append(_moved(flow[:, :, :, i], spread[-1]) + _diagonal(rounds[:, :, i]))
+    begin = [_diagonal(start)]
+    for j in range(runs - 1):
+        begin.append(_moved(through[-1][:, :, j], begin[-1]) + spread[-1][:, :, j])
+    begins = np.stack(begin, axis=2)
+    variances = np.stack(
+        [
+            np.einsum("ij...,jk...,ik...->i...", phi, begins, phi) + p[range(m), range(m)]
+            for phi, p in zip(through, spread, strict=True)
+        ],
+        axis=2,
+    )
+    variances = variances.reshape(m, runs * length, *lanes)[:, :n]
+    # beyond all numbers it is infinite
+    variances = np.where(np.isnan(variances), np.inf, np.maximum(variances, 0.0))
+    return np.concatenate([start[:, None], variances], axis=1)
+
+
+def _diagonal(x: Reals) -> Reals:
+    out = np.zeros((len(x), *x.shape))
+    out[range(len(x)), range(len(x))] = x
+    return out
+
+
+def _moved(flow: Reals, spread: Reals) -> Reals:
+    """Φ P Φᵀ."""
+    return np.asarray(np.einsum("ij...,kj...->ik...", _times(flow, spread), flow))
