@@ -230,6 +230,8 @@ def read_joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
     made.more = stated(
         [text(axis, "limit", end) for end in ("lower", "upper")], text(axis, "dynamics", "friction")
     )
+    if at.number("initial_position", text(axis, "initial_position") or "0"):
+        robot.notes.append(f"{at.where}: its initial_position is left out: the pose is that of coordinate 0")
     made.damping, made.stiffness, made.rest = (
         at.number(tag, text(axis, "dynamics", tag) or "0")
         for tag in ("damping", "spring_stiffness", "spring_reference")

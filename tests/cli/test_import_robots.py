@@ -304,6 +304,16 @@ def test_coupled_joints_of_mjcf_are_gears_and_what_is_no_ratio_is_named(powers: 
     assert "not a straight line" in str(taken(text.replace(powers, "0 1 2"))[1])
 
 
+def test_weight_that_does_not_act_in_mjcf_and_positions_that_sdf_starts_from_are_heard() -> None:
+    assert taken(MJCF)[0].gravity == pytest.approx(-9.81j)
+    still = MJCF.replace("<worldbody>", '<option><flag gravity="disable"/></option><worldbody>')
+    assert taken(still)[0].gravity == 0
+    held = MJCF.replace('name="rod"', 'name="rod" gravcomp="1"')
+    assert "body 'rod': its gravcomp is left out: its whole weight acts" in taken(held)[1]
+    moved = SDF.replace("<axis>", "<axis><initial_position>0.3</initial_position>", 1)
+    assert "joint 'A': its initial_position is left out: the pose is that of coordinate 0" in taken(moved)[1]
+
+
 def test_axes_rounded_to_a_few_digits_are_planar_and_said() -> None:
     m, notes = taken(URDF.format(loop=LOOPS["gazebo"]).replace(
         '<axis xyz="0 1 0"/>\n  <origin xyz="0 0 0.2"/>', '<axis xyz="0 0 1"/>\n  <origin xyz="0 0 0.2" rpy="-1.5708 0 0"/>'
