@@ -260,6 +260,14 @@ def test_poses_of_sdf_relative_to_frames_links_and_in_degrees() -> None:
     )
 
 
+def test_the_model_of_a_world_with_a_floor_is_the_one_that_has_joints() -> None:
+    floor = '<model name="floor"><static>true</static><link name="link"/></model>'
+    model = SDF[SDF.index("<model") : SDF.index("</sdf>")]
+    m, notes = taken(f'<sdf version="1.6"><world name="w">{floor}{model}</world></sdf>')
+    assert m.name == "four bar"
+    assert "models left out: floor" in notes
+
+
 def test_joints_of_sdf_between_frames_are_those_of_the_links_that_hold_the_frames() -> None:
     frames = (
         '<frame name="W" attached_to="world"/><frame name="E" attached_to="BC"><pose>0.3 0 0 0 0 0</pose></frame>'
