@@ -19,10 +19,8 @@ from cli.cases.inputs import Driven, Grid, Varied, of_one, with_numbers
 from cli.read.options import about, bad
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError
-from dalembert.results.text import csv_text
 from dalembert.tables.files import note, read_bytes, remember, split_sheet
-from dalembert.tables.table import Numbers, read
-from dalembert.units import UNITS, to_si
+from dalembert.tables.table import read
 
 if TYPE_CHECKING:
     from types import SimpleNamespace
@@ -82,24 +80,8 @@ def naming(file: str) -> Iterator[None]:
         raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
 
 
-_DIMENSIONS = {
-    "time": "time",
-    "t": "time",
-    "angle": "angle",
-    "position": "length",
-    "speed": "speed",
-    "fx": "force",
-    "fy": "force",
-    "torque": "torque",
-    "lift": "length",
-    "swing": "angle",
-}
-# the units that the library reads; a column in another unit is converted to the first of them
-_PLAIN = {"angle": ("rad", "deg"), "position": ("m", "mm"), "lift": ("m", "mm"), "swing": ("rad", "deg")}
-
-
 def beside(warnings: list[str], path: Path) -> bytes:
-    """Return a table as plain CSV: commas, points, units of the library; its warnings are added to `warnings`.
+    """Return a table that a mechanism's file names, perhaps with its sheet; its warnings are added to `warnings`.
 
     Raises
     ------
@@ -108,21 +90,11 @@ def beside(warnings: list[str], path: Path) -> bytes:
     DataError
         The table is wrong: it names row or cell, column, value and what was expected.
     """
-    note(split_sheet(str(path))[0]).stat()
-    table = read(str(path), numbers=_DIMENSIONS, texts=("step",), blank=tuple(_DIMENSIONS))
-    warnings += table.warnings
-    columns = dict(_plain(name, column) for name, column in table.numbers.items())
-    return csv_text(columns).encode()
+    from virtualwork.describe.curves import QUANTITIES
 
-
-def _plain(name: str, column: Numbers) -> tuple[str, list[float]]:
-    """Return header and values of a column; in a unit that the library reads they have the digits of the file."""
-    dimension = _DIMENSIONS[name]
-    first = next(iter(UNITS[dimension]))
-    if column.unit in _PLAIN.get(name, (first,)):
-        return f"{name}_{column.unit}", column.values.tolist()
-    si = _PLAIN.get(name, (first,))[0]
-    return f"{name}_{si}", to_si(column.values, dimension, column.unit).tolist()
+    data = note(split_sheet(str(path))[0]).read_bytes()
+    warnings += read(str(path), numbers=QUANTITIES, texts=("step",), blank=tuple(QUANTITIES)).warnings
+    return data
 
 
 @dataclass(frozen=True)

@@ -65,13 +65,17 @@ class _Reader:
         for e in children(root, "option"):
             if e.get("gravity") is not None:
                 robot.gravity = np.array(At(self.file, "option").numbers("gravity", e.get("gravity"), 3))
+        if any(
+            flag.get("gravity") == "disable" for e in children(root, "option") for flag in children(e, "flag")
+        ):
+            robot.gravity = None
         for e in children(root, "default"):
             self._defaults(e, "main", {})
 
     def _defaults(self, element: Element, name: str, above: dict[str, dict[str, str]]) -> None:
         mine = {tag: dict(values) for tag, values in above.items()}
         for e in element:
-            if isinstance(e.tag, str) and e.tag != "default":
+            if e.tag != "default":
                 mine.setdefault(e.tag, {}).update(e.attrib)
         self.classes[name] = mine
         for e in children(element, "default"):
@@ -93,8 +97,7 @@ class _Reader:
         share = self.total / (sum(held.mass for held in masses) or 1.0)
         for held in masses if share > 0 else ():
             held.mass, held.tensor, held.half = held.mass * share, held.tensor * share, held.half * share
-        for e in children(self.root, "equality"):
-            self._equalities(e)
+        self._equalities()
         self._tendons()
         self._actuators()
 
@@ -104,7 +107,7 @@ class _Reader:
             if e.tag == "frame":
                 inner = frame @ self.frames.pose(f"frame '{e.get('name', '')}'", e.attrib)
                 yield from self._contents(e, e.get("childclass", of), inner)
-            elif isinstance(e.tag, str):
+            else:
                 yield e, of, frame
 
     def _inside(self, element: Element, link: str, base: Array, of: str) -> None:
@@ -122,6 +125,8 @@ class _Reader:
         robot = self.robot
         name = e.get("name") or f"body {len(robot.links)}"
         where = f"body '{name}'"
+        if e.get("gravcomp", "0").strip("0. "):
+            robot.notes.append(f"{where}: its gravcomp is left out: its whole weight acts")
         here = base @ self.frames.pose(where, e.attrib)
         held = [
             (inner, self.whole(inner, class_), at) for inner, class_, at in self._contents(e, of, np.eye(4))
@@ -189,12 +194,15 @@ class _Reader:
                 texts |= dict(zip(names, numbers, strict=True))
         return Inertial(mass, place, *printed(texts))
 
+    def _every(self, section: str) -> Iterator[tuple[int, Element]]:
+        """Yield the elements of all sections of a name, with their numbers there."""
+        for part in children(self.root, section):
+            yield from enumerate(part, 1)
+
     # --- what closes loops ----------------------------------------------------------------------------------
-    def _equalities(self, element: Element) -> None:
+    def _equalities(self) -> None:
         robot = self.robot
-        for k, e in enumerate(element, 1):
-            if not isinstance(e.tag, str):
-                continue
+        for k, e in self._every("equality"):
             values = self.whole(e, "main")
             name = values.get("name") or f"{e.tag} {k}"
             where = f"equality '{name}'"
@@ -204,7 +212,8 @@ class _Reader:
             elif e.tag in ("connect", "weld"):
                 self._connect(e.tag, name, at, values)
             elif e.tag == "joint":
-                offset, factor, *powers = [*at.numbers("polycoef", values.get("polycoef", "0 1")), 0.0, 0.0]
+                stated = at.numbers("polycoef", values.get("polycoef", ""))
+                offset, factor, *powers = [*stated, *(0.0, 1.0, 0.0, 0.0, 0.0)[len(stated) :]]
                 if any(powers):
                     robot.notes.append(f"{where}: left out: its polynomial is not a straight line")
                     continue
@@ -237,18 +246,16 @@ class _Reader:
 
     def _fixed(self, name: str, at: At) -> list[tuple[str, float]]:
         """Return the terms of a fixed tendon."""
-        for element in children(self.root, "tendon"):
-            for e in children(element, "fixed"):
-                if e.get("name") == name:
-                    own = At(self.file, f"tendon '{name}'")
-                    joints = children(e, "joint")
-                    return [(named(self.file, j, "joint"), own.number("", j.get("coef"))) for j in joints]
+        for _, e in self._every("tendon"):
+            if e.tag == "fixed" and e.get("name") == name:
+                own = At(self.file, f"tendon '{name}'")
+                joints = children(e, "joint")
+                return [(named(self.file, j, "joint"), own.number("", j.get("coef"))) for j in joints]
         raise DataError(f"{self.file}: {at.where}: no fixed tendon is called '{name}'")
 
     def _tendons(self) -> None:
-        for element in children(self.root, "tendon"):
-            for k, e in enumerate(children(element, "spatial", "fixed"), 1):
-                self._spring(e, At(self.file, f"tendon '{e.get('name') or k}'"))
+        for k, e in self._every("tendon"):
+            self._spring(e, At(self.file, f"tendon '{e.get('name') or k}'"))
         for name, (link, at) in self.sites.items():
             self.robot.links[link].points[name] = at
 
@@ -283,29 +290,24 @@ class _Reader:
     def _actuators(self) -> None:
         robot = self.robot
         speeds = self._speeds()
-        for element in children(self.root, "actuator"):
-            for k, e in enumerate(element, 1):
-                if not isinstance(e.tag, str):
-                    continue
-                values = self.whole(e, "main")
-                name = values.get("name") or f"actuator {k}"
-                if "joint" in values:
-                    terms = [(values["joint"], 1.0)]
-                elif "tendon" in values:
-                    terms = self._fixed(values["tendon"], At(self.file, f"actuator '{name}'"))
-                else:
-                    robot.notes.append(f"actuator '{name}': left out: it drives no joint")
-                    continue
-                speed = sum(factor * speeds.get(joint, 0.0) for joint, factor in terms)
-                robot.motors.append(Motor(name, terms, speed or None))
+        for k, e in self._every("actuator"):
+            values = self.whole(e, "main")
+            name = values.get("name") or f"actuator {k}"
+            if "joint" in values:
+                terms = [(values["joint"], 1.0)]
+            elif "tendon" in values:
+                terms = self._fixed(values["tendon"], At(self.file, f"actuator '{name}'"))
+            else:
+                robot.notes.append(f"actuator '{name}': left out: it drives no joint")
+                continue
+            speed = sum(factor * speeds.get(joint, 0.0) for joint, factor in terms)
+            robot.motors.append(Motor(name, terms, speed or None))
 
     def _speeds(self) -> dict[str, float]:
         """Return the joints' speeds in the first key frame."""
-        keys = [key for e in children(self.root, "keyframe") for key in children(e, "key")]
+        text = next((e.get("qvel") for _, e in self._every("keyframe")), None)
         own = [j.name for j in self.robot.joints.values() if j.kind in ("turn", "slide")]
-        if not keys or keys[0].get("qvel") is None:
-            return {}
-        result = At(self.file, "key").numbers("qvel", keys[0].get("qvel"))
+        result = At(self.file, "key").numbers("qvel", text)
         if len(result) != len(own):
             return {}
         # a key frame at rest has no speed

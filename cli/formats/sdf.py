@@ -47,19 +47,21 @@ PLUGIN = {"filename": "gz-sim-joint-controller-system", "name": "gz::sim::system
 
 
 def read(file: str, root: Element) -> Robot:
-    """Read the first `<model>` of an `<sdf>`, in a `<world>` or not."""
+    """Read the first `<model>` of an `<sdf>` with joints, in a `<world>` or not: worlds begin with the floor."""
     world = child(root, "world")
     models = list(children(root if world is None else world, "model"))
     if not models:
         raise DataError(f"{file}: <sdf>: no <model>")
-    robot = Robot(file, "SDF", models[0].get("name", ""))
+    model = next((e for e in models if child(e, "joint") is not None), models[0])
+    robot = Robot(file, "SDF", model.get("name", ""))
     if len(models) > 1:
-        robot.notes.append(f"models after the first are left out: {len(models) - 1}")
+        others = ", ".join(e.get("name", "without a name") for e in models if e is not model)
+        robot.notes.append(f"models left out: {others}")
     robot.add(RobotLink(WORLD, np.eye(4)))
     if world is not None:
         numbers = At(file, "world").numbers("gravity", text(world, "gravity"), 3, (0.0, 0.0, -9.8))
         robot.gravity = np.array(numbers)
-    _Model(robot, models[0], root.get("version", "1.0")).read()
+    _Model(robot, model, root.get("version", "1.0")).read()
     return robot
 
 
@@ -230,6 +232,8 @@ def read_joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
     made.more = stated(
         [text(axis, "limit", end) for end in ("lower", "upper")], text(axis, "dynamics", "friction")
     )
+    if at.number("initial_position", text(axis, "initial_position") or "0"):
+        robot.notes.append(f"{at.where}: its initial_position is left out: the pose is that of coordinate 0")
     made.damping, made.stiffness, made.rest = (
         at.number(tag, text(axis, "dynamics", tag) or "0")
         for tag in ("damping", "spring_stiffness", "spring_reference")

@@ -260,6 +260,14 @@ def test_poses_of_sdf_relative_to_frames_links_and_in_degrees() -> None:
     )
 
 
+def test_the_model_of_a_world_with_a_floor_is_the_one_that_has_joints() -> None:
+    floor = '<model name="floor"><static>true</static><link name="link"/></model>'
+    model = SDF[SDF.index("<model") : SDF.index("</sdf>")]
+    m, notes = taken(f'<sdf version="1.6"><world name="w">{floor}{model}</world></sdf>')
+    assert m.name == "four bar"
+    assert "models left out: floor" in notes
+
+
 def test_joints_of_sdf_between_frames_are_those_of_the_links_that_hold_the_frames() -> None:
     frames = (
         '<frame name="W" attached_to="world"/><frame name="E" attached_to="BC"><pose>0.3 0 0 0 0 0</pose></frame>'
@@ -302,6 +310,16 @@ def test_coupled_joints_of_mjcf_are_gears_and_what_is_no_ratio_is_named(powers: 
     assert m.motion(0.1, speed=2.0).link("b").omega[0] == pytest.approx(5.0)
     assert "equality 'joint 1': its offset 0.1 is left out: the pose is that of the file" in notes
     assert "not a straight line" in str(taken(text.replace(powers, "0 1 2"))[1])
+
+
+def test_weight_that_does_not_act_in_mjcf_and_positions_that_sdf_starts_from_are_heard() -> None:
+    assert taken(MJCF)[0].gravity == pytest.approx(-9.81j)
+    still = MJCF.replace("<worldbody>", '<option><flag gravity="disable"/></option><worldbody>')
+    assert taken(still)[0].gravity == 0
+    held = MJCF.replace('name="rod"', 'name="rod" gravcomp="1"')
+    assert "body 'rod': its gravcomp is left out: its whole weight acts" in taken(held)[1]
+    moved = SDF.replace("<axis>", "<axis><initial_position>0.3</initial_position>", 1)
+    assert "joint 'A': its initial_position is left out: the pose is that of coordinate 0" in taken(moved)[1]
 
 
 def test_axes_rounded_to_a_few_digits_are_planar_and_said() -> None:

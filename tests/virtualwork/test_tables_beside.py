@@ -94,6 +94,20 @@ def test_a_table_takes_any_unit_and_any_case(
     assert np.array(history).ravel().tolist() == pytest.approx(np.array(rows).ravel().tolist(), rel=1e-15)
 
 
+def test_a_law_in_a_workbook_is_that_of_the_sheet_that_its_name_ends_in(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl", reason="workbooks: pip install 'dalembert[excel]'")
+    book = openpyxl.Workbook()
+    for sheet, step in ((book.active, 30), (book.create_sheet("second one"), 60)):
+        for row in (["time [s]", "angle [deg]"], [0, 0], [1, step]):
+            sheet.append(row)
+    book.save(tmp_path / "law.xlsx")
+    for name, last in (("law.xlsx", 30), ("law.xlsx#second one", 60)):
+        m = Mechanism.from_toml_text(CRANK.replace("law.csv", name), folder=tmp_path)
+        assert m.inputs[0].history == ((0, 0), (1, np.radians(last)))
+    with pytest.raises(DescriptionError, match=r"\[input\] law: law.xlsx: no sheet 'third'"):
+        Mechanism.from_toml_text(CRANK.replace("law.csv", "law.xlsx#third"), folder=tmp_path)
+
+
 def test_a_torque_over_what_it_cannot_be_over_is_refused() -> None:
     with pytest.raises(DescriptionError, match="found 'input', expected time, angle or speed"):
         Torque("crank", history=((0.0, 1.0), (1.0, 2.0)), over="input")  # type: ignore[arg-type]

@@ -11,6 +11,7 @@ from typing import Any
 from dalembert.dataclass import dataclass
 from dalembert.errors import DataError
 from dalembert.quantities import number_expected, parse_number
+from dalembert.tables.files import split_sheet
 from dalembert.tables.headers import find_columns
 from dalembert.tables.sources import Source, source_of
 from dalembert.units import LISTED, MINUS, UNITS
@@ -133,9 +134,10 @@ def curve(
     try:
         data = entry.file.beside(name)
     except (OSError, ValueError):
-        raise wrong(where, name, "a CSV file that can be read") from None
+        raise wrong(where, name, "a table that can be read") from None
     try:
-        source = source_of(str(name), data, known, ())
+        file, sheet = split_sheet(str(name))
+        source = source_of(file, data, known, (), sheet)
         columns = find_columns(source.file, source.headings, known, ())
         axis = next((quantity for quantity in over if quantity in columns), None)
         if axis is None or columns.keys().isdisjoint(values):

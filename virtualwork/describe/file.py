@@ -8,6 +8,7 @@ from typing import Any
 
 from dalembert.dataclass import dataclass, field
 from dalembert.hints import nearest
+from dalembert.tables.files import split_sheet
 from virtualwork.describe import DescriptionError, require
 from virtualwork.describe.units import Units, wrong
 
@@ -40,8 +41,11 @@ class File:
         return value
 
     def beside(self, name: Any) -> bytes:
-        """The bytes of a file in the same folder."""
-        return self.load(self.folder / str(name))
+        """The bytes of a file in the same folder; the name may end in the sheet of a workbook."""
+        try:
+            return self.load(self.folder / str(name))
+        except OSError:
+            return self.load(self.folder / split_sheet(str(name))[0])
 
     def point_of(self, name: Any, where: str) -> tuple[str, str]:
         """`crank.B`, or the plain name of a point that one body alone has: the body and the point."""
