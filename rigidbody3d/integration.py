@@ -399,10 +399,11 @@ def _split(
             for _ in range(steps):
                 for stage in STAGES:
                     _free_and_kick(state, stage * gap / steps, I1, I3, mgl)
+                # a length that drifts by rounding would turn the body too far
+                length = math.sqrt(sum(x * x for x in state[3:]))
+                state[3:] = [x / length for x in state[3:]]
             count += steps * len(STAGES)
             now = float(time[index])
-            length = math.sqrt(sum(x * x for x in state[3:]))
-            state[3:] = [x / length for x in state[3:]]
             H[index], q[index] = state[:3], state[3:]
     return H, q, count
 
