@@ -79,6 +79,11 @@ class TurningBody:
     written: Mapping[str, Written] = field(default_factory=dict)
     """The numbers of the file by their keys; an attitude of any length."""
 
+    @property
+    def forced(self) -> bool:
+        """Whether a torque acts."""
+        return self.torque is not None and bool(self.torque.any())
+
     def exact(self) -> TurningBody:
         """Return the body in doubled numbers, the decimals of the file exact."""
         from cli.read.exact import plain
@@ -240,9 +245,9 @@ class Rotation:
     def exact(self) -> bool:
         """Whether a closed form is used."""
         g = self.body
-        closed = g.torque is None and (g.mgl is None or self.round_moments is not None)
+        closed = not g.forced and (g.mgl is None or self.round_moments is not None)
         if self.method == "exact" and not closed:
-            why = "a torque" if g.torque is not None else "a top whose two moments across body z differ"
+            why = "a torque" if g.forced else "a top whose two moments across body z differ"
             raise DataError(f"{g.file}: there is no closed form for {why}: expected --method integrate")
         return closed and self.method != "integrate"
 
@@ -283,7 +288,7 @@ class Rotation:
     def drift(self) -> dict[str, float | None]:
         """How far momentum and energy stray from those at time zero, relatively; None where they are not constant."""
         g = self.body
-        if g.torque is not None:
+        if g.forced:
             return {"momentum": None, "energy": None}
         tensor = _tensor(g.inertia)
         H = rotate(g.attitude, tensor @ g.omega)
@@ -330,7 +335,7 @@ class Rotation:
 
     @property
     def _free(self) -> bool:
-        return self.body.torque is None and self.body.mgl is None
+        return not self.body.forced and self.body.mgl is None
 
     @cached_property
     def _pole(self) -> int | None:

@@ -212,3 +212,11 @@ def test_a_top_of_parts_stands_on_its_axis(spin, tmp_path) -> None:
     assert "the centre of mass lies at x = 0.002 m, y = 0 m" in spin(top).stderr
     (tmp_path / "parts.csv").write_text("part,shape,mass_kg,radius_mm,z_mm\nwheel,disk,1,50,40\n")
     assert "centre of mass" not in spin(top).stderr
+
+
+def test_a_torque_of_zero_is_none(spin) -> None:
+    free = document(spin("inertia = [1, 2, 3]\nomega = [1, 2, 3]\n", "--at", "2", "--json"))
+    zero = document(
+        spin("inertia = [1, 2, 3]\nomega = [1, 2, 3]\ntorque = [0, 0, 0]\n", "--at", "2", "--json")
+    )
+    assert zero == free
