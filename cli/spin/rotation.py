@@ -253,7 +253,7 @@ class Rotation:
 
     @cached_property
     def states(self) -> FreeState | TopState | Trajectory:
-        """The states at the times asked for."""
+        """The states at the times of the request."""
         return self.at(self.time)
 
     def at(self, time: Array) -> FreeState | TopState | Trajectory:
