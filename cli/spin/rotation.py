@@ -309,7 +309,9 @@ class Rotation:
     @cached_property
     def period(self) -> float | None:
         """The period of ω in body axes; None where it is constant, or not periodic."""
-        return finite(float(_period(self.body))) if self._free else None
+        if not self._free or self._like(0, 2):
+            return None
+        return finite(float(_period(self.body)))
 
     def cones(self) -> dict[str, float | None] | None:
         """Return the cones of a free symmetric body."""
@@ -340,11 +342,18 @@ class Rotation:
     @cached_property
     def _pole(self) -> int | None:
         """Which principal axis is that of a free body of revolution; None of a sphere, or of three different moments."""
-        if not self._free:
-            return None
-        low, middle, high = principal(self.body.inertia).moments.tolist()
-        oblate, prolate = middle - low <= EQUAL * high, high - middle <= EQUAL * high
-        return None if oblate == prolate else 2 if oblate else 0
+        oblate, prolate = self._like(0, 1), self._like(1, 2)
+        return None if not self._free or oblate == prolate else 2 if oblate else 0
+
+    def _like(self, one: int, other: int) -> bool:
+        """Whether two principal moments are equal to rounding."""
+        moments = self._moments
+        return bool(moments[other] - moments[one] <= EQUAL * moments[2])
+
+    @cached_property
+    def _moments(self) -> Array:
+        """The principal moments, ascending."""
+        return principal(self.body.inertia).moments
 
     def constant_error(self, name: str, value: float) -> Array:
         """The error of a period, or of a number of cones or of steady precession, by computing twice."""
