@@ -14,7 +14,7 @@ from dalembert.arithmetic.shapes import as_array, as_numbers, common_shape, in_3
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.free_rotation import FreeRotation
 from rigidbody3d.inertia import check, principal
-from rigidbody3d.states import STATE, AtTimes, Seen, difference, in_blocks, require
+from rigidbody3d.states import STATE, AtTimes, PictureData, difference, in_blocks, require
 
 Array = NDArray[np.float64]
 
@@ -192,8 +192,8 @@ class FreeState(AtTimes):
         return (moments[..., None, :], axes[..., None, :, :]) if self.time.ndim else (moments, axes)
 
     @property
-    def _seen(self) -> Seen:
-        return Seen(self.body.inertia, free=True, top=False)
+    def _picture_data(self) -> PictureData:
+        return PictureData(self.body.inertia, free=True, top=False)
 
     def error_estimate(self, of: str = "attitude", exact: FreeState | None = None) -> Array:
         """Return an estimate of the error of a quantity: computed twice, with 16 and with 32 digits.

@@ -54,7 +54,7 @@ class Principal(_Axes):
         Parameters
         ----------
         exact
-            The tensor to 32 digits, (..., 3, 3), kg·m² (`Body.in_32_digits`): that of floats if it counts as given.
+            The tensor to 32 digits, (..., 3, 3), kg·m² (`Body.in_32_digits`): default: the tensor of floats, taken as exact.
 
         Notes
         -----
@@ -70,9 +70,9 @@ class Principal(_Axes):
         """
         from rigidbody3d.eigenvectors import eigenvectors, unknown
 
-        given: Any = in_32_digits(self.tensor) if exact is None else exact
+        tensor: Any = in_32_digits(self.tensor) if exact is None else exact
         second: tuple[Any, Any] = (
-            eigenvectors(given, self.axes) if given.ndim == self.axes.ndim else principal(given)
+            eigenvectors(tensor, self.axes) if tensor.ndim == self.axes.ndim else principal(tensor)
         )
         moments, axes = second
         hidden, swing = unknown(moments)
@@ -379,7 +379,7 @@ def second_moments(inertia: ArrayLike) -> Array:
 
 
 def nearest(inertia: ArrayLike) -> Array:
-    """Return the tensor that a body can have which lies nearest to a given one (3, 3), in the sum of squared entries.
+    """Return the nearest tensor to this one (3, 3) that a body can have, by the sum of squared differences of the entries.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.inertia import principal
-from rigidbody3d.states import STATE, AtTimes, Seen, State, require
+from rigidbody3d.states import STATE, AtTimes, PictureData, State, require
 
 if TYPE_CHECKING:
     from dalembert.arithmetic.doubled_arrays import DoubledArray
@@ -74,8 +74,8 @@ class Trajectory(AtTimes):
         return self._run_again(self.tensor)
 
     @property
-    def _seen(self) -> Seen:
-        return Seen(self.tensor, free=False, top=self.mgl != 0)
+    def _picture_data(self) -> PictureData:
+        return PictureData(self.tensor, free=False, top=self.mgl != 0)
 
     def error_estimate(self, of: str = "attitude", exact: DoubledArray | None = None) -> Array:
         """Return an estimate of the error, of the method and of rounding together.
@@ -139,7 +139,7 @@ def _apart(there: State, here: State, of: str) -> Array:
 FEW = 12 * EPS
 """The error of a dozen roundings."""
 MOST = 10_000_000
-"""So many steps take some quarter of an hour."""
+"""The largest number of steps, which takes a quarter of an hour."""
 METHODS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA", "splitting")
 """scipy's methods, and the splitting."""
 
@@ -257,8 +257,8 @@ def integrate(
         H, q, count = _split(tensor[0, 0], tensor[2, 2], mgl, H0, q0, time, steps_per_turn, refine, most)
         finer = partial(again, steps_per_turn=steps_per_turn, refine=2 * refine)
         return Trajectory(time, H, q, tensor, mgl, count, finer)
-    given = torque if callable(torque) else constant
-    H, q, count, step = _solve(tensor, w0, H0, q0, time, given, frame, mgl, method, rtol, longest, most)
+    load = torque if callable(torque) else constant
+    H, q, count, step = _solve(tensor, w0, H0, q0, time, load, frame, mgl, method, rtol, longest, most)
     finer = partial(again, longest=step / 2, rtol=rtol / 256)
     return Trajectory(time, H, q, tensor, mgl, count, finer)
 
@@ -399,10 +399,11 @@ def _split(
             for _ in range(steps):
                 for stage in STAGES:
                     _free_and_kick(state, stage * gap / steps, I1, I3, mgl)
+                # a length that drifts by rounding would turn the body too far
+                length = math.sqrt(sum(x * x for x in state[3:]))
+                state[3:] = [x / length for x in state[3:]]
             count += steps * len(STAGES)
             now = float(time[index])
-            length = math.sqrt(sum(x * x for x in state[3:]))
-            state[3:] = [x / length for x in state[3:]]
             H[index], q[index] = state[:3], state[3:]
     return H, q, count
 

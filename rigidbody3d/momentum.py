@@ -86,7 +86,7 @@ class Motion:
     velocity: Array
     acceleration: Array
     pivot: Array | None
-    """The point fixed in space that velocity and acceleration were computed from; None: they are given."""
+    """The point fixed in space from which velocity and acceleration follow; None: they are arguments."""
 
     def __init__(
         self,
@@ -102,7 +102,7 @@ class Motion:
         I, m = as_numbers("inertia", inertia), as_numbers("mass", mass)
         if I.shape[-2:] != (3, 3):
             raise ValueError(f"inertia must have the shape (..., 3, 3), found {I.shape}")
-        given = {
+        arguments = {
             "omega": omega,
             "alpha": alpha,
             "center": center,
@@ -110,8 +110,8 @@ class Motion:
             "acceleration": acceleration,
         }
         if frame_omega is not None:
-            given["frame_omega"] = frame_omega
-        each = {name: vectors(name, value) for name, value in given.items()}
+            arguments["frame_omega"] = frame_omega
+        each = {name: vectors(name, value) for name, value in arguments.items()}
         common_shape(inertia=I.shape[:-2], mass=m.shape, **{name: v.shape[:-1] for name, v in each.items()})
         none = {"frame_omega": None, "pivot": None}
         for name, value in ({"inertia": I, "mass": m} | none | each).items():
@@ -219,7 +219,7 @@ class Motion:
         return self.of_body(*map(in_32_digits, (self.mass, self.center, self.inertia)))
 
     def of_body(self, mass: Array, center: Array, inertia: Array) -> Motion:
-        """Return the same motion, in doubled numbers, of a body that has these."""
+        """Return this motion, in doubled numbers, of a body with other mass, centre and tensor."""
         omega, alpha = in_32_digits(self.omega), in_32_digits(self.alpha)
         frame = None if self.frame_omega is None else in_32_digits(self.frame_omega)
         if self.pivot is not None:

@@ -266,7 +266,7 @@ class Shaft:
         return self.with_masses_xy(np.stack([U.real, U.imag], axis=-1), np.asarray(z, dtype=float))
 
     def with_masses_xy(self, unbalance: Array, z: Array) -> Array:
-        """Return the same for unbalances (..., k, 2) as x and y."""
+        """Return `with_masses` for unbalances (..., k, 2) as x and y."""
         z1, z2 = self.bearings[..., 0], self.bearings[..., 1]
         shares = [
             (unbalance * ((z - there[..., None]) / (here - there)[..., None])[..., None]).sum(axis=-2)

@@ -77,7 +77,7 @@ def _columns(state: StateInTime) -> dict[str, Array]:
     return columns | {"energy_J": state.energy}
 
 
-class Seen(NamedTuple):
+class PictureData(NamedTuple):
     """The data of a body for pictures: its inertia, whether no torque acts on it, whether it stands on a point."""
 
     inertia: ArrayLike
@@ -91,7 +91,7 @@ class StateInTime(State, Protocol):
     @property
     def time(self) -> Array: ...
     @property
-    def _seen(self) -> Seen: ...
+    def _picture_data(self) -> PictureData: ...
 
 
 class AtTimes:
@@ -110,7 +110,7 @@ class AtTimes:
         from rigidbody3d.picture.rotation import rotation
 
         _one_body(self)
-        inertia, free, top = self._seen
+        inertia, free, top = self._picture_data
         return rotation(self.time, self.omega, self.attitude, inertia, free=free, top=top, figure=figure)
 
     def animate(self: StateInTime) -> Page:
@@ -123,7 +123,7 @@ class AtTimes:
 
         _one_body(self)
         shown = {name: Shown(values, name) for name, values in _columns(self).items()}
-        return turning_page("", self._seen.inertia, self.omega[0], shown, self._seen.top)
+        return turning_page("", self._picture_data.inertia, self.omega[0], shown, self._picture_data.top)
 
 
 def _one_body(state: StateInTime) -> None:

@@ -30,7 +30,7 @@ from dalembert.arithmetic.records import record
 from dalembert.arithmetic.shapes import as_array, as_numbers, common_shape, filled, in_32_digits, is_doubled
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
-from rigidbody3d.states import STATE, AtTimes, Seen, difference, in_blocks, require
+from rigidbody3d.states import STATE, AtTimes, PictureData, difference, in_blocks, require
 from rigidbody3d.top_roots import constants
 
 Array = NDArray[np.float64]
@@ -175,8 +175,8 @@ class TopState(AtTimes):
         return as_array(kinetic + self._mgl * (w * w + z * z - x * x - y * y))
 
     @property
-    def _seen(self) -> Seen:
-        return Seen(self.top.inertia, free=False, top=True)
+    def _picture_data(self) -> PictureData:
+        return PictureData(self.top.inertia, free=False, top=True)
 
     def error_estimate(self, of: str = "attitude", exact: TopState | None = None) -> Array:
         """Return an estimate of the error of a quantity: computed twice, with 16 and with 32 digits.

@@ -74,7 +74,7 @@ class MovingBody:
 
     @cached_property
     def second(self) -> MovingBody:
-        """The same body in 32 digits."""
+        """This body in 32 digits."""
         return replace(self, doubled=True)
 
     @property
@@ -132,7 +132,7 @@ class MovingBody:
 
     @cached_property
     def point(self) -> Array:
-        """The point that `…_about` speaks of, (3,): as given, else the fixed point, else the origin."""
+        """The point of the quantities `…_about`, (3,): that of --about, else of --fixed, else the origin."""
         return self._numbers(self.request.about or self.request.fixed or ORIGIN)
 
     @property
@@ -193,7 +193,7 @@ class MovingBody:
 
     @property
     def corrections(self) -> list[CorrectionMass]:
-        """The masses of the correction planes; none where no plane was given."""
+        """The masses of the correction planes; none without a plane."""
         fix = self.correction
         if fix is None:
             return []

@@ -350,10 +350,10 @@ def _warnings(b: MovingBody) -> list[str]:
     lines = []
     motion, shaft = b.motion, b.request.shaft
     if not b.moving:
-        given = {"--fixed": b.request.fixed, "--frame-omega": b.request.frame_omega}
+        idle = {"--fixed": b.request.fixed, "--frame-omega": b.request.frame_omega}
         lines += [
             f"{option}: the body is at rest: expected --omega or --alpha too"
-            for option, value in given.items()
+            for option, value in idle.items()
             if value is not None
         ]
     if shaft is not None and not (shaft.speed or shaft.speed_rate or any(shaft.gravity)):

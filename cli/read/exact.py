@@ -15,6 +15,7 @@ from dalembert.arithmetic.doubled_arrays import DoubledArray
 from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array
 from dalembert.quantities import decimals, exactly
 from dalembert.tables.table import Numbers
+from dalembert.units import UNITS
 
 
 def written(number: float) -> Fraction:
@@ -86,9 +87,21 @@ def rates(numbers: ArrayLike) -> DoubledArray:
 
 def column(numbers: Numbers, rows: Sequence[int]) -> DoubledArray:
     """Rows of a column of a file, in SI, as they are written; what is blank is zero."""
-    values = np.nan_to_num(numbers.values[list(rows)])
-    exact = DoubledArray.of(doubled_array(replace(numbers, values=values).exact, values.shape))
+    exact = _in_si(replace(numbers, values=np.nan_to_num(numbers.values[list(rows)])))
     return exact * pi / 180.0 if numbers.unit == "deg" else exact
+
+
+LONG = 100
+"""The number of rows from which a column is read as an array."""
+
+
+def _in_si(numbers: Numbers) -> DoubledArray:
+    """A column of a file, in SI, as it is written; degrees stay."""
+    if len(numbers.values) < LONG:
+        return DoubledArray.of(doubled_array(numbers.exact, numbers.values.shape))
+    above, below = (1, 1) if numbers.unit == "deg" else UNITS[numbers.dimension][numbers.unit]
+    exact: DoubledArray = long_column(numbers) * float(above) / float(below)
+    return exact
 
 
 def cosine_and_sine(angle: Numbers, rows: Sequence[int]) -> tuple[DoubledArray, DoubledArray]:
@@ -116,5 +129,5 @@ def long_column(numbers: Numbers) -> DoubledArray:
 
 def as_written(numbers: Numbers) -> DoubledArray:
     """A column of a file, in SI, as it is written; angles in degrees."""
-    exact = DoubledArray.of(doubled_array(numbers.exact, numbers.values.shape))
+    exact = _in_si(numbers)
     return exact * 180.0 / pi if numbers.dimension == "angle" and numbers.unit != "deg" else exact

@@ -79,6 +79,11 @@ class TurningBody:
     written: Mapping[str, Written] = field(default_factory=dict)
     """The numbers of the file by their keys; an attitude of any length."""
 
+    @property
+    def forced(self) -> bool:
+        """Whether a torque acts."""
+        return self.torque is not None and bool(self.torque.any())
+
     def exact(self) -> TurningBody:
         """Return the body in doubled numbers, the decimals of the file exact."""
         from cli.read.exact import plain
@@ -240,15 +245,15 @@ class Rotation:
     def exact(self) -> bool:
         """Whether a closed form is used."""
         g = self.body
-        closed = g.torque is None and (g.mgl is None or self.round_moments is not None)
+        closed = not g.forced and (g.mgl is None or self.round_moments is not None)
         if self.method == "exact" and not closed:
-            why = "a torque" if g.torque is not None else "a top whose two moments across body z differ"
+            why = "a torque" if g.forced else "a top whose two moments across body z differ"
             raise DataError(f"{g.file}: there is no closed form for {why}: expected --method integrate")
         return closed and self.method != "integrate"
 
     @cached_property
     def states(self) -> FreeState | TopState | Trajectory:
-        """The states at the times asked for."""
+        """The states at the times of the request."""
         return self.at(self.time)
 
     def at(self, time: Array) -> FreeState | TopState | Trajectory:
@@ -283,7 +288,7 @@ class Rotation:
     def drift(self) -> dict[str, float | None]:
         """How far momentum and energy stray from those at time zero, relatively; None where they are not constant."""
         g = self.body
-        if g.torque is not None:
+        if g.forced:
             return {"momentum": None, "energy": None}
         tensor = _tensor(g.inertia)
         H = rotate(g.attitude, tensor @ g.omega)
@@ -304,7 +309,9 @@ class Rotation:
     @cached_property
     def period(self) -> float | None:
         """The period of ω in body axes; None where it is constant, or not periodic."""
-        return finite(float(_period(self.body))) if self._free else None
+        if not self._free or self._like(0, 2):
+            return None
+        return finite(float(_period(self.body)))
 
     def cones(self) -> dict[str, float | None] | None:
         """Return the cones of a free symmetric body."""
@@ -330,16 +337,23 @@ class Rotation:
 
     @property
     def _free(self) -> bool:
-        return self.body.torque is None and self.body.mgl is None
+        return not self.body.forced and self.body.mgl is None
 
     @cached_property
     def _pole(self) -> int | None:
         """Which principal axis is that of a free body of revolution; None of a sphere, or of three different moments."""
-        if not self._free:
-            return None
-        low, middle, high = principal(self.body.inertia).moments.tolist()
-        oblate, prolate = middle - low <= EQUAL * high, high - middle <= EQUAL * high
-        return None if oblate == prolate else 2 if oblate else 0
+        oblate, prolate = self._like(0, 1), self._like(1, 2)
+        return None if not self._free or oblate == prolate else 2 if oblate else 0
+
+    def _like(self, one: int, other: int) -> bool:
+        """Whether two principal moments are equal to rounding."""
+        moments = self._moments
+        return bool(moments[other] - moments[one] <= EQUAL * moments[2])
+
+    @cached_property
+    def _moments(self) -> Array:
+        """The principal moments, ascending."""
+        return principal(self.body.inertia).moments
 
     def constant_error(self, name: str, value: float) -> Array:
         """The error of a period, or of a number of cones or of steady precession, by computing twice."""

@@ -100,7 +100,7 @@ def constants(r: Rotation, only: Collection[str] = QUANTITIES) -> Table:
 def warnings(r: Rotation, only: Collection[str] = ()) -> list[str]:
     """Warnings about the method, the precession, and what --only names and this rotation does not have."""
     absent = {
-        "drift": (r.body.torque is not None, "a torque changes momentum and energy"),
+        "drift": (r.body.forced, "a torque changes momentum and energy"),
         "period": (r.period is None, "the angular velocity is constant, or not periodic"),
         "nutation_period": (r.nutation_period is None, "only a top that nutates has it"),
         "cones": (r.cones() is None, "only a free body of revolution has them"),
@@ -142,7 +142,7 @@ def draw(r: Rotation) -> Figure:
         at.omega,
         at.attitude,
         body.inertia,
-        free=body.torque is None and body.mgl is None,
+        free=not body.forced and body.mgl is None,
         top=body.mgl is not None,
         name=body.name,
         figure=figure,
@@ -181,7 +181,7 @@ def way(r: Rotation) -> list[Topic]:
         "kinetic_energy_J": energy,
     }
     result = [Topic("start", start, "At time zero", head)]
-    if g.torque is not None:
+    if g.forced:
         law = ["Ḣ = M: momentum and energy change with the torque; I·ω̇ = M − ω × I·ω (Euler)."]
     elif g.mgl is not None:
         law = [

@@ -187,15 +187,21 @@ class WorkBalance:
     def exact_unknowns(self) -> Doubled:
         """The load of each cell of all unknowns in 32 digits, (cells,)."""
         from cli.read.exact import plain
+        from dalembert.arithmetic.doubled_arrays import DoubledArray
 
+        values: list[Any] = [again.value for _, again in self.second]
         cells = [
-            self.second[group][1].value[place, j] * plain(cell.factor)
-            for group, place, step in ((*self.where[i], step) for i, step in enumerate(self.states.steps))
+            (*self.where[i], j, cell.factor)
+            for i, step in enumerate(self.states.steps)
             for j, unknown in enumerate(step.unknowns)
             for cell in unknown.cells
         ]
-        both: Any = np.stack(cells)
-        return both.doubled  # type: ignore[no-any-return]
+        high, low = (
+            [getattr(values[group], part)[place, j] for group, place, j, _ in cells]
+            for part in ("high", "low")
+        )
+        loads: Any = DoubledArray(high, low) * plain([factor for *_, factor in cells])
+        return loads.doubled  # type: ignore[no-any-return]
 
     def sums(self, index: int) -> list[float]:
         """The sum of the powers of each velocity field of a step, W."""

@@ -74,7 +74,7 @@ class DoubledArray(NDArrayOperatorsMixin):
 
     @property
     def doubled(self) -> Doubled:
-        """The same for functions of `Doubled`."""
+        """These numbers for functions of `Doubled`."""
         return Doubled(self.high[()], self.low[()])
 
     @property
@@ -128,7 +128,7 @@ class DoubledArray(NDArrayOperatorsMixin):
         self.high[index], self.low[index] = new.high, new.low
 
     def reshape(self, *shape: Any) -> DoubledArray:
-        """The same numbers laid out in another shape."""
+        """These numbers in another shape."""
         return DoubledArray(self.high.reshape(*shape), self.low.reshape(*shape))
 
     def sum(self, axis: int = -1, keepdims: bool = False) -> DoubledArray:
@@ -216,7 +216,7 @@ class DoubledComplex(NDArrayOperatorsMixin):
 
     @property
     def vectors(self) -> Vectors:
-        """The same for functions of `Vectors`."""
+        """These numbers for functions of `Vectors`."""
         return Vectors(self.real.doubled, self.imag.doubled)
 
     @property

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 NAMED = 16
-"""So many parts are named."""
+"""The largest number of parts with their names in the picture."""
 VIEWS = ((0, 2), (1, 2), (0, 1))
 """The axes of a view, to the right and up; of views that show as much the first are taken."""
 ALONG_SHAFT = ((2, 0), (2, 1))

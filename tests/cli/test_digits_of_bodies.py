@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 from fractions import Fraction
 
 import mpmath as mp
@@ -11,8 +12,10 @@ import numpy as np
 import pytest
 
 from benchmarks.truth.rotation import period_of, taylor
+from cli.read.exact import LONG, as_written
 from cli.spin.rotation import Rotation, read_body
 from cli.spin.tables import constants
+from dalembert.tables.table import Numbers
 
 F = Fraction
 
@@ -271,3 +274,25 @@ def test_the_third_axis_of_a_ring_that_lies_aslant(dalembert, tmp_path) -> None:
     for cell, true in zip(shown["principal_axis_3"], (-size, F(3, 10) * size, F(0)), strict=True):
         holds(cell, sign * true)
     assert min(map(digits, shown["principal_axis_3"][:2])) >= 14
+
+
+@pytest.mark.parametrize("unit", ["mm", "in", "deg", "rpm", "Hz", "lbf_ft", "kg_m2", "oz_in", "1e9"])
+def test_a_long_column_is_as_exact_as_a_short_one(unit: str) -> None:
+    dimension = {
+        "deg": "angle",
+        "rpm": "speed",
+        "Hz": "speed",
+        "lbf_ft": "torque",
+        "kg_m2": "inertia",
+        "oz_in": "unbalance",
+    }
+    values = np.random.default_rng(1).integers(-10000, 10000, LONG) / 1000.0
+    if unit == "1e9":
+        # too many figures at once for whole numbers
+        values, unit = values * 10.0 ** np.arange(LONG), "mm"
+    many = Numbers("x", unit, values, dimension.get(unit, "length"))
+    exact = as_written(many)
+    for i in range(LONG):
+        one = as_written(replace(many, values=values[i : i + 1]))
+        off = (F(exact.high[i]) - F(one.high[0])) + (F(exact.low[i]) - F(one.low[0]))
+        assert abs(off) <= abs(F(one.high[0])) * F(1, 2**103)
