@@ -46,6 +46,8 @@ def _run(file: str, answers: str, key: str | None = None) -> Result:
         companions=["totals"],
         notes=lambda: f"{exercise.title}: {several(len(students), 'student')}, {points:g} of {of:g} points",
         method=METHOD,
+        # the marks hold the answers; the tables of each student's numbers are gone with the workshop
+        shows_input=True,
         about={"title": f"Marks: {exercise.title}"},
     )
 
