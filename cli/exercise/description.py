@@ -98,6 +98,16 @@ class Ask:
     unit: str
     label: str = ""
 
+    @property
+    def name(self) -> str:
+        """The quantity without its unit."""
+        return self.parted[0]
+
+    @property
+    def parted(self) -> tuple[str, str]:
+        """The quantity and the unit of its header, which is empty where it has none."""
+        return parted(self.quantity, further=("kg_m2_s", "J", "W", "rad_s3", "m_s3"))
+
 
 @dataclass(frozen=True)
 class Exercise:

@@ -24,7 +24,6 @@ from dalembert.figures import written
 from dalembert.results.columns import Table, names
 from dalembert.tables.files import is_input
 from dalembert.tables.table import read
-from dalembert.units import parted
 from dalembert.units import written as unit_written
 
 STYLE = """
@@ -110,7 +109,7 @@ def label(ask: Ask) -> str:
     """Return what a question asks for, in words."""
     if ask.label:
         return ask.label
-    name = parted(ask.quantity, further=("kg_m2_s", "J", "W", "rad_s3", "m_s3"))[0].replace("_", " ")
+    name = ask.name.replace("_", " ")
     where = ", ".join(
         f"{key.removesuffix('_deg')} {text}{'°' if key.endswith('_deg') else ''}"
         for key, text in ask.where.items()
