@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
@@ -122,7 +122,6 @@ class Exercise:
     source: str
     draws: tuple[Draw, ...]
     asks: tuple[Ask, ...]
-    warnings: list[str] = field(default_factory=list)
 
     @property
     def keys(self) -> dict[str, str]:

@@ -274,16 +274,18 @@ dl { display: grid; grid-template-columns: fit-content(40%) 1fr; gap: 0 4mm } td
 
 
 def solutions(
-    exercise: Exercise, students: Sequence[Student], variants: Sequence[Variant], drawings: Mapping[int, str]
+    exercise: Exercise,
+    students: Sequence[Student],
+    variants: Sequence[Variant],
+    drawings: Mapping[Variant, str],
 ) -> bytes:
     """Return the page; students with the same numbers share a solution."""
     parts = [f"<h1>{html.escape(exercise.title)}: solutions</h1>\n"]
-    shared: dict[int, list[str]] = {}
+    shared: dict[Variant, list[str]] = {}
     for student, variant in zip(students, variants, strict=True):
-        shared.setdefault(id(variant), []).append(student.name)
-    by_id = {id(variant): variant for variant in variants}
-    for key, who in shared.items():
-        parts += ["<section>\n", *_solution(by_id[key], who, drawings[key]), "</section>\n"]
+        shared.setdefault(variant, []).append(student.name)
+    for variant, who in shared.items():
+        parts += ["<section>\n", *_solution(variant, who, drawings[variant]), "</section>\n"]
     return page(f"{exercise.title}: solutions", "".join(parts), SOLUTION_STYLE)
 
 
