@@ -58,7 +58,7 @@ def _run(
     from cli.show.output import options_of
     from cli.show.result import Result
 
-    if folder is None:
+    if not folder:
         raise options.bad("-o", "expected -o FOLDER, where the sheets go")
     for name in system or ():
         if name not in SYSTEMS:

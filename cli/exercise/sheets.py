@@ -44,6 +44,9 @@ section + section { break-before: page }
 @page { size: A4; margin: 14mm 13mm } @media print { body { margin: 0; padding: 0; max-width: none } .wide { overflow: visible } }
 """
 
+FORMULA = re.compile(r"\$[^$]+\$|\\\(.*?\\\)|\\\[.*?\\\]", re.DOTALL)
+"""A formula of TeX, whose braces are its own."""
+
 
 @dataclass(frozen=True)
 class Student:
@@ -83,16 +86,19 @@ def filled(workshop: Workshop, drawn: Mapping[str, Value], form: Callable[[str],
         A name that is no datum of the exercise.
     """
     exercise = workshop.exercise
+    formulas = [match.span() for match in FORMULA.finditer(exercise.text)]
 
     def put(match: re.Match[str]) -> str:
         name = match[1].strip()
         value = workshop.datum(name, drawn)
-        if value is None:
-            raise DataError(
-                f"{exercise.file}: key text: found {quote('{' + name + '}')}, expected a name of [draw], a dimension of the "
-                "mechanism or a table's cell such as {rotor.csv:W1.mass_kg} that holds a number"
-            )
-        return form(spoken(value))
+        if value is not None:
+            return form(spoken(value))
+        if any(start < match.start() < end for start, end in formulas):
+            return match[0]
+        raise DataError(
+            f"{exercise.file}: key text: found {quote('{' + name + '}')}, expected a name of [draw], a dimension of the "
+            "mechanism or a table's cell such as {rotor.csv:W1.mass_kg} that holds a number"
+        )
 
     return re.sub(r"\{([^{}\n]+)\}", put, exercise.text)
 
