@@ -346,6 +346,10 @@ class Answer:
         """A turn in the unit of an angle."""
         return 360.0 if unit_name(self.unit) == "deg" else tau
 
+    def distance(self, one: float, other: float) -> float:
+        """How far apart two values are; angles modulo a turn."""
+        return remainder(one - other, self.turn) if self.is_angle else one - other
+
 
 @dataclass(eq=False, repr=False)
 class Solved:

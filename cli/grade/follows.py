@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
-from math import remainder
 
 import numpy as np
 
@@ -22,11 +22,14 @@ ENOUGH = 3
 AXES = "xyz"
 
 
+@dataclass(eq=False, repr=False)
 class Follows:
     """What follows from earlier answers of a variant, by relations of its command and by its runs with slips."""
 
-    def __init__(self, variant: Variant, runs: Recomputed) -> None:
-        self.variant, self.runs = variant, runs
+    variant: Variant
+    runs: Recomputed
+    shares: dict[tuple[int, int], float | None] = field(default_factory=dict)
+    """The ratios of two answers."""
 
     def ranges(self, k: int, typed: Typed, wrong: frozenset[int]) -> Iterator[Range]:
         """Yield the ranges of an answer that would follow from earlier ones; `wrong`: those that are not right."""
@@ -69,13 +72,8 @@ class Follows:
         ]
 
     def _near(self, k: int, slipped: float | None, value: float, half: float) -> bool:
-        return slipped is not None and abs(self._distance(k, slipped, value)) <= half * (1 + 1e-9)
-
-    def _distance(self, k: int, one: float, other: float) -> float:
         answer = self.variant.answers[k]
-        if not answer.is_angle:
-            return one - other
-        return remainder(one - other, answer.turn)
+        return slipped is not None and abs(answer.distance(slipped, value)) <= half * (1 + 1e-9)
 
     def _vector(self, k: int) -> tuple[str, str]:
         """What the number is a part of: size and angle, or the components, are one answer."""
@@ -85,15 +83,11 @@ class Follows:
         where = {key: text for key, text in ask.where.items() if key != "axis"}
         return re.sub(r"(?<=[_vaf])[xyz]$", "", name), str(sorted(where.items()))
 
-    @cached_property
-    def _shares(self) -> dict[tuple[int, int], float | None]:
-        return {}
-
     def _share(self, j: int, k: int) -> float | None:
         """The ratio of two answers, where all slips that change the first change both in proportion."""
-        if (j, k) not in self._shares:
-            self._shares[j, k] = self._proportion(j, k)
-        return self._shares[j, k]
+        if (j, k) not in self.shares:
+            self.shares[j, k] = self._proportion(j, k)
+        return self.shares[j, k]
 
     def _proportion(self, j: int, k: int) -> float | None:
         one, other = self.variant.answers[j], self.variant.answers[k]

@@ -144,7 +144,7 @@ class Judge:
             right = Right(middle, answer.ask.figures)
             # what the earlier answers' own rounding leaves open, and that of this one
             room = spread * (1 + 1e-9) + max(reading.half, float(right.unit) / 2)
-            if abs(self.slips[k].distance(reading.value, middle)) <= room:
+            if abs(answer.distance(reading.value, middle)) <= room:
                 return True
         return self._follows_from.same_slip(k, reading.value, reading.half, typed, wrong)
 
