@@ -42,7 +42,8 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     name = options.name
     listed = names() if name is None else [name]
     if name is not None and name not in names():
-        raise DataError(f"no example '{name}': expected one of {', '.join(names())}{nearest(name, names())}")
+        hint = nearest(name.lower(), names())
+        raise DataError(f"no example '{name}': expected one that dalembert examples lists{hint}")
     about = {folder: describe(folder) for folder in listed}
     files = {} if name is None else _here(name)
     width = max(map(len, about))

@@ -65,7 +65,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     from cli.show.output import options_of
     from cli.show.result import Result
 
-    if options.folder is None:
+    if not options.folder:
         raise bad("-o", "expected -o FOLDER, where the sheets go")
     for name in options.system or ():
         if name not in SYSTEMS:
@@ -73,47 +73,37 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     exercise = read_exercise(options.file)
     if options.page and "--page" not in options_of(exercise.command[0]):
         raise bad("--page", f"found an exercise on {exercise.command[0]}, which has no page")
-    warnings = list(exercise.warnings)
+    warnings: list[str] = []
     people = _students(options.students, exercise)
     with workshop(exercise) as shop:
         drawn = variants(shop, len(people), options.seed, warnings)
         filled(shop, drawn[0].drawn)
-        drawings = {id(variant): "" for variant in drawn}
-        for variant in drawn:
-            drawings[id(variant)] = drawings[id(variant)] or figure(variant)
-        frames = {id(variant): moving(variant) for variant in dict.fromkeys(drawn)} if options.page else {}
+        # students may share a variant
+        each = dict.fromkeys(drawn)
+        drawings = {variant: figure(variant) for variant in each}
+        frames = {variant: moving(variant) for variant in each} if options.page else {}
         files = {
             f"sheet-{student.file}.html": sheet_page(
-                exercise, student, variant, drawings[id(variant)], frames.get(id(variant), "")
+                exercise, student, variant, drawings[variant], frames.get(variant, "")
             )
             for student, variant in zip(people, drawn, strict=True)
         }
         files["answers.csv"] = answers_csv(exercise, people, drawn)
         files["key.csv"] = key_csv(exercise, people, drawn)
         files["solutions.html"] = solutions(exercise, people, drawn, drawings)
-        slips = {id(variant): candidates(variant) for variant in dict.fromkeys(drawn)}
+        slips = {variant: candidates(variant) for variant in each}
         files["moodle.xml"] = questions.moodle(exercise, people, drawn, drawings, slips)
         for name in options.system or ():
             files |= questions.SYSTEMS[name](exercise, drawn, drawings, slips)
         put(Path(options.folder), files)
-        made = len({id(variant) for variant in drawn})
-        result = Result(
-            tables=tables(exercise, people, drawn),
-            head={
-                "title": exercise.title,
-                "folder": options.folder,
-                "variants": made,
-                "files": sorted(files),
-            },
-            notes=lambda: (
-                f"wrote {len(files)} files to {options.folder}: {several(made, 'variant')} for {several(len(people), 'student')}\n"
-            ),
-            warnings=warnings,
-        )
-        # the temporary folder goes, with all its files
-        for table in result.tables.values():
-            table()
-    return result
+    return Result(
+        tables=tables(exercise, people, drawn),
+        head={"title": exercise.title, "folder": options.folder, "variants": len(each), "files": sorted(files)},
+        notes=lambda: (
+            f"wrote {len(files)} files to {options.folder}: {several(len(each), 'variant')} for {several(len(people), 'student')}\n"
+        ),
+        warnings=warnings,
+    )
 
 
 def _students(text: str, exercise: Exercise) -> list[Student]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
@@ -98,6 +98,16 @@ class Ask:
     unit: str
     label: str = ""
 
+    @property
+    def name(self) -> str:
+        """The quantity without its unit."""
+        return self.parted[0]
+
+    @property
+    def parted(self) -> tuple[str, str]:
+        """The quantity and the unit of its header, which is empty where it has none."""
+        return parted(self.quantity, further=("kg_m2_s", "J", "W", "rad_s3", "m_s3"))
+
 
 @dataclass(frozen=True)
 class Exercise:
@@ -112,7 +122,6 @@ class Exercise:
     source: str
     draws: tuple[Draw, ...]
     asks: tuple[Ask, ...]
-    warnings: list[str] = field(default_factory=list)
 
     @property
     def keys(self) -> dict[str, str]:
@@ -336,6 +345,10 @@ class Answer:
     def turn(self) -> float:
         """A turn in the unit of an angle."""
         return 360.0 if unit_name(self.unit) == "deg" else tau
+
+    def distance(self, one: float, other: float) -> float:
+        """How far apart two values are; angles modulo a turn."""
+        return remainder(one - other, self.turn) if self.is_angle else one - other
 
 
 @dataclass(eq=False, repr=False)

@@ -21,20 +21,20 @@ FEEDBACKS = 30
 
 
 def moodle(
-    exercise: Exercise, students: Sequence[Student], variants: Sequence[Variant], drawings: Mapping[int, str],
-    slips: Mapping[int, list[Candidates]],
+    exercise: Exercise, students: Sequence[Student], variants: Sequence[Variant], drawings: Mapping[Variant, str],
+    slips: Mapping[Variant, list[Candidates]],
 ) -> bytes:  # fmt: skip
     """Return the file: for each question a category with one numerical question for each variant."""
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<quiz>"]
+    # a variant is named after the first student who has it
+    first: dict[Variant, Student] = {}
+    for student, variant in zip(students, variants, strict=True):
+        first.setdefault(variant, student)
     for k, ask in enumerate(exercise.asks):
         lines += _category(f"{exercise.title}/{k + 1} {label(ask)}", exercise)
-        done: set[int] = set()
-        for student, variant in zip(students, variants, strict=True):
-            if id(variant) in done:
-                continue
-            done.add(id(variant))
+        for variant, student in first.items():
             name = f"{exercise.title}: {label(ask)}" + (f" ({student.name})" if exercise.draws else "")
-            lines += _moodle_question(name, variant, slips[id(variant)][k], drawings[id(variant)])
+            lines += _moodle_question(name, variant, slips[variant][k], drawings[variant])
     return "\n".join([*lines, "</quiz>", ""]).encode()
 
 
@@ -185,15 +185,13 @@ def grade(data):
 def prairielearn(
     exercise: Exercise,
     variants: Sequence[Variant],
-    drawings: Mapping[int, str],
-    slips: Mapping[int, list[Candidates]],
+    drawings: Mapping[Variant, str],
+    slips: Mapping[Variant, list[Candidates]],
 ) -> dict[str, bytes]:
     """Return the files of the question by their paths: prairielearn/NAME/…"""
     name = re.sub(r"\W+", "-", exercise.title.lower()).strip("-") or "exercise"
     folder = f"prairielearn/{name}"
-    every = [
-        _variant(variant, slips[id(variant)], drawings[id(variant)]) for variant in dict.fromkeys(variants)
-    ]
+    every = [_variant(variant, slips[variant], drawings[variant]) for variant in dict.fromkeys(variants)]
     identity = json.dumps([exercise.title, exercise.command, exercise.text], ensure_ascii=False)
     info = {
         "uuid": str(uuid5(NAMESPACE_URL, identity)),
@@ -275,13 +273,13 @@ STYLES = ["plain", "en", "si-en", "plain-eu", "eu", "si-fr"]
 def numbas(
     exercise: Exercise,
     variants: Sequence[Variant],
-    drawings: Mapping[int, str],
-    slips: Mapping[int, list[Candidates]],
+    drawings: Mapping[Variant, str],
+    slips: Mapping[Variant, list[Candidates]],
 ) -> dict[str, bytes]:
     """Return the file."""
     every = list(dict.fromkeys(variants))
     questions = [
-        _numbas_question(f"{exercise.title} ({k})", variant, slips[id(variant)], drawings[id(variant)])
+        _numbas_question(f"{exercise.title} ({k})", variant, slips[variant], drawings[variant])
         for k, variant in enumerate(every, 1)
     ]
     group = {

@@ -20,7 +20,7 @@ from cli.exercise.slips_of_sums import Load, is_sum, loads, of_ledger, of_loads,
 from cli.exercise.solving import Problem
 from cli.exercise.variants import Variant
 from dalembert.errors import DataError
-from dalembert.units import G0, parted, unit_name
+from dalembert.units import G0, unit_name
 
 MOST = 160
 """The largest number of slips that are tried."""
@@ -36,7 +36,6 @@ RANGES = ("--over", "--time", "--cases")
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*")
 ANGLE = re.compile(r"(?<![\w.])([-+]?\d+\.?\d*)deg\b")
 SPEED = re.compile(r"(?<![\w.])([-+]?\d+\.?\d*)rpm\b")
-RESULTS = ("kg_m2_s", "J", "W", "rad_s3", "m_s3")
 
 
 class Edit(NamedTuple):
@@ -143,7 +142,7 @@ class Recomputed:
     def _siblings(self, k: int) -> Iterator[Slip]:
         """The other component of a vector: sine for cosine."""
         answer = self.variant.answers[k]
-        name, unit = parted(answer.ask.quantity, further=RESULTS)
+        name, unit = answer.ask.parted
         match = re.fullmatch(r"(.*(?:^|_)[vaf]?)([xy])", name)
         if match is None:
             return

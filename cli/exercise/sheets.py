@@ -24,7 +24,6 @@ from dalembert.figures import written
 from dalembert.results.columns import Table, names
 from dalembert.tables.files import is_input
 from dalembert.tables.table import read
-from dalembert.units import parted
 from dalembert.units import written as unit_written
 
 STYLE = """
@@ -44,6 +43,9 @@ section + section { break-before: page }
 @media (max-width: 480px) { table { font-size: 9pt } th, td { padding: .6mm .8mm } .blank { width: auto; min-width: 13mm } }
 @page { size: A4; margin: 14mm 13mm } @media print { body { margin: 0; padding: 0; max-width: none } .wide { overflow: visible } }
 """
+
+FORMULA = re.compile(r"\$[^$]+\$|\\\(.*?\\\)|\\\[.*?\\\]", re.DOTALL)
+"""A formula of TeX, whose braces are its own."""
 
 
 @dataclass(frozen=True)
@@ -84,16 +86,19 @@ def filled(workshop: Workshop, drawn: Mapping[str, Value], form: Callable[[str],
         A name that is no datum of the exercise.
     """
     exercise = workshop.exercise
+    formulas = [match.span() for match in FORMULA.finditer(exercise.text)]
 
     def put(match: re.Match[str]) -> str:
         name = match[1].strip()
         value = workshop.datum(name, drawn)
-        if value is None:
-            raise DataError(
-                f"{exercise.file}: key text: found {quote('{' + name + '}')}, expected a name of [draw], a dimension of the "
-                "mechanism or a table's cell such as {rotor.csv:W1.mass_kg} that holds a number"
-            )
-        return form(spoken(value))
+        if value is not None:
+            return form(spoken(value))
+        if any(start < match.start() < end for start, end in formulas):
+            return match[0]
+        raise DataError(
+            f"{exercise.file}: key text: found {quote('{' + name + '}')}, expected a name of [draw], a dimension of the "
+            "mechanism or a table's cell such as {rotor.csv:W1.mass_kg} that holds a number"
+        )
 
     return re.sub(r"\{([^{}\n]+)\}", put, exercise.text)
 
@@ -110,7 +115,7 @@ def label(ask: Ask) -> str:
     """Return what a question asks for, in words."""
     if ask.label:
         return ask.label
-    name = parted(ask.quantity, further=("kg_m2_s", "J", "W", "rad_s3", "m_s3"))[0].replace("_", " ")
+    name = ask.name.replace("_", " ")
     where = ", ".join(
         f"{key.removesuffix('_deg')} {text}{'°' if key.endswith('_deg') else ''}"
         for key, text in ask.where.items()
@@ -275,16 +280,18 @@ dl { display: grid; grid-template-columns: fit-content(40%) 1fr; gap: 0 4mm } td
 
 
 def solutions(
-    exercise: Exercise, students: Sequence[Student], variants: Sequence[Variant], drawings: Mapping[int, str]
+    exercise: Exercise,
+    students: Sequence[Student],
+    variants: Sequence[Variant],
+    drawings: Mapping[Variant, str],
 ) -> bytes:
     """Return the page; students with the same numbers share a solution."""
     parts = [f"<h1>{html.escape(exercise.title)}: solutions</h1>\n"]
-    shared: dict[int, list[str]] = {}
+    shared: dict[Variant, list[str]] = {}
     for student, variant in zip(students, variants, strict=True):
-        shared.setdefault(id(variant), []).append(student.name)
-    by_id = {id(variant): variant for variant in variants}
-    for key, who in shared.items():
-        parts += ["<section>\n", *_solution(by_id[key], who, drawings[key]), "</section>\n"]
+        shared.setdefault(variant, []).append(student.name)
+    for variant, who in shared.items():
+        parts += ["<section>\n", *_solution(variant, who, drawings[variant]), "</section>\n"]
     return page(f"{exercise.title}: solutions", "".join(parts), SOLUTION_STYLE)
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import cached_property
-from math import isfinite, pi, remainder
+from math import isfinite, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,7 +101,7 @@ class Candidates:
                 continue
             exact = Decimal(slip.value)
             if self.right.verdict(Typed(exact)) == "right" or (
-                self.answer.is_angle and self._off(slip.value) < 1e-9
+                self.answer.is_angle and abs(self.answer.distance(slip.value, self.answer.value)) < 1e-9
             ):
                 continue
             key = f"{slip.value:.9g}"
@@ -109,15 +109,6 @@ class Candidates:
                 seen.add(key)
                 likely.append(slip)
         return likely
-
-    def _off(self, value: float) -> float:
-        return abs(self.distance(value, self.answer.value))
-
-    def distance(self, value: float, other: float) -> float:
-        """How far apart two values are; angles modulo a turn."""
-        if not self.answer.is_angle:
-            return value - other
-        return remainder(value - other, self.answer.turn)
 
     def name(self, number: Typed, scale: float = 1.0) -> str | None:
         """Return the likely mistake behind a wrong answer; None where no slip reproduces it.
@@ -135,7 +126,7 @@ class Candidates:
             most = max(float(self.right.unit), own) / 2 * (1 + 1e-9)
             halves = [float(half) * size for half in number.half_units]
             halves = [half for half in halves if half <= most] or halves[:1]
-        near = [(abs(self.distance(slip.value, a)), k) for k, slip in enumerate(self.wrong)]
+        near = [(abs(self.answer.distance(slip.value, a)), k) for k, slip in enumerate(self.wrong)]
         for half in halves:
             hits = [k for off, k in near if off <= half * (1 + 1e-9)]
             if hits:

@@ -15,7 +15,6 @@ from cli.exercise.description import Answer
 from cli.exercise.slips import GRAVITIES, Candidates, Change, Slip, finals, of_sum, other_gravities
 from cli.exercise.variants import Variant
 from dalembert.angles import degrees
-from dalembert.units import parted
 
 Complexes = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -107,7 +106,7 @@ KINDS = ("mass", "weight", "unbalance", "angle")
 
 def kind_of(answer: Answer) -> str:
     """What a question asks of a correction: mass, weight, unbalance, angle; empty for anything else."""
-    name = parted(answer.ask.quantity)[0].lower()
+    name = answer.ask.name.lower()
     return name if name in KINDS else ""
 
 

@@ -13,7 +13,6 @@ from cli.exercise.slips import Change, Pairs, Slip, of_sum, other_gravities
 from cli.exercise.solving import Problem
 from cli.exercise.variants import Variant
 from dalembert.results.way import figures
-from dalembert.units import parted
 
 AXES = "xyz"
 PARTS = {
@@ -66,7 +65,7 @@ def _part_changes(k: int, part: Part) -> Iterator[Change]:
 
 def _parts(variant: Variant, answer: Answer) -> Sequence[Part]:
     command = variant.problem.exercise.command[0]
-    name = parted(answer.ask.quantity, further=("kg_m2_s", "J"))[0]
+    name = answer.ask.name
     if command in ("mechanism", "forces"):
         return _of_point(variant, name, answer.ask.where)
     if command == "body" and answer.ask.where.get("axis", "x") in AXES:
@@ -202,7 +201,7 @@ def of_loads(
 
 def is_sum(answer: Answer) -> bool:
     """Whether an answer is a sum over the loads."""
-    return LINEAR.search(parted(answer.ask.quantity)[0]) is not None
+    return LINEAR.search(answer.ask.name) is not None
 
 
 def _load_changes(k: int, load: Load, number: int) -> Iterator[Change]:

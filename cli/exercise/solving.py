@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cli.exercise.data import DataTable, converted
-from cli.exercise.description import Exercise, Solved, Value, cell_of, value_of
+from cli.exercise.description import Draw, Exercise, Solved, Value, cell_of, value_of
 from cli.read.options import components
 from cli.show.output import result_of
 from dalembert.errors import DataError, quote
@@ -97,7 +97,7 @@ class Workshop:
         for draw in self.exercise.draws:
             where = f"{place}: [draw], {draw.name}"
             if draw.cell is not None:
-                self._check_cell(where, draw.cell, draw.values)
+                self._check_cell(where, draw, draw.cell)
                 continue
             if draw.name in placeholders:
                 continue
@@ -114,7 +114,7 @@ class Workshop:
         for name in sorted(placeholders - {draw.name for draw in self.exercise.draws}):
             raise DataError(f"{place}: key command: found {{{name}}}, expected a name of [draw]")
 
-    def _check_cell(self, where: str, cell: tuple[str, str, str], values: Sequence[Value]) -> None:
+    def _check_cell(self, where: str, draw: Draw, cell: tuple[str, str, str]) -> None:
         file, row, column = cell
         if file not in self.tables:
             raise DataError(
@@ -126,18 +126,32 @@ class Workshop:
             raise DataError(
                 f"{where}: no row {quote(row)} in {file}: expected one of {', '.join(table.names)}"
             )
-        place = table.column(column)
-        if place is None:
+        if table.column(column) is None:
             raise DataError(
                 f"{where}: no column {quote(column)} in {file}: expected one of {', '.join(table.header)}"
                 f"{nearest(column, table.header)}"
             )
-        unit = table.quantity(place)[1]
-        for value in values:
-            if value.unit and converted(value, unit) is None:
-                raise DataError(
-                    f"{where}: found {quote(str(value))}, expected a value in the unit of the column {column}"
-                )
+        for value in draw.values:
+            self.entered(draw.name, value)
+
+    def entered(self, name: str, value: Value) -> tuple[str, int, int, str]:
+        """Return file, row and column of a drawn value's cell, and its text.
+
+        Raises
+        ------
+        DataError
+            A unit that is not the column's.
+        """
+        place = self.cell(name)
+        assert place is not None
+        file, row, column = place
+        text = converted(value, self.table(file).quantity(column)[1])
+        if text is None:
+            raise DataError(
+                f"{self.exercise.file}: [draw], {name}: found {quote(str(value))}, expected a value in the unit of the column "
+                f"{self.table(file).header[column]}"
+            )
+        return file, row, column, text
 
     def _check_unit(self, where: str, values: Sequence[Value], kind: str) -> None:
         from dalembert.quantities import expected, number_in_si
@@ -246,11 +260,8 @@ class Problem:
         shop = self.workshop
         cells: dict[str, dict[tuple[int, int], str]] = {name: {} for name in shop.tables}
         for name, value in self.drawn.items():
-            place = shop.cell(name)
-            if place is not None:
-                file, row, column = place
-                text = converted(value, shop.table(file).quantity(column)[1])
-                assert text is not None
+            if shop.cell(name) is not None:
+                file, row, column, text = shop.entered(name, value)
                 cells[file][row, column] = text
         for (file, row, column), text in self.cells.items():
             cells[file][row, column] = text

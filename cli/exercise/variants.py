@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import cached_property
-from math import isfinite, prod, remainder, tau
+from math import isfinite, prod, tau
 from random import Random
 from typing import Any
 
@@ -189,7 +189,7 @@ def _growth(workshop: Workshop, drawn: Mapping[str, Value], answers: Sequence[An
 def change(answer: Answer, other: Answer) -> float:
     """The share of itself by which an answer changes; an angle in radians, modulo a turn."""
     if answer.is_angle:
-        return abs(remainder(other.value - answer.value, answer.turn)) * tau / answer.turn
+        return abs(answer.distance(other.value, answer.value)) * tau / answer.turn
     size = abs(answer.value)
     off = abs(other.value - answer.value)
     return off / size if size and isfinite(off) else float("inf")

@@ -289,7 +289,8 @@ def _motors(analysis: Analysis) -> list[Topic]:
             continue
         link, whole = m.links[motor.carrier], m.rigid[motor.carrier]
         j = next((j for j, e in enumerate(m.inputs) if e.link == motor.drives), None)
-        torque = [None if j is None else finite(float(v)) for v in _effort(analysis, j)]
+        effort = analysis.motions[0].dynamics.effort
+        torque = [] if j is None else [finite(value) for value in effort[:, j].tolist()]
         text = [
             f"m′ = {figures(link.mass)} + {figures(motor.mass)} = {figures(whole.mass)} kg",
             f"r_G′ = (m·r_G + m_M·r_M)/m′ = ({figures(link.mass)}·{_vector_of(link.center)} + "
@@ -311,14 +312,6 @@ def _motors(analysis: Analysis) -> list[Topic]:
         title = f"Link {motor.carrier} with the motor of {motor.drives} (Ibrahim §2.3)"
         motors.append(Topic("motor", text, title, head))
     return motors
-
-
-def _effort(analysis: Analysis, j: int | None) -> list[float]:
-    motion = analysis.motions[0]
-    if j is None:
-        return []
-    values: list[float] = motion.dynamics.effort[:, j].tolist()
-    return values
 
 
 def _vector_of(z: complex) -> str:

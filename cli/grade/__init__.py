@@ -49,5 +49,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
         companions=["totals"],
         notes=lambda: f"{exercise.title}: {several(len(students), 'student')}, {points:g} of {of:g} points",
         method=METHOD,
+        # the marks hold the answers; the tables of each student's numbers are gone with the workshop
+        shows_input=True,
         about={"title": f"Marks: {exercise.title}"},
     )

@@ -4,32 +4,32 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
-from math import remainder
 
 import numpy as np
 
-from cli.exercise.description import Answer
 from cli.exercise.recomputed import Recomputed
 from cli.exercise.slips_of_rotors import Range, carried, polar_range
 from cli.exercise.slips_of_sums import WRONG, is_sum, way_of
 from cli.exercise.variants import Variant
-from dalembert.units import parted
 
 Typed = Mapping[int, tuple[float, float]]
 """Of earlier questions by their number: the value typed, in the unit asked for, and half a unit of its last digit."""
 ENOUGH = 3
 """From so many slips on that change both answers in proportion, the one follows from the other."""
 AXES = "xyz"
-FURTHER = ("kg_m2_s", "J", "W")
 
 
+@dataclass(eq=False, repr=False)
 class Follows:
     """What follows from earlier answers of a variant, by relations of its command and by its runs with slips."""
 
-    def __init__(self, variant: Variant, runs: Recomputed) -> None:
-        self.variant, self.runs = variant, runs
+    variant: Variant
+    runs: Recomputed
+    shares: dict[tuple[int, int], float | None] = field(default_factory=dict)
+    """The ratios of two answers."""
 
     def ranges(self, k: int, typed: Typed, wrong: frozenset[int]) -> Iterator[Range]:
         """Yield the ranges of an answer that would follow from earlier ones; `wrong`: those that are not right."""
@@ -72,31 +72,22 @@ class Follows:
         ]
 
     def _near(self, k: int, slipped: float | None, value: float, half: float) -> bool:
-        return slipped is not None and abs(self._distance(k, slipped, value)) <= half * (1 + 1e-9)
-
-    def _distance(self, k: int, one: float, other: float) -> float:
         answer = self.variant.answers[k]
-        if not answer.is_angle:
-            return one - other
-        return remainder(one - other, answer.turn)
+        return slipped is not None and abs(answer.distance(slipped, value)) <= half * (1 + 1e-9)
 
     def _vector(self, k: int) -> tuple[str, str]:
         """What the number is a part of: size and angle, or the components, are one answer."""
         ask = self.variant.answers[k].ask
-        name = parted(ask.quantity, further=FURTHER)[0].lower()
+        name = ask.name.lower()
         name = re.sub(r"(mass|weight|unbalance|amplitude|magnitude|angle|phase)$", "", name)
         where = {key: text for key, text in ask.where.items() if key != "axis"}
         return re.sub(r"(?<=[_vaf])[xyz]$", "", name), str(sorted(where.items()))
 
-    @cached_property
-    def _shares(self) -> dict[tuple[int, int], float | None]:
-        return {}
-
     def _share(self, j: int, k: int) -> float | None:
         """The ratio of two answers, where all slips that change the first change both in proportion."""
-        if (j, k) not in self._shares:
-            self._shares[j, k] = self._proportion(j, k)
-        return self._shares[j, k]
+        if (j, k) not in self.shares:
+            self.shares[j, k] = self._proportion(j, k)
+        return self.shares[j, k]
 
     def _proportion(self, j: int, k: int) -> float | None:
         one, other = self.variant.answers[j], self.variant.answers[k]
@@ -132,22 +123,18 @@ def _linear(
     return middle - spread, middle + spread
 
 
-def _name(answer: Answer) -> str:
-    return parted(answer.ask.quantity, further=FURTHER)[0]
-
-
 def _efforts(variant: Variant, k: int, typed: Typed, wrong: frozenset[int]) -> Range | None:
     """The effort of a link takes up that of each link driven against it: a motor pushes back on its carrier."""
     inputs = variant.problem.workshop.described.mechanism.inputs
     suffix = "_input_torque"
-    name = _name(variant.answers[k])
+    name = variant.answers[k].ask.name
     if not name.endswith(suffix):
         return None
     driven = {f"{each.link}{suffix}" for each in inputs if each.link and each.on == name.removesuffix(suffix)}
     shares = {
         j: 1.0
         for j in typed
-        if _name(variant.answers[j]) in driven
+        if variant.answers[j].ask.name in driven
         and variant.answers[j].unit == variant.answers[k].unit
         and variant.answers[j].ask.where == variant.answers[k].ask.where
     }
@@ -161,8 +148,8 @@ def _body(variant: Variant, k: int, typed: Typed, wrong: frozenset[int]) -> Rang
     if "rate of momentum" not in way:
         return None
     rate, omega = way["rate of momentum"], way["momentum"]["omega_rad_s"]
-    name, axis = _name(answer), answer.ask.where.get("axis", "x")
-    of = {(_name(variant.answers[j]), variant.answers[j].ask.where.get("axis", "x")): j for j in typed}
+    name, axis = answer.ask.name, answer.ask.where.get("axis", "x")
+    of = {(variant.answers[j].ask.name, variant.answers[j].ask.where.get("axis", "x")): j for j in typed}
     shares: dict[int, float] = {}
     if name in ("momentum_rate", "inertia_moment") and axis in AXES:
         at = AXES.index(axis)
@@ -194,7 +181,7 @@ def _body(variant: Variant, k: int, typed: Typed, wrong: frozenset[int]) -> Rang
 def _trim(variant: Variant, k: int, typed: Typed, wrong: frozenset[int]) -> Range | None:
     """The trim follows from the correction: it is the correction less the masses on the rotor."""
     answer = variant.answers[k]
-    match = re.fullmatch(r"trim_(mass|unbalance|angle)", _name(answer))
+    match = re.fullmatch(r"trim_(mass|unbalance|angle)", answer.ask.name)
     if match is None:
         return None
     right, correction = _vector(variant, k, "trim_"), _vector(variant, k, "")
@@ -207,9 +194,9 @@ def _trim(variant: Variant, k: int, typed: Typed, wrong: frozenset[int]) -> Rang
         if its.ask.where != answer.ask.where:
             continue
         ends = [value + share * half for share in (-1.0, 0.0, 1.0)]
-        if _name(its) in ("mass", "unbalance"):
+        if its.ask.name in ("mass", "unbalance"):
             sizes, there = [end * abs(correction) / its.value for end in ends], there or j in wrong
-        elif _name(its) == "angle":
+        elif its.ask.name == "angle":
             turns, there = [end * 2 * np.pi / its.turn for end in ends], there or j in wrong
     if not there:
         return None

@@ -144,7 +144,7 @@ class Judge:
             right = Right(middle, answer.ask.figures)
             # what the earlier answers' own rounding leaves open, and that of this one
             room = spread * (1 + 1e-9) + max(reading.half, float(right.unit) / 2)
-            if abs(self.slips[k].distance(reading.value, middle)) <= room:
+            if abs(answer.distance(reading.value, middle)) <= room:
                 return True
         return self._follows_from.same_slip(k, reading.value, reading.half, typed, wrong)
 
@@ -237,13 +237,13 @@ def marks_table(exercise: Exercise, students: Sequence[Student], marks: Sequence
 
 def totals(exercise: Exercise, students: Sequence[Student], marks: Sequence[Mark]) -> Table:
     """A row for each student."""
-    sums = {id(student): Fraction(0) for student in students}
+    sums = dict.fromkeys(students, Fraction(0))
     for mark in marks:
-        sums[id(mark.student)] += Fraction(mark.points)
+        sums[mark.student] += Fraction(mark.points)
     columns = [
         names("student", [student.name for student in students]),
         *(names(other, [student.others.get(other) for student in students]) for other in _others(students)),
-        names("points", [float(sums[id(student)]) for student in students]),
+        names("points", [float(sums[student]) for student in students]),
         names("of", [float(exercise.points)] * len(students)),
     ]
     return Table(columns, ["student"], "totals[]")

@@ -43,8 +43,14 @@ class _Expected:
 
     header: str
     column: str
+    unit: str
     cells: list[str]
     convert: Callable[[float], float]
+
+    @property
+    def turn(self) -> float:
+        """A turn in the unit of the result's column; 0 where it is no angle."""
+        return {"deg": 360.0, "rad": math.tau}.get(self.unit, 0.0)
 
 
 def compare(table: Table, file: str, rtol: float, others: Sequence[Callable[[], Table]] = ()) -> Comparison:
@@ -133,7 +139,8 @@ def _columns(read_table: ReadTable, table: Table, file: str) -> tuple[list[_Expe
             aside.append(header)
             continue
         column, unit = partner
-        compared.append(_Expected(header, column, cells, _conversion(unit, by_header[column].unit)))
+        own = by_header[column].unit
+        compared.append(_Expected(header, column, own, cells, _conversion(unit, own)))
     if not compared:
         raise DataError(f"{file}: no column of the result: expected some of {', '.join(by_header)}")
     return compared, aside
@@ -236,9 +243,9 @@ def _nearest(c: _Expected, column: Values, rows: list[int], wanted: str, rtol: f
     except ValueError:
         return []
     away = np.array([column[row] for row in rows], dtype=float) - number
-    if c.column.endswith("_deg"):  # first the same angle, and of 0° and 360° the one that is meant
-        turned = np.abs(np.radians(np.remainder(away + 180.0, 360.0) - 180.0))
-        limit = max(rtol, math.radians(_half_unit(wanted)))
+    if c.turn:  # first the same angle, and of 0° and 360° the one that is meant
+        turned = np.abs(np.remainder(away + c.turn / 2, c.turn) - c.turn / 2) * (math.tau / c.turn)
+        limit = max(rtol, abs(c.convert(_half_unit(wanted))) * (math.tau / c.turn))
         best = turned <= min(limit, turned.min(initial=np.inf) + 1e-12)
     else:
         most = max(abs(number), np.abs(away).max(initial=0.0))
@@ -270,10 +277,8 @@ def _error(c: _Expected, value: Cell, wanted: str, column: Values) -> tuple[Cell
         return wanted, math.inf
     if value is None or value != value:
         return number, math.inf
-    if c.column.endswith("_deg"):
-        return number, abs(math.radians(math.remainder(value - number, 360.0)))
-    if c.column.endswith("angle_rad"):
-        return number, abs(math.remainder(value - number, math.tau))
+    if c.turn:
+        return number, abs(math.remainder(value - number, c.turn)) * (math.tau / c.turn)
     scale = abs(number) or max(
         (abs(other) for other in column if other is not None and not isinstance(other, str)), default=0.0
     )

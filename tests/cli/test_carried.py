@@ -231,3 +231,17 @@ def test_from_a_load_to_the_joint(
     marks = json.loads(dalembert("grade", "e.toml", "a.csv", "--json").stdout)["marks"]
     for mark, mistake in zip(marks, mistakes, strict=True):
         assert mistake in (mark["mistake"] or ""), mark
+
+
+def test_of_several_rotors_each_has_its_own_answers(dalembert: Any, tmp_path: Path) -> None:
+    """m = 2 kg·30 mm/20 mm = 3 kg of the first rotor, 6 kg of the second: 7.123 kg there are 142.46 kg·mm."""
+    (tmp_path / "r.csv").write_text("rotor,mass_kg,radius_mm,angle_deg\n1,2,30,0\n2,4,30,0\n")
+    command = "balance r.csv --plane P:20mm --gravity 10"
+    unbalance = "unbalance_g_mm@rotor"
+    questions = ("mass_kg@rotor=1", "mass_kg@rotor=2", f"{unbalance}=2", f"{unbalance}=1")
+    assert grade(dalembert, tmp_path, command, questions, (3, 7.123, 142460, 142460)) == [
+        "right", "wrong", "carried", "wrong",
+    ]  # fmt: skip
+    assert grade(dalembert, tmp_path, command, questions, (3.456, 6, 120000, 69120)) == [
+        "wrong", "right", "right", "carried",
+    ]  # fmt: skip

@@ -350,6 +350,18 @@ def test_a_zero_that_computing_has_moved_is_zero(dalembert: Dalembert, tmp_path:
     assert [mark["verdict"] for mark in json.loads(done.stdout)["marks"]] == ["right"]
 
 
+def test_braces_of_a_formula_are_its_own(dalembert: Dalembert, folder: Path) -> None:
+    text = r"U = $\\frac{m}{2}$ of {rotor.csv:W1.weight_N}, \\(x^{2}\\) < 3 & 4"
+    (folder / "e.toml").write_text(re.sub('text = ".*"', lambda _: f'text = "{text}"', EXERCISE))
+    done = dalembert("exercise", "e.toml", "-o", "out")
+    assert done.returncode == 0, done.stderr
+    weight = rows(folder / "out" / "key.csv")[0]["rotor.csv:W1.weight_N"]
+    quiz = ET.parse(folder / "out" / "moodle.xml").getroot()
+    for page in ((folder / "out" / "sheet-1.html").read_text(), quiz.findtext("question/questiontext/text")):
+        assert page is not None
+        assert rf"U = $\frac{{m}}{{2}}$ of {weight}, \(x^{{2}}\) &lt; 3 &amp; 4" in page
+
+
 def test_a_row_of_the_table_that_is_too_short(dalembert: Dalembert, folder: Path) -> None:
     (folder / "rotor.csv").write_text(ROTOR.replace("W2,60,50,210,65", "W2,60,50"))
     done = dalembert("exercise", "e.toml", "-o", "out")
@@ -362,6 +374,7 @@ def test_wrong_usage_is_status_2(dalembert: Dalembert, folder: Path) -> None:
     assert dalembert("exercise", "e.toml").returncode == 2
     assert dalembert("exercise", "e.toml", "--students", "0", "-o", "out").returncode == 2
     assert dalembert("exercise", "e.toml", "--students", "2.5", "-o", "out").returncode == 2
+    assert dalembert("exercise", "e.toml", "-o", "").returncode == 2
     assert not (folder / "out").exists()
 
 

@@ -256,3 +256,20 @@ def test_an_answer_in_its_own_unit_counts_as_in_the_other(dalembert: Dalembert, 
 def test_units_as_people_spell_them(unit: str, question: str, scale: float | None) -> None:
     found = scale_of(unit, question)
     assert (None if found is None else float(found)) == scale
+
+
+def test_a_report_of_the_marks(dalembert: Dalembert, rotor: Path) -> None:
+    done = dalembert("grade", "e.toml", "out/key.csv", "--report", "marks.html")
+    assert done.returncode == 0, done.stderr
+    text = (rotor / "marks.html").read_text()
+    assert "Marks: A rotor" in text
+    assert text.count("right") > 5
+
+
+def test_numbers_in_another_unit_than_the_column(dalembert: Dalembert, rotor: Path) -> None:
+    path = rotor / "out" / "key.csv"
+    path.write_text(path.read_text().replace(" N,", " kg,"))
+    done = dalembert("grade", "e.toml", "out/key.csv")
+    assert done.returncode == 1
+    assert "[draw], rotor.csv:W1.weight_N: found '" in done.stderr
+    assert "expected a value in the unit of the column weight_N (student 1: " in done.stderr

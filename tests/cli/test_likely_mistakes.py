@@ -151,7 +151,7 @@ def share_named(questions: list[Candidates], count: int, seed: int) -> tuple[flo
         if (
             answer is None
             or own.right.verdict(answer) != "wrong"
-            or (own.answer.is_angle and abs(own.distance(slip.value, own.answer.value)) < 0.06)
+            or (own.answer.is_angle and abs(own.answer.distance(slip.value, own.answer.value)) < 0.06)
         ):
             continue
         slipped += 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from benchmarks.stress.topologies import generate, regularity
 from benchmarks.truth.mechanism import Exact
 from virtualwork import Belt, Guess, Guide, Input, Link, Mechanism, Rack
+from virtualwork.study.free_bodies import free_bodies
 
 
 def thrown(rng: np.random.Generator) -> Mechanism:
@@ -155,3 +157,28 @@ def test_an_exact_guess_is_obeyed_where_a_rack_turns_a_link_that_carries_a_slide
     for name in m.links:
         apart = math.remainder(float(motion.link(name).angle[0]) - built.angles[name], 2 * math.pi)
         assert abs(apart) < 1e-9
+
+
+def closes(m: Mechanism) -> float:
+    """The largest share of what acts on a link that ΣF and ΣM leave."""
+    worst = 0.0
+    for body in free_bodies(m.motion().dynamics):
+        force, moment = body.resultant()
+        size = sum(np.abs(f.force) for f in body.forces)
+        arms = sum(np.abs(f.force) * np.abs(f.at - body.center) for f in body.forces)
+        arms = arms + sum(np.abs(t.torque) for t in body.torques)
+        for rest, scale in ((force, size), (moment, arms + size * m.size)):
+            worst = max(worst, float(np.max(np.abs(rest) / np.where(scale == 0, 1, scale))))
+    return worst
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_every_link_of_random_racks_is_in_equilibrium(seed: int) -> None:
+    """The tooth force acts at the pitch point of the wheel."""
+    m = thrown(np.random.default_rng(seed))
+    assert closes(m) < 1e-9
+
+
+@pytest.mark.parametrize("file", ["belt-drive/belt-drive", "rack-lift/rack-lift", "planetary-gear/planetary"])
+def test_every_link_of_gears_and_belts_is_in_equilibrium(file: str) -> None:
+    assert closes(Mechanism.from_toml(str(files("cli.examples") / f"{file}.toml"))) < 1e-9

@@ -127,6 +127,16 @@ class Contact(Force, kind="contact"):
         return forces.contact(self.cam)
 
 
+class MeshForce(Force, kind="mesh"):
+    """The torque of a gear or a belt, N·m, which turns each link by its share; the tooth force of a rack, N, on the guide's link."""
+
+    is_joint_force = True
+    mesh: int
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.mesh(self.mesh)
+
+
 class Shaking(Force, kind="shaking"):
     """The shaking force on the ground, N."""
 

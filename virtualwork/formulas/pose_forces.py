@@ -177,6 +177,15 @@ class PoseForces:
         push = self._bears("contact", str(cam)) if self.redundant else None
         return self.joints.contact(self.pose, cam, push)
 
+    def mesh(self, mesh: int) -> Number:
+        self.solve_places()
+        if self.redundant:
+            return self._bears(*mesh_column(self.mechanism, mesh))
+        of = self.mechanism.meshes[mesh]
+        if of.guide is not None:
+            return self.joints.tooth(self.pose, mesh)
+        return self.paths.value(self.pose, self.paths.couple(of.kind, mesh))
+
     # --- redundant statics ------------------------------------------------------------------------------------------
     @cached_property
     def unknowns(self) -> list[Column]:

@@ -192,6 +192,8 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
         ):
             if body != GROUND:
                 result[body].forces.append(Force(f"N: {other}", "contact force", at, sign * force))
+    for number in range(len(m.meshes)):
+        _mesh(dynamics, number, result)
     for j, entry in enumerate(m.inputs):
         if not entry.is_slide:
             for body, sign in ((str(entry.link), 1.0), (m.carrier(j), -1.0)):
@@ -210,6 +212,28 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
                     Force("F" if sign > 0 else "−F", "drive", at, sign * effort[:, j] * rail)
                 )
     return list(result.values())
+
+
+def _mesh(dynamics: Dynamics, number: int, result: dict[str, FreeBody]) -> None:
+    """Add what a gear or a belt turns each of its links by, or a rack's tooth force at the pitch point of its wheel."""
+    m, of = dynamics.poses.mechanism, dynamics.reactions
+    mesh, force = m.meshes[number], dynamics.mesh(number)
+    pin = None if mesh.guide is None else of.meshing(number)
+    if mesh.guide is None or mesh.rack is None or pin is None:
+        for body, share in mesh.torques.items():
+            if body != GROUND:
+                result[body].torques.append(Torque(mesh.kind, f"{mesh.kind} torque", share * force))
+        return
+    g = m.guides[mesh.guide]
+    (rail,) = dynamics.scene.over([partial(of.rail, guide=mesh.guide)], complex)
+    # the wheel turns on the body of the guide, or rolls along it
+    ends, axis = (g.link, g.on), _block(dynamics, mesh.guide)
+    if pin:
+        ends, axis = (g.link, mesh.wheel), dynamics.poses.point(mesh.wheel, 0j, 0, pin)
+    at = axis + (-1j if pin else 1j) * mesh.rack.radius * rail
+    for body, sign in zip(ends, (1.0, -1.0), strict=True):
+        if body != GROUND:
+            result[body].forces.append(Force("teeth", "tooth force", at, sign * force * rail))
 
 
 def _normal(pose: LoadedPose, touch: Touch) -> Number:
