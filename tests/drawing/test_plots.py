@@ -22,7 +22,8 @@ ON = np.array([[0], [1], [1j], [-1]])
 FIT = joint_fit(5 + 2 * ON + 0.1 * np.array([[1], [-1], [0], [1]]), ON)
 ROD = Body.of("rod", 4.0, length=1.0).turned([[0.5, 0, np.sqrt(0.75)], [0, 1, 0], [-np.sqrt(0.75), 0, 0.5]])
 PARTS = Body.of("cylinder", [3.0, -0.5], [[0, 0, 0.1], [0.03, 0, 0.1]], radius=[0.1, 0.02], length=0.2)
-KLANN = Mechanism.from_toml(str(files("cli") / "examples/klann/klann.toml"))
+KLANN_TOML = (files("cli") / "examples/klann/klann.toml").read_text()
+KLANN = Mechanism.from_toml_text(KLANN_TOML)
 ENGINE = Mechanism.from_toml(str(files("cli") / "examples/engine/engine.toml"))
 PENDULUM = Mechanism.from_toml(str(files("cli") / "examples/double-pendulum/double-pendulum.toml"))
 SLIDER_CRANK = LinkStates(
@@ -199,6 +200,28 @@ def test_noise_is_drawn_as_zero() -> None:
     for found in plot_quantities(motion.poses, ["coupler.omega", "coupler.alpha"]):
         axes = motion.plot_curves(found.name, figure=Figure())[0]
         assert not np.any(axes.lines[0].get_ydata())
+
+
+def test_what_is_zero_everywhere_has_one_number_on_its_axis() -> None:
+    """A shaft on its own axis loads no bearing, a leg without masses no joint: a scale about zero would be made up."""
+    balanced = Shaft(Body.of("cylinder", 1.0, radius=0.05, length=0.1), (-0.1, 0.1), 60.0).plot(
+        figure=Figure()
+    )
+    resting = KLANN.motion(SWEEP, speed=2.0).dynamics.plot(figure=Figure())
+    coupler = KLANN.motion(SWEEP, speed=0.0).plot_curves("coupler.omega", figure=Figure())
+    for axes in (*balanced[1], resting[0], resting[-1], *coupler):
+        assert list(axes.get_yticks()) == [0]
+
+
+def test_long_names_leave_room_for_their_curves() -> None:
+    name = "the crank of the machine in the second hall on the left"
+    text = KLANN_TOML.replace("[links.crank]", f'[links."{name}"]').replace('"crank"', f'"{name}"')
+    motion = Mechanism.from_toml_text(text).motion(SWEEP, speed=2.0)
+    figure = Figure()
+    (axes,) = motion.plot_curves(f"{name}.omega", "leg.omega", figure=figure)
+    figure.draw_without_rendering()
+    assert faults(figure) == []
+    assert axes.bbox.width > 0.4 * figure.bbox.width
 
 
 def test_parts_are_drawn_as_their_shapes_to_scale() -> None:

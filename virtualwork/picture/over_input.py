@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.drawing.amounts import prefixed, quiet
-from dalembert.drawing.curves import Curve, Ends, panel, spread
-from dalembert.drawing.sheet import plain, sheet
+from dalembert.drawing.curves import Curve, Ends, panel, shortened, spread
+from dalembert.drawing.sheet import plain, sheet, zero_alone
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.poses import Poses
@@ -109,8 +109,8 @@ def _input(poses: Poses) -> tuple[Reals, str]:
     entry = m.inputs[0]
     if entry.is_slide:
         factor, unit = prefixed(float(np.abs(poses.inputs).max(initial=0.0)), "m")
-        return poses.inputs[:, 0] * factor, f"position of {entry.name}, {unit}"
-    return np.degrees(poses.inputs[:, 0]), f"angle of {entry.name}, deg"
+        return poses.inputs[:, 0] * factor, f"position of {shortened(entry.name, 31)}, {unit}"
+    return np.degrees(poses.inputs[:, 0]), f"angle of {shortened(entry.name, 31)}, deg"
 
 
 def _name_input(axes: Axes, x: Reals, label: str) -> None:
@@ -163,8 +163,8 @@ def _hodograph(axes: Axes, shaking: Reals, largest: float) -> None:
     plain(axes)
     if size:
         axes.set_aspect("equal", adjustable="datalim")
+        axes.xaxis.set_major_locator(MaxNLocator(4))
     else:
-        axes.set(xlim=(-1, 1), ylim=(-1, 1))
-    axes.xaxis.set_major_locator(MaxNLocator(4))
+        zero_alone(axes, "xy")
     axes.set_xlabel(f"shaking force, x, {unit} (dot: first pose)")
     axes.set_ylabel(f"y, {unit}")
