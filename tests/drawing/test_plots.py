@@ -15,7 +15,6 @@ from matplotlib.projections.polar import PolarAxes
 from balancing import LogBalance, correct, joint_fit, least_squares, place
 from rigidbody3d import Body, FreeBody, Shaft, Top, compose, integrate
 from virtualwork import DescriptionError, LinkStates, Mechanism, UnitLoad, balance
-from virtualwork.picture.plot_quantities import plot_quantities
 
 MOMENT = np.array([9 * 0.030, 6 * 0.050]) * np.exp(1j * np.radians([60, 210]))
 ON = np.array([[0], [1], [1j], [-1]])
@@ -172,6 +171,17 @@ def test_the_drawing_is_to_scale() -> None:
     assert axes.get_aspect() == 1.0
 
 
+def test_curves_of_a_vector_and_of_an_effort() -> None:
+    """The way from A to H is the difference of both points; its angle goes on through whole turns as a link's does."""
+    motion = ENGINE.motion(SWEEP, speed=100.0, acceleration=0.0)
+    length, angle, torque = motion.plot_curves("B-A.length", "A-O.angle", "crank.torque", figure=Figure())
+    apart = np.hypot(*(motion.point("B").position - motion.point("A").position).T)
+    assert length.lines[0].get_ydata() == pytest.approx(apart, rel=1e-9)
+    assert angle.lines[0].get_ydata() == pytest.approx(np.degrees(SWEEP), abs=1e-9 * 720)
+    assert torque.get_ylabel().endswith("N·m")
+    assert torque.lines[0].get_ydata() == pytest.approx(motion.effort, abs=1e-9 * np.abs(motion.effort).max())
+
+
 @pytest.mark.parametrize("word", ["Q.x", "H.q", "leg.x", "H"])
 def test_a_bad_name_is_named(word: str) -> None:
     with pytest.raises(DescriptionError, match=word):
@@ -197,8 +207,8 @@ def test_noise_is_drawn_as_zero() -> None:
     """A parallelogram's coupler does not turn: what rounding leaves of its ω and α is zero in the picture."""
     bars = Mechanism.from_toml(str(files("cli") / "examples/parallelogram/parallelogram.toml"))
     motion = bars.motion(np.linspace(0, 4 * np.pi, 91))
-    for found in plot_quantities(motion.poses, ["coupler.omega", "coupler.alpha"]):
-        axes = motion.plot_curves(found.name, figure=Figure())[0]
+    for name in ("coupler.omega", "coupler.alpha"):
+        (axes,) = motion.plot_curves(name, figure=Figure())
         assert not np.any(axes.lines[0].get_ydata())
 
 
