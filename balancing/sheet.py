@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from balancing.tapes import measured, split
 from dalembert.angles import degrees
 from dalembert.arithmetic.engines.javascript import engine, written
-from dalembert.page import Page
+from dalembert.page import Page, spelled, units
 from dalembert.page import sheet as sheet_page
-from dalembert.page.typed import spelled, units
 from dalembert.units import to_si
 
 Real = NDArray[np.float64]

@@ -17,8 +17,7 @@ import numpy as np
 from dalembert.arithmetic.engines.javascript import engine, literal
 from dalembert.arithmetic.recorded import Number
 from dalembert.arithmetic.tape import Tape
-from dalembert.page import Page, Shown, packed
-from dalembert.page.typed import units
+from dalembert.page import Page, Shown, packed, units
 from virtualwork.animation import JointForce, Series, moving_page
 from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.guess import informed

@@ -50,10 +50,10 @@ class MotionViews:
         return on_paper(self.poses, points, figure)
 
     def plot_curves(self, *names: str, figure: FigureBase | None = None) -> NDArray[np.object_]:
-        """Draw `H.x`, `coupler.omega` … against the input, a panel for each unit; return their axes."""
+        """Draw `H.x`, `coupler.omega`, `crank.torque` … against the input, a panel for each unit; return their axes."""
         from virtualwork.picture.over_input import curves
 
-        return curves(self.poses, names, figure)
+        return curves(self.poses, names, lambda: self.dynamics, figure)
 
     def animate(self, forces: bool = False) -> Page:
         """Return a page that replays these poses: the mechanism with play, slider, curves and values.

@@ -13,7 +13,7 @@ from balancing.picture import MOST, KnownMasses, known_masses
 from cli.balance.rotors import DIMENSIONS, Balancing
 from cli.show.picture import blank
 from dalembert.errors import DataError
-from dalembert.page.typed import spelled, units
+from dalembert.page import spelled, units
 from dalembert.quantities import decimal_to_si
 from dalembert.units import UNITS, from_si, to_si
 

@@ -15,23 +15,15 @@ from dalembert.angles import read_degrees
 from dalembert.results.columns import Column, Table
 from dalembert.units import UNITS, from_si, written
 from virtualwork import MechanismError, quantities
-from virtualwork.formulas.kinematics import Angle
 from virtualwork.quantities import Component, links, points
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
     from cli.show.result import Bars
     from dalembert.page import Shown
     from virtualwork import Mechanism
     from virtualwork.animation import JointForce, Series
-    from virtualwork.picture.plot_quantities import PlotQuantity
-
-SHOWN = {
-    "m": "m", "m_s": "m/s", "m_s2": "m/s²", "m_s3": "m/s³", "deg": "deg", "rad_s": "rad/s", "rad_s2": "rad/s²",
-    "rad_s3": "rad/s³", "N": "N", "N_m": "N·m",
-}  # fmt: skip
 
 
 def is_by_quantity(analysis: Analysis) -> bool:
@@ -62,33 +54,13 @@ def forces_drawn(analysis: Analysis) -> Figure:
 
 def curves(analysis: Analysis) -> Figure:
     """Draw the requested quantities of the first assembly against the input."""
-    from virtualwork.picture.over_input import curves_of
+    from virtualwork.picture.over_input import curves_of, plot_quantity
 
     figure, motion = blank(), analysis.motions[0]
     components = [each for each in (*analysis.places, *analysis.forces) if each.key]
     values = solved(motion, keys_of(components))
-    curves_of(motion.poses, [_curve(analysis, each, values[each.key]) for each in components], figure)
+    curves_of(motion.poses, [plot_quantity(motion.poses, each, values) for each in components], figure)
     return figure
-
-
-def _curve(analysis: Analysis, each: Component, value: NDArray[np.generic]) -> PlotQuantity:
-    """Return the curve of a quantity, with the usual size of its kind."""
-    from virtualwork.picture.plot_quantities import PlotQuantity, pace, unwrapped
-
-    m, poses = analysis.mechanism, analysis.motions[0].poses
-    numbers = unwrapped(value.real) if each.link else each.of(value)
-    name = each.names[0]
-    unit = next(
-        text
-        for suffix, text in sorted(SHOWN.items(), key=lambda u: -len(u[0]))
-        if each.header.endswith(f"_{suffix}")
-    )
-    if each in analysis.forces:
-        return PlotQuantity(
-            name, unit, numbers, float(np.abs(numbers[np.isfinite(numbers)]).max(initial=0.0))
-        )
-    size = 1.0 if isinstance(each.key, Angle) else m.size
-    return PlotQuantity(name, unit, numbers, 180.0 if each.link else size * pace(poses) ** each.order)
 
 
 # --- the page that moves ----------------------------------------------------------------------------------------------

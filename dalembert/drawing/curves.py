@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.drawing.amounts import prefixed, quiet
-from dalembert.drawing.sheet import plain
+from dalembert.drawing.sheet import plain, zero_alone
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,6 +28,8 @@ DASHES: tuple[tuple[float, ...], ...] = (
 )
 LONGEST = 28
 """So many characters the names of three and more equal curves may have."""
+MOST = 41
+"""Characters of a name beside a picture."""
 EQUAL = 1e-9
 """Curves that differ nowhere by more, of the largest value of all, are one."""
 
@@ -82,19 +84,31 @@ def panel(axes: Axes, x: Real, curves: Sequence[Curve], what: str, unit: str, sc
         if dash:
             line.set_dashes(dash)
         good = np.flatnonzero(np.isfinite(values))
-        text = _equal_ones([name for name in names if name])
+        text = shortened(_equal_ones([name for name in names if name]))
         if text and len(good):
             ends.append(_end(axes, text, x[good[-1]], values[good[-1]] * factor, color, dash))
     axes.set_ylabel(", ".join(filter(None, (what, unit))))
     plain(axes)
     low, high = axes.get_ylim()
     values = np.concatenate([v[np.isfinite(v)] for _, v in groups]) * factor if groups else np.zeros(0)
-    if len(values) and np.ptp(values) == 0:  # a constant in the middle, not on a scale of its rounding
+    if len(values) and not values.any():
+        zero_alone(axes)
+    elif len(values) and np.ptp(values) == 0:  # a constant in the middle, not on a scale of its rounding
         about = float(values[0])
-        axes.set_ylim(about - (abs(about) or 1.0), about + (abs(about) or 1.0))
+        axes.set_ylim(about - abs(about), about + abs(about))
     else:
         axes.set_ylim(low, high)
     return Ends(axes, ends)
+
+
+def shortened(name: str, most: int = MOST) -> str:
+    """Return a name, its middle left out where it is longer than there is room for.
+
+    >>> shortened("coupler.omega"), shortened("the coupler of machine 7.omega", 21)
+    ('coupler.omega', 'the couple…ne 7.omega')
+    """
+    half = (most - 1) // 2
+    return name if len(name) <= most else f"{name[:half]}…{name[-half:]}"
 
 
 def _equal_ones(names: Sequence[str]) -> str:

@@ -53,3 +53,10 @@ def plain(axes: Axes, which: str = "both") -> None:
             axis.set_major_formatter(formatter)
     axes.grid(color="0.9", lw=0.6)
     axes.set_axisbelow(True)
+
+
+def zero_alone(axes: Axes, which: str = "y") -> None:
+    """Let axes of what is zero everywhere print this one number: a scale about it would be made up."""
+    for name in which:
+        getattr(axes, f"set_{name}lim")(-1, 1)
+        getattr(axes, f"set_{name}ticks")([0])

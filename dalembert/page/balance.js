@@ -1,6 +1,5 @@
 // Rotors whose masses are known: rows are typed, corrections, states, tolerances and polygons follow.
 const tapesOf = sheet.rotors.map((rotor) => Object.fromEntries(Object.entries(tapes[rotor.tapes]).map(([name, tape]) => [name, new Tape(tape)])));
-const ROW = ["share", "sum"];
 const namesOf = sheet.rotors.map((rotor) => sheet.outputs[rotor.tapes]);
 const prefix = (rotor) => (sheet.rotors.length > 1 ? `${rotor.name}/` : "");
 const cellName = (rotor, row, column) => `${prefix(rotor)}${row}.${column}`;

@@ -182,7 +182,8 @@ function plot(column) {
         put(svg, "line", { class: "grid", x1: px(t), x2: px(t), y1: margin.top, y2: height - margin.bottom });
         put(svg, "text", { class: "tick", x: px(t), y: height - margin.bottom + 15, "text-anchor": "middle" }, short(t));
       }
-      for (const t of ticks(low, high, stepOf(low, high, 5))) {
+      // of what is zero everywhere a scale would be made up
+      for (const t of varies || low + high ? ticks(low, high, stepOf(low, high, 5)) : [0]) {
         put(svg, "line", { class: "grid", x1: margin.left, x2: width - margin.right, y1: py(t), y2: py(t) });
         put(svg, "text", { class: "tick", x: margin.left - 5, y: py(t) + 3, "text-anchor": "end" }, short(t));
       }

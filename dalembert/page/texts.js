@@ -65,7 +65,6 @@ const TEXTS = {
   handles: "handles",
   numbers: "Dimensions",
   inputs: "Inputs",
-  changed: "changed",
   original: "original",
   copied: "copied",
   handle: (name) => `${name}: drag it, or move it by the arrow keys`,

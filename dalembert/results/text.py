@@ -78,7 +78,17 @@ def table_text(columns: Mapping[str, Values], keys: Sequence[str] = (), width: i
 
 
 def as_list(table: Table) -> Table:
-    """Return a table of one row as a list: a row for each quantity, its value and unit."""
+    """Return a table of one row as a list: a row for each quantity, its value and unit.
+
+    >>> narrow = as_list(Table([Column("static_unbalance", "g_mm", [2.0])]))
+    >>> print(table_text(narrow.cells, narrow.keys, 26))
+    quantity          value
+    static unbalance  2
+    <BLANKLINE>
+    quantity          unit
+    static unbalance  g·mm
+    <BLANKLINE>
+    """
     texts = [printed(column.header, column.values)[0] for column in table.columns]
     return Table(
         [
@@ -86,6 +96,7 @@ def as_list(table: Table) -> Table:
             Column("value", "", texts),
             Column("unit", "", [written(column.unit) for column in table.columns]),
         ],
+        ["quantity"],
         above=table.above,
         below=table.below,
     )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dalembert.drawing.amounts import dimensioned, prefixed, quiet
 from dalembert.drawing.labels import Label, place
 from dalembert.drawing.polar import Look, head
-from dalembert.drawing.sheet import plain, sheet
+from dalembert.drawing.sheet import plain, sheet, zero_alone
 from rigidbody3d.solids import Piece, Solid, Whole, outline
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def shaft(
         plain(below)
         below.margins(y=0.15)
         if not largest or not any(quiet(f[:, component], largest).any() for f in forces.values()):
-            below.set_ylim(-1, 1)
+            zero_alone(below)
         below.set_ylabel(f"bearing force on the shaft\nalong {letters[component]}, {unit}")
         below.set_xlabel(view.get_xlabel())
         view.set_xlabel("")

@@ -15,14 +15,14 @@ from matplotlib.projections.polar import PolarAxes
 from balancing import LogBalance, correct, joint_fit, least_squares, place
 from rigidbody3d import Body, FreeBody, Shaft, Top, compose, integrate
 from virtualwork import DescriptionError, LinkStates, Mechanism, UnitLoad, balance
-from virtualwork.picture.plot_quantities import plot_quantities
 
 MOMENT = np.array([9 * 0.030, 6 * 0.050]) * np.exp(1j * np.radians([60, 210]))
 ON = np.array([[0], [1], [1j], [-1]])
 FIT = joint_fit(5 + 2 * ON + 0.1 * np.array([[1], [-1], [0], [1]]), ON)
 ROD = Body.of("rod", 4.0, length=1.0).turned([[0.5, 0, np.sqrt(0.75)], [0, 1, 0], [-np.sqrt(0.75), 0, 0.5]])
 PARTS = Body.of("cylinder", [3.0, -0.5], [[0, 0, 0.1], [0.03, 0, 0.1]], radius=[0.1, 0.02], length=0.2)
-KLANN = Mechanism.from_toml(str(files("cli") / "examples/klann/klann.toml"))
+KLANN_TOML = (files("cli") / "examples/klann/klann.toml").read_text()
+KLANN = Mechanism.from_toml_text(KLANN_TOML)
 ENGINE = Mechanism.from_toml(str(files("cli") / "examples/engine/engine.toml"))
 PENDULUM = Mechanism.from_toml(str(files("cli") / "examples/double-pendulum/double-pendulum.toml"))
 SLIDER_CRANK = LinkStates(
@@ -171,6 +171,17 @@ def test_the_drawing_is_to_scale() -> None:
     assert axes.get_aspect() == 1.0
 
 
+def test_curves_of_a_vector_and_of_an_effort() -> None:
+    """The way from A to H is the difference of both points; its angle goes on through whole turns as a link's does."""
+    motion = ENGINE.motion(SWEEP, speed=100.0, acceleration=0.0)
+    length, angle, torque = motion.plot_curves("B-A.length", "A-O.angle", "crank.torque", figure=Figure())
+    apart = np.hypot(*(motion.point("B").position - motion.point("A").position).T)
+    assert length.lines[0].get_ydata() == pytest.approx(apart, rel=1e-9)
+    assert angle.lines[0].get_ydata() == pytest.approx(np.degrees(SWEEP), abs=1e-9 * 720)
+    assert torque.get_ylabel().endswith("N·m")
+    assert torque.lines[0].get_ydata() == pytest.approx(motion.effort, abs=1e-9 * np.abs(motion.effort).max())
+
+
 @pytest.mark.parametrize("word", ["Q.x", "H.q", "leg.x", "H"])
 def test_a_bad_name_is_named(word: str) -> None:
     with pytest.raises(DescriptionError, match=word):
@@ -196,9 +207,31 @@ def test_noise_is_drawn_as_zero() -> None:
     """A parallelogram's coupler does not turn: what rounding leaves of its ω and α is zero in the picture."""
     bars = Mechanism.from_toml(str(files("cli") / "examples/parallelogram/parallelogram.toml"))
     motion = bars.motion(np.linspace(0, 4 * np.pi, 91))
-    for found in plot_quantities(motion.poses, ["coupler.omega", "coupler.alpha"]):
-        axes = motion.plot_curves(found.name, figure=Figure())[0]
+    for name in ("coupler.omega", "coupler.alpha"):
+        (axes,) = motion.plot_curves(name, figure=Figure())
         assert not np.any(axes.lines[0].get_ydata())
+
+
+def test_what_is_zero_everywhere_has_one_number_on_its_axis() -> None:
+    """A shaft on its own axis loads no bearing, a leg without masses no joint: a scale about zero would be made up."""
+    balanced = Shaft(Body.of("cylinder", 1.0, radius=0.05, length=0.1), (-0.1, 0.1), 60.0).plot(
+        figure=Figure()
+    )
+    resting = KLANN.motion(SWEEP, speed=2.0).dynamics.plot(figure=Figure())
+    coupler = KLANN.motion(SWEEP, speed=0.0).plot_curves("coupler.omega", figure=Figure())
+    for axes in (*balanced[1], resting[0], resting[-1], *coupler):
+        assert list(axes.get_yticks()) == [0]
+
+
+def test_long_names_leave_room_for_their_curves() -> None:
+    name = "the crank of the machine in the second hall on the left"
+    text = KLANN_TOML.replace("[links.crank]", f'[links."{name}"]').replace('"crank"', f'"{name}"')
+    motion = Mechanism.from_toml_text(text).motion(SWEEP, speed=2.0)
+    figure = Figure()
+    (axes,) = motion.plot_curves(f"{name}.omega", "leg.omega", figure=figure)
+    figure.draw_without_rendering()
+    assert faults(figure) == []
+    assert axes.bbox.width > 0.4 * figure.bbox.width
 
 
 def test_parts_are_drawn_as_their_shapes_to_scale() -> None:

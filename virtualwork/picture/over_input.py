@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.drawing.amounts import prefixed, quiet
-from dalembert.drawing.curves import Curve, Ends, panel, spread
-from dalembert.drawing.sheet import plain, sheet
+from dalembert.drawing.curves import Curve, Ends, panel, shortened, spread
+from dalembert.drawing.sheet import plain, sheet, zero_alone
+from dalembert.units import parted, written
+from virtualwork.describe import DescriptionError
+from virtualwork.describe.description import Description
 from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.kinematics import Angle
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.poses import Poses
-from virtualwork.picture.plot_quantities import PlotQuantity, plot_quantities
+from virtualwork.formulas.quantity import Quantity
 from virtualwork.plan.steps import Joint
+from virtualwork.quantities import Component, named
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,9 +32,75 @@ Row = tuple[Joint, str, str]
 """A joint, the body that its force acts on, and what it comes from."""
 
 
-def curves(poses: Poses, names: Sequence[str], figure: FigureBase | None = None) -> Panels:
-    """Draw quantities of these names against the input, a panel for each unit; return their axes."""
-    return curves_of(poses, plot_quantities(poses, names), figure)
+class PlotQuantity(NamedTuple):
+    """A quantity over the poses: its name, its unit, its values (n,), and how large one of its kind is."""
+
+    name: str
+    unit: str
+    values: Reals
+    scale: float
+
+
+def curves(
+    poses: Lanes, names: Sequence[str], forces: Callable[[], Dynamics], figure: FigureBase | None = None
+) -> Panels:
+    """Draw quantities of these names against the input, a panel for each unit; return their axes.
+
+    Raises
+    ------
+    DescriptionError
+        No quantity has such a name; the message lists the names.
+    """
+    wanted = [_quantity(poses.mechanism, name) for name in names]
+    keys = list(dict.fromkeys(key for each in wanted for key in (each.key, each.less) if key))
+    values = dict(zip(keys, poses.values(keys, forces), strict=True))
+    return curves_of(poses, [plot_quantity(poses, each, values) for each in wanted], figure)
+
+
+def _quantity(m: Description, name: str) -> Component:
+    each = named(m, name)[0]
+    if name not in each.names:
+        raise DescriptionError(f"'{name}': expected a quantity, such as {each.names[0]}")
+    return each
+
+
+def plot_quantity(poses: Poses, each: Component, values: Mapping[Quantity, Any]) -> PlotQuantity:
+    """Return a quantity as a picture draws it, from the values of its keys: an angle goes on through whole turns."""
+    m = poses.mechanism
+    z = values[each.key] - (values[each.less] if each.less else 0.0) if each.key else np.zeros(poses.n)
+    turns = each.link or each.polar == "angle"
+    numbers = _unwrapped(np.radians(each.of(z)) if each.polar else z.real) if turns else each.of(z)
+    unit = (
+        "deg"
+        if turns or each.in_degrees
+        else written(parted(each.header, further=("m_s3", "rad_s3"))[1] or "")
+    )
+    if each.key.is_force:
+        scale = float(np.abs(numbers[np.isfinite(numbers)]).max(initial=0.0))
+    elif unit == "deg":
+        scale = 180.0
+    else:
+        scale = (1.0 if isinstance(each.key, Angle) else m.size) * _pace(poses) ** each.order
+    return PlotQuantity(each.names[0], unit, numbers, scale)
+
+
+def _pace(poses: Poses) -> float:
+    """Return how fast the inputs go, 1/s: the largest of ω, √α and ∛jerk, a slide in the mechanism's sizes."""
+    m = poses.mechanism
+    result = 0.0
+    for j, entry in enumerate(m.inputs):
+        for order in (1, 2, 3):
+            rate = np.abs(poses.rate(j, order)).max(initial=0.0) / (m.size if entry.is_slide else 1.0)
+            result = max(result, float(rate) ** (1 / order))
+    return result
+
+
+def _unwrapped(angle: Reals) -> Reals:
+    """Return angles (n,), rad, as degrees without jumps, across gaps too."""
+    out = np.degrees(angle)
+    good = np.isfinite(angle)
+    out[good] = np.degrees(np.unwrap(angle[good]))
+    return out
 
 
 def curves_of(poses: Poses, quantities: Sequence[PlotQuantity], figure: FigureBase | None = None) -> Panels:
@@ -109,8 +181,8 @@ def _input(poses: Poses) -> tuple[Reals, str]:
     entry = m.inputs[0]
     if entry.is_slide:
         factor, unit = prefixed(float(np.abs(poses.inputs).max(initial=0.0)), "m")
-        return poses.inputs[:, 0] * factor, f"position of {entry.name}, {unit}"
-    return np.degrees(poses.inputs[:, 0]), f"angle of {entry.name}, deg"
+        return poses.inputs[:, 0] * factor, f"position of {shortened(entry.name, 31)}, {unit}"
+    return np.degrees(poses.inputs[:, 0]), f"angle of {shortened(entry.name, 31)}, deg"
 
 
 def _name_input(axes: Axes, x: Reals, label: str) -> None:
@@ -163,8 +235,8 @@ def _hodograph(axes: Axes, shaking: Reals, largest: float) -> None:
     plain(axes)
     if size:
         axes.set_aspect("equal", adjustable="datalim")
+        axes.xaxis.set_major_locator(MaxNLocator(4))
     else:
-        axes.set(xlim=(-1, 1), ylim=(-1, 1))
-    axes.xaxis.set_major_locator(MaxNLocator(4))
+        zero_alone(axes, "xy")
     axes.set_xlabel(f"shaking force, x, {unit} (dot: first pose)")
     axes.set_ylabel(f"y, {unit}")
