@@ -98,7 +98,12 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
         put(Path(options.folder), files)
     return Result(
         tables=tables(exercise, people, drawn),
-        head={"title": exercise.title, "folder": options.folder, "variants": len(each), "files": sorted(files)},
+        head={
+            "title": exercise.title,
+            "folder": options.folder,
+            "variants": len(each),
+            "files": sorted(files),
+        },
         notes=lambda: (
             f"wrote {len(files)} files to {options.folder}: {several(len(each), 'variant')} for {several(len(people), 'student')}\n"
         ),
