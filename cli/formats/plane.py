@@ -371,18 +371,33 @@ class _Layer:
                 raise DataError(f"{robot.file}: nothing is driven: no actuator, and no joint on the ground")
             d.notes.append(f"the file has no actuator: {first.name} is taken as the input")
             motors = [Motor(first.name, [(first.name, 1.0)])]
+        self.counted = Groups(d.bodies)
         for m in motors:
             drive = self._drive(m)
             if drive is None:
                 d.leave(f"actuator {m.name}", "it drives neither one slide nor the angle between two links")
             elif all(drive.moves != e.moves for e in d.drives):
                 d.drives.append(drive)
-                if drive.link is not None:
-                    # gears and torsion springs count the whole turns of the input
-                    link, on = d.bodies[drive.link], d.bodies[drive.on]
-                    link.turn += 2 * math.pi * round((drive.at - link.turn + on.turn) / (2 * math.pi))
+                self._count_turns(drive)
         spare = [self._drive(Motor(j.name, [(j.name, 1.0)])) for j in ordered]
         d.spare = [e for e in spare if e is not None]
+
+    def _count_turns(self, drive: Drive) -> None:
+        """Turn a body, and those that inputs before this one tie to it, by whole turns: gears and torsion springs count the input's."""
+        if drive.link is None:
+            return
+        bodies, counted = self.d.bodies, self.counted
+        whole = drive.at - bodies[drive.link].turn + bodies[drive.on].turn
+        whole = 2 * math.pi * round(whole / (2 * math.pi))
+        first, second, ground = map(counted.of, (drive.link, drive.on, GROUND))
+        if first == second:
+            # both are counted already
+            drive.at -= whole
+        moved, sense = (second, -1.0) if first == ground else (first, 1.0)
+        for name in bodies if first != second else ():
+            if counted.of(name) == moved:
+                bodies[name].turn += sense * whole
+        counted.join(first, second)
 
     def _drive(self, m: Motor) -> Drive | None:
         """Return the input that an actuator is; None where it is none."""

@@ -180,8 +180,6 @@ def quaternion(w: float, x: float, y: float, z: float) -> Array:
     array([ 0., -1.,  0.])
     """
     n = w * w + x * x + y * y + z * z
-    if not n > 0:
-        raise ValueError("found 0 0 0 0, expected a quaternion of some length")
     rows = [
         [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
@@ -192,10 +190,9 @@ def quaternion(w: float, x: float, y: float, z: float) -> Array:
 
 def rotation(at: At, wxyz: Sequence[float]) -> Array:
     """Return the rotation of a quaternion of a file."""
-    try:
-        return quaternion(*wxyz)
-    except ValueError as error:
-        raise DataError(f"{at.file}: {at.where}: {error}") from None
+    if not sum(v * v for v in wxyz) > 0:
+        raise at.error("", "0 0 0 0", "a quaternion of some length")
+    return quaternion(*wxyz)
 
 
 def half_unit(word: str) -> float:
@@ -221,8 +218,7 @@ def symmetric(entries: Mapping[str, float]) -> Array:
 
 def printed(texts: Mapping[str, str]) -> tuple[Array, Array]:
     """Return the matrix of such entries as printed, and half a unit of the last digit of each."""
-    of = (float, half_unit)
-    tensor, half = (symmetric({entry: read(text) for entry, text in texts.items()}) for read in of)
+    tensor, half = (symmetric({k: read(text) for k, text in texts.items()}) for read in (float, half_unit))
     return tensor, half
 
 
@@ -407,28 +403,27 @@ def plane_of(file: str, joints: list[RobotJoint], notes: list[str]) -> Plane:
             raise DataError(
                 f"{file}: no planar mechanism: joint '{j.name}' is of the type '{j.type}': expected pins, slides and fixed joints"
             )
-    turning = [j for j in joints if j.kind == "turn"]
-    sliding = [j for j in joints if j.kind == "slide"]
+    turning, sliding = ([j for j in joints if j.kind == kind] for kind in ("turn", "slide"))
     if turning:
         normal = max((j.axis for j in turning), key=lambda n: sum(_off(n, j.axis) < ROUNDED for j in turning))
     else:
-        pairs = [np.cross(a.axis, b.axis) for a in sliding for b in sliding]
-        normal = max(pairs, key=lambda n: float(np.linalg.norm(n)), default=np.array([0.0, 0.0, 1.0]))
-        length = float(np.linalg.norm(normal))
-        normal = normal / length if length > ROUNDED else np.array([0.0, 0.0, 1.0])
+        along = sliding[0].axis if sliding else np.zeros(3)
+        across = (np.cross(along, j.axis) for j in sliding)
+        normal = max(across, key=lambda n: float(np.linalg.norm(n)), default=along)
+        if np.linalg.norm(normal) <= ROUNDED:
+            # parallel slides lie in many planes: the one nearest to a plane of the world's axes, x-y before the others
+            normal = min(np.eye(3)[::-1], key=lambda n: round(abs(float(n @ along)), 9))
+            normal = normal - along * (along @ normal)
+        normal = normal / np.linalg.norm(normal)
     plane = _axes(normal)
     worst = 0.0
-    for j in joints:
-        if j.kind == "ball":
-            continue
-        off = _off(plane.normal, j.axis)
-        off = off if j.kind == "turn" else math.pi / 2 - off
+    for j in (j for j in joints if j.kind != "ball"):
+        off = abs(_off(plane.normal, j.axis) - (math.pi / 2 if j.kind == "slide" else 0.0))
         if off > ROUNDED:
-            what = "its axis stands" if j.kind == "turn" else "its slide leaves the plane by"
-            behind = " off the normal of the plane of the others" if j.kind == "turn" else ""
-            raise DataError(
-                f"{file}: no planar mechanism: joint '{j.name}': {what} {math.degrees(off):.4g} deg{behind}"
-            )
+            by = f"{math.degrees(off):.4g} deg"
+            turn = f"axis stands {by} off the normal of the plane of the others"
+            what = turn if j.kind == "turn" else f"slide leaves the plane by {by}"
+            raise DataError(f"{file}: no planar mechanism: joint '{j.name}': its {what}")
         worst = max(worst, off)
     if worst > SILENT:
         notes.append(f"axes are off by up to {math.degrees(worst):.2g} deg: read as planar")

@@ -182,6 +182,36 @@ def test_mujoco_agrees_with_what_is_read_of_poses() -> None:
         assert joints[k].ends[1] == pytest.approx(state.xanchor[k], abs=1e-14)
 
 
+@pytest.mark.parametrize(("axes", "plane"), [(["1 0 0"], "xy"), (["0 0 1"], "xz"), (["0 3 4"], "yz"), (["1 0 2", "2 0 4", "1 0 0"], "xz")])  # fmt: skip
+def test_a_robot_of_slides_alone_lies_in_a_plane_of_the_world_where_it_can(
+    axes: list[str], plane: str
+) -> None:
+    bodies = "".join(
+        f'<body name="b{k}"><joint name="s{k}" type="slide" axis="{axis}"/><geom size=".1"/>'
+        for k, axis in enumerate(axes)
+    ) + "</body>" * len(axes)
+    drives = "".join(f'<motor joint="s{k}"/>' for k in range(len(axes)))
+    m, _ = taken(f"<mujoco><worldbody>{bodies}</worldbody><actuator>{drives}</actuator></mujoco>")
+    way = np.array(axes[0].split(), dtype=float)
+    along = complex(*(way["xyz".index(axis)] for axis in plane))
+    assert np.exp(1j * m.guides[0].angle) == pytest.approx(along / abs(along), abs=1e-15)
+
+
+def test_springs_of_a_chain_count_the_whole_turns_of_both_inputs() -> None:
+    """Two arms about −y, the first turned by more than half a turn: its spring is wound by what MuJoCo has."""
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads its own format: pip install mujoco")
+    text = """<mujoco><compiler angle="degree"/><default><geom contype="0" conaffinity="0"/></default><worldbody>
+<body name="a" euler="0 -160 0"><joint name="one" axis="0 1 0" stiffness="5" springref="40"/><geom size=".1" pos=".3 0 0"/>
+<body name="b" pos="1 0 0" euler="0 -130 0"><joint name="two" axis="0 1 0" ref="-20"/><geom size=".1" pos=".3 0 0"/></body></body>
+</worldbody><actuator><motor joint="one"/><motor joint="two"/></actuator></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(text)
+    state = mujoco.MjData(model)
+    mujoco.mj_inverse(model, state)
+    m, _ = taken(text)
+    effort = m.motion([[e.value for e in m.inputs]], [[0.0, 0.0]], [[0.0, 0.0]]).effort[0]
+    assert np.abs(effort) == pytest.approx(np.abs(state.qfrc_inverse), rel=1e-12)
+
+
 @pytest.mark.parametrize("total", [-1, 14])
 def test_masses_that_follow_from_shapes_are_mujocos(total: int) -> None:
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads its own format: pip install mujoco")
