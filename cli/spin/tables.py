@@ -109,7 +109,7 @@ def warnings(r: Rotation, only: Collection[str] = ()) -> list[str]:
     lines = [
         f"--only {name}: none here: {why}" for name, (none, why) in absent.items() if none and name in only
     ]
-    if r.body.mgl is not None and r.round_moments is None:
+    if r.body.mgl and r.round_moments is None:
         lines.append("a top whose moments across body z differ has no closed form: it was integrated")
     steady = r.steady()
     if steady is not None and steady["slow_rad_s"] is None:
