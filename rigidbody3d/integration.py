@@ -10,10 +10,11 @@ order six: a symplectic map, whose energy error does not grow with time.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +23,7 @@ from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.inertia import principal
+from rigidbody3d.splitting import check_steps, split
 from rigidbody3d.states import STATE, AtTimes, PictureData, State, require
 
 if TYPE_CHECKING:
@@ -29,16 +31,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Torque = Callable[[float, Array, Array], ArrayLike]
-
-# W. Kahan and R.-C. Li, Math. Comp. 66 (1997) 1089-1099: nine symmetric stages, order six
-_STAGES = (
-    0.39216144400731413928,
-    0.33259913678935943860,
-    -0.70624617255763935981,
-    0.082213596293550800230,
-    0.79854399093482996340,
-)
-STAGES = _STAGES + _STAGES[-2::-1]
 
 
 @record
@@ -90,7 +82,7 @@ class Trajectory(AtTimes):
 
         Notes
         -----
-        The motion is integrated once more with steps half as long, at twice the cost: the tolerance of a step says
+        The motion is integrated once more with each step halved, at twice the cost: the tolerance of a step says
         little about the drift of many turns. Rounding adds up as a random walk.
 
         Examples
@@ -102,8 +94,8 @@ class Trajectory(AtTimes):
         require(of, *STATE)
         finer = self._finer
         walk = FEW * (1 + np.sqrt(self.evaluations))
-        # both methods are at least of the sixth order: the finer run is off by some 2 % of this one's error, or by
-        # rounding alone; twice the difference leaves room where the error does not yet follow that law
+        # of a method of the third order the finer run is off by an eighth of this one's error, of one of the sixth by 2 %, or
+        # by rounding alone; twice the difference leaves room where the error does not yet follow that law
         bound = 2 * _apart(finer, self, of)
         if of == "energy":
             bound = bound + walk * (np.abs(self.energy) + abs(self.mgl))
@@ -140,8 +132,8 @@ FEW = 12 * EPS
 """The error of a dozen roundings."""
 MOST = 10_000_000
 """The largest number of steps, which takes a quarter of an hour."""
-METHODS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA", "splitting")
-"""scipy's methods, and the splitting."""
+METHODS = ("DOP853", "RK45", "RK23", "Radau", "splitting")
+"""scipy's one-step methods, whose steps can be halved for an estimate, and the splitting."""
 
 
 def integrate(
@@ -159,6 +151,7 @@ def integrate(
     refine: int = 1,
     longest: float = math.inf,
     most: float = MOST,
+    halved: Steps | None = None,
 ) -> Trajectory:
     """Integrate the rotation of a body under a torque from time zero to each time.
 
@@ -180,7 +173,7 @@ def integrate(
     mgl
         Weight times the distance of the centre of mass from the fixed point along body z, N·m.
     method
-        One of scipy's methods, or "splitting" for a symmetric top without further torque.
+        One of scipy's one-step methods (`METHODS`), or "splitting" for a symmetric top without further torque.
     rtol
         Relative tolerance of a scipy method.
     steps_per_turn
@@ -191,6 +184,8 @@ def integrate(
         No step of a scipy method is longer, s.
     most
         Steps that are not to be exceeded.
+    halved
+        The steps of another run: no step of a scipy method is longer than half of the one taken there.
 
     Returns
     -------
@@ -249,18 +244,46 @@ def integrate(
     )
     if method == "splitting":
         if (
-            torque is not None
+            callable(torque)
+            or constant.any()
             or not (tensor == np.diag(np.diag(tensor))).all()
             or tensor[0, 0] != tensor[1, 1]
         ):
             raise ValueError("the splitting is for a symmetric top, its axis body z, under its weight alone")
-        H, q, count = _split(tensor[0, 0], tensor[2, 2], mgl, H0, q0, time, steps_per_turn, refine, most)
+        H, q, count = split(tensor[0, 0], tensor[2, 2], mgl, H0, q0, time, steps_per_turn, refine, most)
         finer = partial(again, steps_per_turn=steps_per_turn, refine=2 * refine)
         return Trajectory(time, H, q, tensor, mgl, count, finer)
     load = torque if callable(torque) else constant
-    H, q, count, step = _solve(tensor, w0, H0, q0, time, load, frame, mgl, method, rtol, longest, most)
-    finer = partial(again, longest=step / 2, rtol=rtol / 256)
+    limits = _Limits(rtol, longest, most, halved)
+    H, q, count, taken = _solve(tensor, w0, H0, q0, time, load, frame, mgl, method, limits)
+    finer = partial(again, halved=taken, rtol=rtol / 256)
     return Trajectory(time, H, q, tensor, mgl, count, finer)
+
+
+class Steps:
+    """The steps of an integration, forwards and backwards: where they begin and how long they are, s."""
+
+    def __init__(self) -> None:
+        self.starts: dict[float, list[float]] = {1.0: [], -1.0: []}
+        self.sizes: dict[float, list[float]] = {1.0: [], -1.0: []}
+
+    def add(self, sign: float, start: float, size: float) -> None:
+        """Add a step in the direction of the sign."""
+        self.starts[sign].append(abs(start))
+        self.sizes[sign].append(size)
+
+    def half(self, sign: float, t: float) -> float:
+        """Return half of the step that was taken at a time."""
+        return self.sizes[sign][max(bisect_right(self.starts[sign], abs(t)) - 1, 0)] / 2
+
+
+class _Limits(NamedTuple):
+    """The limits of the steps of an integration: see `integrate`."""
+
+    rtol: float
+    longest: float
+    most: float
+    halved: Steps | None
 
 
 def _solve(
@@ -273,11 +296,11 @@ def _solve(
     frame: str,
     mgl: float,
     method: str,
-    rtol: float,
-    longest: float,
-    most: float,
-) -> tuple[Array, Array, int, float]:
+    limits: _Limits,
+) -> tuple[Array, Array, int, Steps]:
     import scipy.integrate
+
+    rtol, longest, most, halved = limits
 
     (a, b, c), (d, e, f), (g, h, i) = np.linalg.inv(tensor).tolist()
     function = torque if callable(torque) else None
@@ -327,6 +350,7 @@ def _solve(
     out = np.empty((len(time), 7))
     start = np.concatenate([H0 / size, q0])
     count = steps = 0
+    taken = Steps()
     for sign in (1.0, -1.0):
         side = np.flatnonzero(time * sign > 0)
         order = side[np.argsort(np.abs(time[side]), kind="stable")]
@@ -338,16 +362,20 @@ def _solve(
         rate = max(float(np.linalg.norm(omega)), math.sqrt(abs(mgl) / tensor.diagonal().min()))
         if rate:
             longest = min(longest, 2 * math.pi / rate / 40 * (max(rtol, 1e-13) / 1e-13) ** 0.125)
-        _check_steps(float(np.abs(time[order]).max()) / longest, most)
-        limits = {"rtol": max(rtol, 3e-14), "atol": rtol, "max_step": longest}
-        solver = method_class(rates, 0.0, start, sign * np.inf, **limits)
+        check_steps(float(np.abs(time[order]).max()) / longest, most)
+        first = longest if halved is None else min(longest, halved.half(sign, 0.0))
+        tolerances = {"rtol": max(rtol, 3e-14), "atol": rtol}
+        solver = method_class(rates, 0.0, start, sign * np.inf, max_step=first, **tolerances)
         before = (0.0, start)
         for index in order:
             stop = float(time[index])
             while abs(solver.t) < abs(stop):
                 before = (solver.t, solver.y)
+                if halved is not None:
+                    solver.max_step = min(longest, halved.half(sign, solver.t))
                 message = solver.step()
                 steps += 1
+                taken.add(sign, before[0], abs(solver.t - before[0]))
                 if steps > most:
                     raise RuntimeError(f"the integration stopped at {solver.t:g} s, after {most:.0e} steps")
                 if solver.status == "failed":
@@ -362,72 +390,4 @@ def _solve(
             count += last.nfev
         count += solver.nfev
     out[time == 0] = start
-    mean = reach / steps if steps else math.inf
-    return out[:, :3] * size, quaternion.normalize(out[:, 3:]), count, mean
-
-
-def _check_steps(planned: float, most: float) -> None:
-    if planned > most:
-        raise ValueError(
-            f"the integration would take some {planned:.1g} steps, more than {most:.0e}: expected a shorter time "
-            "or a slower rotation"
-        )
-
-
-def _split(
-    I1: float,
-    I3: float,
-    mgl: float,
-    H0: Array,
-    q0: Array,
-    time: Array,
-    per_turn: float,
-    refine: int,
-    most: float,
-) -> tuple[Array, Array, int]:
-    rate = max(float(np.linalg.norm(H0)) / min(I1, I3), math.sqrt(abs(mgl) / I1))
-    longest = 2 * math.pi / rate / per_turn if rate else math.inf
-    _check_steps(float(np.abs(time).max(initial=0.0)) / longest, most)
-    H, q = np.empty((len(time), 3)), np.empty((len(time), 4))
-    count = 0
-    for sign in (1.0, -1.0):
-        state, now = [*H0.tolist(), *q0.tolist()], 0.0
-        side = np.flatnonzero(time >= 0) if sign > 0 else np.flatnonzero(time < 0)
-        for index in side[np.argsort(np.abs(time[side]), kind="stable")]:
-            gap = float(time[index]) - now
-            steps = refine * math.ceil(abs(gap) / longest) if gap else 0
-            for _ in range(steps):
-                for stage in STAGES:
-                    _free_and_kick(state, stage * gap / steps, I1, I3, mgl)
-                # a length that drifts by rounding would turn the body too far
-                length = math.sqrt(sum(x * x for x in state[3:]))
-                state[3:] = [x / length for x in state[3:]]
-            count += steps * len(STAGES)
-            now = float(time[index])
-            H[index], q[index] = state[:3], state[3:]
-    return H, q, count
-
-
-def _free_and_kick(state: list[float], h: float, I1: float, I3: float, mgl: float) -> None:
-    """Half a kick, a free rotation exp(H h/I1) q exp(e3 (1/I3 - 1/I1) H3 h), half a kick."""
-    X, Y, Z, w, x, y, z = state
-    # half of 2·mgl·h
-    k = h * mgl
-    X, Y = X - k * (y * z - w * x), Y + k * (x * z + w * y)
-    axis = 2 * (x * z + w * y) * X + 2 * (y * z - w * x) * Y + (w * w - x * x - y * y + z * z) * Z
-    size = math.sqrt(X * X + Y * Y + Z * Z)
-    half = size * h / I1 / 2
-    c = math.cos(half)
-    s = math.sin(half) / size if size else 0.0
-    p, q, r = s * X, s * Y, s * Z
-    w, x, y, z = (
-        c * w - p * x - q * y - r * z,
-        c * x + p * w + q * z - r * y,
-        c * y + q * w + r * x - p * z,
-        c * z + r * w + p * y - q * x,
-    )
-    own = axis * h * (I1 - I3) / (I1 * I3) / 2
-    c, s = math.cos(own), math.sin(own)
-    w, x, y, z = c * w - s * z, c * x + s * y, c * y - s * x, c * z + s * w
-    X, Y = X - k * (y * z - w * x), Y + k * (x * z + w * y)
-    state[:] = X, Y, Z, w, x, y, z
+    return out[:, :3] * size, quaternion.normalize(out[:, 3:]), count, taken

@@ -92,7 +92,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("animation", "picture"),
         ("solids",),
         ("inertia",),
-        ("attitude", "eigenvectors", "elliptic", "shapes", "top_roots"),
+        ("attitude", "eigenvectors", "elliptic", "shapes", "splitting", "top_roots"),
     ),
     "cli": (
         ("__main__",),

@@ -349,8 +349,8 @@ def way(e: Engine) -> list[Topic]:
         )
     )
     result = [Topic("orders", text, "Orders of each piston")]
-    rows: list[tuple[Any, ...]] = []
-    for i, name in enumerate(names_of):
+    shares: list[list[float]] = []
+    for i in range(len(names_of)):
         one = slice(i, i + 1)
         force = reciprocating_forces(
             c.crank[one],
@@ -362,24 +362,12 @@ def way(e: Engine) -> list[Topic]:
             e.speed,
             e.highest,
         )
-        f = force.coefficients()
-        rows += [(name, k + 1, *f[k].ravel().tolist()) for k in used]
-    whole = e.reciprocating.coefficients()
-    sums = [("sum", k + 1, *whole[k].ravel().tolist()) for k in used]
-    heads = ("x_cos", "x_sin", "y_cos", "y_sin")
-    every = [*rows, *sums]
-    table = Table(
-        [
-            names("cylinder", [row[0] for row in every]),
-            Column("order", "", [row[1] for row in every], place="order"),
-            *(
-                Column(head, "N", [row[2 + j] for row in every], place=f"{head}_N")
-                for j, head in enumerate(heads)
-            ),
-        ],
-        ("cylinder", "order"),
-        "shares[]",
-    )
+        shares += force.coefficients()[used].reshape(-1, 4).tolist()
+    shares += e.reciprocating.coefficients()[used].reshape(-1, 4).tolist()
+    every = [name for name in (*names_of, "sum") for _ in used]
+    orders_of = [k + 1 for k in used]
+    keys = [names("cylinder", every), _order(orders_of * (len(names_of) + 1))]
+    table = Table([*keys, *_parts("", "N", shares)], ("cylinder", "order"), "shares[]")
     result.append(
         Topic("forces", ["Coefficients of cos kθ and sin kθ of each cylinder's force, and their sums:", table], "Shares and sums")
     )  # fmt: skip
@@ -395,23 +383,51 @@ def way(e: Engine) -> list[Topic]:
         )
     weights = e.counterweights
     if weights is not None:
-        lines = [
-            f"  {name}: ({figures(w.real)}, {figures(w.imag)}) kg·m at z = {figures(z)} m"
-            for name, w, z in zip(weights.names, weights.unbalance.tolist(), weights.z.tolist(), strict=True)
+        at = [
+            names("counterweight", weights.names),
+            *_unbalances(weights.unbalance),
+            number("z", "length", weights.z),
         ]
-        result.append(
-            Topic(
-                "counterweights",
-                ["Against the rotating masses and the share of the reciprocating ones:", *lines],
-            )
-        )
-    left = e.residual.coefficients()
-    lines = [
-        f"  order {k + 1}: {', '.join(f'{head} {figures(v)} N' for head, v in zip(heads, left[k].ravel().tolist(), strict=True))}"
-        for k in used
-    ]
+        opposite = Table(at, ("counterweight",), "counterweights[]")
+        text = ["Against the rotating masses and the share of the reciprocating ones:", opposite]
+        result.append(Topic("counterweights", text))
+    if e.shafts:
+        at = [
+            _order([s.order for s in e.shafts]),
+            names("direction", ["against" if s.against else "with" for s in e.shafts]),
+            *_unbalances(e.shaft_unbalances),
+            number("z", "length", [s.z for s in e.shafts]),
+        ]
+        turning = Table(at, ("order", "direction", "z_m"), "shafts[]")
+        text = [
+            "Each turns against the part of its order that turns as it does, F/(order·ω)²; at θ = 0:",
+            turning,
+        ]
+        result.append(Topic("shafts", text, "Balance shafts"))
     if e.balanced:
-        result.append(
-            Topic("residual", ["Residual forces with counterweights and balance shafts:", *lines], "Residual")
+        forces, couples = (
+            e.residual.coefficients(couple)[used].reshape(-1, 4).tolist() for couple in (False, True)
         )
+        columns = [_order(orders_of), *_parts("", "N", forces), *_parts("couple_", "N_m", couples)]
+        text = [
+            "Residual forces and couples with counterweights and balance shafts:",
+            Table(columns, ("order",), "orders[]"),
+        ]
+        result.append(Topic("residual", text, "Residual"))
     return result
+
+
+def _order(orders: list[int]) -> Column:
+    return Column("order", "", list(orders), place="order")
+
+
+def _parts(prefix: str, unit: str, rows: list[list[float]]) -> list[Column]:
+    """The coefficients of cos kθ and sin kθ along x and y, a row for each order."""
+    heads = (f"{prefix}{axis}_{part}" for axis in "xy" for part in ("cos", "sin"))
+    return [
+        Column(head, unit, [row[j] for row in rows], place=f"{head}_{unit}") for j, head in enumerate(heads)
+    ]
+
+
+def _unbalances(vectors: Complex) -> list[Column]:
+    return [number("x", "unbalance", vectors.real + 0.0), number("y", "unbalance", vectors.imag + 0.0)]

@@ -245,7 +245,7 @@ class Rotation:
     def exact(self) -> bool:
         """Whether a closed form is used."""
         g = self.body
-        closed = not g.forced and (g.mgl is None or self.round_moments is not None)
+        closed = not g.forced and (not g.mgl or self.round_moments is not None)
         if self.method == "exact" and not closed:
             why = "a torque" if g.forced else "a top whose two moments across body z differ"
             raise DataError(f"{g.file}: there is no closed form for {why}: expected --method integrate")
@@ -261,9 +261,8 @@ class Rotation:
         g = self.body
         try:
             if self.exact:
-                if g.mgl is None:
+                if g.mgl is None or self.round_moments is None:
                     return FreeBody(g.inertia, g.omega, g.attitude).at(time)
-                assert self.round_moments is not None
                 return Top(self.round_moments, g.mgl, g.omega, g.attitude).at(time)
             return integrate(
                 g.inertia,

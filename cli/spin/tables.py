@@ -109,7 +109,7 @@ def warnings(r: Rotation, only: Collection[str] = ()) -> list[str]:
     lines = [
         f"--only {name}: none here: {why}" for name, (none, why) in absent.items() if none and name in only
     ]
-    if r.body.mgl is not None and r.round_moments is None:
+    if r.body.mgl and r.round_moments is None:
         lines.append("a top whose moments across body z differ has no closed form: it was integrated")
     steady = r.steady()
     if steady is not None and steady["slow_rad_s"] is None:
@@ -195,17 +195,22 @@ def way(r: Rotation) -> list[Topic]:
     if cones is not None:
         text = [
             "A body of revolution: ω and its axis turn about H with H/I_t (precession), the body about its axis with the spin.",
-            *(f"  {key.rpartition('_')[0] if key.endswith('_deg') else key[:-6]}: {figures(value)} {'°' if key.endswith('_deg') else 'rad/s'}" for key, value in cones.items() if value is not None),
+            *(f"  {_spoken(key)}: {figures(value)} {'°' if key.endswith('_deg') else 'rad/s'}" for key, value in cones.items() if value is not None),
         ]  # fmt: skip
         result.append(Topic("cones", text, "Cones", dict(cones)))
     steady = r.steady()
     if steady is not None:
         text = ["Steady precession at the present tilt: (I_t·cos θ)·ψ̇² − I_a·ω_z·ψ̇ + mgl = 0 has two roots."]
         text += [
-            f"  {key[:-6]}: {figures(value)} rad/s" for key, value in steady.items() if value is not None
+            f"  {_spoken(key)}: {figures(value)} rad/s" for key, value in steady.items() if value is not None
         ]
         result.append(Topic("steady precession", text, "Steady precession", dict(steady)))
     return result
+
+
+def _spoken(key: str) -> str:
+    """A name in JSON as a sentence has it: without its unit, its words apart."""
+    return key.removesuffix("_deg").removesuffix("_rad_s").replace("_", " ")
 
 
 Change = Callable[[float], TurningBody]

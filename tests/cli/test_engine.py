@@ -258,3 +258,23 @@ def test_counterweights_of_nothing(dalembert, tmp_path) -> None:
     for option in (("--plane", "A:0mm:60mm"), ("--counterweight-share", "0")):
         assert "the counterweights are zero" in dalembert(*engine, *option).stderr
     assert "are zero" not in dalembert(*engine, "--counterweight-share", "0.5").stderr
+
+
+def test_the_way_has_counterweights_shafts_and_residuals_in_numbers(dalembert, tmp_path) -> None:
+    (tmp_path / "three.csv").write_text(
+        "cylinder,crank_deg,z_mm,throw_mm,rod_mm,reciprocating_kg,rotating_kg\n"
+        "1,0,0,50,200,1,0.2\n2,120,100,50,200,1,0.2\n3,240,200,50,200,1,0.2\n"
+    )
+    options = ("--counterweight-share", "0.5", "--shaft", "1:0mm:against", "--shaft", "1:300mm:against")
+    result = json.loads(
+        dalembert("engine", "three.csv", "--speed", "3000rpm", *options, "--steps", "--json").stdout
+    )
+    way = {topic["topic"]: topic for topic in result["way"]}
+    weights = way["counterweights"]["counterweights"]
+    assert weights[0] == {"counterweight": "1", "x_kg_m": pytest.approx(-0.035), "y_kg_m": 0.0, "z_m": 0.0}
+    for shaft, shown in zip(result["shafts"], way["shafts"]["shafts"], strict=True):
+        assert np.hypot(shown["x_kg_m"], shown["y_kg_m"]) == pytest.approx(shaft["unbalance_kg_m"])
+    for row in way["residual"]["orders"]:
+        whole = result["residual_orders"][row["order"] - 1]
+        assert [row["y_cos_N"], row["y_sin_N"]] == whole["force_N"]["y"]
+        assert [row["couple_y_cos_N_m"], row["couple_y_sin_N_m"]] == whole["couple_N_m"]["y"]

@@ -220,6 +220,11 @@ def test_a_torque_of_zero_is_none(spin) -> None:
         spin("inertia = [1, 2, 3]\nomega = [1, 2, 3]\ntorque = [0, 0, 0]\n", "--at", "2", "--json")
     )
     assert zero == free
+    # and so is a weight without a lever, of any body
+    hung = document(spin("inertia = [1, 2, 3]\nomega = [1, 2, 3]\n[top]\nmgl = 0\n", "--at", "2", "--json"))
+    assert hung["method"] == "exact"
+    assert hung["states"] == free["states"]
+    assert hung["warnings"] == []
 
 
 def test_a_cube_that_lies_aslant_turns_steadily(spin, tmp_path) -> None:
