@@ -77,7 +77,7 @@ class Computed(Series):
                     for part in every
                 ],
             }
-            for link, every in parts(self.mechanism, forces.case, forces.joints.joints).items()
+            for link, every in parts(forces.case, forces.joints).items()
         ]
         return {"loose": loose}
 

@@ -1,4 +1,4 @@
-"""The tables of an exercise's data: their rows and columns by name, and a drawn value as a cell."""
+"""The tables of an exercise's data: their rows, columns and cells by name, and a drawn value as a cell."""
 
 from __future__ import annotations
 
@@ -18,6 +18,17 @@ from dalembert.units import composed, parted
 NAMES = ("name", "link", "part", "rotor", "cylinder", "run")
 """Columns that may name the rows of a table."""
 COMMA = re.compile(r"\s*[-+]?\d*,\d+(?:[eE][-+]?\d+)?\s*")
+
+
+def cell_of(name: str) -> tuple[str, str, str] | None:
+    """Take the name of a table's cell apart.
+
+    >>> cell_of("rotor.csv:W1.mass_kg"), cell_of("links.crank.B.x")
+    (('rotor.csv', 'W1', 'mass_kg'), None)
+    """
+    file, colon, rest = name.partition(":")
+    row, dot, column = rest.rpartition(".")
+    return (file, row, column) if colon and dot and row else None
 
 
 @dataclass(eq=False, repr=False)

@@ -70,22 +70,6 @@ class Draw:
     name: str
     values: tuple[Value, ...]
 
-    @property
-    def cell(self) -> tuple[str, str, str] | None:
-        """File, row and column, where it is a table's cell: `rotor.csv:W1.mass_kg`."""
-        return cell_of(self.name)
-
-
-def cell_of(name: str) -> tuple[str, str, str] | None:
-    """Take the name of a table's cell apart.
-
-    >>> cell_of("rotor.csv:W1.mass_kg"), cell_of("links.crank.B.x")
-    (('rotor.csv', 'W1', 'mass_kg'), None)
-    """
-    file, colon, rest = name.partition(":")
-    row, dot, column = rest.rpartition(".")
-    return (file, row, column) if colon and dot and row else None
-
 
 @dataclass(frozen=True)
 class Ask:

@@ -15,8 +15,8 @@ from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cli.exercise.data import DataTable, converted
-from cli.exercise.description import Draw, Exercise, Solved, Value, cell_of, value_of
+from cli.exercise.data import DataTable, cell_of, converted
+from cli.exercise.description import Draw, Exercise, Solved, Value, value_of
 from cli.read.options import components
 from cli.show.output import result_of
 from dalembert.errors import DataError, quote
@@ -96,8 +96,9 @@ class Workshop:
         placeholders = {part for word in self.exercise.command for part in _placeholders(word)}
         for draw in self.exercise.draws:
             where = f"{place}: [draw], {draw.name}"
-            if draw.cell is not None:
-                self._check_cell(where, draw, draw.cell)
+            cell = cell_of(draw.name)
+            if cell is not None:
+                self._check_cell(where, draw, cell)
                 continue
             if draw.name in placeholders:
                 continue

@@ -63,12 +63,24 @@ TURN = np.radians(20)
 
 
 @pytest.mark.slow
+def test_belts_turn_every_link(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    path = EXAMPLES / "belt-drive/belt-drive.toml"
+    done = dalembert("forces", path, "--at", "30deg", "--page", "p.html")
+    assert done.returncode == 0, done.stderr
+    page, m = Opened(browser, tmp_path / "p.html"), Mechanism.from_toml(str(path))
+    check(page, m, np.radians([30.0]))
+    assert page("return dalembert.set(arguments[0])", {"belts.1.radii.1": 0.07})
+    check(page, changed(m, {"belts.1.radii.1": 0.07}), np.radians([30.0]))
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "at", "inputs", "change"),
     [
         ("crank-press/press.toml", "75deg", np.radians([75.0]), {"links.rod.B.x": 0.37}),
         ("robot-arm/arm.toml", "upper=20deg,fore=20deg", [[TURN, TURN]], {"links.fore.mass": 3.5}),
         ("boom/boom.toml", "", None, {}),
+        ("rack-lift/rack-lift.toml", "30deg", np.radians([30.0]), {"racks.1.radius": 0.031}),
         ("lift.toml", "B=0.4m,arm=20deg", [[0.4, TURN]], {"links.block.mass": 5.0}),
     ],
 )

@@ -19,7 +19,6 @@ from virtualwork.formulas.forces import (
     Generalized,
     JointForce,
     JointMoment,
-    MeshForce,
     NewtonEuler,
     Reaction,
     Shaking,
@@ -155,10 +154,6 @@ class Dynamics:
     def contact(self, cam: int) -> Reals:
         """How hard a cam (from 0) presses on its follower along the normal, (n,); below zero it would have to pull."""
         return np.asarray(self.value(Contact(cam)))
-
-    def mesh(self, mesh: int) -> Reals:
-        """The torque of a gear or a belt (from 0), or the tooth force of a rack on the link of its guide, (n,)."""
-        return np.asarray(self.value(MeshForce(mesh)))
 
     def reaction(self, joint: str, on: str) -> Reals:
         """The force of all others on a link at a joint, (n, 2): of a pin and of a guide, where both are of that name."""

@@ -128,13 +128,35 @@ class Contact(Force, kind="contact"):
 
 
 class MeshForce(Force, kind="mesh"):
-    """The torque of a gear or a belt, N·m, which turns each link by its share; the tooth force of a rack, N, on the guide's link."""
+    """The tooth force of a rack along its slide, N, on the link of the guide; of a gear or a belt the torque for a share of 1."""
 
     is_joint_force = True
     mesh: int
 
     def form(self, forces: PoseForces) -> Number:
         return forces.mesh(self.mesh)
+
+
+class MeshTorque(Force, kind="mesh torque"):
+    """What a gear, a belt or a rack turns a link by, N·m."""
+
+    is_joint_force = True
+    mesh: int
+    body: str
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.mesh_torque(self.mesh, self.body)
+
+
+class ToothPlace(Force, kind="teeth at"):
+    """The pitch point of a rack's wheel, m."""
+
+    is_rubbed = False
+    is_vector = is_joint_force = True
+    mesh: int
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.tooth_place(self.mesh)
 
 
 class Shaking(Force, kind="shaking"):

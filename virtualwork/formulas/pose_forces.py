@@ -19,7 +19,7 @@ from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.loaded_pose import LoadedPose, Shared, Table
 from virtualwork.formulas.loads import applied_loads, reduced, resultant, shaking_loads
-from virtualwork.formulas.numbers import WRITTEN, Number, dot, minus, plus
+from virtualwork.formulas.numbers import WRITTEN, Number, dot, minus, plus, times
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.quantity import Quantity, Recording
 from virtualwork.formulas.rates import Rates
@@ -185,6 +185,20 @@ class PoseForces:
         if of.guide is not None:
             return self.joints.tooth(self.pose, mesh)
         return self.paths.value(self.pose, self.paths.couple(of.kind, mesh))
+
+    def mesh_torque(self, mesh: int, body: str) -> Number:
+        return times(self.mechanism.meshes[mesh].torques[body], self.mesh(mesh))
+
+    def tooth_place(self, mesh: int) -> Number:
+        self.solve_places()
+        of, bodies = self.mechanism.meshes[mesh], self.mechanism.bodies
+        assert of.guide is not None
+        assert of.rack is not None
+        guide, pin = self.mechanism.guides[of.guide], self.joints.meshing(mesh)
+        # the wheel turns on a pin of the guide's body, or rolls along it
+        body, point, side = (of.wheel, pin, -1j) if pin else (guide.link, guide.point, 1j)
+        axis = self.pose.position(self.case.path(body, bodies[body][point]))
+        return plus(axis, times(side * of.rack.radius, self.joints.rail(self.pose, of.guide)))
 
     # --- redundant statics ------------------------------------------------------------------------------------------
     @cached_property

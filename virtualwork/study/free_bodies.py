@@ -6,25 +6,37 @@ Ibrahim §2.2 and §2.3, Riul, unit II, figures 3 to 5: loads, weights, joint fo
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.dynamics import Dynamics
-from virtualwork.formulas.forces import Effort, JointForce, JointMoment, Load, LoadPlace, LoadTorque, Rail
+from virtualwork.formulas.forces import (
+    Effort,
+    JointForce,
+    JointMoment,
+    Load,
+    LoadPlace,
+    LoadTorque,
+    MeshForce,
+    MeshTorque,
+    Rail,
+    ToothPlace,
+)
 from virtualwork.formulas.kinematics import Point
 from virtualwork.formulas.touches import Touch
 from virtualwork.plan.joint_forces import pairs
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator
 
     from virtualwork.describe.description import Description
     from virtualwork.formulas.load_case import LoadCase
     from virtualwork.formulas.loaded_pose import LoadedPose
     from virtualwork.formulas.numbers import Complexes, Number, Reals
     from virtualwork.formulas.quantity import Quantity
+    from virtualwork.formulas.reactions import JointForces
     from virtualwork.plan.steps import Joint
 
 SHORT = {
@@ -62,11 +74,12 @@ class Part(NamedTuple):
     at: Quantity | None
     sign: float
     along: Quantity | None = None
-    """Of a drive along a guide: the direction of its effort."""
+    """Of a drive or of teeth along a guide: the direction of its effort."""
 
 
-def parts(m: Description, case: LoadCase, joints: Sequence[Joint]) -> dict[str, list[Part]]:
+def parts(case: LoadCase, of: JointForces) -> dict[str, list[Part]]:
     """Return what acts on every link, as `free_bodies` has it over poses, for tapes."""
+    m = of.mechanism
     rubbing = {joint.key for joint, *_ in case.contacts if joint.guide is None}
     result: dict[str, list[Part]] = {body: [] for body in m.links}
     for i, load in enumerate(case.loads):
@@ -75,7 +88,7 @@ def parts(m: Description, case: LoadCase, joints: Sequence[Joint]) -> dict[str, 
             torque = load.path is None
             key: Quantity = LoadTorque(i) if torque else Load(i)
             result[load.body].append(Part(name, load.kind, key, None if torque else LoadPlace(i), 1.0))
-    for joint in joints:
+    for joint in of.joints:
         for body in joint.bodies:
             if body == GROUND:
                 continue
@@ -85,6 +98,9 @@ def parts(m: Description, case: LoadCase, joints: Sequence[Joint]) -> dict[str, 
             result[body].append(Part(name, "joint force", JointForce(joint.key, body), at, 1.0))
             if joint.key in rubbing or (guide is not None and m.guides[guide].is_slider):
                 result[body].append(Part(name, "joint moment", JointMoment(joint.key, body), None, 1.0))
+    for body, part in _meshes(of):
+        if body != GROUND:
+            result[body].append(part)
     for j, entry in enumerate(m.inputs):
         guide = m.guide_of(entry) if entry.is_slide else None
         ends = (
@@ -192,8 +208,14 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
         ):
             if body != GROUND:
                 result[body].forces.append(Force(f"N: {other}", "contact force", at, sign * force))
-    for number in range(len(m.meshes)):
-        _mesh(dynamics, number, result)
+    for body, part in _meshes(dynamics.reactions):
+        if body == GROUND:
+            continue
+        force, at, along = (_value(dynamics, key) for key in (part.key, part.at, part.along))
+        if at is None:
+            result[body].torques.append(Torque(part.name, part.kind, part.sign * force))
+        else:
+            result[body].forces.append(Force(part.name, part.kind, at, part.sign * force * along))
     for j, entry in enumerate(m.inputs):
         if not entry.is_slide:
             for body, sign in ((str(entry.link), 1.0), (m.carrier(j), -1.0)):
@@ -214,26 +236,23 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
     return list(result.values())
 
 
-def _mesh(dynamics: Dynamics, number: int, result: dict[str, FreeBody]) -> None:
-    """Add what a gear or a belt turns each of its links by, or a rack's tooth force at the pitch point of its wheel."""
-    m, of = dynamics.poses.mechanism, dynamics.reactions
-    mesh, force = m.meshes[number], dynamics.mesh(number)
-    pin = None if mesh.guide is None else of.meshing(number)
-    if mesh.guide is None or mesh.rack is None or pin is None:
-        for body, share in mesh.torques.items():
-            if body != GROUND:
-                result[body].torques.append(Torque(mesh.kind, f"{mesh.kind} torque", share * force))
-        return
-    g = m.guides[mesh.guide]
-    (rail,) = dynamics.scene.over([partial(of.rail, guide=mesh.guide)], complex)
-    # the wheel turns on the body of the guide, or rolls along it
-    ends, axis = (g.link, g.on), _block(dynamics, mesh.guide)
-    if pin:
-        ends, axis = (g.link, mesh.wheel), dynamics.poses.point(mesh.wheel, 0j, 0, pin)
-    at = axis + (-1j if pin else 1j) * mesh.rack.radius * rail
-    for body, sign in zip(ends, (1.0, -1.0), strict=True):
-        if body != GROUND:
-            result[body].forces.append(Force("teeth", "tooth force", at, sign * force * rail))
+def _value(dynamics: Dynamics, key: Any) -> Any:
+    return None if key is None else np.asarray(dynamics.value(key))
+
+
+def _meshes(of: JointForces) -> Iterator[tuple[str, Part]]:
+    """What gears and belts turn each of their links by; of racks the tooth force at the pitch point of the wheel."""
+    m = of.mechanism
+    for i, mesh in enumerate(m.meshes):
+        pin = None if mesh.guide is None else of.meshing(i)
+        if mesh.guide is None or pin is None:
+            for body in mesh.torques:
+                yield body, Part(mesh.kind, f"{mesh.kind} torque", MeshTorque(i, body), None, 1.0)
+            continue
+        g = m.guides[mesh.guide]
+        # the wheel turns on the body of the guide, or rolls along it
+        for body, sign in ((g.link, 1.0), (mesh.wheel if pin else g.on, -1.0)):
+            yield body, Part("teeth", "tooth force", MeshForce(i), ToothPlace(i), sign, Rail(mesh.guide))
 
 
 def _normal(pose: LoadedPose, touch: Touch) -> Number:
