@@ -24,7 +24,7 @@ from virtualwork.branch.guess import informed
 from virtualwork.branch.sampling import FINE
 from virtualwork.branch.track import SAMPLES
 from virtualwork.describe.description import Description, known_by_guess
-from virtualwork.describe.dimensions import Dimension, dimensions, value
+from virtualwork.describe.dimensions import dimensions, value
 from virtualwork.drawing import Drawing, draw
 from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.forces import Forces
@@ -225,15 +225,14 @@ class Formulas:
         iterated = {g.name for g in written.plan.groups if g.kind == "Newton"}
         closed = {g.name for g in written.closed}
         groups = [
-            {
-                "name": g.name,
-                **(self._iterated(g) if g.name in iterated else self._closed(g)),
-            }
+            {"name": g.name, **(self._iterated(g) if g.name in iterated else self._closed(g))}
             for g in written.plan.groups
             if g.name in closed or g.name in iterated
         ]
         return {
-            "dimensions": [self._dimension(d) for d in self.dimensions.values()],
+            "dimensions": [
+                [d.path, d.kind, float(np.real(value(m, d.path)))] for d in self.dimensions.values()
+            ],
             "inputs": [self._input(j) for j in range(len(m.inputs))],
             "groups": groups,
             "phases": written.phases,
@@ -318,9 +317,6 @@ class Formulas:
             "sure": all(body in known for body in group.angles),
             "informed": informed(self.mechanism, group),
         }
-
-    def _dimension(self, d: Dimension) -> list[Any]:
-        return [d.path, d.kind, float(np.real(value(self.mechanism, d.path)))]
 
     def _input(self, j: int) -> dict[str, Any]:
         m = self.mechanism
