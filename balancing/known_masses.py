@@ -117,15 +117,15 @@ def known_masses(
     outputs: Outputs = {}
     sums = {"static": u, "couple": u * (z - about)}
     places = {"plane": planes} | ({} if bearings is None else {"bearing": bearings})
-    asked = {what: _asked(np.asarray(at, dtype=float), z) for what, at in places.items()}
+    factors = {what: _factors(np.asarray(at, dtype=float), z) for what, at in places.items()}
     if modal is not None:
         conditions = modal.conditions(recorder, z)
-        asked["plane"] = [
+        factors["plane"] = [
             sum((float(x) * phi for x, phi in zip(column, conditions, strict=True)), 0.0)
             for column in modal.solution.T
         ]
         sums |= {f"mode {k}": u * phi for k, phi in enumerate(conditions[modal.first :])}
-    for what, each in asked.items():
+    for what, each in factors.items():
         sums |= {f"{what} {p}": u * factor for p, factor in enumerate(each)}
     for p in range(len(planes)):
         outputs |= parts(f"share {p}", -sums[f"plane {p}"])
@@ -171,7 +171,7 @@ def known_masses(
     return {"mass": mass, "result": result, "given": given}
 
 
-def _asked(planes: Real, z: Number) -> list[Number]:
+def _factors(planes: Real, z: Number) -> list[Number]:
     """Return the correction in every plane for an unbalance of 1 at z, so that force and couple vanish."""
     first, slope, about = shares(planes)
     return [float(a) + float(b) * (z - about) for a, b in zip(first, slope, strict=True)]
