@@ -24,7 +24,7 @@ from virtualwork.branch.guess import informed
 from virtualwork.branch.sampling import FINE
 from virtualwork.branch.track import SAMPLES
 from virtualwork.describe.description import Description, known_by_guess
-from virtualwork.describe.dimensions import Dimension, dimensions, value
+from virtualwork.describe.dimensions import dimensions, value
 from virtualwork.drawing import Drawing, draw
 from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.forces import Forces
@@ -165,14 +165,14 @@ class Formulas:
         """Return the request to the tape of the poses for a column or a name."""
         if not each.key:
             return {"zero": 1}
-        found: dict[str, Any] = {"row": self.row(each.key) + each.imaginary, **self.locking(each.key)}
+        request: dict[str, Any] = {"row": self.row(each.key) + each.imaginary, **self.locking(each.key)}
         if each.less:
-            found["less"] = self.row(each.less)
+            request["less"] = self.row(each.less)
         if each.link:
-            found["turns"] = 1
+            request["turns"] = 1
         if each.order:
-            found["order"] = each.order
-        return found
+            request["order"] = each.order
+        return request
 
     def locking(self, key: Quantity) -> dict[str, Any]:
         """Return whether a quantity depends on the friction of joints, and so has no value where they lock."""
@@ -186,7 +186,7 @@ class Formulas:
         groups = written.plan.groups
         closed = [g.name for g in written.closed]
         every = Closed(tuple(g.name for g in groups))
-        found = {
+        tapes = {
             "pose": written.tape((*self.keys, every)),
             "choice": written.choice,
             "margins": written.tape([Margin(name) for name in closed]),
@@ -195,29 +195,29 @@ class Formulas:
         }
         if self.traced:
             places = [Point(self.mechanism.points[name][0], 0j, name, 0) for name in self.traced]
-            found["paths"] = written.tape((*places, every))
-        found |= profiles(written.mechanism, written.recording.recorder)
+            tapes["paths"] = written.tape((*places, every))
+        tapes |= profiles(written.mechanism, written.recording.recorder)
         if self._bears:
             system = self._bears.system.items()
             entries = {f"{row} {column}": value for (row, column), value in system}
-            found["statics"] = written.recording.recorder.tape(entries)
+            tapes["statics"] = written.recording.recorder.tape(entries)
         if self._rubs:
             names = [f"friction {n}" for n in range(self._rubs)]
             rubs = [Rub(n) for n in range(self._rubs)]
-            found["slips"] = written.tape([Slip(n) for n in range(self._rubs)])
-            found["rubs"] = written.tape(rubs)
-            found["slopes"] = written.evaluation(rubs, tuple(names), False)
+            tapes["slips"] = written.tape([Slip(n) for n in range(self._rubs)])
+            tapes["rubs"] = written.tape(rubs)
+            tapes["slopes"] = written.evaluation(rubs, tuple(names), False)
         if self._loaded and self.written.recording.tables:
-            found["over"] = written.tape([Over(i) for i in range(len(self.written.recording.tables))])
+            tapes["over"] = written.tape([Over(i) for i in range(len(self.written.recording.tables))])
         if any(g.kind == "Newton" for g in groups):
-            found |= {"steps": written.steps, "guessed": written.guessed}
+            tapes |= {"steps": written.steps, "guessed": written.guessed}
         winding = [body for g in written.closed for body in self._closed(g)["winds"]]
         if winding:
-            found["winds"] = written.tape([Angle(body, 0) for body in winding])
+            tapes["winds"] = written.tape([Angle(body, 0) for body in winding])
         if self.mechanism.torsion_springs:
             springs = range(len(self.mechanism.torsion_springs))
-            found["twists"] = written.tape([Twist(i) for i in springs])
-        return found
+            tapes["twists"] = written.tape([Twist(i) for i in springs])
+        return tapes
 
     def document(self) -> dict[str, Any]:
         """Return the data of the mechanism for the page, other than its tapes."""
@@ -225,15 +225,14 @@ class Formulas:
         iterated = {g.name for g in written.plan.groups if g.kind == "Newton"}
         closed = {g.name for g in written.closed}
         groups = [
-            {
-                "name": g.name,
-                **(self._iterated(g) if g.name in iterated else self._closed(g)),
-            }
+            {"name": g.name, **(self._iterated(g) if g.name in iterated else self._closed(g))}
             for g in written.plan.groups
             if g.name in closed or g.name in iterated
         ]
         return {
-            "dimensions": [self._dimension(d) for d in self.dimensions.values()],
+            "dimensions": [
+                [d.path, d.kind, float(np.real(value(m, d.path)))] for d in self.dimensions.values()
+            ],
             "inputs": [self._input(j) for j in range(len(m.inputs))],
             "groups": groups,
             "phases": written.phases,
@@ -319,9 +318,6 @@ class Formulas:
             "informed": informed(self.mechanism, group),
         }
 
-    def _dimension(self, d: Dimension) -> list[Any]:
-        return [d.path, d.kind, float(np.real(value(self.mechanism, d.path)))]
-
     def _input(self, j: int) -> dict[str, Any]:
         m = self.mechanism
         entry = m.inputs[j]
@@ -380,8 +376,8 @@ def computing_page(
         return reason
     listed: dict[str, Shown] = {}
     for header, (what, how) in columns.items():
-        asked: Any = {"input": what} if isinstance(what, int) else formulas.column(what)
-        listed[header] = Shown(asked, how.header, how.si)
+        request: Any = {"input": what} if isinstance(what, int) else formulas.column(what)
+        listed[header] = Shown(request, how.header, how.si)
     over = [header for header, (what, _) in columns.items() if isinstance(what, int)]
     travel = travel_of(poses)
     drawing = draw(m, travel)

@@ -112,10 +112,12 @@ def _computing(
     m = first.mechanism
     start = motion.inputs[0]
     if motion.n == 1 and len(m.inputs) == 1 and not m.inputs[0].is_slide:
-        # one pose, and the whole turn from it
+        # one pose, and the whole turn from it in degrees, which fields and options show short
+        turn = np.radians(read_degrees(float(start[0])) + np.linspace(0.0, 360.0, SWEEP))
+        turn[0] = start[0]
         motion = Motion(
             assembly,
-            start[0] + np.linspace(0.0, 2 * np.pi, SWEEP),
+            turn,
             first.inputs.whole.speed,
             first.inputs.whole.acceleration,
         )

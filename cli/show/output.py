@@ -40,7 +40,7 @@ def command(
 
 
 def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
-    """Write the requested files, print the result; status 1 if an expectation is not met, or nothing was found."""
+    """Write the requested files, print the result; status 1 if an expectation is not met, or there is no result."""
     from dalembert.tables.headers import check_renamed
 
     if take(result):

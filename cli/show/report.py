@@ -62,7 +62,7 @@ class Report:
     about: list[tuple[str, str]]
     pages: list[Page]
     closing: list[str]
-    """Warnings are said on the first page; method, sources and version here."""
+    """Method, sources and version; warnings stand on the first page."""
     warnings: list[str]
 
 

@@ -135,10 +135,10 @@ class Result:
     afterword: Callable[[], str] = lambda: ""
     """What the terminal shows below the table."""
     aside: Callable[[], Sequence[str]] = lambda: ()
-    """What else was asked for and stands in no table: told on standard error where the table alone is shown."""
+    """Requested results that stand in no table: lines for standard error, where the table alone is shown."""
     figure: Callable[[], Figure] | None = None
     method: str = ""
-    """How it was found, and after whom: for the report."""
+    """The method and its source, for the report."""
     sheets: Callable[[], Iterable[Sheet]] | None = None
     """What the report shows, where that is more than the notes, the tables, the afterword and the picture."""
     shows_input: bool = False
@@ -146,7 +146,7 @@ class Result:
     about: Mapping[str, str] = field(default_factory=dict)
     """What the file itself says for the head of the report."""
     beside: Mapping[Path, Callable[[], bytes | Iterable[bytes]]] = field(default_factory=dict)
-    """Files that options of the command itself ask for."""
+    """Files that options of the command itself request."""
     warnings: list[str] = field(default_factory=list)
     failed: Callable[[], bool] = lambda: False
     """Whether nothing that was requested could be computed: status 1, once all is shown."""
@@ -162,11 +162,11 @@ class Result:
     way: Callable[[], Sequence[Topic]] | None = None
     """The worked solution, formed with --steps alone."""
     shows_way: bool = False
-    """Whether it is asked for."""
+    """Whether the worked solution is requested."""
     toml: Callable[[], bytes] | None = None
-    """The mechanism's file that was found, for -o FILE.toml."""
+    """The file of the resulting mechanism, for -o FILE.toml."""
     late_warnings: Callable[[], list[str]] = list
-    """What there is to say once all parts are written."""
+    """Warnings that are known once all parts are written."""
 
     def documented(self) -> Document:
         """Return the JSON document, without its warnings."""

@@ -138,7 +138,15 @@ function saved(text, type, suffix) {
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
-const undoButton = tool(TEXTS.undo, () => {
+function undone() {
   undo();
   anew();
+}
+const undoButton = tool(TEXTS.undo, undone);
+$("keys").append(`${TEXTS.undoKey}: ${TEXTS.undo}. `);
+document.addEventListener("keydown", (event) => {
+  // a text that is being typed has an undo of its own
+  if (!(event.ctrlKey || event.metaKey) || event.shiftKey || event.key !== "z" || event.target.type?.startsWith("text")) return;
+  event.preventDefault();
+  undone();
 });

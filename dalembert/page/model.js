@@ -63,7 +63,7 @@ class Machine extends Way {
       if (this.iterate(g, given)) return true;
     }
     let [least, best, others] = [Infinity, null, false];
-    for (const start of this.#starts(g)) {
+    for (const start of spread(g, this.model.size)) {
       put(start);
       if (!this.iterate(g, given)) continue;
       const far = this.tapes.guessed.one(given)[g.guess + g.start.length + g.rows * (1 + g.free.length)];
@@ -75,19 +75,6 @@ class Machine extends Way {
     if (!best || (others && !g.informed)) return false;
     put(best);
     return true;
-  }
-
-  // starts spread evenly over angles and slides: a Kronecker sequence of the generalised golden ratio
-  *#starts(g) {
-    const count = g.start.length;
-    let golden = 1;
-    for (let round = 0; round < 64; round++) golden = (1 + golden) ** (1 / (count + 1));
-    for (let k = 1; k <= Math.min(4096, 128 * count); k++) {
-      yield g.start.map((_, i) => {
-        const u = (0.5 + k * golden ** -(i + 1)) % 1;
-        return i < g.angles ? u * TAU : (2 * u - 1) * this.model.size;
-      });
-    }
   }
 
   // what places enter by at inputs, one array for each input of the mechanism; `pose`: with its rates
@@ -223,26 +210,11 @@ class Machine extends Way {
     }
   }
 
-  // the forces that tables give, of what they are over: linear between their rows
+  // the forces that tables give, of what they are over
   #load(given, over) {
-    for (const [i, { at, x, y, periodic, turns }] of this.model.tables.entries()) {
-      const [first, end] = [at[0], at.at(-1)];
-      const within = (angle, period) => first + ((angle - first) % period < 0 ? ((angle - first) % period) + period : (angle - first) % period);
-      const force = (values) => over[i].map((place) => {
-        if (turns) place = within(place, TAU);
-        if (periodic) place = within(place, end - first);
-        if (!(place >= first && place <= end)) return NaN;
-        let [low, high] = [0, at.length - 1];
-        while (high - low > 1) {
-          const middle = (low + high) >> 1;
-          if (at[middle] <= place) low = middle;
-          else high = middle;
-        }
-        if (place === end) return values.at(-1);
-        return ((values[high] - values[low]) / (at[high] - at[low])) * (place - at[low]) + values[low];
-      });
-      given[`table ${i} x`] = force(x);
-      given[`table ${i} y`] = force(y);
+    for (const [i, table] of this.model.tables.entries()) {
+      given[`table ${i} x`] = tabled(table, table.x, over[i]);
+      given[`table ${i} y`] = tabled(table, table.y, over[i]);
     }
   }
 

@@ -158,7 +158,8 @@ function plot(column) {
   const svg = svgIn(host);
   const x = data.x === undefined ? Float64Array.from({ length: n + 1 }, (_, i) => i + 1) : whole.columns[data.x].values;
   const margin = { left: 58, right: 18, top: 8, bottom: 30 };
-  let cursor, dot, ghosts, px, py;
+  let cursor, dot, px, py;
+  let noise = 0; // what is smaller is the rounding of zero
   const chart = {
     draw() {
       const k = Number(choice.value);
@@ -169,8 +170,9 @@ function plot(column) {
       const lines = data.series.map((s) => (s.hidden?.() ? [] : (s.columns[k]?.values.subarray(0, s.n) ?? [])));
       let [low, high] = range(lines.flatMap((values) => range(values)).filter(Number.isFinite));
       if (!(low <= high)) [low, high] = [0, 1];
+      noise = 1e-12 * Math.max(Math.abs(low), Math.abs(high));
       // what varies by rounding alone is constant
-      const varies = high - low > 1e-12 * Math.max(Math.abs(low), Math.abs(high));
+      const varies = high - low > noise;
       const pad = varies ? (high - low) * 0.06 : Math.abs(high) * 0.1 || 1;
       [low, high] = [low - pad, high + pad];
       let [left, right] = range(x.subarray(0, n));
@@ -218,7 +220,7 @@ function plot(column) {
         dot.setAttribute("cx", px(x[i]));
         dot.setAttribute("cy", py(y));
       }
-      value.textContent = short(y);
+      value.textContent = short(Math.abs(y) < noise ? 0 : y);
     },
   };
   const seek = (event) => {

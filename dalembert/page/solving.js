@@ -1,5 +1,5 @@
-// Systems of equations as tapes give them: least squares, dependent equations, what fits its own effect. No formula of mechanics
-// stands here.
+// Systems of equations as tapes give them: least squares, dependent equations, what fits its own effect; starts of a search, tables.
+// No formula of mechanics stands here.
 
 // the x of least |Σ x_j·column_j + gap|, by Householder's reflections; columns are arrays
 function leastSquares(columns, gap) {
@@ -174,4 +174,36 @@ class Fitted {
     const [step] = eliminated(this.#jacobian(here, 1), rest);
     this.keys.forEach((key, k) => (here[key] = two.add([here[key], 0], [-step[k] || 0, 0])));
   }
+}
+
+// starts of an iterated group spread evenly over angles and slides: a Kronecker sequence of the generalised golden ratio
+function* spread(g, size) {
+  const count = g.start.length;
+  let golden = 1;
+  for (let round = 0; round < 64; round++) golden = (1 + golden) ** (1 / (count + 1));
+  for (let k = 1; k <= Math.min(4096, 128 * count); k++) {
+    yield g.start.map((_, i) => {
+      const u = (0.5 + k * golden ** -(i + 1)) % 1;
+      return i < g.angles ? u * TAU : (2 * u - 1) * size;
+    });
+  }
+}
+
+// the values of a table at places, linear between its rows; NaN beside it
+function tabled({ at, periodic, turns }, values, places) {
+  const [first, end] = [at[0], at.at(-1)];
+  const within = (angle, period) => first + ((angle - first) % period < 0 ? ((angle - first) % period) + period : (angle - first) % period);
+  return places.map((place) => {
+    if (turns) place = within(place, TAU);
+    if (periodic) place = within(place, end - first);
+    if (!(place >= first && place <= end)) return NaN;
+    let [low, high] = [0, at.length - 1];
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (at[middle] <= place) low = middle;
+      else high = middle;
+    }
+    if (place === end) return values.at(-1);
+    return ((values[high] - values[low]) / (at[high] - at[low])) * (place - at[low]) + values[low];
+  });
 }

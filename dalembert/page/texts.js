@@ -57,6 +57,7 @@ const TEXTS = {
   traceOfAxis: "trace of an axis",
   traceOf: (axis) => `trace of ${axis} on a sphere about the centre; drag to turn the view`,
   undo: "undo",
+  undoKey: "Ctrl+Z",
   reset: "reset",
   copyOptions: "copy --set options",
   copyFile: "copy TOML",

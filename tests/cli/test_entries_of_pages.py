@@ -45,6 +45,17 @@ def test_a_number_stands_in_its_field_as_in_the_file(
     assert page.faults() == []
 
 
+def test_every_pose_of_a_turn_has_short_degrees(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """From 10° on by whole degrees: no 117.99999999999999."""
+    (tmp_path / "m.toml").write_text(CRANK)
+    assert dalembert("mechanism", "m.toml", "--at", "10deg", "--page", "m.html").returncode == 0
+    page = Computing(browser, tmp_path / "m.html")
+    for pose in (0, 108, 198, 360):
+        page.set(pose)
+        assert page("return dalembert.options()") == f"--at {10 + pose}deg"
+        assert page.get("input") == math.radians(10 + pose)
+
+
 def test_degrees_of_a_table_stand_as_in_the_file(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
     rows = "name,unbalance_g_mm,angle_deg\nA,60,28.64789\nB,0.3,120.321137\n"
     (tmp_path / "r.csv").write_text(rows)

@@ -150,6 +150,9 @@ def test_real_keys(klann: Computing) -> None:
         klann.button("undo")
         assert klann.get("links.crank.B.x") == length
     assert klann("return document.getElementById('tools').firstChild.disabled")
+    klann.put(links__crank__B__x=0.13)
+    klann.browser.find_element("css selector", "#slider").send_keys(Keys.CONTROL + "z")
+    assert klann.get("links.crank.B.x") == 0.12
     box = klann.browser.find_element("css selector", "input[type=checkbox]")
     ticked = box.is_selected()
     box.send_keys(Keys.SPACE)
