@@ -91,7 +91,8 @@ class Marks(NamedTuple):
             apart = self.high - self.low
             return apart[apart.argmax()] / 2
         # other even marks lie elsewhere there
-        line, k = self.at[0] + (self.at[1] - self.at[0]) * place, np.arange(len(self.at)) - place
+        last, k = len(self.at) - 1, np.arange(len(self.at)) - place
+        line = self.at[0] + (self.at[-1] - self.at[0]) * (place / last)
         return max(line - _envelope(k, self.low), -_envelope(k, -self.high) - line, key=float)
 
     def resolution(self, middle: float, pulses: int) -> Any:
