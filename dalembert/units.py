@@ -183,12 +183,48 @@ _SIGNS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "³": "3", "·": "*", "
 _PER_MINUTE = r"(?:1|r|rev|u|tr|giri|rot)\s*/\s*min|min\s*(?:\^?-1|⁻¹)"
 
 
+_FULL = {
+    "m": "metre meter metres meters",
+    "mm": "millimetre millimeter millimetres millimeters",
+    "um": "micrometre micrometer micrometres micrometers micron microns",
+    "in": "inch inches",
+    "ft": "foot feet",
+    "mil": "mils thou",
+    "kg": "kilogram kilograms",
+    "g": "gram grams",
+    "lb": "lbs pound pounds",
+    "oz": "ounce ounces",
+    "s": "sec second seconds",
+    "deg": "degree degrees",
+    "rad": "radian radians",
+    "rev": "revolution revolutions",
+    "N": "newton newtons",
+}
+"""Units in full, as people write them in files and options."""
+_ABBREVIATION = {word: unit for unit, words in _FULL.items() for word in words.split()}
+# products without a sign between their words: Nm, kNm, gmm, kgm2; `gm` may be grams
+_JOINED = re.compile(r"(?!gm\b)([kMm]?N|k?g|mg|oz|lbf?)(mm|cm|m|in|ft)(s?)(?![A-Za-z])")
+
+
 def _spelled(text: str) -> str:
-    """A unit in plain signs: `µ` is u, `°` deg, `1/min` rpm."""
+    """A unit in plain signs: `µ` is u, `°` deg, `1/min` rpm, `degrees` deg, `Nm` N*m.
+
+    >>> [_spelled(text) for text in ("µm", "inches", "kNm", "gmm", "kgm²", "Nm/rad", "gm", "mm")]
+    ['um', 'in', 'kN*m', 'g*mm', 'kg*m2', 'N*m/rad', 'gm', 'mm']
+    """
     text = text.strip()
     if "min" in text.lower() and re.fullmatch(_PER_MINUTE, text.lower()):
         return "rpm"
-    return text.translate(_SIGNS).replace("°", "deg").replace("**", "^")
+    text = text.translate(_SIGNS).replace("°", "deg").replace("**", "^")
+    return re.sub("[A-Za-z]+", _word, text)
+
+
+def _word(match: re.Match[str]) -> str:
+    """A word of a unit as the table has it."""
+    word = match[0]
+    if joined := _JOINED.fullmatch(word):
+        return "*".join(filter(None, joined.groups()))
+    return _ABBREVIATION.get(word.lower(), word)
 
 
 def unit_name(written: str) -> str:

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import pytest
 
-from dalembert.quantities import number_in_si
+from dalembert.quantities import number_in_si, parse_quantity
 from dalembert.units import LISTED, UNITS, composed, find_unit, to_si, unit_name, written
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.units import Units
@@ -100,3 +100,29 @@ def test_the_case_of_a_header_does_not_matter_where_small_letters_are_a_unit(suf
     small = {d for d in UNITS if find_unit(d, suffix.lower())}
     assert {d for d in UNITS if find_unit(d, suffix)} == small
     assert (small == set()) == (suffix in ("KN_MM", "N/MM2"))
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "unit"),
+    [
+        ("3 Nm", "torque", "N_m"),
+        ("3kNm", "torque", "kN_m"),
+        ("4 Nm/rad", "torsional stiffness", "N_m_per_rad"),
+        ("5 Nms/rad", "torsional damping", "N_m_s_per_rad"),
+        ("2 gmm", "unbalance", "g_mm"),
+        ("3 kgm²", "inertia", "kg_m2"),
+        ("2 inches", "length", "in"),
+        ("90 degrees", "angle", "deg"),
+        ("5 lbs", "mass", "lb"),
+        ("7 radians/sec", "speed", "rad_s"),
+    ],
+)
+def test_units_as_people_write_them(text: str, dimension: str, unit: str) -> None:
+    assert parse_quantity(text, dimension)[1] == unit
+
+
+@pytest.mark.parametrize(("text", "dimension"), [("2 gm", "mass"), ("3 NM", "torque"), ("20 1/s", "speed")])
+def test_units_of_two_meanings_are_refused(text: str, dimension: str) -> None:
+    """Grams or g·m, newton or nautical, rad/s or Hz."""
+    with pytest.raises(ValueError, match="unknown"):
+        parse_quantity(text, dimension)
