@@ -64,12 +64,14 @@ def runs_layout(path: str) -> Layout:
 
 
 def _trial_names(header: list[str]) -> list[str]:
-    """Return a header in which `plane` and `kept` are those of the trial masses.
+    """Return a header in which `plane` and `kept` are those of the trial masses, where there are any.
 
     >>> _trial_names(["run", "plane", "kept", "trial_mass_g"])
     ['run', 'trial_plane', 'trial_kept', 'trial_mass_g']
     """
     lower = [name.lower() for name in header]
+    if not any(name.startswith(("trial_mass", "trial_unbalance")) for name in lower):
+        return header
     return [
         f"trial_{name}" if name in ("plane", "kept") and f"trial_{name}" not in lower else written
         for written, name in zip(header, lower, strict=True)
