@@ -138,6 +138,9 @@ def parse_quantity(text: str, dimension: str) -> tuple[float, str]:
     if match is None:
         raise ValueError(f"'{text}' is not a number with a unit (units: {names})")
     number, suffix = match.groups()
+    value = float(number)
+    if not abs(value) <= LARGEST:
+        raise ValueError(f"'{text}' is too large a number")
     suffix = unit_name(suffix)
     unit = find_unit(dimension, suffix)
     if unit is None:
@@ -146,9 +149,6 @@ def parse_quantity(text: str, dimension: str) -> tuple[float, str]:
         raise ValueError(
             f"'{text}' has the unknown {dimension} unit '{suffix}' (units: {names}){nearest_unit(suffix, dimension)}"
         )
-    value = float(number)
-    if not abs(value) <= LARGEST:
-        raise ValueError(f"'{text}' is too large a number")
     return value, unit
 
 

@@ -10,7 +10,7 @@ from cli.read.options import bad
 from dalembert.errors import DataError
 from dalembert.hints import nearest
 from dalembert.quantities import is_number, parse_number, parse_quantity
-from dalembert.units import LISTED, UNITS, from_si, to_si, written
+from dalembert.units import LISTED, UNITS, from_si, to_si, unit_name, written
 
 SIDES = 96
 """Samples on either side of the present number: evenly spaced at first, then further and further apart."""
@@ -126,6 +126,10 @@ def value_in(unit: str, text: str) -> float:
         except ValueError:
             continue
         return value if its == unit else float(from_si(to_si(value, dimension, its), dimension, unit))
+    # results alone have some units, such as J and kg_m2_s
+    number = next((text[:k] for k in range(len(text) - 1, 0, -1) if is_number(text[:k])), "")
+    if number and unit_name(text[len(number) :]) == unit:
+        return parse_number(number)
     raise bad("--so-that", f"'{text}': expected a number, in {written(unit)} or with its unit")
 
 

@@ -248,7 +248,7 @@ def finished(table: Table, units: str | None, digits: bool) -> tuple[Table, int]
 
 
 def _in_unit(column: Column, chosen: Mapping[str, str]) -> Column:
-    fits = [d for d in _DIMENSIONS if d in chosen and column.unit in UNITS[d]]
+    fits = [d for d in _DIMENSIONS if d in chosen and find_unit(d, column.unit) == column.unit]
     if not fits or chosen[fits[0]] == column.unit or column.name.startswith(_MEASURED):
         return column
     dimension = fits[0]

@@ -66,7 +66,7 @@ def states(r: Rotation, only: Collection[str] = QUANTITIES) -> Table:
         columns.append(number("energy", "energy", s.energy + 0.0, error=error("energy")))
     how = "closed form" if r.exact else f"integrated by {r.integrator}"
     above = f"omega in body axes, momentum in space axes, attitude [w, x, y, z] from body to space; {how}"
-    return Table(columns, place="states[]", above=above)
+    return Table(columns, keys=("t_s",), place="states[]", above=above)
 
 
 def constants(r: Rotation, only: Collection[str] = QUANTITIES) -> Table:

@@ -354,3 +354,21 @@ def test_a_picture_that_cannot_be_drawn_is_refused(dalembert: Dalembert, tmp_pat
     assert picture.exists()
     for words in (("trial",), ("signal",)):
         assert "--plot" not in dalembert(*words, "--help").stdout
+
+
+def test_a_unit_made_of_words_is_converted(dalembert: Dalembert) -> None:
+    states = "link,torque_lbf_ft,omega_rpm\na,?,60\nb,3,60\n"
+    done = dalembert("work", "-", "--units", "N_m", stdin=states)
+    assert done.stdout == "step,link,torque_N_m\n1,a,-4.067453844994201\n"
+
+
+def test_a_wanted_result_may_carry_its_unit(dalembert: Dalembert) -> None:
+    body = "inertia = [1.0, 2.0, 3.0]\nomega = [0.0, 0.0, 1.0]\n"
+    for wanted in ("energy=6J", "momentum.z=6 kg m²/s"):
+        done = dalembert("spin", "-", "--find", "omega.z", "--so-that", wanted, "--json", stdin=body)
+        assert document(done)["found"]["omega.z_rad_s"] == pytest.approx(2.0, rel=1e-12)
+
+
+def test_a_number_that_is_too_large_is_called_so(dalembert: Dalembert) -> None:
+    done = dalembert("body", "-", "--omega", "1e99,0,0", stdin="part,shape,mass_kg\na,point,1\n")
+    assert (done.returncode, "'1e99' is too large a number" in done.stderr) == (2, True)
