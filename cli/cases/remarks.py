@@ -199,7 +199,17 @@ def statements(analysis: Analysis) -> list[str]:
         result.append(
             "friction: nothing moves (speed zero), so that its direction and size are not determined: left out"
         )
-    return list(dict.fromkeys(result))
+    return list(dict.fromkeys([*result, *idle_friction(analysis.mechanism)]))
+
+
+def idle_friction(m: Description) -> list[str]:
+    """Return the warnings of pins that rub on no radius."""
+    guides = {guide.point for guide in m.guides}
+    return [
+        f"[[friction]] {number}: no effect at the pin {each.joint}: its friction acts on the radius of the pin; add radius"
+        for number, each in enumerate(m.friction, 1)
+        if each.coefficient and not each.radius and each.joint not in guides
+    ]
 
 
 def pinned(m: Description, body: str, center: complex) -> bool:

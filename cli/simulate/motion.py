@@ -14,6 +14,7 @@ from cli.cases.analysis import Analysis
 from cli.cases.axes import input_values
 from cli.cases.case import Case, Study
 from cli.cases.poses import bounds_of, cells, column, in_rows, keys_of, nested
+from cli.cases.remarks import idle_friction
 from cli.read import options
 from cli.show.commands import ShowOptions
 from cli.show.picture import shown as on_page
@@ -203,7 +204,7 @@ class Motion(Case):
 
     def warnings(self) -> list[str]:
         """Return the warnings: an early end, and doubts."""
-        return [*self.analysis.warnings, *self.run.warnings]
+        return [*self.analysis.warnings, *self.run.warnings, *idle_friction(self.analysis.mechanism)]
 
     def way(self) -> list[Topic]:
         """Return the start, and the energy."""

@@ -372,3 +372,27 @@ def test_a_wanted_result_may_carry_its_unit(dalembert: Dalembert) -> None:
 def test_a_number_that_is_too_large_is_called_so(dalembert: Dalembert) -> None:
     done = dalembert("body", "-", "--omega", "1e99,0,0", stdin="part,shape,mass_kg\na,point,1\n")
     assert (done.returncode, "'1e99' is too large a number" in done.stderr) == (2, True)
+
+
+PENDULUM = """gravity = [0, -9.81]
+[ground]
+O = [0, 0]
+[links.bob]
+points = { O = [0, 0], P = [1, 0] }
+mass = 2
+center = [1, 0]
+[input]
+link = "bob"
+speed = 1
+[[friction]]
+joint = "O"
+coefficient = 0.1
+"""
+
+
+@pytest.mark.parametrize("call", [("forces", "-"), ("simulate", "-", "--time", "0:1:0.5")])
+def test_friction_at_a_pin_without_a_radius_is_named(call: tuple[str, ...], dalembert: Dalembert) -> None:
+    text = PENDULUM
+    line = "warning: [[friction]] 1: no effect at the pin O: its friction acts on the radius of the pin; add radius"
+    assert line in dalembert(*call, stdin=text).stderr.splitlines()
+    assert "no effect" not in dalembert(*call, stdin=text + "radius = 0.01\n").stderr
