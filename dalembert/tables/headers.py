@@ -97,11 +97,13 @@ def rename(names: Mapping[str, str]) -> None:
 
 
 def rename_from(path: str) -> None:
-    """Take the headers of `--columns FILE.toml` for this call; where `--column` has the same name, that one holds."""
+    """Take the headers of `--columns FILE.toml` for this call; where `--column` has the same name or header, that one holds."""
+    own = {header.strip().lower() for header in _renamed.values()}
     for name, header in read_toml(path)[1].items():
         if not isinstance(header, str):
             raise DataError(f'{path}: {name}: expected a header in quotes, such as mass_g = "Masse"')
-        _renamed.setdefault(name, header.strip())
+        if header.strip().lower() not in own:
+            _renamed.setdefault(name, header.strip())
 
 
 def check_renamed() -> None:

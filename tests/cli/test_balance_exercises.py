@@ -116,3 +116,34 @@ def test_forces_in_the_bearings_are_those_of_the_shaft(dalembert: Any, tmp_path:
     assert sum(b["dynamic_N"][0] for b in found["bearings"]) == pytest.approx(
         0.1248076 * (100 * pi) ** 2, rel=1e-5
     )
+
+
+@pytest.mark.parametrize("radius", ["20mm", "?"])
+def test_a_mass_that_is_given_is_not_rounded(radius: str, dalembert: Any, tmp_path: Path) -> None:
+    table = "mass_kg,radius_mm,angle_deg\n1,60,30\n"
+    options = ("--plane", f"A:{radius}", "--mass", "A:2.4kg", "--round-mass", "1kg")
+    (tmp_path / "r.csv").write_text(table)
+    one, _ = rotor(dalembert, *options)
+    (fix,) = one["corrections"]
+    assert fix["mass_kg"] == 2.4
+    left = 0.0 if radius == "?" else 0.060 - 2.4 * 0.020
+    assert fix["radius_m"] == pytest.approx(0.060 / 2.4 if radius == "?" else 0.020, rel=1e-15)
+    assert abs(one["residual"]["static_unbalance_kg_m"] - left) <= 1e-15 * 0.060
+
+
+@pytest.mark.parametrize("planes", [("A:20mm",), ("A:0mm:20mm", "B:90mm:20mm")])
+def test_equal_masses_evenly_around_need_no_correction(
+    planes: tuple[str, ...], dalembert: Any, tmp_path: Path
+) -> None:
+    """A rounding of sin 120° gave 9e-17 kg at 180°."""
+    table = "mass_kg,radius_mm,angle_deg,z_mm\n1,10,0,10\n1,10,120,10\n1,10,240,10\n"
+    options = [word for plane in planes for word in ("--plane", plane)]
+    (tmp_path / "r.csv").write_text(table)
+    one, _ = rotor(dalembert, *options)
+    assert all((fix["mass_kg"], fix["angle_deg"]) == (0.0, 0.0) for fix in one["corrections"])
+    assert one["initial"]["static_unbalance_kg_m"] == one["initial"]["static_angle_deg"] == 0.0
+    assert one["residual"]["static_unbalance_kg_m"] == 0.0
+    assert one["initial"]["couple_unbalance_kg_m2"] == one["residual"]["couple_unbalance_kg_m2"]
+    assert one["residual"]["couple_unbalance_kg_m2"] in (None, 0.0)
+    way = json.loads(dalembert("balance", "r.csv", *options, "--steps", "--json").stdout)["way"]
+    assert set(way[0]["sum"].values()) <= {0.0, None}

@@ -375,3 +375,22 @@ def test_the_angle_of_material_to_remove(dalembert: Dalembert) -> None:
     planes = [word for z in (-46, 92, 390, 395) for word in ("--plane", f"P{z}:{z}mm:50cm")]
     for row in rows(dalembert("balance", "-", *planes, "--remove", "--digits", stdin=table)):
         assert float(row["angle_deg"]) == 26
+
+
+def test_digits_that_hold(dalembert: Dalembert) -> None:
+    """Two masses that nearly cancel, and planes 1e-6 apart: few digits are left, and only they are printed."""
+    table = "mass_g,radius_mm,angle_deg,z_mm\n5,20,30,90\n5,20,210.0000001,90\n"
+    near = ("--plane", "A:0mm:20mm", "--plane", "B:0.001mm:20mm")
+    full = rows(dalembert("balance", "-", *near, stdin=table))[0]
+    held = rows(dalembert("balance", "-", *near, "--digits", stdin=table))[0]
+    assert 2 <= len(held["mass_g"].lstrip("0.").replace(".", "")) <= 9
+    # both vectors have the direction of 120°; the difference in length is 5·(1e-7 in radians), the arm that to plane B
+    true = 5 * np.radians(1e-7) * (90 - 0.001) / 0.001
+    last = 10.0 ** -len(held["mass_g"].split(".")[1])
+    assert abs(float(held["mass_g"]) - true) <= last
+    assert len(full["mass_g"]) > len(held["mass_g"]) + 5
+    assert held["mass_g"] == "0.0007853894"
+    apart = (*near[:2], "--plane", "B:90mm:20mm", "--digits")
+    rotor = "mass_kg,radius_mm,angle_deg,z_mm\n9,30,60,20\n6,50,210,65\n"
+    plain = rows(dalembert("balance", "-", *apart, stdin=rotor))[0]
+    assert 13 <= len(plain["mass_kg"].replace(".", "")) <= 16

@@ -215,3 +215,11 @@ def test_plane_and_kept_without_trial(dalembert: Dalembert) -> None:
         "field", "-", "--json", stdin=LONG.replace("trial_plane", "plane").replace("trial_kept", "kept")
     )
     assert document(done) == document(dalembert("field", "-", "--json", stdin=LONG))
+
+
+def test_column_goes_before_the_file_of_columns(dalembert: Dalembert, tmp_path: Path) -> None:
+    """Of two names for one header that of the option is taken: the other one was said to be missing."""
+    (tmp_path / "names.toml").write_text('trial_mass_g = "TW"\nphase_deg = "Ph"\n')
+    runs = "run,amplitude_um,Ph,TW,trial_angle_deg\n0,10,0,,\n1,12,45,2,0\n"
+    call = ("field", "-", "--columns", "names.toml", "--column", "trial_mass_kg=TW")
+    assert dalembert(*call, stdin=runs).stdout.startswith("rotor,plane,mass_kg,")

@@ -162,3 +162,9 @@ def test_columns_without_a_header(dalembert: Dalembert) -> None:
     assert (done.returncode, done.stderr) == (0, "")
     done = dalembert("balance", "-", *PLANE, stdin=empty.replace("60,,", "60,x,y"))
     assert done.stderr == "warning: standard input: ignored 2 columns without a header\n"
+
+
+@pytest.mark.parametrize("unit", ["g.mm", "g·mm", "g mm", "g*mm", "g_mm"])
+def test_every_spelling_of_an_unbalance(unit: str, dalembert: Dalembert) -> None:
+    done = dalembert("balance", "-", "--plane", "A:1mm", stdin=f"unbalance [{unit}],angle_deg\n10,0\n")
+    assert done.stdout == "rotor,plane,radius_mm,unbalance_g_mm,mass_g,angle_deg\n1,A,1.0,10.0,10.0,180.0\n"
