@@ -242,7 +242,10 @@ class Analysis:
         names = {name for each in components for name in (*each.names, *each.owners)}
         owner = word.rpartition(".")[0]
         parts = [
-            name.rpartition(".")[2] for each in components if owner in each.owners for name in each.names[:1]
+            name.removeprefix(f"{owner}.")
+            for each in components
+            for name in each.names[:1]
+            if owner in each.owners and name.startswith(f"{owner}.")
         ]
         if parts:
             choices = ", ".join(dict.fromkeys(parts))

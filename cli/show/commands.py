@@ -47,14 +47,14 @@ FORMS = (".csv", ".json", ".xlsx", ".parquet", ".md", ".tex")
 """Suffixes of what every result can be written as."""
 
 
-def suffix_among(*suffixes: str) -> Callable[[str | Path | None], Path | None]:
-    """Return the check of a file's option: its suffix is one of these, any where there are none."""
+def suffix_among(*suffixes: str, also: str = "") -> Callable[[str | Path | None], Path | None]:
+    """Return the check of a file's option: its suffix is one of these, any where there are none; messages omit `also`."""
 
     def check(name: str | Path | None) -> Path | None:
         if name is None:
             return None
         path = Path(name)
-        if suffixes and path.suffix.lower() not in suffixes:
+        if suffixes and path.suffix.lower() not in filter(None, (*suffixes, also)):
             report = (
                 "; --report writes .html" if path.suffix.lower() == ".html" and ".json" in suffixes else ""
             )
@@ -71,7 +71,7 @@ def _tolerance(value: float) -> float:
 
 
 CHECKS: dict[str, Callable[[Any], Any]] = {
-    "output": suffix_among(*FORMS, ".toml"),
+    "output": suffix_among(*FORMS, also=".toml"),
     "plot": suffix_among(".svg", ".png", ".pdf"),
     "expect": suffix_among(),
     "report": suffix_among(".html", ".htm", ".md"),
