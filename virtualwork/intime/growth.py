@@ -59,8 +59,12 @@ def grown(f: Rates, scale: Reals, t: Reals, q: Reals, v: Reals, a: Reals, noise:
     True
     """
     k, h = len(q), np.diff(t, axis=0)
-    (first, stirred), (last, more) = (_linear(f, scale, *_inside(share, t, q, v, a)) for share in GAUSS)
-    rounds = np.hypot(noise, ROUNDINGS * EPS * h * np.maximum(stirred, more))
+    early, late = (_inside(share, t, q, v, a) for share in GAUSS)
+    # all accelerations in one request
+    at = [np.concatenate(both, axis=both[0].ndim - h.ndim) for both in zip(early, late, strict=True)]
+    matrices, stirred = _linear(f, scale, at[0], at[1], at[2])
+    first, last = np.split(matrices, 2, axis=2)
+    rounds = np.hypot(noise, ROUNDINGS * EPS * h * np.maximum(*np.split(stirred, 2, axis=1)))
     turning = math.sqrt(3) / 12 * h * h * (_times(last, first) - _times(first, last))
     flow = _exponential(0.5 * h * (first + last) + turning)
     start = 0.5 * EPS * np.abs(np.concatenate([q[:, 0], v[:, 0]]))
@@ -86,13 +90,15 @@ def _linear(f: Rates, scale: Reals, t: Reals, q: Reals, v: Reals) -> tuple[Reals
     """The matrix of the linear equation at states, (2k, 2k, m, …), and what rounding of these makes of the accelerations, (k, m, …)."""
     k = len(q)
     state = np.concatenate([q, v])
-    here, result = f(t, q, v), np.zeros((2 * k, *state.shape))
+    by, moved = [BESIDE * scale[j % k] for j in range(2 * k)], np.stack([state] * (2 * k + 1), axis=1)
     for j in range(2 * k):
-        by = BESIDE * scale[j % k]
-        moved = state.copy()
-        moved[j] += by
+        moved[j, j + 1] += by[j]
+    rates = f(np.concatenate([t] * (2 * k + 1)), *moved.reshape(2, k, -1, *state.shape[2:]))
+    here, *others = rates.reshape(k, 2 * k + 1, *state.shape[1:]).swapaxes(0, 1)
+    result = np.zeros((2 * k, *state.shape))
+    for j, (there, apart) in enumerate(zip(others, by, strict=True)):
         # a place that cannot be assembled says nothing
-        slope = (f(t, moved[:k], moved[k:]) - here) / by
+        slope = (there - here) / apart
         result[k:, j] = np.where(np.isfinite(slope), slope, 0.0)
         if j >= k:
             result[j - k, j] = 1.0
