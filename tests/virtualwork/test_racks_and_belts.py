@@ -259,7 +259,7 @@ BAD = [
     ({"racks": [Rack("pinon", "R", 0.1)]}, r"\[\[racks\]\] 1 gear: .*did you mean 'pinion'"),
     ({"racks": [Rack("pinion", "S", 0.1)]}, r"\[\[racks\]\] 1 slider: unknown slot or slider 'S'"),
     ({"racks": [Rack("rack", "R", 0.1)]}, r"\[\[racks\]\] 1 slider: the wheel 'rack' cannot turn in a slider"),
-    ({"belts": [Belt(("pinion", "pinion"), (0.1, 0.1))]}, r"\[\[belts\]\] 1: expected two links and an arm"),
+    ({"belts": [Belt(("pinion", "pinion"), (0.1, 0.1))]}, r"\[\[belts\]\] 1: found the links pinion and pinion and the arm ground, expected two links and an arm"),
     ({"belts": [Belt(("pinion", "rack"), (0.1, -0.1))]}, r"\[\[belts\]\] 1 radii: found -0.1 m, expected a radius above"),
 ]  # fmt: skip
 

@@ -223,9 +223,11 @@ def _finite(path: str, number: Any, count: int) -> tuple[Any, ...]:
     ------
     DescriptionError
     """
+    parts: tuple[Any, ...] = (number,)
     if count == 2 and isinstance(number, complex | Real):
-        number = number.real, number.imag
-    parts = tuple(number) if count == 2 and isinstance(number, Iterable) else (number,)
+        parts = number.real, number.imag
+    elif count == 2 and isinstance(number, Iterable):
+        parts = tuple(number)
     finite = (isinstance(x, Constant) or (isinstance(x, Real) and abs(float(x)) <= LARGEST) for x in parts)
     if len(parts) != count or not all(finite):
         expected = "a finite number" if count == 1 else "a point (x, y) or x + iy of finite numbers"
