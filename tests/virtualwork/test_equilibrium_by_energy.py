@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from virtualwork import Force, Guess, Guide, Input, Link, Mechanism, Spring, Torque, TorsionSpring
-from virtualwork.study.equilibrium import winding
 
 G = 9.81
 
@@ -302,19 +301,3 @@ def test_rest_of_a_block_that_runs_away_where_its_guides_are_parallel() -> None:
     rest = m.equilibria().found
     assert [e.stable for e in rest] == [True, False, True, False]
     assert np.allclose(np.degrees([e.inputs[0] for e in rest]), [60, 120, 240, 300], rtol=0, atol=1e-10)
-
-
-@pytest.mark.parametrize(("lengths", "turns"), [((40, 120, 80, 100), 2), ((90, 60, 70, 120), 1)])
-def test_how_far_a_spring_is_wound(lengths: tuple[float, ...], turns: int) -> None:
-    """A crank that goes round is searched a turn either way, one between limits half a turn: its own angle has no gap there."""
-    crank, coupler, rocker, ground = lengths
-    links = {
-        "crank": Link({"A": 0j, "B": crank}),
-        "coupler": Link({"B": 0j, "C": coupler}),
-        "rocker": Link({"D": 0j, "C": rocker}),
-    }
-    m = Mechanism(
-        {"A": 0j, "D": ground}, links, inputs=Input(link="crank"), guess=Guess((1.0,), {"coupler": 0.3, "rocker": 1.2}),
-        torsion_springs=[TorsionSpring(("ground", "crank"), 1.0, 0.0)],
-    )  # fmt: skip
-    assert winding(m.assembly).tolist() == [turns * math.pi]

@@ -216,8 +216,7 @@ def winding(assembly: Assembly) -> Reals:
             poses = Rest(assembly, ways).poses
             twists = np.array([poses.twist(i) for i in range(len(m.torsion_springs))])
             wound = np.abs(twists[:, -1] - twists[:, 0]) > np.pi
-            goes_round = poses.assembled.all() and not (assembly.track.active and assembly.track.has_limits)
-            reach[j] = np.pi * (0 if not wound.any() else 2 if goes_round else 1)
+            reach[j] = np.pi * (0 if not wound.any() else 2 if np.isfinite(twists).all() else 1)
     return reach
 
 
