@@ -82,17 +82,27 @@ def exactly(number: str, factor: Factor) -> Fraction:
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.ASCII | re.DOTALL)
 
 
+def number_and_unit(text: str) -> tuple[str, str] | None:
+    """Take a quantity apart: its decimals and the unit behind them as it is written; None where it begins with no number.
+
+    >>> number_and_unit("2.5 N m"), number_and_unit("-3"), number_and_unit("m")
+    (('2.5', 'N m'), ('-3', ''), None)
+    """
+    match = _QUANTITY.match(text.replace(MINUS, "-"))
+    return None if match is None else (match[1], match[2])
+
+
 def _quantity(text: str, dimension: str) -> tuple[str, Factor] | None:
     """The decimals of a quantity and the factor of its unit; None where text is no quantity of that dimension."""
-    match = _QUANTITY.match(text.replace(MINUS, "-"))
-    unit = composed(match[2]) if match and match[2] else None
-    if match is None or unit is None:
+    parts = number_and_unit(text)
+    unit = composed(parts[1]) if parts and parts[1] else None
+    if parts is None or unit is None:
         return None
     own, wanted = unit[1], DIMENSIONS[dimension].exponents
     # rad is a pure number: a torque may be N m/rad, but a length is never an angle
     loose = own[:3] == wanted[:3] and wanted[:3] != (0, 0, 0) and 0 in (own[3], wanted[3])
     loose = loose and dimension not in ("speed", "angular acceleration", "angular jerk")
-    return (match[1], unit[0]) if own == wanted or loose else None
+    return (parts[0], unit[0]) if own == wanted or loose else None
 
 
 def parse_number(text: str) -> float:
@@ -134,11 +144,10 @@ def parse_quantity(text: str, dimension: str) -> tuple[float, str]:
     Raises ValueError with a sentence that says what is wrong and which units there are.
     """
     names = ", ".join(LISTED[dimension])
-    match = _QUANTITY.match(text.replace(MINUS, "-"))
-    if match is None:
+    parts = number_and_unit(text)
+    if parts is None:
         raise ValueError(f"'{text}' is not a number with a unit (units: {names})")
-    number, suffix = match.groups()
-    value = float(number)
+    value, suffix = float(parts[0]), parts[1]
     if not abs(value) <= LARGEST:
         raise ValueError(f"'{text}' is too large a number")
     suffix = unit_name(suffix)

@@ -28,7 +28,7 @@ Search:
 """
 
 
-@command(OPTIONS)
+@command(OPTIONS, forms=[".toml"])
 def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Fit dimensions of a mechanism to a target: a path, a function of the input, a guided body, an effort.
 

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 from cli.read.options import bad
 from dalembert.errors import DataError
 from dalembert.hints import nearest
-from dalembert.quantities import is_number, parse_number, parse_quantity
+from dalembert.quantities import is_number, number_and_unit, parse_number, parse_quantity
 from dalembert.units import LISTED, UNITS, from_si, to_si, unit_name, written
 
 SIDES = 96
@@ -127,9 +127,9 @@ def value_in(unit: str, text: str) -> float:
             continue
         return value if its == unit else float(from_si(to_si(value, dimension, its), dimension, unit))
     # results alone have some units, such as J and kg_m2_s
-    number = next((text[:k] for k in range(len(text) - 1, 0, -1) if is_number(text[:k])), "")
-    if number and unit_name(text[len(number) :]) == unit:
-        return parse_number(number)
+    parts = number_and_unit(text)
+    if parts and unit_name(parts[1]) == unit:
+        return parse_number(parts[0])
     raise bad("--so-that", f"'{text}': expected a number, in {written(unit)} or with its unit")
 
 

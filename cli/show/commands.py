@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
-from functools import wraps
+from functools import cache, wraps
 from inspect import Parameter, signature
 from pathlib import Path
 from textwrap import wrap
@@ -47,14 +47,14 @@ FORMS = (".csv", ".json", ".xlsx", ".parquet", ".md", ".tex")
 """Suffixes of what every result can be written as."""
 
 
-def suffix_among(*suffixes: str, also: str = "") -> Callable[[str | Path | None], Path | None]:
-    """Return the check of a file's option: its suffix is one of these, any where there are none; messages omit `also`."""
+def suffix_among(*suffixes: str) -> Callable[[str | Path | None], Path | None]:
+    """Return the check of a file's option: its suffix is one of these, any where there are none."""
 
     def check(name: str | Path | None) -> Path | None:
         if name is None:
             return None
         path = Path(name)
-        if suffixes and path.suffix.lower() not in filter(None, (*suffixes, also)):
+        if suffixes and path.suffix.lower() not in suffixes:
             report = (
                 "; --report writes .html" if path.suffix.lower() == ".html" and ".json" in suffixes else ""
             )
@@ -70,14 +70,19 @@ def _tolerance(value: float) -> float:
     return value
 
 
-CHECKS: dict[str, Callable[[Any], Any]] = {
-    "output": suffix_among(*FORMS, also=".toml"),
-    "plot": suffix_among(".svg", ".png", ".pdf"),
-    "expect": suffix_among(),
-    "report": suffix_among(".html", ".htm", ".md"),
-    "rtol": _tolerance,
-}
-"""What checks their values."""
+@cache
+def shared_parameters(*forms: str) -> dict[str, Parameter]:
+    """Return the parameters that every command shares; `forms` are the further suffixes that its -o takes."""
+    return parameters(
+        SHARED.replace("  help  Show this message and exit.\n", ""),
+        checks={
+            "output": suffix_among(*FORMS, *forms),
+            "plot": suffix_among(".svg", ".png", ".pdf"),
+            "expect": suffix_among(),
+            "report": suffix_among(".html", ".htm", ".md"),
+            "rtol": _tolerance,
+        },
+    )
 
 
 class ShowOptions(SimpleNamespace):
@@ -99,7 +104,7 @@ class ShowOptions(SimpleNamespace):
 
     def __init__(self, **values: object) -> None:
         """Take these values; an option that is not among them has its default."""
-        super().__init__(**({name: p.default for name, p in _SHARED.items()} | values))
+        super().__init__(**({name: p.default for name, p in shared_parameters().items()} | values))
 
     @property
     def head(self) -> dict[str, str]:
@@ -186,13 +191,15 @@ def with_options(
     shared: Collection[str],
     present: Callable[[Result, ShowOptions, Mapping[str, str]], None],
     eager: Mapping[str, Callable[[bool], None]] | None = None,
+    forms: Sequence[str] = (),
 ) -> Callable[[Callable[[SimpleNamespace, ShowOptions], Result]], Callable[..., None]]:
     """Make a command of a function of its own options and of the shared ones; `present` shows its result.
 
-    `options` declares its own, as `parameters` reads them; `shared` are those of the shared ones that it takes.
+    `options` declares its own, as `parameters` reads them; `shared` are those of the shared ones that it takes, `forms`
+    further suffixes of -o.
     """
     own = parameters(options, eager)
-    common = {name: p for name, p in _SHARED.items() if name in shared}
+    common = {name: p for name, p in shared_parameters(*forms).items() if name in shared}
     # a command may have a value of its own below --about, which is no KEY=TEXT
     two = "about" in own
     if two:
@@ -443,6 +450,3 @@ def _answered(answer: Callable[[bool], None]) -> Callable[[bool], bool]:
         return value
 
     return callback
-
-
-_SHARED = parameters(SHARED.replace("  help  Show this message and exit.\n", ""), checks=CHECKS)

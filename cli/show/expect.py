@@ -53,18 +53,17 @@ class _Expected:
         return {"deg": 360.0, "rad": math.tau}.get(self.unit, 0.0)
 
 
-def compare(table: Table, file: str, rtol: float, others: Sequence[Callable[[], Table]] = ()) -> Comparison:
-    """Compare a result with a file of expected values, cell by cell.
+def compare(tables: Sequence[Table], file: str, rtol: float) -> Comparison:
+    """Compare that table of a result which has most of a file's columns with the expected values in it, cell by cell.
 
     Rows are matched by the key columns that the file has, else by their order. A number holds where its
     relative error is at most `rtol`, an angle where it is off by at most `rtol` radians, modulo a turn; an
     expected zero is measured against the largest value in its column. Empty cells expect nothing. A key that is a
     number is matched to the digits that the file has. Values in another unit are converted; further columns of texts
-    (a student's name) are kept with the verdicts, not compared. `others` are the result's further tables, for a file with columns of one of them.
+    (a student's name) are kept with the verdicts, not compared.
     """
     read_table = read(file, texts=None)
     headers = list(read_table.texts)
-    tables = [table, *(of() for of in others)]
     table = max(tables, key=lambda each: sum(_partner(header, each) is not None for header in headers))
     columns = table.cells
     compared, aside = _columns(read_table, table, file)

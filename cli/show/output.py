@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cli.show.commands import FORMS, ShowOptions, with_options
+from cli.show.commands import ShowOptions, with_options
 from cli.show.terminal import coloured
 from dalembert.errors import DataError, one_line
 
@@ -28,15 +28,18 @@ if TYPE_CHECKING:
 
 
 def command(
-    options: str, without: Collection[str] = (), eager: Mapping[str, Callable[[bool], None]] | None = None
+    options: str,
+    without: Collection[str] = (),
+    eager: Mapping[str, Callable[[bool], None]] | None = None,
+    forms: Sequence[str] = (),
 ) -> Callable[[Callable[[SimpleNamespace, ShowOptions], Result]], Callable[..., None]]:
     """Make a command of a function that returns its result: the result is shown as the shared options say.
 
     `options` declares its own by the text of their help, `without` are the shared ones that mean nothing for it, `eager`
-    answers flags that need nothing else.
+    answers flags that need nothing else, `forms` are suffixes of -o that this command alone writes.
     """
     shared = [name for name in ShowOptions.__annotations__ if name not in without]
-    return with_options(options, shared, show, eager)
+    return with_options(options, shared, show, eager, forms)
 
 
 def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
@@ -46,10 +49,6 @@ def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
     if take(result):
         return
     form = options.form
-    if form == ".toml" and result.toml is None:
-        raise typer.BadParameter(
-            f"'{options.output}' has no known suffix: expected {', '.join(FORMS)}", param_hint="-o"
-        )
     if options.plot is not None and result.figure is None:
         result.warnings.append("--plot: there is no picture of this result")
     if result.blocks is not None:
@@ -71,8 +70,9 @@ def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
         from cli.show.expect import compare
 
         _, *others = result.tables.values()
-        screen = [] if result.screen is None else [lambda of=of: of for of in result.screen()]
-        checked = compare(whole(), str(options.expect), options.rtol, [*screen, *result.expected, *others])
+        screen = () if result.screen is None else result.screen()
+        tables = [whole(), *screen, *(of() for of in (*result.expected, *others))]
+        checked = compare(tables, str(options.expect), options.rtol)
         result.warnings.extend(checked.warnings)
     check_renamed()
     if options.digits:

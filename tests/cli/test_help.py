@@ -217,3 +217,87 @@ def test_progress_of_one_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
             assert stream.getvalue().endswith("\r")
         else:
             assert not lines
+
+
+GRAMMAR = """
+Arguments:
+  source FILE.csv  A table.
+  other [FILE]  Another.
+What:
+  count N  A number of parts.
+  share NUMBER(0-1)=0.5  A share.
+  seed N(0-)=0  A seed.
+  order one|other  A word.
+  page FILE(.html)  A page.
+  set NAME=VALUE...  Values.
+  tol -t --tol TEXT=3mm  A text with a default.
+  plain  A flag.
+"""
+# a word of the command line, its parameter, and what it becomes
+TAKEN = [
+    ([], "count", None),
+    (["--count", "3"], "count", 3),
+    ([], "share", 0.5),
+    (["--share", "1"], "share", 1.0),
+    ([], "seed", 0),
+    (["--order", "one"], "order", "one"),
+    (["--page", "a.html"], "page", Path("a.html")),
+    (["--set", "a=1", "--set", "b=2"], "set", ["a=1", "b=2"]),
+    ([], "tol", "3mm"),
+    (["-t", "4mm"], "tol", "4mm"),
+    ([], "plain", False),
+    (["--plain"], "plain", True),
+    ([], "source", "a.csv"),
+    ([], "other", None),
+    (["c.toml"], "other", "c.toml"),
+]
+REFUSED = [
+    (["--count", "0"], "0: expected a number, at least 1"),
+    (["--count", "x"], "'x': expected a whole number"),
+    (["--share", "1.5"], "1.5: expected a number from 0 to 1"),
+    (["--seed", "-1"], "-1: expected a number, at least 0"),
+    (["--order", "third"], "'one', 'other'"),
+    (["--page", "a.pdf"], "'a.pdf' has no known suffix: expected .html"),
+]
+
+
+def parsed(words: list[str]) -> dict[str, object]:
+    """What a command of the options of GRAMMAR takes of some words."""
+    import typer
+
+    from cli.show.commands import with_help, with_options
+    from cli.show.result import Result
+
+    taken: list[dict[str, object]] = []
+
+    def run(options: object, show: object) -> Result:
+        taken.append(vars(options))
+        return Result(tables={}, document=dict)
+
+    app = typer.Typer(add_completion=False)
+    app.command(cls=with_help(GRAMMAR, "", str))(with_options(GRAMMAR, (), lambda *_: None)(run))  # type: ignore[arg-type]
+    typer.main.get_command(app).main(["a.csv", *words], standalone_mode=False)
+    return taken[0]
+
+
+@pytest.mark.parametrize(("words", "name", "value"), TAKEN)
+def test_a_placeholder_declares_the_values_of_an_option(words: list[str], name: str, value: object) -> None:
+    assert parsed(words)[name] == value
+
+
+@pytest.mark.parametrize(("words", "message"), REFUSED)
+def test_a_value_that_its_placeholder_excludes(words: list[str], message: str) -> None:
+    import typer
+
+    with pytest.raises(typer.BadParameter) as error:
+        parsed(words)
+    assert message in error.value.format_message()
+
+
+def test_suffixes_of_the_output_are_those_that_the_command_writes(dalembert: Dalembert) -> None:
+    for command, words in (("mechanism", ("klann.toml",)), ("balance", ("r.csv", "--plane", "A:20mm"))):
+        done = dalembert(command, *words, "-o", "x.toml")
+        assert done.returncode == 2
+        assert "expected .csv, .json, .xlsx, .parquet, .md, .tex\n" in done.stderr
+    assert dalembert("fit", "x.toml", "t.csv", "-o", "x.html").returncode == 2
+    assert ".tex, .toml; --report" in dalembert("fit", "x.toml", "t.csv", "-o", "x.html").stderr
