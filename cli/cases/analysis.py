@@ -15,6 +15,7 @@ from dalembert.errors import DataError
 from dalembert.hints import nearest
 from dalembert.memory import memory
 from dalembert.results.way import figures
+from dalembert.tables.files import name_of
 from virtualwork import quantities
 from virtualwork.formulas.kinematics import Angle, Point
 from virtualwork.quantities import Component
@@ -96,7 +97,7 @@ class Analysis:
     @property
     def file(self) -> str:
         """The name of the file, for messages."""
-        return self.request.file
+        return name_of(self.request.file)
 
     @cached_property
     def input_order(self) -> int:

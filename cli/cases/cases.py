@@ -19,7 +19,7 @@ from cli.cases.inputs import Driven, Grid, Varied, of_one, with_numbers
 from cli.read.options import about, bad
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError
-from dalembert.tables.files import note, read_bytes, remember, split_sheet
+from dalembert.tables.files import name_of, note, read_bytes, remember, split_sheet
 from dalembert.tables.table import read
 
 if TYPE_CHECKING:
@@ -74,10 +74,11 @@ def naming(file: str) -> Iterator[None]:
     """Name the file in the errors of a mechanism."""
     from virtualwork import MechanismError
 
+    name = name_of(file)
     try:
         yield
     except MechanismError as error:
-        raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
+        raise DataError(f"{error}" if str(error).startswith(name) else f"{name}: {error}") from None
 
 
 def beside(warnings: list[str], path: Path) -> bytes:

@@ -56,6 +56,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     from cli.cases.inputs import of_one
     from cli.formats.drawing import cam_bytes, of_follower
     from cli.show.result import Result
+    from dalembert.tables.files import name_of
     from virtualwork import MechanismError
 
     output, file, profile = Path(options.output), options.file, options.profile
@@ -71,7 +72,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
         raise bad("--profile", wrong)
     moved = grids(m, None if options.at is None else [options.at], None, None, bare, [])[1]
     inputs = tuple(of_one(m, moved).part(0, 1).values[0].tolist())
-    name = "standard input" if file == "-" else Path(file).name
+    name = Path(name_of(file)).name
     try:
         if profile is not None:
             data, notes = cam_bytes(m, of_follower(m, profile), suffix, name, bare)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.cases.study import PoseCase, PoseStudy
+from dalembert.angles import read_degrees
 from dalembert.dataclass import dataclass
 from dalembert.results.columns import Column, Table, names, number
 from dalembert.results.way import Topic
@@ -88,11 +89,11 @@ def iterates(analysis: Analysis) -> dict[str, Table]:
         )
     columns = [names("k", [each.k for each in first.iterates])]
     for i, unknown in enumerate(first.unknowns):
-        values = np.array([each.unknowns[i] for each in first.iterates])
+        values = [each.unknowns[i] for each in first.iterates]
         turns = i < first.angles
-        columns.append(
-            number(unknown, "angle" if turns else "length", np.degrees(values) if turns else values)
-        )
+        # the first is the guess, as the file has it
+        shown = [read_degrees(value) for value in values] if turns else values
+        columns.append(number(unknown, "angle" if turns else "length", shown))
         columns[-1].place = (columns[-1].header,)
     columns.append(number("residual", "length", [each.residual for each in first.iterates]))
     rows = zip(first.unknowns, np.array(first.jacobian).T.tolist(), strict=True)

@@ -227,7 +227,8 @@ def _newton(analysis: Analysis, motion: Motion) -> Topic:
         every = []
         for it in iterates:
             turned, slid = np.split(it.unknowns, [done.angles])
-            unknowns = dict(zip(keys, [*np.degrees(turned).tolist(), *slid.tolist()], strict=True))
+            shown = [*map(read_degrees, turned.tolist()), *slid.tolist()]
+            unknowns = dict(zip(keys, shown, strict=True))
             every.append(
                 {
                     "k": it.k,

@@ -19,7 +19,7 @@ from dalembert.errors import DataError
 from dalembert.quantities import is_number, parse_quantity
 from dalembert.results.columns import Column, Table
 from dalembert.results.text import BAD, GOOD, Grid, has_names, heading, in_blocks, printed
-from dalembert.tables.files import load, named
+from dalembert.tables.files import load, name_of, named
 from dalembert.tables.sources import open_source
 from dalembert.units import LISTED, parted, written
 
@@ -146,7 +146,7 @@ def _inputs(call_options: Mapping[str, str], files: Sequence[str]) -> Iterator[s
             name if value == "yes" else f"{name} {_spaced(value)}" for name, value in call_options.items()
         )
     for path in files:
-        shown = "standard input" if path == "-" else path
+        shown = name_of(path)
         if path.lower().endswith(".toml") or (path == "-" and _is_toml()):
             lines = load(path).decode("utf-8-sig").splitlines()
             more = f"\n… and {len(lines) - LINES} further lines" if len(lines) > LINES else ""

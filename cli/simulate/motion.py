@@ -25,6 +25,7 @@ from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table, document, names, number
 from dalembert.results.way import Topic, figures
+from dalembert.tables.files import name_of
 from virtualwork import MechanismError, quantities
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.forces import Shaking
@@ -339,7 +340,7 @@ def _lanes(study: Simulation, rows: Rows) -> Iterator[tuple[Case | None, list[st
             study.times, accuracy=study.accuracy, until=study.levels(m)
         )
     except ValueError as error:
-        raise DataError(f"{study.cases.request.file}: {error}") from None
+        raise DataError(f"{name_of(study.cases.request.file)}: {error}") from None
     for i, reached in enumerate(np.isfinite(runs.times)):
         remarks = list(runs.warnings.get(i, ()))
         if not reached.any():

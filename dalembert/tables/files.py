@@ -60,9 +60,14 @@ def load(path: str | Path) -> bytes:
     return data
 
 
+def name_of(path: str) -> str:
+    """Return what messages call a file."""
+    return "standard input" if path == "-" else path or "''"
+
+
 def read_bytes(path: str) -> tuple[str, bytes]:
     """Read a file: what messages call it, and what it holds."""
-    file = "standard input" if path == "-" else path or "''"
+    file = name_of(path)
     try:
         return file, load(path)
     except (OSError, ValueError) as error:

@@ -33,3 +33,14 @@ def test_a_file_that_is_no_toml_is_named_with_its_fault(
         assert done.returncode == 1
         assert done.stderr.startswith(f"dalembert: f.toml: {fault}")
         assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.whole
+@pytest.mark.parametrize("command", ["mechanism", "forces", "inspect"])
+def test_every_fault_of_standard_input_is_named_so(command: str, dalembert: Any) -> None:
+    free = (
+        '[ground]\nA = [0, 0]\n[links.crank]\npoints = { A = [0, 0] }\n[links.rod]\n[input]\nlink = "crank"\n'
+    )
+    done = dalembert(command, "-", stdin=free)
+    assert done.returncode == 1
+    assert done.stderr.startswith("dalembert: standard input: a free degree of freedom: rod can still move")

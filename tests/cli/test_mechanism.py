@@ -55,7 +55,8 @@ def test_one_pose_as_json(dalembert: Dalembert) -> None:
     assert set(pose["points"]["H"]) == {"x_m", "y_m", "vx_m_s", "vy_m_s", "ax_m_s2", "ay_m_s2"}
     assert pose["points"]["H"]["x_m"] == pytest.approx(0.7960057379415451, rel=1e-13)
     assert [row["k"] for row in found["iterates"]][:3] == [1, 2, 3]
-    assert found["iterates"][0]["coupler_deg"] == pytest.approx(-15)
+    # the guess as the file has it
+    assert found["iterates"][0]["coupler_deg"] == -15
     assert found["iterates"][1]["leg_deg"] == pytest.approx(-45.70461199396262, rel=1e-12)
     assert found["iterates"][1]["residual_m"] == pytest.approx(0.010746883121656163, rel=1e-12)
     assert found["newton_difference_rad"] < 1e-14
