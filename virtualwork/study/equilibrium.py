@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.branch.assembly import Assembly
-from virtualwork.branch.limits import TURNS
+from virtualwork.branch.limits import TURNED
 from virtualwork.digits.balance import Balance
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.study.loads_at_rest import Rest
@@ -238,18 +238,21 @@ def _searched(assembly: Assembly) -> tuple[tuple[int | None, ...], Reals]:
 
 
 def _turns(assembly: Assembly, j: int) -> int | None:
-    """After how many turns of an input the loads come back, whatever the others are; None where not within `TURNS`."""
+    """After how many turns of an input the loads come back, whatever the others are; None where not within the `TURNED`."""
     at = np.asarray(assembly.mechanism.at, dtype=float)
     shares = np.multiply.outer(np.arange(1.0, COMPARED + 1), np.sqrt(np.arange(2.0, 2 + len(at)))) % 1.0
     rest = Rest(assembly, at + 2 * np.pi * shares)
     force, size = rest.force()
-    slope = np.abs(rest.hessian()[:, :, j])
-    for n in range(1, TURNS + 1):
-        later = rest.inputs + 2 * np.pi * n * np.eye(len(at))[j]
-        rounding = 4 * EPS * np.abs(later[:, [j]]) * slope
+    slope, tried = np.abs(rest.hessian()[:, :, j]), 0
+    for last in TURNED:
+        turns = np.arange(tried + 1, last + 1)
+        later = rest.inputs + 2 * np.pi * np.multiply.outer(turns, np.eye(len(at))[[j]])
+        off = np.abs(Rest(assembly, later.reshape(-1, len(at))).force()[0].reshape(later.shape) - force)
         # what is not assembled contradicts nothing
-        if not (np.abs(Rest(assembly, later).force()[0] - force) > ALIKE * size + rounding).any():
-            return n
+        back = ~(off > ALIKE * size + 4 * EPS * np.abs(later[:, :, [j]]) * slope).any(axis=(1, 2))
+        if back.any():
+            return int(turns[np.argmax(back)])
+        tried = last
     return None
 
 
