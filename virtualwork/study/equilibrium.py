@@ -33,8 +33,8 @@ AROUND = 72
 COMPARED, ALIKE = 24, 1e-9
 # of a turn: a range in which the loads' usual work cannot be seen
 NARROW = 0.1
-# halvings of the way from the last sample to a limit
-NEARER = 30
+# halvings of the way from the last sample to a limit, and how far behind the limit a range ends, of a turn
+NEARER, BEHIND = 30, 1e-9
 
 
 @dataclass(frozen=True)
@@ -224,7 +224,8 @@ def _searched(assembly: Assembly) -> tuple[tuple[int | None, ...], Reals]:
     limits = np.array([-np.inf, np.inf])
     if one and (m.torsion_springs or not (turns[0] or m.inputs[0].is_slide)):
         # beyond them no way leads from the guess, along which turns would be counted
-        limits = np.array(assembly.reach.range)
+        # at a limit itself rounding has the sign of the force: the range ends just behind it
+        limits = np.array(assembly.reach.range) + BEHIND * assembly.track.length * np.array([-1.0, 1.0])
         turns = [None] if np.isfinite(limits).any() else turns
     ranges = np.stack([at, at], axis=1)
     for j, (entry, n) in enumerate(zip(m.inputs, turns, strict=True)):
