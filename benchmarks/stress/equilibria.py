@@ -156,10 +156,21 @@ def slope(potential: Potential, q: Any) -> Any:
         return np.where(outside, np.nan, potential(q + 1j * STEP).imag / STEP)
 
 
+def _looked_through(mechanism: Mechanism, potential: Potential) -> Reals:
+    """Angles of the crank, a `GRID`th of a turn apart: a turn; under a torsion spring, whose turns count, those that the guess leads to."""
+    if not mechanism.torsion_springs:
+        return np.linspace(0, 2 * np.pi, GRID + 1)
+    q: Reals = mechanism.at[0] + np.linspace(-2 * np.pi, 2 * np.pi, 2 * GRID + 1)
+    with np.errstate(invalid="ignore"):
+        gaps = np.flatnonzero(~np.isfinite(potential(q)))
+    before, behind = gaps[gaps < GRID], gaps[gaps > GRID]
+    return np.asarray(q[before.max(initial=-1) + 1 : behind.min(initial=len(q))])
+
+
 def faults(mechanism: Mechanism, potential: Potential) -> list[str]:
     """What is wrong with the equilibria that a mechanism gives: one line for each."""
     found = mechanism.equilibria()
-    q = (np.arange(GRID + 1)) * (2 * np.pi / GRID)
+    q = _looked_through(mechanism, potential)
     effort = slope(potential, q)
     good = np.isfinite(effort)
     scale = float(np.median(np.abs(effort[good])))
@@ -169,7 +180,9 @@ def faults(mechanism: Mechanism, potential: Potential) -> list[str]:
     change = np.flatnonzero(good[:-1] & good[1:] & (np.sign(effort[:-1]) * np.sign(effort[1:]) < 0))
     cell, wrong = 2 * np.pi / GRID, []
     for i in change:
-        away = np.abs(np.angle(np.exp(1j * (told - q[i] - cell / 2))))
+        away = np.abs(told - q[i] - cell / 2)
+        if not mechanism.torsion_springs:
+            away = np.abs(np.angle(np.exp(1j * away)))
         near = np.flatnonzero(away < cell)
         stable = bool(effort[i] < 0)
         if not len(near):
@@ -182,6 +195,8 @@ def faults(mechanism: Mechanism, potential: Potential) -> list[str]:
         around = slope(potential, x + np.array([-1.0, 0.0, 1.0]) * 1e-7)
         if not np.abs(around[1]) <= 1e-9 * scale + 1e-6 * np.nanmax(np.abs(around), initial=0.0):
             wrong.append(f"invented {x:.9g}")
+        elif mechanism.torsion_springs and not q[0] - cell <= x <= q[-1] + cell:
+            wrong.append(f"out of reach {x:.9g}")
     return wrong
 
 

@@ -56,15 +56,16 @@ class Rest(Case):
 
     @cached_property
     def shown(self) -> list[list[float]]:
-        """Each input at the positions: m, or deg within a turn; deg with its turns where these wind a torsion spring up."""
-        from virtualwork.study.equilibrium import winding
-
-        m = self.analysis.mechanism
-        winds, columns = winding(m.assembly), []
-        for j, entry in enumerate(m.inputs):
+        """Each input at the positions: m, or deg within the turns after which the loads come back, deg as counted where they do not."""
+        columns = []
+        for j, (entry, turns) in enumerate(
+            zip(self.analysis.mechanism.inputs, self.equilibria.turns, strict=True)
+        ):
             values = [e.inputs[j] for e in self.equilibria.found]
             if not entry.is_slide:
-                values = [math.degrees(x) if winds[j] else in_turn(math.degrees(x)) for x in values]
+                values = [math.degrees(x) for x in values]
+            if turns:
+                values = [in_turn(x, turns) for x in values]
             columns.append(values)
         return columns
 
@@ -114,6 +115,15 @@ class Rest(Case):
             )
         elif not equilibria.found:
             lines.append("no equilibrium: the loads balance at no position of the range")
+        m = self.analysis.mechanism
+        if not np.isfinite(m.assembly.reach.range).all():
+            for j, (entry, turns) in enumerate(zip(m.inputs, equilibria.turns, strict=True)):
+                if not (turns or entry.is_slide or j in self.ranged):
+                    low, high = (f"{math.degrees(end):.10g}" for end in equilibria.ranges[j])
+                    lines.append(
+                        f"no number of turns of {entry.name} brings the loads back: searched from {low} to {high} deg; "
+                        "--over sets another range"
+                    )
         if any(e.stable and e.period is None for e in equilibria.found):
             lines.append("no period of oscillation: nothing that moves there has a mass or an inertia")
         if any(e.stable is None for e in equilibria.found):

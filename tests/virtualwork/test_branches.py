@@ -229,3 +229,36 @@ def test_a_kite_is_looked_at_turn_by_turn():
     near, far = m.motion(TWO_TURNS), m.motion(TWO_TURNS + 4 * math.pi * 7)
     found = [np.exp(1j * motion.link("rocker").angle) for motion in (near, far)]
     assert np.abs(found[0] - found[1]).max() < 1e-11
+
+
+@pytest.mark.parametrize("mirrored", [1, -1])
+@pytest.mark.parametrize(
+    ("coupler", "rocker", "named"),
+    [
+        (18.376, 64.944, None),
+        (-2.0, 85.0, None),
+        (40.0, 40.0, None),
+        (20.0, -80.0, ("rocker", -80.0)),
+        (-80.0, 65.0, ("rocker", 65.0)),
+        (-65.0, -170.0, None),
+        (16.0, -112.0, ("rocker", -112.0)),
+    ],
+)
+def test_a_guess_that_contradicts_the_rest_is_named(coupler, rocker, named, mirrored):
+    """Norton's four-bar at 60°: coupler and rocker stand at 18.4° and 64.9°, or at −65.2° and −111.8°; a rough guess is some 20° off."""
+    m = four_bar(40, 120, 80, 100, *(mirrored * angle for angle in (60, coupler, rocker)))
+    warnings = m.assembly.warnings
+    expected = named and f"[guess] {named[0]}: {mirrored * named[1]:g} deg contradicts the rest of the guess"
+    assert [w.split(",")[0] for w in warnings] == [expected] * (named is not None)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_guessed_point_that_contradicts_the_rest_is_named(side):
+    """The pin C stands at (133.9, 72.5), as the links' angles have it, and not at (70.3, −74.3)."""
+    m = four_bar(40, 120, 80, 100, side * 60, 0, 0)
+    turned = {name: side * math.radians(angle) for name, angle in (("coupler", 20.0), ("rocker", 65.0))}
+    for point, contradicts in ((72.0 - 76.0j, True), (115.0 + 55.0j, False)):
+        at = complex(point.real, side * point.imag)
+        guess = Guess(side * math.radians(60), turned, {"C": at})
+        warnings = Mechanism(m.ground, m.links, inputs=m.inputs, guess=guess).assembly.warnings
+        assert [w.split(" m ")[0] for w in warnings] == [f"[guess] C: (72, {-76 * side})"] * contradicts

@@ -9,8 +9,9 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
-from virtualwork import Force, Guess, Guide, Input, Link, Mechanism, Spring, Torque, TorsionSpring
+from virtualwork import Force, Gear, Guess, Guide, Input, Link, Mechanism, Spring, Torque, TorsionSpring
 
 G = 9.81
 
@@ -301,3 +302,143 @@ def test_rest_of_a_block_that_runs_away_where_its_guides_are_parallel() -> None:
     rest = m.equilibria().found
     assert [e.stable for e in rest] == [True, False, True, False]
     assert np.allclose(np.degrees([e.inputs[0] for e in rest]), [60, 120, 240, 300], rtol=0, atol=1e-10)
+
+
+def all_roots(f: Any, low: float, high: float, steps: int = 4001) -> list[float]:
+    """The sign changes of a function, by Brent's method between samples."""
+    q = np.linspace(low, high, steps)
+    values = [f(x) for x in q]
+    return [
+        brentq(f, a, b, xtol=1e-15) for (a, u), (b, v) in pairwise(zip(q, values, strict=True)) if u * v < 0
+    ]
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_crank_between_limits_rests_where_it_can_go(side: int) -> None:
+    """A weight below a crank that is longer than its rod, and a soft torsion spring: V = −m g l cos θ + ½ k (θ − θ₀)².
+
+    The crank swings between ±asin(5/6). At half a turn, and a turn farther on, the loads balance too: there the spring would be
+    wound up on a way that the rod bars.
+    """
+    mass, arm, k, free = 1.0, 0.06, 0.03, side * 0.4
+    m = Mechanism(
+        {"O": 0j},
+        {"crank": Link({"O": 0j, "A": arm}, mass, -1j * side * arm), "rod": Link({"A": 0j, "B": 0.05})},
+        [Guide("B", "rod")],
+        inputs=Input(link="crank"),
+        guess=Guess(side * 0.3, {"rod": -side * 0.36}),
+        gravity=-1j * side * G,
+        torsion_springs=[TorsionSpring(("ground", "crank"), k, free)],
+    )
+
+    def slope(t: float) -> float:
+        return mass * G * arm * math.sin(t) + k * (t - free)
+
+    end = math.asin(5 / 6)
+    (exact,) = all_roots(slope, -end, end)
+    assert len(all_roots(slope, side * 0.3 - 2 * math.pi, side * 0.3 + 2 * math.pi)) == 5
+    found = m.equilibria()
+    assert found.ranges == (pytest.approx((-end, end), rel=1e-8),)
+    (e,) = found.found
+    assert e.inputs[0] == pytest.approx(exact, rel=1e-12)
+    assert e.stable is True
+    assert e.stiffness == pytest.approx(mass * G * arm * math.cos(exact) + k, rel=1e-12)
+
+
+@pytest.mark.parametrize(("ratio", "turns"), [(-0.5, 2), (-2.0, 1), (2 / 3, 3), (1.5, 2)])
+def test_weights_on_a_crank_and_on_a_gear(ratio: float, turns: int) -> None:
+    """V = m₁ g l₁ sin θ + m₂ g l₂ sin(φ₀ + r θ) comes back after as many turns of the crank as the ratio's denominator."""
+    start = 0.4
+    m = Mechanism(
+        {"O": 0j, "Q": 1.0},
+        {"crank": Link({"O": 0j}, 2.0, 0.5), "gear": Link({"Q": 0j}, 3.0, 0.4)},
+        gears=[Gear(("crank", "gear"), ratio)],
+        inputs=Input(link="crank"),
+        guess=Guess(start, {"gear": 0.7}),
+        gravity=-G * 1j,
+    )
+    first = 0.7 - ratio * start
+
+    def slope(t: float) -> float:
+        return G * (math.cos(t) + 1.2 * ratio * math.cos(first + ratio * t))
+
+    exact = all_roots(slope, 0.0, 2 * math.pi * turns)
+    assert exact
+    found = m.equilibria()
+    assert found.turns == (turns,)
+    assert [e.inputs[0] for e in found.found] == pytest.approx(exact, rel=1e-12)
+    for e in found.found:
+        bend = -G * (math.sin(e.inputs[0]) + 1.2 * ratio**2 * math.sin(first + ratio * e.inputs[0]))
+        assert e.stiffness == pytest.approx(bend, rel=1e-11)
+
+
+def test_gears_that_never_come_back_are_searched_a_turn_either_way() -> None:
+    ratio = -math.sqrt(0.5)
+    m = Mechanism(
+        {"O": 0j, "Q": 1.0},
+        {"crank": Link({"O": 0j}, 2.0, 0.5), "gear": Link({"Q": 0j}, 3.0, 0.4)},
+        gears=[Gear(("crank", "gear"), ratio)],
+        inputs=Input(link="crank"),
+        guess=Guess(0.4, {"gear": 0.7}),
+        gravity=-G * 1j,
+    )
+    low, high = 0.4 - 2 * math.pi, 0.4 + 2 * math.pi
+    exact = all_roots(lambda t: math.cos(t) + 1.2 * ratio * math.cos(0.7 + ratio * (t - 0.4)), low, high)
+    found = m.equilibria()
+    assert (found.turns, found.ranges) == ((None,), (pytest.approx((low, high)),))
+    assert [e.inputs[0] for e in found.found] == pytest.approx(exact, rel=1e-12)
+
+
+def test_a_geared_input_of_two() -> None:
+    """The same gear, with another pendulum that is an input too: each rest of the one with each of the other."""
+    first = 0.7 + 0.5 * 0.4
+    m = Mechanism(
+        {"O": 0j, "Q": 1.0, "P": 5.0},
+        {
+            "crank": Link({"O": 0j}, 2.0, 0.5),
+            "gear": Link({"Q": 0j}, 3.0, 0.4),
+            "bob": Link({"P": 0j}, 1.0, 1.0),
+        },
+        gears=[Gear(("crank", "gear"), -0.5)],
+        inputs=(Input(link="crank"), Input(link="bob")),
+        guess=Guess((0.4, 0.0), {"gear": 0.7}),
+        gravity=-G * 1j,
+    )
+    exact = all_roots(lambda t: math.cos(t) - 0.6 * math.cos(first - 0.5 * t), 0.0, 4 * math.pi)
+    found = m.equilibria()
+    assert found.turns == (2, 1)
+    assert [e.inputs for e in found.found] == [
+        pytest.approx((t, u), rel=1e-11) for t in exact for u in (math.pi / 2, 3 * math.pi / 2)
+    ]
+
+
+def test_a_branch_of_two_turns_has_the_rests_of_both() -> None:
+    """Crank 60, coupler 90, rocker 70, ground 100 mm: through the change point at 180° the other assembly goes on."""
+    m = Mechanism(
+        {"A": 0j, "D": 0.1},
+        {
+            "crank": Link({"A": 0j, "B": 0.06}),
+            "coupler": Link({"B": 0j, "C": 0.09}, 1.0, 0.045 + 0.03j),
+            "rocker": Link({"D": 0j, "C": 0.07}, 1.0, 0.035),
+        },
+        inputs=Input("crank"),
+        guess=Guess(math.radians(60), {"coupler": -1.45, "rocker": 3.7}),
+        gravity=-G * 1j,
+    )
+
+    def energy(t: Any) -> Any:
+        b = 0.06 * mp.expj(t)
+        way = 0.1 - b
+        foot = (0.09**2 - 0.07**2 + abs(way) ** 2) / (2 * abs(way))
+        side = -1 if mp.cos(t / 2) > 0 else 1
+        across = side * mp.sqrt(max(mp.mpf(0), 0.09**2 - foot**2))
+        pin = b + mp.mpc(foot, across) * way / abs(way)
+        coupler, rocker = (pin - b) / mp.mpf("0.09"), (pin - 0.1) / mp.mpf("0.07")
+        return G * ((b + mp.mpc(0.045, 0.03) * coupler).imag + 0.035 * rocker.imag)
+
+    with mp.workdps(30):
+        exact = all_roots(lambda t: float(mp.diff(energy, t, h=mp.mpf(10) ** -10)), 1e-6, 4 * math.pi, 601)
+        found = m.equilibria()
+    assert found.turns == (2,)
+    assert max(exact) > 2 * math.pi
+    assert [e.inputs[0] for e in found.found] == pytest.approx(exact, rel=1e-9)

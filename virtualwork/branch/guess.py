@@ -25,6 +25,8 @@ from virtualwork.plan.steps import Group, Plan, Step, Turn
 C = TypeVar("C", bound=Choice)
 # rad, or of the mechanism's size: how far beside a guess that tells nothing one looks
 BESIDE = 0.02
+# rad, or of the mechanism's size: how far off a rough guess may be; and how many times nearer is clearly nearer
+ROUGH, CLEARLY = 0.5, 3.0
 
 
 def choose(m: Description, make: Callable[..., C]) -> C:
@@ -198,7 +200,8 @@ class _Chooser:
             st.turn.update({b: near.turn[b] for b in group.members})
             st.slide.update({g: near.slide[g] for g in group.slides})
             return sign
-        distances = [self._distance(group, trial) for _, trial in solutions]
+        named = [self._distances(group, trial) for _, trial in solutions]
+        distances = [sum(each.values()) for each in named]
         # a guess to full precision tells apart even assemblies that all but meet; distances are squares
         clear = min(distances) < 1e-3 * max(distances) and max(distances) > 1e-28
         if len(solutions) == 2 and abs(solutions[0][1].margin[group.name]) < 1e-14 and not clear:
@@ -208,10 +211,39 @@ class _Chooser:
             self.warnings.append(self._meeting(group))
         elif len(solutions) == 2 and not informed(self.m, group):
             raise AssemblyError(self._choices(group, [t for _, t in solutions]))
-        sign, chosen = solutions[int(np.argmin(distances))]
+        best = int(np.argmin(distances))
+        sign, chosen = solutions[best]
+        if len(solutions) == 2:
+            self._warn_of_contradictions(
+                group, [named[best], named[1 - best]], [chosen, solutions[1 - best][1]]
+            )
         for name in ("turn", "point", "slide", "angle", "margin"):
             getattr(st, name).update(getattr(chosen, name))
         return sign
+
+    def _warn_of_contradictions(
+        self, group: Group, squares: list[dict[tuple[str, str], float]], states: list[State]
+    ) -> None:
+        """Warn of each guess that is clearly nearer to the second of two assemblies than to the first, which is taken."""
+        guess, links, anchors = self.m.guess, self.m.links, self.plan.anchors
+        for (body, point), far in squares[0].items():
+            if far < max(ROUGH**2, CLEARLY**2 * squares[1][body, point]):
+                continue
+            if point in guess.points:
+                at = links[body].points[point]
+                places = [st.origins({body: anchors[body]})[body] + at * st.turn[body] for st in states]
+                shown = [f"({z.real:.4g}, {z.imag:.4g}) m" for z in (guess.points[point], *places)]
+            elif not point and body in guess.angles:
+                turns = [guess.angles[body], *(np.angle(st.turn[body]) for st in states)]
+                shown = [f"{np.degrees(turn):.4g} deg" for turn in turns]
+            else:
+                continue
+            text = (
+                f"[guess] {point or body}: {shown[0]} contradicts the rest of the guess, which takes the assembly of "
+                f"{group.name} with {shown[1]}; the other one has {shown[2]}: correct one of them"
+            )
+            # a point of two links once
+            self.warnings += [text] if text not in self.warnings else []
 
     def _solutions(self, group: Group, case: Case, st: State) -> list[tuple[int, State]]:
         """The signs of which a closed form has a solution, each with that."""
@@ -295,8 +327,11 @@ class _Chooser:
         ways = "; or ".join(texts)
         return f"[guess]: {group.name} can be assembled in {len(texts)} ways; choose one: {ways}"
 
+    def _distances(self, group: Group, st: State) -> dict[tuple[str, str], float]:
+        return distances(group, st, self.plan, self.m, self.angles, self.points)
+
     def _distance(self, group: Group, st: State) -> float:
-        return float(distance(group, st, self.plan, self.m, self.angles, self.points))
+        return float(sum(self._distances(group, st).values()))
 
     # --- groups with no closed form -------------------------------------------------------------------------------
     def _newton(self, group: Group, st: State) -> Any:
@@ -343,8 +378,20 @@ def distance(
     angles: Mapping[str, Number],
     points: Mapping[str, Number],
 ) -> Number:
-    """How far an assembly is from the guess: chords of the unit circle, and points relative to the size, squared."""
-    total: Number = 0.0
+    """How far an assembly is from the guess: the sum of the squared distances."""
+    return sum(distances(group, st, done, m, angles, points).values())
+
+
+def distances(
+    group: Group,
+    st: State,
+    done: Plan,
+    m: Description,
+    angles: Mapping[str, Number],
+    points: Mapping[str, Number],
+) -> dict[tuple[str, str], Any]:
+    """How far an assembly is from each guess, squared: chords of the unit circle by (link, ""), points relative to the size by (link, point)."""
+    result = {}
     named = {
         body: [(name, z) for name, z in m.links[body].points.items() if name in points]
         for body in group.links
@@ -352,12 +399,12 @@ def distance(
     origins = st.origins({body: done.anchors[body] for body, here in named.items() if here})
     for body in group.links:
         if body in angles and body in st.turn:
-            total = total + squared(bare(st.turn[body] - bare(rotation(angles[body]))))
+            result[body, ""] = squared(bare(st.turn[body] - bare(rotation(angles[body]))))
         if body in origins:
             for name, z in named[body]:
                 here = origins[body] + z * st.turn[body]
-                total = total + squared(bare(here - points[name])) / bare(m.size**2)
-    return total
+                result[body, name] = squared(bare(here - points[name])) / bare(m.size**2)
+    return result
 
 
 def sign_of_angles(group: Group, case: Case, st: State, angles: Mapping[str, Number]) -> Number:

@@ -32,7 +32,9 @@ Rates = Callable[[Reals, Reals, Reals], Reals]
 """The accelerations (k, m, …) at states: times (m, …), inputs and speeds (k, m, …)."""
 
 
-def grown(f: Rates, scale: Reals, t: Reals, q: Reals, v: Reals, a: Reals, noise: Reals) -> Reals:
+def grown(
+    f: Rates, scale: Reals, t: Reals, q: Reals, v: Reals, a: Reals, noise: Reals | float = 0.0
+) -> Reals:
     """The standard deviation of the inputs at the nodes of a way, (k, n, …), as rounding in all steps before leaves it.
 
     At most the `scale`.
@@ -45,8 +47,8 @@ def grown(f: Rates, scale: Reals, t: Reals, q: Reals, v: Reals, a: Reals, noise:
     t : array (n, …)
     q, v, a : array (k, n, …)
         The inputs, their speeds and accelerations.
-    noise : array (k, n − 1, …)
-        What rounding of the accelerations makes of the speeds over each step.
+    noise : array (k, n − 1, …), optional
+        What rounding of the accelerations makes of the speeds over each step, in addition to that of their arguments.
 
     Examples
     --------
@@ -54,7 +56,7 @@ def grown(f: Rates, scale: Reals, t: Reals, q: Reals, v: Reals, a: Reals, noise:
 
     >>> t = np.linspace(0, 20, 41)
     >>> q, v = np.cosh(t)[None], np.sinh(t)[None]
-    >>> size = grown(lambda t, q, v: q, np.ones(1), t, q, v, q, 0 * q[:, 1:])[0, -1] / (EPS * np.cosh(20))
+    >>> size = grown(lambda t, q, v: q, np.ones(1), t, q, v, q)[0, -1] / (EPS * np.cosh(20))
     >>> bool(0.5 < size < 20)
     True
     """

@@ -178,7 +178,7 @@ class Path:
         steps = np.arange(self.steps) + 0.5
         return np.asarray(np.exp(np.stack([np.interp(steps, which, of) for of in sizes.T], axis=1)))
 
-    @property
+    @cached_property
     def noise_of_speeds(self) -> Reals:
         """What rounding of the accelerations may make of the speeds over each step, (n − 1, k).
 

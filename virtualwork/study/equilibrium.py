@@ -11,7 +11,8 @@ V″ a μ = M a (Meriam & Kraige, Dynamics, §8/5; Lagrange).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -20,17 +21,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.branch.assembly import Assembly
+from virtualwork.branch.limits import TURNED
 from virtualwork.digits.balance import Balance
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.study.loads_at_rest import Rest
 
 SAMPLES = 1440
-# steps of a turn in which springs are looked at
+# steps of a turn in which usual loads are looked at
 AROUND = 72
+# positions in which the loads some turns later are compared, and what makes no difference, as a share of their terms
+COMPARED, ALIKE = 24, 1e-9
 # of a turn: a range in which the loads' usual work cannot be seen
 NARROW = 0.1
-# halvings of the way from the last sample to a limit
-NEARER = 30
+# halvings of the way from the last sample to a limit, and how far behind the limit a range ends, of a turn
+NEARER, BEHIND = 30, 1e-9
 
 
 @dataclass(frozen=True)
@@ -145,12 +149,21 @@ class Equilibria:
 
     `everywhere`: the loads balance in every position of the range. `region`: with several inputs, positions of rest
     fill a part of the range and are not listed. `loaded`: something acts at rest.
+
+    Attributes
+    ----------
+    turns : tuple of int or None
+        After how many turns of each input the loads come back; None where they do not, and of a slide.
+    ranges : tuple of (float, float)
+        What was searched of each input, rad or m.
     """
 
     found: tuple[Equilibrium, ...]
     everywhere: bool = False
     region: bool = False
     loaded: bool = True
+    turns: tuple[int | None, ...] = ()
+    ranges: tuple[tuple[float, float], ...] = ()
 
     def __repr__(self) -> str:
         if self.everywhere or self.region:
@@ -167,12 +180,13 @@ def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int 
     assembly : Description
         With its gravity, constant and follower forces, torques, springs. Dampers and friction do not act at rest.
     spans : array (k, 2), optional
-        The range of each input, rad or m; it may be one position. Default, also of an input whose row is NaN: a whole turn; for
-        a slide, two sizes of the mechanism either way, where its loops are no farther from their ends. An input that
-        winds a torsion spring up is searched a turn either way of the guess; half a turn where it cannot go round.
+        The range of each input, rad or m; it may be one position. Default, also of an input whose row is NaN: the turns,
+        from 0 on, after which the loads come back; a turn either way of the guess where none bring them back, as where a
+        torsion spring is wound up; of a slide two sizes of the mechanism either way, where its loops are no farther from
+        their ends. With torsion springs, and where turns count, it is the range of the one input between its limits.
     samples : int
-        How finely the range of one input is looked through for sign changes, more finely where a body turns faster;
-        every root is then exact to rounding.
+        How finely a turn of one input, or the range of a slide, is looked through for sign changes, more finely where a body
+        turns faster; every root is then exact to rounding.
 
     Returns
     -------
@@ -189,39 +203,71 @@ def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int 
     [(90, False), (270, True)]
     """
     k = len(assembly.mechanism.inputs)
-    at = np.asarray(assembly.mechanism.at, dtype=float)
     given = np.full((k, 2), np.nan) if spans is None else np.asarray(spans, dtype=float).reshape(k, 2)
     limited = ~np.isnan(given).any(axis=1)
-    ranges = given
-    if not limited.all():
-        slide = np.array([e.is_slide for e in assembly.mechanism.inputs])
-        size = assembly.track.length if k == 1 else assembly.mechanism.size
-        reach = winding(assembly)
-        low = np.where(slide, at - 2 * size, np.where(reach > 0, at - reach, 0.0))
-        high = np.where(slide, at + 2 * size, np.where(reach > 0, at + reach, 2 * np.pi))
-        ranges = np.where(limited[:, None], given, np.stack([low, high], axis=1))
     # at a limit, and beyond it, a loop has no rates
     with np.errstate(all="ignore"):
-        return _one(assembly, ranges[0], samples) if k == 1 else _many(assembly, ranges, limited)
+        turns, ranges = _searched(assembly)
+        ranges = np.where(limited[:, None], given, ranges)
+        if k == 1:
+            result = _one(assembly, ranges[0], samples, turns[0])
+        else:
+            result = _many(assembly, ranges, limited, turns)
+    return replace(result, turns=turns, ranges=tuple((float(low), float(high)) for low, high in ranges))
 
 
-def winding(assembly: Assembly) -> Reals:
-    """How far either way of the guess inputs are searched that wind a torsion spring up, (k,) rad; 0 of all others."""
-    m, at = assembly.mechanism, np.asarray(assembly.mechanism.at, dtype=float)
-    reach = np.zeros(len(at))
-    for j, entry in enumerate(m.inputs if m.torsion_springs else ()):
-        if not entry.is_slide:
-            ways = np.tile(at, (AROUND + 1, 1))
-            ways[:, j] += np.linspace(-np.pi, np.pi, AROUND + 1)
-            poses = Rest(assembly, ways).poses
-            twists = np.array([poses.twist(i) for i in range(len(m.torsion_springs))])
-            wound = np.abs(twists[:, -1] - twists[:, 0]) > np.pi
-            reach[j] = np.pi * (0 if not wound.any() else 2 if np.isfinite(twists).all() else 1)
-    return reach
+def _searched(assembly: Assembly) -> tuple[tuple[int | None, ...], Reals]:
+    """After how many turns of each input the loads come back, and the range that is searched of each, (k, 2)."""
+    m, at, turn = assembly.mechanism, np.asarray(assembly.mechanism.at, dtype=float), 2 * np.pi
+    one = len(at) == 1
+    turns = [None if entry.is_slide else _turns(assembly, j) for j, entry in enumerate(m.inputs)]
+    limits = np.array([-np.inf, np.inf])
+    if one and (m.torsion_springs or not (turns[0] or m.inputs[0].is_slide)):
+        # beyond them no way leads from the guess, along which turns would be counted
+        # at a limit itself rounding has the sign of the force: the range ends just behind it
+        limits = np.array(assembly.reach.range) + BEHIND * assembly.track.length * np.array([-1.0, 1.0])
+        turns = [None] if np.isfinite(limits).any() else turns
+    ranges = np.stack([at, at], axis=1)
+    for j, (entry, n) in enumerate(zip(m.inputs, turns, strict=True)):
+        if n:
+            ranges[j] = 0.0, turn * n
+        elif entry.is_slide:
+            ranges[j] += np.array([-2.0, 2.0]) * (assembly.track.length if one else m.size)
+        else:
+            ranges[j] += np.array([-turn, turn]) / (1 if one or _goes_round(assembly, j) else 2)
+    return tuple(turns), np.where(np.isfinite(limits), limits, ranges)
 
 
-def _one(assembly: Assembly, span: Reals, samples: int) -> Equilibria:
-    whole = not assembly.mechanism.inputs[0].is_slide and abs(span[1] - span[0] - 2 * np.pi) < 1e-12
+def _turns(assembly: Assembly, j: int) -> int | None:
+    """After how many turns of an input the loads come back, whatever the others are; None where not within the `TURNED`."""
+    at = np.asarray(assembly.mechanism.at, dtype=float)
+    shares = np.multiply.outer(np.arange(1.0, COMPARED + 1), np.sqrt(np.arange(2.0, 2 + len(at)))) % 1.0
+    rest = Rest(assembly, at + 2 * np.pi * shares)
+    force, size = rest.force()
+    slope, tried = np.abs(rest.hessian()[:, :, j]), 0
+    for last in TURNED:
+        turns = np.arange(tried + 1, last + 1)
+        later = rest.inputs + 2 * np.pi * np.multiply.outer(turns, np.eye(len(at))[[j]])
+        off = np.abs(Rest(assembly, later.reshape(-1, len(at))).force()[0].reshape(later.shape) - force)
+        # what is not assembled contradicts nothing
+        back = ~(off > ALIKE * size + 4 * EPS * np.abs(later[:, :, [j]]) * slope).any(axis=(1, 2))
+        if back.any():
+            return int(turns[np.argmax(back)])
+        tried = last
+    return None
+
+
+def _goes_round(assembly: Assembly, j: int) -> bool:
+    """Whether one of several inputs turns all the way round with the others as in the guess."""
+    ways = np.tile(np.asarray(assembly.mechanism.at, dtype=float), (AROUND + 1, 1))
+    ways[:, j] += np.linspace(-np.pi, np.pi, AROUND + 1)
+    return bool(Rest(assembly, ways).poses.assembled.all())
+
+
+def _one(assembly: Assembly, span: Reals, samples: int, turns: int | None) -> Equilibria:
+    width, period = float(span[1] - span[0]), 2 * np.pi * (turns or np.inf)
+    if not assembly.mechanism.inputs[0].is_slide:
+        samples *= max(1, math.ceil(width / (2 * np.pi)))
     q = assembly.track.samples(float(span[0]), float(span[1]), samples)
     rest = Rest(assembly, q[:, None])
     force, size = (values[:, 0] for values in rest.force())
@@ -231,7 +277,7 @@ def _one(assembly: Assembly, span: Reals, samples: int) -> Equilibria:
     # beside a limit the loads' work grows without bound: that is no measure of it elsewhere
     largest, scale = float(size[good].max()), _usual(size[good])
     turn = assembly.track.length
-    if span[1] - span[0] < NARROW * turn:
+    if width < NARROW * turn:
         # nor is it about a position of rest, where all terms may vanish
         beside = q.mean() + turn * np.linspace(-0.5, 0.5, AROUND + 1)
         scale = max(scale, _usual(Rest(assembly, beside[:, None]).force()[1][:, 0]))
@@ -274,7 +320,7 @@ def _one(assembly: Assembly, span: Reals, samples: int) -> Equilibria:
             roots += list(_refine(assembly, low, middle, force[touch][twice], value[twice]))
             roots += list(_refine(assembly, middle, high, value[twice], force[touch + 1][twice]))
     roots = sorted(roots)
-    if whole and len(roots) > 1 and roots[-1] - roots[0] > 2 * np.pi - 1e-9:
+    if len(roots) > 1 and roots[-1] - roots[0] > period - 1e-9:
         roots.pop()
     unit = 1.0 if not assembly.mechanism.inputs[0].is_slide else assembly.track.length
     distinct = [root for i, root in enumerate(roots) if i == 0 or root - roots[i - 1] > 1e-8 * unit]
@@ -356,7 +402,9 @@ def _judged(assembly: Assembly, inputs: Reals, scale: float) -> Equilibria:
     return Equilibria(tuple(result))
 
 
-def _many(assembly: Assembly, ranges: Reals, limited: NDArray[np.bool_]) -> Equilibria:
+def _many(
+    assembly: Assembly, ranges: Reals, limited: NDArray[np.bool_], turns: tuple[int | None, ...]
+) -> Equilibria:
     """Several inputs: Newton on Q from a grid of starts, all at once; of a `limited` input only what lies in its range."""
     k = len(ranges)
     per = max(4, round(4000 ** (1 / k)))
@@ -398,21 +446,20 @@ def _many(assembly: Assembly, ranges: Reals, limited: NDArray[np.bool_]) -> Equi
     force, size = Rest(assembly, x).force()
     settled = (np.abs(force) <= 1e-10 * np.maximum(size, 1e-3 * scale)).all(axis=1)
     x = x[settled]
-    # a turn later it is another position where a torsion spring is wound up
-    winds = winding(assembly) > 0
-    again = turning & ~winds
-    x = np.where(again, np.mod(x, 2 * np.pi), x)
-    x = np.where(again & (2 * np.pi - x < 1e-9), 0.0, x)
-    # Newton's steps lead out of the range too; an angle lies in it up to whole turns
+    again = np.array([bool(n) for n in turns])
+    period = np.array([2 * np.pi * (n or 1) for n in turns])
+    x = np.where(again, np.mod(x, period), x)
+    x = np.where(again & (period - x < 1e-9), 0.0, x)
+    # Newton's steps lead out of the range too; an angle lies in it up to whole periods
     slack = 1e-9 * unit
     off = x - ranges[:, 0] + slack
-    off = np.where(again, np.mod(off, 2 * np.pi), off)
+    off = np.where(again, np.mod(off, period), off)
     within = (off >= 0) & (off <= width + 2 * slack)
-    x = x[(within | ~(limited | winds)).all(axis=1)]
+    x = x[(within | ~(limited | (turning & ~again))).all(axis=1)]
     distinct: list[Any] = []
     for row in x[np.lexsort(np.round(x / unit, 7).T[::-1])] if len(x) else []:
         gaps = [(row - other) / unit for other in distinct]
-        gaps = [np.where(again, np.abs(np.angle(np.exp(1j * gap))), np.abs(gap)) for gap in gaps]
+        gaps = [np.abs(np.where(again, gap - period * np.round(gap / period), gap)) for gap in gaps]
         if not any((gap < 1e-6).all() for gap in gaps):
             distinct.append(row)
     judged = _judged(assembly, np.array(distinct).reshape(-1, k), scale)
