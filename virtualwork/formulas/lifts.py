@@ -13,7 +13,7 @@ from typing import Any
 from dalembert.arithmetic.recorded import bare
 from dalembert.arithmetic.varied import direction
 from dalembert.dataclass import dataclass, field
-from virtualwork.describe.laws import TURN, Lift, Piece
+from virtualwork.describe.laws import TURN, Lift
 from virtualwork.formulas.numbers import EPS, Kind, Number, plus, times
 
 # an angle so near a knot stands at it: what the rounding of a direction can make
@@ -72,22 +72,6 @@ def placed(kind: Kind, of: Lift, angle: Number, chosen: Callable[[list[Number]],
         among("frequency"),
         among("family"),
         tuple(sorted({piece.family for piece in of.pieces if piece.amplitude})),
-    )
-
-
-def on_piece(kind: Kind, of: Piece, angle: Number) -> Located:
-    """An angle of a law that lies on a piece of it."""
-    return Located(
-        kind,
-        (angle - of.start) / of.width,
-        of.width,
-        of.level,
-        of.height,
-        of.powers,
-        of.amplitude,
-        of.frequency,
-        of.family,
-        (of.family,) if of.amplitude else (),
     )
 
 
