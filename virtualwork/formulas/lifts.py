@@ -131,9 +131,7 @@ def composed(k: int, of: Located, rates: list[Number]) -> Number:
         for j in range(1, k + 1):
             total: Number = None
             for a in range(1, i - j + 2):
-                total = plus(
-                    total, times(float(math.comb(i - 1, a - 1)), times(rates[a - 1], bell[i - a][j - 1]))
-                )
+                total = plus(total, times(math.comb(i - 1, a - 1), times(rates[a - 1], bell[i - a][j - 1])))
             row.append(total)
         bell.append(row)
     value: Number = None
