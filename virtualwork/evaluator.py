@@ -7,6 +7,7 @@ one with arrays is one pass of the engine for all quantities together.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -74,7 +75,7 @@ class Evaluator:
         dict of name to float or (x, y); to array (n,) or (n, 2)
             NaN where the pose cannot be assembled.
         """
-        if isinstance(angle, float):
+        if isinstance(angle, float) and isfinite(angle):
             moves = speed != 0.0, acceleration != 0.0, jerk != 0.0
             if moves not in self._ready:
                 self._ready[moves] = ready(self.assembly, moves, self.keys)

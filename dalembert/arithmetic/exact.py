@@ -9,8 +9,6 @@ Array = NDArray[np.float64]
 
 EPS = float(np.finfo(float).eps)
 """From 1 to the next number."""
-UNIT = EPS / 2
-"""The largest relative error of one rounding."""
 
 
 def two_sum(a: Array, b: Array) -> tuple[Array, Array]:

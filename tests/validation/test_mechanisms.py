@@ -366,6 +366,17 @@ def test_000_1_10_block_on_a_turning_bar():
     assert block.velocity == pytest.approx(1 + 1j + 2 * -3j + 1.5)
 
 
+@pytest.mark.parametrize("angle", [np.pi / 2, np.array([np.pi / 2, np.pi / 2]), np.empty(0)])
+def test_000_1_11_a_rod_that_is_too_short_reaches_nowhere(angle, recwarn):
+    """A rod of 0.5 on a crank of 1 at 90°: no warning, and no number."""
+    further, nearer = crank_rod_piston(1, 0.5, angle)
+    assert np.isnan(further.slide).all()
+    assert np.isnan(nearer.slide).all()
+    # at 0° it reaches from 0.5 to 1.5
+    assert [float(piston.slide) for piston in crank_rod_piston(1, 0.5, 0.0)] == [1.5, 0.5]
+    assert not recwarn
+
+
 @pytest.mark.parametrize("incline", [0.0, 30.0, 90.0, 137.0])
 def test_000_1_11_both_solution_sets_on_any_incline(incline):
     through = 0.02 - 0.01j

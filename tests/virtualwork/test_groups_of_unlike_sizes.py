@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from virtualwork import Guess, Input, Link, Mechanism
-from virtualwork.formulas.numbers import singular_poses, solve_determined
+from virtualwork.formulas.numbers import determined, singular_poses, solve_columns
 
 
 def flexure(leg: float, size: float = 1.0) -> Mechanism:
@@ -86,7 +86,7 @@ def test_rates_that_a_singular_pose_determines_do_not_depend_on_other_poses() ->
     size = np.array([1.0, 1e9])
     zero = 0 * size + 0j
     cols = [[size + 0j, size + 0j, zero], [zero, zero, 1 + 0 * zero]]
-    found = solve_determined(cols, [-3 * size + 0j, -5 + zero])
+    found = solve_columns(cols, [-3 * size + 0j, -5 + zero], determined)
     assert np.isnan(found[0]).all()
     assert np.isnan(found[1]).all()
     np.testing.assert_allclose(found[2], 5.0, rtol=1e-14)

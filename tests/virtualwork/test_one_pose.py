@@ -58,3 +58,30 @@ def test_own_rates_other_numbers_and_refusals() -> None:
         assert own.inputs.shape == (1, 1)
     with pytest.raises(ValueError, match="speed"):
         m.motion(1.0, speed="fast")
+
+
+@pytest.mark.parametrize("angle", [float("inf"), -float("inf"), float("nan")])
+def test_an_angle_that_is_no_number_cannot_be_assembled(angle: float) -> None:
+    m = four_bar(loaded=True)
+    for _ in range(2 * OFTEN):
+        for at in (angle, [angle]):
+            motion = m.motion(at, speed=10.0)
+            assert not motion.assembled[0]
+            # the crank's own speed depends on no angle
+            for link in ("crank", "rocker"):
+                assert np.isnan(motion.link(link).omega).all()
+            assert np.isnan(motion.point("C").acceleration).all()
+            assert np.isnan(motion.effort).all()
+    shown = m.evaluator("C.x", "crank.omega", "crank.torque")(angle, speed=10.0)
+    assert all(np.isnan(x) for x in shown.values())
+
+
+def test_both_coordinates_of_a_point_by_an_evaluator() -> None:
+    """Of one pose they are two numbers of one vector; a name that is requested twice is as good."""
+    m = klann()
+    many = m.evaluator("H", "points.H", "H.x")([1.0], 3.0, 1.0)
+    one = m.evaluator("H", "points.H", "H.x")(1.0, 3.0, 1.0)
+    assert list(one) == list(many) == ["H.x", "H.y", "H.vx", "H.vy", "H.ax", "H.ay", "points.H"]
+    for name, value in many.items():
+        assert one[name] == pytest.approx(value[0], rel=1e-13)
+    assert one["points.H"] == (one["H.x"], one["H.y"])

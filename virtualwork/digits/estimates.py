@@ -107,11 +107,6 @@ class Estimates:
                 estimates[key] += OWN * more
             self._known[key] = _without_nan(estimates[key], values[key])
 
-    @property
-    def looked_at(self) -> frozenset[str]:
-        """The groups whose assembly was compared with that of the second run: those that a quantity depends on."""
-        return frozenset(self._undecided)
-
     @cached_property
     def second(self) -> SecondRun:
         """The poses in 32 digits."""

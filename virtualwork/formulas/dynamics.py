@@ -24,15 +24,12 @@ from virtualwork.formulas.forces import (
     Shaking,
     ShakingMoment,
 )
-from virtualwork.formulas.numbers import TOGETHER, Complexes, Reals, leave_out, xy
+from virtualwork.formulas.numbers import FAST, TOGETHER, Complexes, Reals, leave_out, xy
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.reactions import JointForces
 from virtualwork.formulas.scene import Scene
 from virtualwork.formulas.statics import Statics
 from virtualwork.plan.steps import Joint
-
-# a link that turns so many times as fast as the input: at a dead point to rounding, no number is left
-FAST = 1e13
 
 
 @guarded

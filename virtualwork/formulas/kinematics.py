@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import ClassVar
 
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
@@ -17,9 +16,6 @@ from virtualwork.plan.steps import Path, Term, path_reads
 
 class Kinematic(Quantity):
     """A quantity that the positions of a state and their derivatives give."""
-
-    is_partial: ClassVar[bool] = False
-    """Whether it is the derivative to one input alone, its field `input`."""
 
     def place(self, of: Planned, st: State) -> Number:
         """Its value at the positions of a state."""
@@ -38,8 +34,6 @@ class Kinematic(Quantity):
 
 class Partial(Kinematic):
     """The derivative of a place to one input; with one input the second one too."""
-
-    is_partial = True
 
     @property
     def input(self) -> int:

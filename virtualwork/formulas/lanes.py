@@ -135,6 +135,9 @@ class Lanes(Solving):
         if loaded:
             of = _dynamics_of(self) if forces is None else forces()
             result |= {key: of.value(key) for key in loaded}
+        if self._nowhere is not None:
+            for value in result.values():
+                leave_out(value, self._nowhere)
         return result
 
     def one(self, keys: tuple[Quantity, ...]) -> bool:
@@ -142,7 +145,7 @@ class Lanes(Solving):
         given = [self.inputs, *(rates[0] for rates in self.rates)]
         values = [x if isinstance(x, float) else float(np.ravel(x)[0]) for x in given]
         function = ready(self.branch, tuple(x != 0.0 for x in values[1:]), keys)
-        if function is None:
+        if function is None or self._nowhere is not None:
             return False
         try:
             result = function(*values)

@@ -13,7 +13,7 @@ from typing import Any
 from dalembert.arithmetic.recorded import bare
 from dalembert.arithmetic.varied import direction
 from dalembert.dataclass import dataclass, field
-from virtualwork.describe.laws import TURN, Lift, Piece
+from virtualwork.describe.laws import TURN, Lift
 from virtualwork.formulas.numbers import EPS, Kind, Number, plus, times
 
 # an angle so near a knot stands at it: what the rounding of a direction can make
@@ -75,22 +75,6 @@ def placed(kind: Kind, of: Lift, angle: Number, chosen: Callable[[list[Number]],
     )
 
 
-def on_piece(kind: Kind, of: Piece, angle: Number) -> Located:
-    """An angle of a law that lies on a piece of it."""
-    return Located(
-        kind,
-        (angle - of.start) / of.width,
-        of.width,
-        of.level,
-        of.height,
-        of.powers,
-        of.amplitude,
-        of.frequency,
-        of.family,
-        (of.family,) if of.amplitude else (),
-    )
-
-
 def lift(at: Located, k: int) -> Number:
     """The k-th derivative of the lift to the angle of its cam, formed once."""
     if ("lift", k) not in at.known:
@@ -147,9 +131,7 @@ def composed(k: int, of: Located, rates: list[Number]) -> Number:
         for j in range(1, k + 1):
             total: Number = None
             for a in range(1, i - j + 2):
-                total = plus(
-                    total, times(float(math.comb(i - 1, a - 1)), times(rates[a - 1], bell[i - a][j - 1]))
-                )
+                total = plus(total, times(math.comb(i - 1, a - 1), times(rates[a - 1], bell[i - a][j - 1])))
             row.append(total)
         bell.append(row)
     value: Number = None

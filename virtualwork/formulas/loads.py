@@ -188,7 +188,8 @@ class Tabled(Load):
         q = np.asarray(q, dtype=float)
         if self.periodic:
             # the table is one cycle of a whole number of turns
-            q = at[0] + np.mod(q - at[0], at[-1] - at[0])
+            with np.errstate(invalid="ignore"):
+                q = at[0] + np.mod(q - at[0], at[-1] - at[0])
         return at, force, q
 
     def place_in(self, pose: LoadedPose) -> Number:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import cmath
 import math
 from bisect import bisect
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -27,6 +27,8 @@ EPS = float(np.finfo(float).eps)
 PARALLEL = 1e-11
 # of the mechanism's size: two points nearer than this have no direction from one to the other
 TOGETHER = 64 * EPS
+# a link that turns so many times as fast as the input: at a dead point to rounding, no number is left
+FAST = 1e13
 # a singular value below this share of the largest is that of a null vector
 SINGULAR = 1e-6
 
@@ -59,9 +61,9 @@ def times(a: Number, b: Number) -> Number:
     """a·b, where None is zero; a factor of exactly 1 leaves the other as it is."""
     if a is None or b is None:
         return None
-    if isinstance(a, float) and a == 1.0:
+    if isinstance(a, (int, float)) and a == 1:
         return b
-    return a if isinstance(b, float) and b == 1.0 else a * b
+    return a if isinstance(b, (int, float)) and b == 1 else a * b
 
 
 def leave_out(values: NDArray[Any], which: NDArray[np.bool_]) -> None:
@@ -205,29 +207,28 @@ def singular_poses(cols: list[list[Number]], n: int) -> NDArray[np.bool_]:
     return np.asarray(s[:, -1] < SINGULAR * s[:, 0])
 
 
-def solve_columns(cols: list[list[Number]], right: list[Number]) -> list[Number]:
-    """Solve Σ column·x + right = 0 for the unknowns' derivatives."""
-    shape = np.broadcast_shapes(*(np.shape(c) for row in cols for c in row), *(np.shape(w) for w in right))
-    n = int(np.prod(shape))
-    x = solve(stack(cols, n), -stack_rows(right, n))
-    return [x[:, j] if shape else float(x[0, j]) for j in range(x.shape[1])]
-
-
-def solve_determined(cols: list[list[Number]], right: list[Number]) -> list[Number]:
-    """The same where J is singular in every pose: what a null vector of J moves is not determined, and NaN."""
-    shape = np.broadcast_shapes(*(np.shape(c) for row in cols for c in row), *(np.shape(w) for w in right))
-    n = int(np.prod(shape))
-    jacobian, w = stack(cols, n), stack_rows(right, n)
-    good = np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(w).all(axis=1)
-    out = np.full((n, jacobian.shape[2]), np.nan)
+def determined(jacobian: Reals, right: Reals) -> Reals:
+    """Solve Φ·x = right where Φ is singular in every pose: what a null vector of it moves is not determined, and NaN."""
+    good = np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
+    out = np.full((len(right), jacobian.shape[2]), np.nan)
     if good.any():
         jacobian, lengths = equilibrated(jacobian[good])
         _, s, null = np.linalg.svd(jacobian)
         loose = (s < SINGULAR * s[:, :1]).astype(float)
         free = np.einsum("nk,nkj->nj", loose, np.abs(null[:, : s.shape[1]])) > SINGULAR
-        least = -(np.linalg.pinv(jacobian, rcond=SINGULAR) @ w[good][..., None])[..., 0]
+        least = (np.linalg.pinv(jacobian, rcond=SINGULAR) @ right[good][..., None])[..., 0]
         out[good] = np.where(free, np.nan, least / lengths)
-    return [out[:, j] if shape else float(out[0, j]) for j in range(out.shape[1])]
+    return out
+
+
+def solve_columns(
+    cols: list[list[Number]], right: list[Number], solver: Callable[[Reals, Reals], Reals] = solve
+) -> list[Number]:
+    """Solve Σ column·x + right = 0 for the unknowns' derivatives."""
+    shape = np.broadcast_shapes(*(np.shape(c) for row in cols for c in row), *(np.shape(w) for w in right))
+    n = int(np.prod(shape))
+    x = solver(stack(cols, n), -stack_rows(right, n))
+    return [x[:, j] if shape else float(x[0, j]) for j in range(x.shape[1])]
 
 
 def solve_transposed(cols: list[list[Number]], loads: list[Number]) -> list[Number]:
@@ -293,27 +294,21 @@ class One:
     """Python numbers: a single pose."""
 
     def sqrt(self, x: float) -> float:
-        """The root."""
         return math.sqrt(x) if x >= 0 else math.nan
 
     def exp(self, angle: float) -> complex:
-        """e^{i·angle}."""
         return complex(math.cos(angle), math.sin(angle))
 
     def regular(self, inverse: float, c1: complex, c2: complex) -> float:
-        """1/(c1 × c2), or NaN."""
         return inverse if abs(inverse) * (abs(c1) * abs(c2)) < 1 / PARALLEL else math.nan
 
     def inverse(self, length: float, least: float) -> float:
-        """1/length, or NaN."""
         return 1 / length if length > least else math.nan
 
     def select(self, test: float, positive: Number, otherwise: Number) -> Number:
-        """One of two."""
         return positive if test > 0 else otherwise
 
     def among(self, x: float, knots: Sequence[float], values: Sequence[Number]) -> Number:
-        """The value in whose interval x lies."""
         return values[min(max(bisect(knots, x) - 1, 0), len(values) - 1)]
 
     def system(self, rows: list[list[float]], right: list[float]) -> list[float]:
@@ -336,7 +331,6 @@ class Many:
     solve = staticmethod(solve_columns)
 
     def exp(self, angle: Number) -> Number:
-        """e^{i·angle}."""
         if not np.ndim(angle):
             return ONE.exp(angle)
         z = np.empty(np.shape(angle), complex)
@@ -345,18 +339,15 @@ class Many:
         return z
 
     def join(self, re: Number, im: Number) -> Number:
-        """re + i·im."""
         z = np.empty(np.broadcast_shapes(np.shape(re), np.shape(im)), complex)
         z.real = re
         z.imag = im
         return z
 
     def select(self, test: Number, positive: Number, otherwise: Number) -> Number:
-        """One of two."""
         return np.where(test > 0, positive, otherwise)
 
     def among(self, x: Number, knots: Sequence[float], values: Sequence[Number]) -> Number:
-        """The value in whose interval x lies."""
         if all(value == values[0] for value in values):
             return values[0]
         return np.array(values)[np.clip(np.searchsorted(knots, x, "right") - 1, 0, len(values) - 1)]
@@ -379,39 +370,32 @@ class Written:
     """Recorded numbers, and constants of the mechanism that vary: what is done with them is written down."""
 
     def sqrt(self, x: Number) -> Number:
-        """The root."""
         return RECORDED.sqrt(bare(x))
 
     def exp(self, angle: Number) -> Number:
-        """e^{i·angle}."""
         return RECORDED.turn(bare(angle))
 
     def join(self, re: Number, im: Number) -> Number:
-        """re + i·im."""
         return RECORDED.join(bare(re), bare(im))
 
     def angle(self, z: Number) -> Number:
-        """The angle."""
         return RECORDED.angle(bare(z))
 
     def regular(self, inverse: Number, c1: Number, c2: Number) -> Number:
-        """1/(c1 × c2), or NaN."""
         size = (c1.conjugate() * c1).real * (c2.conjugate() * c2).real * (inverse * inverse)
         return RECORDED.select(1 / PARALLEL**2 - bare(size), bare(inverse), math.nan)
 
     def inverse(self, length: Number, least: Number) -> Number:
-        """1/length, or NaN."""
         length = bare(length)
         return 1 / RECORDED.select(length - bare(least), length, math.nan)
 
     def select(self, test: Number, positive: Number, otherwise: Number) -> Number:
-        """One of two."""
         return RECORDED.select(bare(test), bare(positive), bare(otherwise))
 
     def among(self, x: Number, knots: Sequence[Number], values: Sequence[Number]) -> Number:
-        """The value in whose interval x lies: halves of halves, so that a decision is a few deep."""
         if all(value == values[0] for value in values):
             return bare(values[0])
+        # halves of halves: a decision is a few deep
         middle = len(values) // 2
         return self.select(
             bare(x) - bare(knots[middle]),
@@ -420,18 +404,15 @@ class Written:
         )
 
     def solve(self, cols: list[list[Number]], right: list[Number]) -> list[Number]:
-        """Solve Σ column·x + right = 0."""
         rows = [[part(c) for c in row] for row in cols for part in PARTS]
         return self.system(rows, [-part(w) for w in right for part in PARTS])
 
     def transposed(self, cols: list[list[Number]], loads: list[Number]) -> list[Number]:
-        """Solve Σ_c λ_c·column_c + load = 0."""
         rows = [[part(row[j]) for row in cols for part in PARTS] for j in range(len(loads))]
         x = self.system(rows, [0.0 if load is None else -bare(load) for load in loads], PARALLEL)
         return [self.join(x[2 * c], x[2 * c + 1]) for c in range(len(cols))]
 
     def system(self, rows: list[list[Number]], right: list[Number], least: float = 0.0) -> list[Number]:
-        """Solve rows·x = right."""
         return solved(rows, right, least=least)
 
 

@@ -6,6 +6,7 @@ after the same first request comes with it from then on, by one function for all
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Any
 
 from numpy import array, empty
@@ -114,9 +115,9 @@ class OnePose:
 
 
 def one_pose(branch: Branch, angle: Any, speed: Any, acceleration: Any, jerk: Any) -> OnePose | None:
-    """The one pose at a float, over one input; None where it is anything else. A rate of None is the description's own."""
+    """The one pose at a finite float, over one input; None where it is anything else. A rate of None is the description's own."""
     entries = branch.mechanism.inputs
-    if not isinstance(angle, float) or len(entries) > 1:
+    if not isinstance(angle, float) or not isfinite(angle) or len(entries) > 1:
         return None
     own = entries[0]
     if speed is None:

@@ -7,6 +7,7 @@ the inputs' rates. Derivatives of many poses come from the tape (`lanes`).
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property, partial
@@ -212,7 +213,8 @@ class Poses:
             k = self.inputs.shape[1]
             self.cover()
             if not self.many:
-                self._blocks = [State([float(v) for v in self.inputs[0]])]
+                # of infinity Python has no sine
+                self._blocks = [State([v if math.isfinite(v) else math.nan for v in self.inputs[0].tolist()])]
             else:
                 self._blocks = [
                     State([self.inputs[i : i + BLOCK, j] for j in range(k)]) for i in range(0, self.n, BLOCK)

@@ -240,11 +240,6 @@ def columns(group: Group, st: State) -> list[list[Number]]:
     return rows
 
 
-def ratio(group: Group, body: str, angle: str) -> float:
-    """∂θ_body/∂θ_angle inside a group."""
-    return group.shares.get(body, {}).get(group.angles.index(angle), 0.0)
-
-
 # --- angles with their whole turns, counted along the one input from the guess outwards --------------------------------
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
+from operator import itemgetter
 from typing import Any
 
 from dalembert.arithmetic.varied import direction, heading
@@ -12,7 +13,7 @@ from virtualwork.describe.cams import CamDrive
 from virtualwork.describe.description import Description
 from virtualwork.describe.laws import TURN, Lift
 from virtualwork.describe.points import joined
-from virtualwork.formulas.lifts import lift, on_piece, placed
+from virtualwork.formulas.lifts import lift, placed
 from virtualwork.formulas.numbers import WRITTEN, Number, One
 from virtualwork.formulas.touches import carried
 
@@ -89,11 +90,11 @@ def profile(m: Description, drive: CamDrive, steps: int = STEPS) -> list[Profile
     """
     of, center = drive.lift, m.bodies[drive.cam.cam][drive.pin]
     points: list[ProfilePoint] = []
-    for i, (piece, count) in enumerate(zip(of.pieces, counts(of, steps), strict=True)):
+    for i, count in enumerate(counts(of, steps)):
         low, high = of.knots[i], of.knots[i + 1]
         for j in range(count):
             angle: Number = low + (high - low) * (j / count)
-            at = on_piece(OWN, piece, angle)
+            at = placed(OWN, of, angle, itemgetter(i))
             touching = carried(m, drive, OWN, at)
             back = OWN.exp(-(of.first + angle))
             points.append(

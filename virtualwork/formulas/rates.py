@@ -19,7 +19,7 @@ from virtualwork.describe.laws import Lift
 from virtualwork.describe.meshes import Coordinate
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.lifts import composed
-from virtualwork.formulas.numbers import Number, cross, singular_poses, solve_determined
+from virtualwork.formulas.numbers import Number, cross, determined, plus, singular_poses, solve_columns, times
 from virtualwork.formulas.positions import State, columns
 from virtualwork.plan.steps import Angle, Group, Path, Place, Plan, Step, Term, Turn
 
@@ -81,9 +81,9 @@ class Rates:
         total: Number = None
         for j in range(k - 1):
             if theta[j] is not None:
-                total = _plus(total, _times(comb(k - 1, j), _times(theta[j], self.turn(body, k - 1 - j))))
+                total = plus(total, times(comb(k - 1, j), times(theta[j], self.turn(body, k - 1 - j))))
         if top is not None:
-            total = _plus(total, _times(top, self.st.turn[body]))
+            total = plus(total, times(top, self.st.turn[body]))
         return None if total is None else 1j * total
 
     def turn(self, body: str, k: int) -> Number:
@@ -101,7 +101,7 @@ class Rates:
         base, terms = path
         v: Number = None if base is None else self.point[base][k - 1]
         for t in terms:
-            v = _plus(v, self._term(t, k))
+            v = plus(v, self._term(t, k))
         return v
 
     def advance(self, steps: Iterable[Step], k: int) -> None:
@@ -119,13 +119,13 @@ class Rates:
     def _tied(self, angle: Angle, k: int, without: tuple[Coordinate, ...] = ()) -> Number:
         value: Number = None
         for j, f in angle.inputs:
-            value = _plus(value, _times(f, self.rate(j, k)))
+            value = plus(value, times(f, self.rate(j, k)))
         for base, r in angle.bases:
             if base not in without:
                 known = self.slide[base] if isinstance(base, int) else self.angle[base]
-                value = _plus(value, _times(r, known[k - 1]))
+                value = plus(value, times(r, known[k - 1]))
         for of, r in angle.cams:
-            value = _plus(value, _times(r, composed(k, self.st.lifts[of], self.against(of, k))))
+            value = plus(value, times(r, composed(k, self.st.lifts[of], self.against(of, k))))
         return value
 
     def against(self, of: Lift, k: int) -> list[Number]:
@@ -133,7 +133,7 @@ class Rates:
         on = self.angle[of.on]
         if not on:
             return self.angle[of.cam][:k]
-        return [_plus(a, _times(-1, b)) for a, b in zip(self.angle[of.cam][:k], on[:k], strict=True)]
+        return [plus(a, times(-1, b)) for a, b in zip(self.angle[of.cam][:k], on[:k], strict=True)]
 
     def _write_tied(self, tie: Turn, k: int) -> None:
         """Store the k-th derivative of an angle or a slide that is tied to others."""
@@ -146,7 +146,7 @@ class Rates:
         """(z·s·e^{iθ})⁽ᵏ⁾; `tops` stand for (e^{iθ})⁽ᵏ⁾, and `unknown` for s⁽ᵏ⁾ without what is not known of it."""
         highest = tops[t.body] if tops and t.body in tops else self.turn(t.body, k)
         if t.slide is None:
-            return _times(t.z, highest)
+            return times(t.z, highest)
         s = self.slide.get(t.slide, [])
         total = None if highest is None else self.st.slide[t.slide] * highest
         for j in range(1, k + 1):
@@ -154,8 +154,8 @@ class Rates:
             if rate is not None:
                 e = self.turn(t.body, k - j)
                 if e is not None:
-                    total = _plus(total, _times(comb(k, j), rate * e))
-        return _times(t.z, total)
+                    total = plus(total, times(comb(k, j), rate * e))
+        return times(t.z, total)
 
     def right_side(self, group: Group, k: int) -> list[Number]:
         """The k-th derivative of each loop with the unknowns' own k-th derivatives left out."""
@@ -177,9 +177,9 @@ class Rates:
             if closure.start is not None:
                 w = self.point[closure.start][k - 1]
             if closure.end is not None:
-                w = _plus(w, _times(-1, self.point[closure.end][k - 1]))
+                w = plus(w, times(-1, self.point[closure.end][k - 1]))
             for t in closure.terms:
-                w = _plus(w, self._term(t, k, tops, runs))
+                w = plus(w, self._term(t, k, tops, runs))
             rows.append(0j if w is None else w)
         return rows
 
@@ -200,7 +200,7 @@ class Rates:
         right = self.right_side(group, k)
         cols = self.columns(group)
         if group.name in self.st.folded:
-            x = solve_determined(cols, right)
+            x = solve_columns(cols, right, determined)
         elif group.kind != "Newton":
             x = crossed(cols[0], right[0], self.inverse(group))
         else:
@@ -248,19 +248,6 @@ def _put(store: dict[Any, list[Number]], key: Any, k: int, value: Number) -> Non
     series = store.setdefault(key, [])
     del series[k - 1 :]
     series.append(value)
-
-
-# as in `numbers`, but here: the terms of Leibniz's rule are added up by the hundred, and a binomial of 1 costs nothing
-
-
-def _plus(a: Number, b: Number) -> Number:
-    return b if a is None else a if b is None else a + b
-
-
-def _times(f: Number, a: Number) -> Number:
-    if a is None:
-        return None
-    return a if isinstance(f, (int, float)) and f == 1 else f * a
 
 
 def chain_rule(order: int, get: Callable[[int], Number], rates: Sequence[Number]) -> Number:

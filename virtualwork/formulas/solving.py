@@ -22,14 +22,15 @@ from virtualwork.formulas.group_loops import unknowns
 from virtualwork.formulas.kinematics import AnglePartial
 from virtualwork.formulas.loops import Closed, Margin, Regularity
 from virtualwork.formulas.numbers import (
+    FAST,
     SINGULAR,
     Complexes,
     Number,
     Reals,
     cross,
+    determined,
     leave_out,
     solve_columns,
-    solve_determined,
 )
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.quantity import Quantity
@@ -166,14 +167,14 @@ class Solving(Poses):
         return [key.of_rows(out, self.n) for key in keys]
 
     def _too_fast(self, j: int) -> NDArray[np.bool_]:
-        """Where a link turns more than 10¹³ times as fast as the input: at a dead point to rounding, no number is left."""
+        """Where a link turns too fast beside the input for a force to have a number."""
         reach = self.mechanism.size if self.mechanism.inputs[j].is_slide else 1.0
         needed = self.plan.needed(self.recording.forces.case.targets()[0])
         bodies = (body for g in needed if isinstance(g, Group) for body in g.angles)
         keys = [AnglePartial(body, j, 1) for body in bodies]
         result = np.zeros(self.n, dtype=bool)
         for rate in self._raw(keys):
-            result |= ~(np.abs(rate) * reach < 1e13)
+            result |= ~(np.abs(rate) * reach < FAST)
         return result
 
     # --- what is solved outside ---------------------------------------------------------------------------------------
@@ -357,7 +358,7 @@ class Solving(Poses):
             right = values[len(loops) * len(each) :]
             with np.errstate(all="ignore"):
                 if group in self.branch.folded:
-                    rates = solve_determined(cols, right)
+                    rates = solve_columns(cols, right, determined)
                 elif of.kind == "Newton":
                     rates = solve_columns(cols, right)
                 else:

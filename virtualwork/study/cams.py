@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from virtualwork.describe.description import Description
 from virtualwork.describe.laws import TURN
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.lanes import Lanes
-from virtualwork.formulas.lifts import lift, located, on_piece
+from virtualwork.formulas.lifts import lift, located, placed
 from virtualwork.formulas.numbers import ONE, Reals
 from virtualwork.formulas.profiles import FINE, profile
 from virtualwork.formulas.touches import Touching, carried
@@ -128,11 +129,9 @@ def _steps(drive: CamDrive) -> list[tuple[int, float]]:
     """The knots at which the velocity or the acceleration of a law has a step."""
     of = drive.lift
     ends = []
-    for i, piece in enumerate(of.pieces):
-        rates = [
-            [float(lift(on_piece(ONE, piece, of.knots[i + side]), k)) for k in (1, 2)] for side in (0, 1)
-        ]
-        ends.append(rates)
+    for i in range(len(of.pieces)):
+        sides = [placed(ONE, of, knot, itemgetter(i)) for knot in of.knots[i : i + 2]]
+        ends.append([[float(lift(at, k)) for k in (1, 2)] for at in sides])
     largest = [
         max(abs(piece.height) * (math.pi / abs(piece.width)) ** k for piece in of.pieces) for k in (1, 2)
     ]

@@ -344,7 +344,7 @@ def crank_rod_piston(
     states = []
     with np.errstate(all="ignore"):
         for sign in (-1, 1):
-            # R_A − R_through + rod·e^{iθ3} − s·u = 0
+            # −1: further along the line. R_A − R_through + rod·e^{iθ3} − s·u = 0
             e, slide, _ = angle_and_slide(arm - through, complex(rod), -u, sign, MANY)
             turned = rod * e
             # the two real equations of the loop's derivative, unknowns ω3 and ṡ
@@ -352,7 +352,4 @@ def crank_rod_piston(
             quadratic = 1j * a2 * arm - w2 * w2 * arm - w3 * w3 * turned
             a3, a, _ = two_columns(quadratic, 1j * turned, np.full_like(turned, -u))
             states.append(Piston(np.angle(e), through + slide * u, slide, w3, v * u, a3, a * u))
-    first, second = states
-    if np.nanmean(first.slide) < np.nanmean(second.slide):
-        first, second = second, first
-    return first, second
+    return states[0], states[1]

@@ -43,7 +43,7 @@ def compiled(
     passed: tuple[str, ...] = (),
     found: tuple[str, ...] = (),
     among: tuple[str, ...] = (),
-    vectors: tuple[bool, ...] = (),
+    results: tuple[tuple[str, ...], ...] = (),
 ) -> Callable[..., tuple[Any, ...]]:
     """The tape as a function of floats: inputs in the order of `tape.inputs`, outputs in that of `tape.outputs`.
 
@@ -58,8 +58,8 @@ def compiled(
         output. A call whose results nothing uses is left out.
     among : names, optional
         The arguments, among which the inputs are; by default the inputs alone.
-    vectors : tuple of bool, optional
-        Whether each result is a complex number, of two outputs; one of a single output has no −0 then.
+    results : tuple of names, optional
+        The output of each real number, which has no −0 then, and the two of each complex one; default: all outputs as they are.
     """
     inputs = list(among) or [name for name in tape.inputs if called(name) is None]
     places = dict(tape.outputs)
@@ -102,13 +102,14 @@ def compiled(
                 text.append(f"v{number}")
                 depth.append(0)
     names = ", ".join([*(["f"] if found else []), *(f"x{k}" for k in range(len(inputs)))])
-    values = [text[number] for name, number in tape.outputs if called(name) is None]
-    if vectors:
-        rest = iter(values)
-        values = [f"complex({next(rest)}, {next(rest)})" if v else f"{next(rest)} + 0.0" for v in vectors]
-    results = "".join(f"{value}, " for value in values)
+    if results:
+        parts = [[text[places[name]] for name in each] for each in results]
+        values = [f"complex({', '.join(of)})" if len(of) > 1 else f"{of[0]} + 0.0" for of in parts]
+    else:
+        values = [text[number] for name, number in tape.outputs if called(name) is None]
+    returned = "".join(f"{value}, " for value in values)
     source = (
-        f"def tape({names}):\n" + "".join(f"    {line}\n" for line in lines) + f"    return ({results})\n"
+        f"def tape({names}):\n" + "".join(f"    {line}\n" for line in lines) + f"    return ({returned})\n"
     )
     room: dict[str, object] = {name: getattr(math, name) for name in ("sin", "cos", "atan2", "sqrt")}
     room["binade"] = binade
