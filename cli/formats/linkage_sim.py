@@ -34,6 +34,29 @@ LOADS: dict[str, tuple[str, tuple[tuple[str, str | None], ...], tuple[str, ...]]
     "ExternalForce": ("forces", (("body_id", "local_point"),), ()),
     "ExternalTorque": ("torques", (("body_id", None),), ("torque",)),
 }
+# keys of a document and of a body that are read, or that say nothing of a mechanism
+READ = {
+    "bodies",
+    "joints",
+    "drivers",
+    "linear_drivers",
+    "forces",
+    "load_cases",
+    "sweep_config",
+    "mounting_angle",
+}
+READ |= {"schema_version", "name", "note", "notes", "meta", "source", "description"}
+OF_BODY = {
+    "attachment_points",
+    "coupler_points",
+    "mount_points",
+    "point_masses",
+    "mass",
+    "cg_local",
+    "izz_cg",
+    "Izz_cg",
+}
+OF_BODY |= {"name", "note", "color", "render"}
 
 
 def read(file: str, data: Any) -> list[Drawing]:
@@ -61,14 +84,14 @@ class _Reader:
 
     def named(self, entry: dict[str, Any], key: str, where: str = "") -> dict[str, Any]:
         """Return an object of named entries; empty where there is none."""
-        value = entry.get(key) or {}
+        value = {} if entry.get(key) is None else entry[key]
         if not isinstance(value, dict):
             raise damaged(self.file, f"{where}{key}", value, "an object by names")
         return value
 
     def listed(self, entry: dict[str, Any], key: str, where: str = "") -> list[dict[str, Any]]:
         """Return a list of objects; empty where there is none."""
-        value = entry.get(key) or []
+        value = [] if entry.get(key) is None else entry[key]
         if not isinstance(value, list) or not all(isinstance(e, dict) for e in value):
             raise damaged(self.file, f"{where}{key}", value, "a list of objects")
         return value
@@ -95,7 +118,9 @@ class _Reader:
             self._body(name, e)
         if GROUND not in data["bodies"]:
             raise DataError(f"{self.file}: bodies: expected one called ground")
-        joints = {k: e for k, e in data["joints"].items() if isinstance(e, dict)}
+        joints = data["joints"]
+        for name, e in joints.items():
+            self.get(f"joint {name}", e, "type")
         for name, e in joints.items():
             if e.get("type") == "fixed":
                 self._fix(name, e)
@@ -122,6 +147,8 @@ class _Reader:
         for key in ("load_cases", "sweep_config"):
             if data.get(key):
                 d.leave(key, "drivers are the inputs; a range is an option of the command")
+        for key in sorted(data.keys() - READ):
+            d.leave(key, "it is not read")
         if data.get("mounting_angle"):
             d.leave("mounting_angle", "it turns gravity: turn `gravity` in the file instead")
         return d
@@ -131,6 +158,8 @@ class _Reader:
         held = self.get(where, e, "attachment_points")
         if not isinstance(held, dict):
             raise damaged(self.file, where, held, "attachment_points by name")
+        for key in sorted(e.keys() - OF_BODY):
+            self.d.leave(f"{where}, {key}", "it is not read")
         self.points[name] = {p: self.pair(f"{where}, point {p}", z) for p, z in held.items()}
         mass = self.real(f"{where}, mass", e.get("mass", 0.0))
         inertia = self.real(f"{where}, izz_cg", e.get("izz_cg", e.get("Izz_cg", 0.0)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, ParseError, SubElement, indent, tostring
@@ -108,6 +108,30 @@ def stated(limits: Iterable[str | None], friction: str | None) -> tuple[str, ...
     """Name the further data of a joint: limits and friction that are present and not zero."""
     result = {"limits": list(limits), "friction": [friction]}
     return tuple(what for what, words in result.items() if any((word or "").strip("0. ") for word in words))
+
+
+def passed_over(root: Element, known: Mapping[str, str]) -> list[str]:
+    """Name the elements that nothing reads.
+
+    Parameters
+    ----------
+    root : Element
+    known : mapping of str
+        Tag -> the tags in it that are read, or that say nothing of a mechanism; elements of other tags are not searched.
+
+    Examples
+    --------
+    >>> passed_over(parse("f", b"<robot><link><inertia1/></link></robot>"), {"robot": "link", "link": "inertial"})
+    ['<inertia1> in <link>: left out: it is not read']
+    """
+    lost = []
+    for inner in root:
+        tag = plain(inner)
+        if tag not in known[plain(root)].split():
+            lost.append(f"<{tag}> in <{plain(root)}>: left out: it is not read")
+        elif tag in known:
+            lost += passed_over(inner, known)
+    return list(dict.fromkeys(lost))
 
 
 class At(NamedTuple):

@@ -9,8 +9,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from cli.formats import markup as xml
 from cli.formats.drawn import GROUND
-from cli.formats.markup import At, add, child, children, digits, document, include, named, spatial
 from cli.formats.robot import (
     DIAGONAL_FIRST,
     LIGHT,
@@ -36,13 +36,26 @@ if TYPE_CHECKING:
 PLURAL = {"gear": "gears", "belt": "belt", "rack": "rack"}
 # MuJoCo takes nothing lighter
 LIGHTEST = 2e-15
+INSIDE = (
+    "inertial joint freejoint geom site body frame camera light replicate attach composite flexcomp plugin"
+)
+# tag -> the tags in it that are read, or that say nothing of a mechanism
+READ = {
+    "mujoco": "compiler option default worldbody equality tendon actuator keyframe "
+    "size visual statistic asset contact sensor custom extension",
+    "worldbody": INSIDE,
+    "body": INSIDE,
+    "frame": INSIDE,
+    "tendon": "fixed spatial",
+    "keyframe": "key",
+}
 KINDS: dict[str, Kind] = {"hinge": "turn", "slide": "slide", "ball": "ball"}
 
 
 def read(file: str, root: Element, folder: Path | None) -> Robot:
     """Read a `<mujoco>`; files that it includes are followed inside its folder alone."""
-    include(file, root, folder, [0])
-    robot = Robot(file, "MJCF", root.get("model", ""))
+    xml.include(file, root, folder, [0])
+    robot = Robot(file, "MJCF", root.get("model", ""), notes=xml.passed_over(root, READ))
     _Reader(robot, root).read()
     return robot
 
@@ -55,22 +68,24 @@ class _Reader:
         self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
         self.sites: dict[str, tuple[str, Array]] = {}
         # how angles are written, whether shapes give masses, and what all of these are together
-        compiler = {key: text for e in children(root, "compiler") for key, text in e.attrib.items()}
+        compiler = {key: text for e in xml.children(root, "compiler") for key, text in e.attrib.items()}
         self.frames = Frames(
             self.file, compiler.get("angle", "degree") != "radian", compiler.get("eulerseq", "xyz")
         )
         self.shapes = compiler.get("inertiafromgeom", "auto")
-        self.total = At(self.file, "compiler").number("settotalmass", compiler.get("settotalmass", "-1"))
+        self.total = xml.At(self.file, "compiler").number("settotalmass", compiler.get("settotalmass", "-1"))
         robot.gravity = np.array([0.0, 0.0, -9.81])
-        for e in children(root, "option"):
+        for e in xml.children(root, "option"):
             if e.get("gravity") is not None:
-                robot.gravity = np.array(At(self.file, "option").numbers("gravity", e.get("gravity"), 3))
+                robot.gravity = np.array(xml.At(self.file, "option").numbers("gravity", e.get("gravity"), 3))
         if any(
-            flag.get("gravity") == "disable" for e in children(root, "option") for flag in children(e, "flag")
+            flag.get("gravity") == "disable"
+            for e in xml.children(root, "option")
+            for flag in xml.children(e, "flag")
         ):
             robot.gravity = None
-        for e in children(root, "default"):
-            self._defaults(e, "main", {})
+        for e in xml.children(root, "default"):
+            self._defaults(e, "main", self.classes["main"])
 
     def _defaults(self, element: Element, name: str, above: dict[str, dict[str, str]]) -> None:
         mine = {tag: dict(values) for tag, values in above.items()}
@@ -78,20 +93,20 @@ class _Reader:
             if e.tag != "default":
                 mine.setdefault(e.tag, {}).update(e.attrib)
         self.classes[name] = mine
-        for e in children(element, "default"):
-            self._defaults(e, named(self.file, e, "class"), mine)
+        for e in xml.children(element, "default"):
+            self._defaults(e, xml.named(self.file, e, "class"), mine)
 
-    def whole(self, e: Element, of: str) -> dict[str, str]:
-        """Return an element's attributes with those of its class."""
+    def whole(self, e: Element, of: str = "main", kind: str = "") -> dict[str, str]:
+        """Return an element's attributes with those of its class, of its tag or of the tag of its `kind`."""
         name = e.get("class", of)
         if name not in self.classes:
             raise DataError(f"{self.file}: <{e.tag}>: no default class is called '{name}'")
-        return self.classes[name].get(e.tag, {}) | e.attrib
+        return self.classes[name].get(kind or e.tag, {}) | e.attrib
 
     def read(self) -> None:
         robot = self.robot
         robot.add(RobotLink(WORLD, np.eye(4)))
-        for e in children(self.root, "worldbody"):
+        for e in xml.children(self.root, "worldbody"):
             self._inside(e, WORLD, np.eye(4), "main")
         masses = [link.inertial for link in robot.links.values() if link.inertial is not None]
         share = self.total / (sum(held.mass for held in masses) or 1.0)
@@ -115,7 +130,7 @@ class _Reader:
         for e, class_, frame in self._contents(element, of, np.eye(4)):
             if e.tag == "site" and e.get("name"):
                 at = frame @ self.frames.pose(f"site '{e.get('name')}'", self.whole(e, class_))
-                self.sites[named(self.file, e)] = link, at[:3, 3]
+                self.sites[xml.named(self.file, e)] = link, at[:3, 3]
             elif e.tag == "body":
                 self._body(e, link, base @ frame, e.get("childclass", class_))
             elif e.tag in ("replicate", "attach", "composite", "flexcomp"):
@@ -135,7 +150,7 @@ class _Reader:
         if any(j.tag == "freejoint" for j, _, _ in held) or any(v.get("type") == "free" for v, _ in joints):
             robot.notes.append(f"{where}: its free joint is left out: the body is fixed")
             joints = []
-        inertial = child(e, "inertial")
+        inertial = xml.child(e, "inertial")
         mass = self._inertial(where, inertial)
         if self.shapes == "true" or (self.shapes == "auto" and inertial is None):
             geoms = ((values, at) for g, values, at in held if g.tag == "geom")
@@ -157,7 +172,7 @@ class _Reader:
 
     def _joint(self, values: dict[str, str], name: str, parent: str, below: str, here: Array) -> None:
         name = values.get("name") or name
-        at = At(self.file, f"joint '{name}'")
+        at = xml.At(self.file, f"joint '{name}'")
         type_ = values.get("type", "hinge")
         kind = KINDS.get(type_, "other")
         place = here @ pose(at.numbers("pos", values.get("pos"), 3, (0.0, 0.0, 0.0)))
@@ -181,7 +196,7 @@ class _Reader:
     def _inertial(self, where: str, e: Element | None) -> Inertial | None:
         if e is None:
             return None
-        at = At(self.file, where)
+        at = xml.At(self.file, where)
         place = self.frames.pose(f"{where}, inertial", e.attrib)
         mass = at.number("mass", e.get("mass"))
         texts = dict.fromkeys(DIAGONAL_FIRST, "0")
@@ -196,17 +211,17 @@ class _Reader:
 
     def _every(self, section: str) -> Iterator[tuple[int, Element]]:
         """Yield the elements of all sections of a name, with their numbers there."""
-        for part in children(self.root, section):
+        for part in xml.children(self.root, section):
             yield from enumerate(part, 1)
 
     # --- what closes loops ----------------------------------------------------------------------------------
     def _equalities(self) -> None:
         robot = self.robot
         for k, e in self._every("equality"):
-            values = self.whole(e, "main")
+            values = self.whole(e, kind="equality")
             name = values.get("name") or f"{e.tag} {k}"
             where = f"equality '{name}'"
-            at = At(self.file, where)
+            at = xml.At(self.file, where)
             if values.get("active") == "false":
                 robot.notes.append(f"{where}: left out: it is not active")
             elif e.tag in ("connect", "weld"):
@@ -217,14 +232,14 @@ class _Reader:
                 if any(powers):
                     robot.notes.append(f"{where}: left out: its polynomial is not a straight line")
                     continue
-                first = named(self.file, e, "joint1")
+                first = xml.named(self.file, e, "joint1")
                 robot.couple(name, first, values.get("joint2", ""), factor, offset, where)
             elif e.tag == "tendon" and "tendon2" not in values:
-                robot.couplings.append((name, self._fixed(named(self.file, e, "tendon1"), at)))
+                robot.couplings.append((name, self._fixed(xml.named(self.file, e, "tendon1"), at)))
             else:
                 robot.notes.append(f"{where}: left out: <{e.tag}> has no equivalent")
 
-    def _connect(self, tag: str, name: str, at: At, values: dict[str, str]) -> None:
+    def _connect(self, tag: str, name: str, at: xml.At, values: dict[str, str]) -> None:
         robot = self.robot
         if "site1" in values or "site2" in values:
             sides = []
@@ -244,24 +259,27 @@ class _Reader:
         kind: Kind = "fixed" if tag == "weld" else "ball"
         robot.join(RobotJoint(name, kind, a, b, (one, other), np.zeros(3)))
 
-    def _fixed(self, name: str, at: At) -> list[tuple[str, float]]:
+    def _fixed(self, name: str, at: xml.At) -> list[tuple[str, float]]:
         """Return the terms of a fixed tendon."""
         for _, e in self._every("tendon"):
             if e.tag == "fixed" and e.get("name") == name:
-                own = At(self.file, f"tendon '{name}'")
-                joints = children(e, "joint")
-                return [(named(self.file, j, "joint"), own.number("", j.get("coef"))) for j in joints]
+                own = xml.At(self.file, f"tendon '{name}'")
+                joints = xml.children(e, "joint")
+                return [(xml.named(self.file, j, "joint"), own.number("", j.get("coef"))) for j in joints]
         raise DataError(f"{self.file}: {at.where}: no fixed tendon is called '{name}'")
 
     def _tendons(self) -> None:
         for k, e in self._every("tendon"):
-            self._spring(e, At(self.file, f"tendon '{e.get('name') or k}'"))
+            self._spring(e, xml.At(self.file, f"tendon '{e.get('name') or k}'"))
         for name, (link, at) in self.sites.items():
             self.robot.links[link].points[name] = at
 
-    def _spring(self, e: Element, at: At) -> None:
+    def _spring(self, e: Element, at: xml.At) -> None:
         """Read a tendon that pulls: between two sites, or on joints."""
-        values = self.classes[e.get("class", "main")].get("tendon", {}) | e.attrib
+        values = self.whole(e, kind="tendon")
+        lost = xml.stated([values.get("range")], values.get("frictionloss"))
+        if lost:
+            self.robot.notes.append(f"{at.where}: its {' and '.join(lost)} are left out")
         stiffness, damping = _leading(at, values, "stiffness", "damping")
         if not (stiffness or damping):
             return
@@ -271,7 +289,7 @@ class _Reader:
             raise at.error("springlength", quote(text), "1 or 2 numbers")
         ends, terms = [], []
         if e.tag == "fixed":
-            terms = self._fixed(named(self.file, e), at)
+            terms = self._fixed(xml.named(self.file, e), at)
         else:
             sites = [s.get("site", "") for s in e]
             if len(sites) != 2 or not all(s in self.sites for s in sites):
@@ -291,12 +309,12 @@ class _Reader:
         robot = self.robot
         speeds = self._speeds()
         for k, e in self._every("actuator"):
-            values = self.whole(e, "main")
+            values = self.whole(e)
             name = values.get("name") or f"actuator {k}"
             if "joint" in values:
                 terms = [(values["joint"], 1.0)]
             elif "tendon" in values:
-                terms = self._fixed(values["tendon"], At(self.file, f"actuator '{name}'"))
+                terms = self._fixed(values["tendon"], xml.At(self.file, f"actuator '{name}'"))
             else:
                 robot.notes.append(f"actuator '{name}': left out: it drives no joint")
                 continue
@@ -307,14 +325,18 @@ class _Reader:
         """Return the joints' speeds in the first key frame."""
         text = next((e.get("qvel") for _, e in self._every("keyframe")), None)
         own = [j.name for j in self.robot.joints.values() if j.kind in ("turn", "slide")]
-        result = At(self.file, "key").numbers("qvel", text)
+        result = xml.At(self.file, "key").numbers("qvel", text)
         if len(result) != len(own):
+            if result:
+                self.robot.notes.append(
+                    f"key, qvel: left out: found {len(result)} speeds, expected {len(own)}: one for each joint"
+                )
             return {}
         # a key frame at rest has no speed
         return {name: v for name, v in zip(own, result, strict=True) if v != 0}
 
 
-def _leading(at: At, values: Mapping[str, str], *keys: str) -> list[float]:
+def _leading(at: xml.At, values: Mapping[str, str], *keys: str) -> list[float]:
     """Return for each key the first of one number or several, such as a stiffness with its polynomial's."""
     return [(at.numbers(key, values.get(key)) or [0.0])[0] for key in keys]
 
@@ -327,15 +349,15 @@ def write(s: Skeleton, comment: str) -> tuple[bytes, list[str]]:
     light = max(LIGHT * (max(p.mass for p in s.bodies.values()) or 1.0), LIGHTEST)
     inertias = [p.inertia for p in s.bodies.values() if p.inertia > 0]
     least = max(min([light * m.size**2, *inertias]), LIGHTEST)
-    add(
+    xml.add(
         root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false", boundmass=light, boundinertia=least
     )  # fmt: skip
-    add(root, "option", gravity=spatial(m.gravity), timestep=0.0005, integrator="implicitfast")
-    default = add(root, "default")
+    xml.add(root, "option", gravity=xml.spatial(m.gravity), timestep=0.0005, integrator="implicitfast")
+    default = xml.add(root, "default")
     # as stiff as the solver of constraints takes it
-    add(default, "equality", solref="0.001 1", solimp="0.9999 0.9999 0.001 0.5 2")
-    add(default, "geom", contype="0", conaffinity="0")
-    world = add(root, "worldbody")
+    xml.add(default, "equality", solref="0.001 1", solimp="0.9999 0.9999 0.001 0.5 2")
+    xml.add(default, "geom", contype="0", conaffinity="0")
+    world = xml.add(root, "worldbody")
     bodies = {GROUND: world}
     for b in s.walk():
         bodies[b.child] = _body(s, b, bodies[b.parent])
@@ -345,35 +367,35 @@ def write(s: Skeleton, comment: str) -> tuple[bytes, list[str]]:
     for j in s.closing:
         _close(j, bodies, equality)
     for link, block in s.welds:
-        add(equality, "weld", body1=link, body2=block)
+        xml.add(equality, "weld", body1=link, body2=block)
     tendon = Element("tendon")
     count = dict.fromkeys(PLURAL, 0)
     for mesh in m.meshes:
         count[mesh.kind] += 1
         name = f"{PLURAL[mesh.kind]} {count[mesh.kind]}"
         _fixed(tendon, name, s.mesh(mesh))
-        add(equality, "tendon", tendon1=name)
+        xml.add(equality, "tendon", tendon1=name)
     _springs(s, tendon, bodies)
     actuator = Element("actuator")
     for k, e in enumerate(m.inputs):
         joint = s.joint_of(k)
-        motor = add(actuator, "motor", name=e.name)
+        motor = xml.add(actuator, "motor", name=e.name)
         if joint is None:
             _fixed(tendon, f"input {e.name}", s.free_input(k))
             motor.set("tendon", f"input {e.name}")
         else:
             motor.set("joint", joint.name)
         if s.travel.peak is not None:
-            motor.set("ctrlrange", digits(-s.travel.peak, s.travel.peak))
+            motor.set("ctrlrange", xml.digits(-s.travel.peak, s.travel.peak))
     root.extend(e for e in (equality, tendon, actuator) if len(e))
-    _key(s, add(root, "keyframe"))
-    return document(root, comment), s.left_out(("springs", "torsion springs", "inputs", "gravity"))
+    _key(s, xml.add(root, "keyframe"))
+    return xml.document(root, comment), s.left_out(("springs", "torsion springs", "inputs", "gravity"))
 
 
 def _fixed(tendon: Element, name: str, terms: dict[str, float]) -> Element:
-    made = add(tendon, "fixed", name=name)
+    made = xml.add(tendon, "fixed", name=name)
     for joint, factor in terms.items():
-        add(made, "joint", joint=joint, coef=factor)
+        xml.add(made, "joint", joint=joint, coef=factor)
     return made
 
 
@@ -381,36 +403,38 @@ def _springs(s: Skeleton, tendon: Element, bodies: dict[str, Element]) -> None:
     """Add springs and dampers, between two places and between two links."""
     m = s.m
     for k, spring in enumerate(m.springs, 1):
-        made = add(tendon, "spatial", name=f"spring {k}", stiffness=spring.stiffness, damping=spring.damping)
-        made.set("springlength", digits(spring.free_length))
+        made = xml.add(
+            tendon, "spatial", name=f"spring {k}", stiffness=spring.stiffness, damping=spring.damping
+        )
+        made.set("springlength", xml.digits(spring.free_length))
         for side, (body, point) in zip("ab", spring.between, strict=True):
             site = f"spring {k} {side}"
-            add(bodies[body], "site", name=site, pos=spatial(m.place(body, point)))
-            add(made, "site", site=site)
+            xml.add(bodies[body], "site", name=site, pos=xml.spatial(m.place(body, point)))
+            xml.add(made, "site", site=site)
     for k, turning in enumerate(m.torsion_springs, 1):
         on, link = turning.links
         terms = s.terms({link: 1.0, on: -1.0})
         made = _fixed(tendon, f"torsion spring {k}", terms)
-        made.attrib |= {"stiffness": digits(turning.stiffness), "damping": digits(turning.damping)}
+        made.attrib |= {"stiffness": xml.digits(turning.stiffness), "damping": xml.digits(turning.damping)}
         here = sum(c * next(j.value for j in s.joints if j.name == name) for name, c in terms.items())
-        made.set("springlength", digits(here - s.twist(turning)))
+        made.set("springlength", xml.digits(here - s.twist(turning)))
 
 
 def _body(s: Skeleton, b: Branching, inside: Element) -> Element:
     """Add a body with its joint."""
     parent, part, j = s.bodies[b.parent], s.bodies[b.child], b.joint
-    body = add(inside, "body", name=b.child, pos=spatial(parent.inside(part.at)))
+    body = xml.add(inside, "body", name=b.child, pos=xml.spatial(parent.inside(part.at)))
     turned = part.turn - parent.turn
     if turned:
-        body.set("euler", digits(0.0, 0.0, turned))
-    made = add(body, "joint", name=j.name, type="hinge" if j.kind == "turn" else "slide")
+        body.set("euler", xml.digits(0.0, 0.0, turned))
+    made = xml.add(body, "joint", name=j.name, type="hinge" if j.kind == "turn" else "slide")
     # of a slide the place means nothing to MuJoCo, but it is the point's
-    made.set("pos", spatial(j.ends[1] if b.child == j.link else j.ends[0]))
-    made.set("axis", digits(*j.axis(part, b.sense)))
+    made.set("pos", xml.spatial(j.ends[1] if b.child == j.link else j.ends[0]))
+    made.set("axis", xml.digits(*j.axis(part, b.sense)))
     if j.value:
-        made.set("ref", digits(j.value))
+        made.set("ref", xml.digits(j.value))
     if j.limits is not None:
-        made.set("range", digits(*j.limits))
+        made.set("range", xml.digits(*j.limits))
     return body
 
 
@@ -418,19 +442,19 @@ def _add_contents(s: Skeleton, name: str, body: Element) -> None:
     """Add what a body has: mass, named points, a drawing."""
     part = s.bodies[name]
     if part.mass > 0 or part.inertia > 0:
-        add(
+        xml.add(
             body,
             "inertial",
-            pos=spatial(part.center),
+            pos=xml.spatial(part.center),
             mass=part.mass,
-            diaginertia=digits(*3 * (part.inertia,)),
+            diaginertia=xml.digits(*3 * (part.inertia,)),
         )
     for point, z in part.points.items():
         # a point of several links stands on the first
         if next(holder for holder, other in s.bodies.items() if point in other.points) == name:
-            add(body, "site", name=point, pos=spatial(z))
+            xml.add(body, "site", name=point, pos=xml.spatial(z))
     for a, b in s.strokes(name):
-        add(body, "geom", type="capsule", size=s.thickness, fromto=f"{spatial(a)} {spatial(b)}")
+        xml.add(body, "geom", type="capsule", size=s.thickness, fromto=f"{xml.spatial(a)} {xml.spatial(b)}")
 
 
 def _close(j: Joint, bodies: dict[str, Element], equality: Element) -> None:
@@ -438,12 +462,12 @@ def _close(j: Joint, bodies: dict[str, Element], equality: Element) -> None:
     sites = []
     for name, z in zip((j.on, j.link), j.ends, strict=True):
         sites.append(f"{j.name} on {name}")
-        add(bodies[name], "site", name=sites[-1], pos=spatial(z))
-    add(equality, "connect", name=j.name, site1=sites[0], site2=sites[1])
+        xml.add(bodies[name], "site", name=sites[-1], pos=xml.spatial(z))
+    xml.add(equality, "connect", name=j.name, site1=sites[0], site2=sites[1])
 
 
 def _key(s: Skeleton, keyframe: Element) -> None:
     """The start: coordinates, speeds, efforts of the inputs."""
     walked = [b.joint for b in s.walk()]
-    start = {"qpos": digits(*(j.value for j in walked)), "qvel": digits(*(j.rate for j in walked))}
-    add(keyframe, "key", name="start", **start)
+    start = {"qpos": xml.digits(*(j.value for j in walked)), "qvel": xml.digits(*(j.rate for j in walked))}
+    xml.add(keyframe, "key", name="start", **start)

@@ -272,7 +272,8 @@ class _String:
         self.file, self.linkage = file, Linkage(file)
         parts = text.split(".")
         settings, rest = parts[:4], parts[4:]
-        if len(rest) < 4 or rest.count("") < 2:
+        # the last part has the active object and the checksum, no list
+        if len(rest) < 4 or rest.count("") < 2 or "," in rest[-1]:
             raise DataError(
                 f"{file}: part {len(parts)}: the string ends there: expected joints, links, forces, each list "
                 "closed by an empty part; is it cut off?"

@@ -14,6 +14,7 @@ from cli.formats.markup import At
 from dalembert.errors import DataError
 
 if TYPE_CHECKING:
+    from rigidbody3d.body import Body
     from virtualwork.describe.meshes import Gear
 
 Array = NDArray[np.float64]
@@ -138,11 +139,24 @@ class Robot:
             raise DataError(f"{self.file}: two joints are called '{joint.name}'")
         self.joints[joint.name] = joint
 
+    def drive(self, speeds: Mapping[str, float | None]) -> None:
+        """Set the motors: one on each of some joints, with its speed."""
+        self.motors = [Motor(name, [(name, 1.0)], speed) for name, speed in speeds.items()]
+
     def couple(self, name: str, joint: str, other: str, factor: float, offset: float, where: str) -> None:
         """Keep a joint's coordinate at a factor times another's, or as it is where there is no other; the offset is the file's."""
         self.couplings.append((name, [(joint, 1.0), *([(other, -factor)] if other else [])]))
         if offset:
             self.notes.append(f"{where}: its offset {offset:g} is left out: the pose is that of the file")
+
+    def mimic(self, joint: str, other: str, words: Mapping[str, str]) -> None:
+        """Keep a joint's coordinate at multiplier·(another's − reference) + offset (URDF, SDF)."""
+        at = At(self.file, f"joint '{joint}'")
+        factor, offset, zero = (
+            at.number(f"mimic {key}", words.get(key, default))
+            for key, default in (("multiplier", "1"), ("offset", "0"), ("reference", "0"))
+        )
+        self.couple(joint, joint, other, factor, offset - factor * zero, f"{at.where}, mimic")
 
 
 def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), rotation: Array | None = None) -> Array:
@@ -173,26 +187,20 @@ def rpy(roll: float, pitch: float, yaw: float) -> Array:
     return np.asarray(about(2, yaw) @ about(1, pitch) @ about(0, roll))
 
 
-def quaternion(w: float, x: float, y: float, z: float) -> Array:
-    """Return the rotation of a quaternion of any length but zero.
-
-    >>> quaternion(1, 0, 0, 1).round(9)[0]
-    array([ 0., -1.,  0.])
-    """
-    n = w * w + x * x + y * y + z * z
-    rows = [
-        [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
-    ]
-    return np.array(rows) / n
-
-
 def rotation(at: At, wxyz: Sequence[float]) -> Array:
     """Return the rotation of a quaternion of a file."""
     if not sum(v * v for v in wxyz) > 0:
         raise at.error("", "0 0 0 0", "a quaternion of some length")
-    return quaternion(*wxyz)
+    from rigidbody3d.attitude import to_matrix
+
+    return np.asarray(to_matrix(wxyz) / np.dot(wxyz, wxyz))
+
+
+def _about(direction: Array, angle: float) -> Array:
+    """Return the rotation about a direction of length 1, rad."""
+    from rigidbody3d.attitude import from_vector, to_matrix
+
+    return to_matrix(from_vector(angle * direction))
 
 
 def half_unit(word: str) -> float:
@@ -266,8 +274,7 @@ class Frames:
                 turned = turned @ one if axis.islower() else one @ turned
         elif "axisangle" in e:
             *v, angle = at.numbers("axisangle", e["axisangle"], 4)
-            half = self.angle(angle) / 2
-            turned = quaternion(np.cos(half), *(np.sin(half) * at.direction("axisangle", v)))
+            turned = _about(at.direction("axisangle", v), self.angle(angle))
         elif "xyaxes" in e:
             v = at.numbers("xyaxes", e["xyaxes"], 6)
             x = at.direction("xyaxes", v[:3])
@@ -284,8 +291,7 @@ def _onto(z: Array) -> Array:
     s, c = float(np.linalg.norm(axis)), float(z[2])
     if s < 1e-15:
         return np.eye(3) if c > 0 else about(0, np.pi)
-    half = np.arctan2(s, c) / 2
-    return quaternion(np.cos(half), *(np.sin(half) * axis / s))
+    return _about(axis / s, np.arctan2(s, c))
 
 
 # of a shape with neither mass nor density, kg/m³
@@ -294,50 +300,41 @@ DENSITY = 1000.0
 SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
 
 
-def unit_mass(shape: str, size: list[float]) -> tuple[float, Array]:
-    """Return a shape's volume, m³, and its moments for unit mass, (3,) m².
+def solid(shape: str, size: list[float]) -> Body:
+    """Return a shape along its own axes, its density 1 kg/m³.
 
-    >>> unit_mass("box", [0.5, 1.0, 1.5])[0]
+    >>> float(solid("box", [0.5, 1.0, 1.5]).mass)
     6.0
     """
-    if shape in ("sphere", "ellipsoid"):
-        a, b, c = size if shape == "ellipsoid" else 3 * size
-        return 4 / 3 * np.pi * a * b * c, np.array([b * b + c * c, a * a + c * c, a * a + b * b]) / 5
-    if shape == "box":
-        a, b, c = size
-        return 8 * a * b * c, np.array([b * b + c * c, a * a + c * c, a * a + b * b]) / 3
-    r, h = size
-    side = np.pi * r * r * 2 * h
-    across, along = r * r / 4 + h * h / 3, r * r / 2
-    if shape == "cylinder":
-        return side, np.array([across, across, along])
-    # a capsule: its two halves of a sphere, each with its centre 3r/8 beyond the cylinder's end
-    ends = 4 / 3 * np.pi * r**3
-    outer = 2 / 5 * r * r - (3 / 8 * r) ** 2 + (h + 3 / 8 * r) ** 2
-    whole = side + ends
-    x = (side * across + ends * outer) / whole
-    return whole, np.array([x, x, (side * along + ends * 2 / 5 * r * r) / whole])
+    from rigidbody3d.body import Body, compose
+    from rigidbody3d.shapes import measure_of
 
-
-def together(parts: list[tuple[float, Array, Array]]) -> Inertial | None:
-    """Return the inertia of several masses: each its mass, pose and moments in its own axes."""
-    from rigidbody3d import inertia
-
-    mass = sum(m for m, _, _ in parts)
-    if mass <= 0:
-        return None
-    center = sum(m * at[:3, 3] for m, at, _ in parts) / mass
-    tensor = sum(
-        inertia.turn(np.diag(moments), at[:3, :3]) + inertia.shift(m, at[:3, 3] - center)
-        for m, at, moments in parts
-    )
-    return Inertial(mass, pose(center), np.asarray(tensor), np.zeros((3, 3)))
+    if shape == "ellipsoid":
+        # a sphere stretched along its axes: its second moments are m a²/5
+        a, b, c = np.square(size)
+        mass = np.asarray(4 / 3 * np.pi * math.prod(size))
+        return Body(mass, np.zeros(3), mass / 5 * np.diag([b + c, a + c, a + b]))
+    r, h = size[0], size[-1]
+    named = {
+        "sphere": {"radius": r},
+        "box": dict(zip(("width", "height", "depth"), (2 * x for x in size), strict=False)),
+    }.get(shape, {"radius": r, "length": 2 * h})
+    kind = "cylinder" if shape == "capsule" else shape
+    whole = Body.of(kind, measure_of(kind, **named)[0], **named)
+    if shape != "capsule":
+        return whole
+    # its two halves of a sphere, each with its centre of mass 3r/8 beyond the cylinder's end
+    end = measure_of("sphere", radius=r)[0] / 2
+    half = Body(end, np.zeros(3), end * r * r * np.diag([83 / 320, 83 / 320, 2 / 5]))
+    return compose([whole, *(half.moved([0.0, 0.0, side * (h + 3 / 8 * r)]) for side in (1, -1))])
 
 
 def mass_of_shapes(
     frames: Frames, where: str, geoms: Iterable[tuple[Mapping[str, str], Array]], notes: list[str]
 ) -> Inertial | None:
     """Return the inertia of a body's shapes, each by its attributes and the pose in the body in which it is written."""
+    from rigidbody3d.body import Body, compose
+
     at, parts = At(frames.file, where), []
     for values, frame in geoms:
         shape = values.get("type", "sphere")
@@ -354,11 +351,18 @@ def mass_of_shapes(
             size = size[:1] * (SIZES[shape] - 1) + [float(np.linalg.norm(way)) / 2]
         if len(size) < SIZES[shape] or min(size[: SIZES[shape]]) <= 0:
             raise at.error("geom size", len(size), f"{SIZES[shape]} above zero")
-        volume, moments = unit_mass(shape, size[: SIZES[shape]])
+        whole = solid(shape, size[: SIZES[shape]])
         density = at.number("geom density", values.get("density", str(DENSITY)))
-        mass = at.number("geom mass", values.get("mass", repr(density * volume)))
-        parts.append((mass, frame @ here, mass * moments))
-    return together(parts)
+        mass = at.number("geom mass", values.get("mass", repr(density * float(whole.mass))))
+        if mass < 0:
+            raise at.error("geom mass", f"{mass:g}", "one of zero or more")
+        held = frame @ here
+        own = Body(np.asarray(mass), np.zeros(3), mass / whole.mass * whole.inertia)
+        parts.append(own.turned(held[:3, :3]).moved(held[:3, 3]))
+    if not sum(part.mass for part in parts) > 0:
+        return None
+    body = compose(parts)
+    return Inertial(float(body.mass), pose(body.center), body.inertia, np.zeros((3, 3)))
 
 
 # rad: what angles such as 1.57 for a right angle are off by

@@ -8,8 +8,8 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
+from cli.formats import markup as xml
 from cli.formats.drawn import GROUND
-from cli.formats.markup import At, add, child, children, digits, document, named, placed, plain, stated, text
 from cli.formats.robot import (
     LIGHT,
     ROWS,
@@ -17,7 +17,6 @@ from cli.formats.robot import (
     Array,
     Inertial,
     Kind,
-    Motor,
     Robot,
     RobotJoint,
     RobotLink,
@@ -39,6 +38,18 @@ KINDS: dict[str, Kind] = {
     "fixed": "fixed",
     "ball": "ball",
 }
+# tag -> the tags in it that are read, or that say nothing of a mechanism
+READ = {
+    "sdf": "world model light actor",
+    "world": "gravity model physics scene light plugin gui wind audio atmosphere magnetic_field spherical_coordinates state",
+    "model": "pose static link joint frame plugin model include self_collide allow_auto_disable enable_wind",
+    "link": "pose inertial visual collision sensor light gravity self_collide enable_wind must_be_base_link velocity_decay",
+    "inertial": "pose mass inertia massless point_mass inertia_alone",
+    "inertia": "ixx ixy ixz iyy iyz izz",
+    "joint": "parent child pose axis axis2 gearbox_ratio gearbox_reference_body physics sensor",
+    "axis": "xyz limit dynamics mimic use_parent_model_frame initial_position",
+    "dynamics": "damping friction spring_stiffness spring_reference",
+}
 MODEL = "__model__"
 # name space of the marks on numbers that the format asks for and the mechanism does not have
 SPACE = "https://dalembert.invalid/sdf"
@@ -48,31 +59,31 @@ PLUGIN = {"filename": "gz-sim-joint-controller-system", "name": "gz::sim::system
 
 def read(file: str, root: Element) -> Robot:
     """Read the first `<model>` of an `<sdf>` with joints, in a `<world>` or not: worlds begin with the floor."""
-    world = child(root, "world")
-    models = list(children(root if world is None else world, "model"))
+    world = xml.child(root, "world")
+    models = list(xml.children(root if world is None else world, "model"))
     if not models:
         raise DataError(f"{file}: <sdf>: no <model>")
-    model = next((e for e in models if child(e, "joint") is not None), models[0])
-    robot = Robot(file, "SDF", model.get("name", ""))
+    model = next((e for e in models if xml.child(e, "joint") is not None), models[0])
+    robot = Robot(file, "SDF", model.get("name", ""), notes=xml.passed_over(root, READ))
     if len(models) > 1:
         others = ", ".join(e.get("name", "without a name") for e in models if e is not model)
         robot.notes.append(f"models left out: {others}")
     robot.add(RobotLink(WORLD, np.eye(4)))
     if world is not None:
-        numbers = At(file, "world").numbers("gravity", text(world, "gravity"), 3, (0.0, 0.0, -9.8))
+        numbers = xml.At(file, "world").numbers("gravity", xml.text(world, "gravity"), 3, (0.0, 0.0, -9.8))
         robot.gravity = np.array(numbers)
     _Model(robot, model, root.get("version", "1.0")).read()
     return robot
 
 
-def _named_text(at: At, element: Element, tag: str) -> str:
-    result = text(element, tag)
+def _named_text(at: xml.At, element: Element, tag: str) -> str:
+    result = xml.text(element, tag)
     if not result:
         raise DataError(f"{at.file}: {at.where}: <{tag}> is missing")
     return result
 
 
-def read_pose(at: At, element: Element | None) -> Array:
+def read_pose(at: xml.At, element: Element | None) -> Array:
     """Return the pose of a `<pose>` element, in the frame to which it is relative."""
     if element is None or not (element.text or "").strip():
         return np.eye(4)
@@ -97,35 +108,39 @@ class _Model:
         self.at: dict[str, Array] = {WORLD: np.eye(4)}
         self.entered: set[str] = set()
         self.frames = {
-            named(self.file, e): e for e in children(element, "link", "joint", "frame") if e.get("name")
+            xml.named(self.file, e): e
+            for e in xml.children(element, "link", "joint", "frame")
+            if e.get("name")
         }
 
     def read(self) -> None:
         robot, file = self.robot, self.file
-        self.at[MODEL] = read_pose(At(file, "model"), child(self.element, "pose"))
-        for e in children(self.element, "model", "include"):
+        self.at[MODEL] = read_pose(xml.At(file, "model"), xml.child(self.element, "pose"))
+        for e in xml.children(self.element, "model", "include"):
             robot.notes.append(
-                f"<{plain(e)}> in the model: left out: nested models and included files are not read"
+                f"<{xml.plain(e)}> in the model: left out: nested models and included files are not read"
             )
-        static = text(self.element, "static") in ("true", "1")
+        static = xml.text(self.element, "static") in ("true", "1")
         if static:
             robot.notes.append(f"model '{robot.name}' is static: nothing in it moves")
-        for e in children(self.element, "link"):
-            name, at = placed(file, e)
-            robot.add(RobotLink(name, self.frame(name, at), _inertial(at, child(e, "inertial"))))
-        for e in children(self.element, "frame"):
-            name, at = placed(file, e)
+        for e in xml.children(self.element, "link"):
+            name, at = xml.placed(file, e)
+            robot.add(RobotLink(name, self.frame(name, at), _inertial(at, xml.child(e, "inertial"))))
+            if xml.text(e, "gravity") in ("false", "0"):
+                robot.notes.append(f"{at.where}: its <gravity> is left out: its whole weight acts")
+        for e in xml.children(self.element, "frame"):
+            name, at = xml.placed(file, e)
             held = self.holder(name, at)
             if held in robot.links:
                 inside = np.linalg.inv(robot.links[held].pose) @ self.frame(name, at)
                 robot.links[held].points[name] = inside[:3, 3]
-        for e in () if static else children(self.element, "joint"):
+        for e in () if static else xml.children(self.element, "joint"):
             read_joint(robot, e, self)
         if not any(WORLD in (j.parent, j.child) for j in robot.joints.values()):
             robot.ground = next((name for name in robot.links if name != WORLD), WORLD)
         self._motors()
 
-    def frame(self, name: str, at: At) -> Array:
+    def frame(self, name: str, at: xml.At) -> Array:
         """Return the pose of a frame in the world."""
         if name in self.at:
             return self.at[name]
@@ -135,26 +150,26 @@ class _Model:
             raise DataError(f"{self.file}: {at.where}: the pose of '{name}' is relative to itself")
         self.entered.add(name)
         e = self.frames[name]
-        pose = child(e, "pose")
+        pose = xml.child(e, "pose")
         base = "" if pose is None else pose.get("relative_to", "")
         if not base:
             base = MODEL
-            if plain(e) == "joint":
-                base = _named_text(At(self.file, f"joint '{name}'"), e, "child")
-            elif plain(e) == "frame":
+            if xml.plain(e) == "joint":
+                base = _named_text(xml.At(self.file, f"joint '{name}'"), e, "child")
+            elif xml.plain(e) == "frame":
                 base = e.get("attached_to") or MODEL
         self.at[name] = self.frame(base, at) @ read_pose(at, pose)
         return self.at[name]
 
-    def holder(self, name: str, at: At) -> str:
+    def holder(self, name: str, at: xml.At) -> str:
         """Return the link that holds a frame: a frame that is attached to none is the model's, and so its first link's."""
         passed: set[str] = set()
-        while name in self.frames and plain(self.frames[name]) != "link":
+        while name in self.frames and xml.plain(self.frames[name]) != "link":
             if name in passed:
                 raise DataError(f"{self.file}: {at.where}: the frame '{name}' is attached to itself")
             passed.add(name)
             e = self.frames[name]
-            name = (text(e, "child") if plain(e) == "joint" else e.get("attached_to")) or MODEL
+            name = (xml.text(e, "child") if xml.plain(e) == "joint" else e.get("attached_to")) or MODEL
         first = self.element.get("canonical_link") or next(
             iter(n for n in self.robot.links if n != WORLD), ""
         )
@@ -166,33 +181,35 @@ class _Model:
         speeds = driven(file, self.element)
         if not speeds:
             efforts = {}
-            for e in children(self.element, "joint"):
-                effort = text(e, "axis", "limit", "effort")
-                efforts[named(file, e)] = None if effort is None else At(file, "effort").number("", effort)
+            for e in xml.children(self.element, "joint"):
+                effort = xml.text(e, "axis", "limit", "effort")
+                efforts[xml.named(file, e)] = (
+                    None if effort is None else xml.At(file, "effort").number("", effort)
+                )
             if 0.0 in efforts.values():
                 speeds = dict.fromkeys(
                     n for n, effort in efforts.items() if effort != 0 and n in robot.joints
                 )
-        robot.motors = [Motor(name, [(name, 1.0)], speed) for name, speed in speeds.items()]
+        robot.drive(speeds)
 
 
-def _inertial(at: At, element: Element | None) -> Inertial | None:
+def _inertial(at: xml.At, element: Element | None) -> Inertial | None:
     """Read an `<inertial>`; without one the format means 1 kg, which no author wrote."""
     if element is None:
         return None
-    texts = {key: text(element, "inertia", key) or str(int(key[1] == key[2])) for key in ROWS}
+    texts = {key: xml.text(element, "inertia", key) or str(int(key[1] == key[2])) for key in ROWS}
     for key, word in texts.items():
         at.number(key, word)
-    mass = "0" if child(element, INERTIA_ALONE) is not None else text(element, "mass")
+    mass = "0" if xml.child(element, INERTIA_ALONE) is not None else xml.text(element, "mass")
     # what `dalembert export` writes beside numbers that the format asks for
-    if child(element, MASSLESS) is not None:
+    if xml.child(element, MASSLESS) is not None:
         return None
     tensor, half = printed(texts)
-    if child(element, POINT_MASS) is not None:
+    if xml.child(element, POINT_MASS) is not None:
         tensor = np.zeros((3, 3))
     return Inertial(
         1.0 if mass is None else at.number("mass", mass),
-        read_pose(at.inside("inertial"), child(element, "pose")),
+        read_pose(at.inside("inertial"), xml.child(element, "pose")),
         tensor,
         half,
     )
@@ -200,7 +217,7 @@ def _inertial(at: At, element: Element | None) -> Inertial | None:
 
 def read_joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
     """Add a `<joint>`, of a model or of a `<gazebo>` block of URDF, where its pose is relative to its child."""
-    name, at = placed(robot.file, e)
+    name, at = xml.placed(robot.file, e)
 
     def resolved(link: str) -> str:
         if model is not None:
@@ -213,13 +230,13 @@ def read_joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
     if model is not None:
         frame = model.frame(name, at)
     else:
-        frame = robot.links[below].pose @ read_pose(at, child(e, "pose"))
-    axis = child(e, "axis")
+        frame = robot.links[below].pose @ read_pose(at, xml.child(e, "pose"))
+    axis = xml.child(e, "axis")
     type_ = e.get("type", "")
     if type_ == "gearbox":
-        reference = resolved(text(e, "gearbox_reference_body") or text(e, "reference_body") or WORLD)
-        ratio = at.number("gearbox_ratio", text(e, "gearbox_ratio") or "1")
-        sense = float(np.sign(_axis(at, axis, frame, None) @ _axis(at, child(e, "axis2"), frame, None)))
+        reference = resolved(xml.text(e, "gearbox_reference_body") or xml.text(e, "reference_body") or WORLD)
+        ratio = at.number("gearbox_ratio", xml.text(e, "gearbox_ratio") or "1")
+        sense = float(np.sign(_axis(at, axis, frame, None) @ _axis(at, xml.child(e, "axis2"), frame, None)))
         # a check of inertias loads no mechanism
         from virtualwork.describe.meshes import Gear
 
@@ -229,35 +246,31 @@ def read_joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
     direction = np.zeros(3) if kind in ("fixed", "ball") else _axis(at, axis, frame, model)
     made = RobotJoint(name, kind, parent, below, (frame[:3, 3], frame[:3, 3]), direction, type=type_)
     robot.join(made)
-    made.more = stated(
-        [text(axis, "limit", end) for end in ("lower", "upper")], text(axis, "dynamics", "friction")
+    made.more = xml.stated(
+        [xml.text(axis, "limit", end) for end in ("lower", "upper")], xml.text(axis, "dynamics", "friction")
     )
-    if at.number("initial_position", text(axis, "initial_position") or "0"):
+    if at.number("initial_position", xml.text(axis, "initial_position") or "0"):
         robot.notes.append(f"{at.where}: its initial_position is left out: the pose is that of coordinate 0")
     made.damping, made.stiffness, made.rest = (
-        at.number(tag, text(axis, "dynamics", tag) or "0")
+        at.number(tag, xml.text(axis, "dynamics", tag) or "0")
         for tag in ("damping", "spring_stiffness", "spring_reference")
     )
-    mimic = child(axis, "mimic")
+    mimic = xml.child(axis, "mimic")
     if mimic is not None:
-        factor, offset, zero = (
-            at.number(f"mimic {tag}", text(mimic, tag) or default)
-            for tag, default in (("multiplier", "1"), ("offset", "0"), ("reference", "0"))
-        )
-        other = named(robot.file, mimic, "joint")
-        robot.couple(name, name, other, factor, offset - factor * zero, f"{at.where}, mimic")
+        words = {xml.plain(inner): inner.text or "" for inner in mimic}
+        robot.mimic(name, xml.named(robot.file, mimic, "joint"), words)
 
 
-def _axis(at: At, axis: Element | None, frame: Array, model: _Model | None) -> Array:
+def _axis(at: xml.At, axis: Element | None, frame: Array, model: _Model | None) -> Array:
     """Return the direction of an axis in the world."""
-    element = child(axis, "xyz")
-    xyz = at.numbers("axis", text(element), 3, (0.0, 0.0, 1.0))
+    element = xml.child(axis, "xyz")
+    xyz = at.numbers("axis", xml.text(element), 3, (0.0, 0.0, 1.0))
     turned = frame
     if element is not None and model is not None:
         base = element.get("expressed_in", "")
         if base:
             turned = model.frame(base, at)
-        elif model.old or text(axis, "use_parent_model_frame") in ("true", "1"):
+        elif model.old or xml.text(axis, "use_parent_model_frame") in ("true", "1"):
             turned = model.at[MODEL]
     return np.asarray(turned[:3, :3] @ at.direction("axis", xyz))
 
@@ -265,11 +278,11 @@ def _axis(at: At, axis: Element | None, frame: Array, model: _Model | None) -> A
 def driven(file: str, element: Element) -> dict[str, float | None]:
     """Return the joints that plug-ins drive, with the speed that they begin with."""
     result: dict[str, float | None] = {}
-    for plugin in children(element, "plugin"):
-        for name in children(plugin, "joint_name", "jointName"):
-            if which := text(name):
-                speed = text(plugin, "initial_velocity")
-                at = At(file, "plugin")
+    for plugin in xml.children(element, "plugin"):
+        for name in xml.children(plugin, "joint_name", "jointName"):
+            if which := xml.text(name):
+                speed = xml.text(plugin, "initial_velocity")
+                at = xml.At(file, "plugin")
                 result[which] = None if speed is None else at.number("initial_velocity", speed)
     return result
 
@@ -279,9 +292,9 @@ def write(s: Skeleton, comment: str) -> tuple[bytes, list[str]]:
     """Return the file of a mechanism, and what it leaves out."""
     m = s.m
     root = Element("sdf", {"version": "1.9", "xmlns:dalembert": SPACE})
-    world = add(root, "world", name="default")
-    add(world, "gravity", digits(m.gravity.real, m.gravity.imag, 0.0))
-    model = add(world, "model", name=m.name or "mechanism")
+    world = xml.add(root, "world", name="default")
+    xml.add(world, "gravity", xml.digits(m.gravity.real, m.gravity.imag, 0.0))
+    model = xml.add(world, "model", name=m.name or "mechanism")
     light = LIGHT * max((p.mass for p in s.bodies.values()), default=0.0) or LIGHT
     for name in s.bodies:
         if name != GROUND:
@@ -292,18 +305,18 @@ def write(s: Skeleton, comment: str) -> tuple[bytes, list[str]]:
     add_gearboxes(model, (*m.gears, *m.belts), WORLD)
     add_plugins(model, s)
     lost = f"racks are left out: {len(m.racks)}: the format has no such joint" if m.racks else ""
-    return document(root, comment), s.left_out(("gravity",), lost)
+    return xml.document(root, comment), s.left_out(("gravity",), lost)
 
 
 def add_pose(element: Element, z: complex, turn: float = 0.0) -> None:
     """Add the pose of a place of the plane."""
-    add(element, "pose", digits(z.real, z.imag, 0.0, 0.0, 0.0, turn))
+    xml.add(element, "pose", xml.digits(z.real, z.imag, 0.0, 0.0, 0.0, turn))
 
 
 def _add_link(s: Skeleton, model: Element, name: str, light: float) -> None:
-    part, link = s.bodies[name], add(model, "link", name=name)
+    part, link = s.bodies[name], xml.add(model, "link", name=name)
     add_pose(link, part.at, part.turn)
-    inertial = add(link, "inertial")
+    inertial = xml.add(link, "inertial")
     mass, inertia = part.mass, part.inertia
     if mass <= 0 < inertia:
         mass = light
@@ -315,17 +328,17 @@ def _add_link(s: Skeleton, model: Element, name: str, light: float) -> None:
         inertia = LIGHT * mass * s.m.size**2
         SubElement(inertial, f"dalembert:{POINT_MASS}")
     add_pose(inertial, part.center)
-    add(inertial, "mass", digits(mass))
-    tensor = add(inertial, "inertia")
+    xml.add(inertial, "mass", xml.digits(mass))
+    tensor = xml.add(inertial, "inertia")
     for entry in ROWS:
         # in the plane only izz acts
-        add(tensor, entry, digits(inertia if entry[1] == entry[2] else 0.0))
+        xml.add(tensor, entry, xml.digits(inertia if entry[1] == entry[2] else 0.0))
     for k, (middle, turn, sides) in enumerate(s.boxes(name), 1):
-        visual = add(link, "visual", name=f"stroke {k}")
+        visual = xml.add(link, "visual", name=f"stroke {k}")
         add_pose(visual, middle, turn)
-        add(add(add(visual, "geometry"), "box"), "size", digits(*sides))
+        xml.add(xml.add(xml.add(visual, "geometry"), "box"), "size", xml.digits(*sides))
     for point, z in s.free_points(name).items():
-        add_pose(add(model, "frame", name=point, attached_to=name), z)
+        add_pose(xml.add(model, "frame", name=point, attached_to=name), z)
 
 
 def add_joint(model: Element, s: Skeleton, j: Joint, ground: str = WORLD) -> None:
@@ -334,27 +347,27 @@ def add_joint(model: Element, s: Skeleton, j: Joint, ground: str = WORLD) -> Non
     if link == GROUND:
         on, link, ends, sense = link, on, (ends[1], ends[0]), -1.0
     kind = {"turn": "revolute", "slide": "prismatic"}[j.kind]
-    made = add(model, "joint", name=j.name, type=kind)
-    add(made, "parent", ground if on == GROUND else on)
-    add(made, "child", link)
+    made = xml.add(model, "joint", name=j.name, type=kind)
+    xml.add(made, "parent", ground if on == GROUND else on)
+    xml.add(made, "child", link)
     add_pose(made, ends[1])
-    axis = add(made, "axis")
-    add(axis, "xyz", digits(*j.axis(s.bodies[link], sense)))
-    limit = add(axis, "limit")
+    axis = xml.add(made, "axis")
+    xml.add(axis, "xyz", xml.digits(*j.axis(s.bodies[link], sense)))
+    limit = xml.add(axis, "limit")
     if j.limits is not None:
         for tag, value in zip(("lower", "upper"), j.limits, strict=True):
             # the coordinate is 0 in the start pose
-            add(limit, tag, digits(value - j.value))
+            xml.add(limit, tag, xml.digits(value - j.value))
     effort = 0.0 if j.input is None else -1.0 if s.travel.peak is None else s.travel.peak
-    add(limit, "effort", digits(effort))
+    xml.add(limit, "effort", xml.digits(effort))
 
 
 def add_welds(model: Element, s: Skeleton) -> None:
     """Add the joints that fix blocks to their links."""
     for link, block in s.welds:
-        made = add(model, "joint", name=f"{block} fixed", type="fixed")
-        add(made, "parent", link)
-        add(made, "child", block)
+        made = xml.add(model, "joint", name=f"{block} fixed", type="fixed")
+        xml.add(made, "parent", link)
+        xml.add(made, "child", block)
 
 
 def add_gearboxes(model: Element, gears: Iterable[Gear | Belt], ground: str) -> None:
@@ -364,13 +377,13 @@ def add_gearboxes(model: Element, gears: Iterable[Gear | Belt], ground: str) -> 
         ratio = g.ratio
         if b == ground:
             a, b, ratio = b, a, 1 / ratio
-        made = add(model, "joint", name=f"gears {k}", type="gearbox")
-        add(made, "parent", a)
-        add(made, "child", b)
-        add(made, "gearbox_ratio", digits(-ratio))
-        add(made, "gearbox_reference_body", arm)
+        made = xml.add(model, "joint", name=f"gears {k}", type="gearbox")
+        xml.add(made, "parent", a)
+        xml.add(made, "child", b)
+        xml.add(made, "gearbox_ratio", xml.digits(-ratio))
+        xml.add(made, "gearbox_reference_body", arm)
         for tag in ("axis", "axis2"):
-            add(add(made, tag), "xyz", digits(0.0, 0.0, 1.0))
+            xml.add(xml.add(made, tag), "xyz", xml.digits(0.0, 0.0, 1.0))
 
 
 def add_plugins(model: Element, s: Skeleton) -> None:
@@ -378,7 +391,7 @@ def add_plugins(model: Element, s: Skeleton) -> None:
     for k, e in enumerate(s.m.inputs):
         j = s.driven(k)
         if j is not None:
-            plugin = add(model, "plugin", None, **PLUGIN)
-            add(plugin, "joint_name", j.name)
+            plugin = xml.add(model, "plugin", None, **PLUGIN)
+            xml.add(plugin, "joint_name", j.name)
             if e.speed is not None:
-                add(plugin, "initial_velocity", digits(j.rate))
+                xml.add(plugin, "initial_velocity", xml.digits(j.rate))

@@ -8,27 +8,14 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from cli.formats import markup as xml
 from cli.formats import sdf
 from cli.formats.drawn import GROUND
-from cli.formats.markup import (
-    At,
-    add,
-    child,
-    children,
-    digits,
-    document,
-    named,
-    placed,
-    plain,
-    spatial,
-    stated,
-)
 from cli.formats.robot import (
     ROWS,
     Array,
     Inertial,
     Kind,
-    Motor,
     Robot,
     RobotJoint,
     RobotLink,
@@ -44,7 +31,15 @@ if TYPE_CHECKING:
     from virtualwork.describe.parts import Belt, Gear
 
 KINDS: dict[str, Kind] = {**sdf.KINDS, "spherical": "ball"}
-
+# tag -> the tags in it that are read, or that say nothing of a mechanism
+READ = sdf.READ | {
+    "robot": "link joint loop_joint gazebo transmission ros2_control material sensor",
+    "link": "inertial visual collision contact sensor",
+    "inertial": "origin mass inertia",
+    "joint": f"{sdf.READ['joint']} origin limit dynamics mimic calibration safety_controller",
+    "gazebo": "joint plugin material visual collision sensor light mu1 mu2 kp kd minDepth maxVel maxContacts selfCollide "
+    "self_collide laserRetro provideFeedback preserveFixedJoint disableFixedJointLumping",
+}
 
 # a limit that is none
 LARGE = 1e9
@@ -55,36 +50,36 @@ class _Joint(NamedTuple):
 
     element: Element
     name: str
-    at: At
+    at: xml.At
     parent: str
     child: str
 
 
 def read(file: str, root: Element) -> Robot:
     """Read a `<robot>`."""
-    robot = Robot(file, "URDF", root.get("name", ""))
-    joints = list(children(root, "joint"))
-    for e in children(root, "link"):
-        name, at = placed(file, e)
-        held = _inertial(at, child(e, "inertial"))
+    robot = Robot(file, "URDF", root.get("name", ""), notes=xml.passed_over(root, READ))
+    joints = list(xml.children(root, "joint"))
+    for e in xml.children(root, "link"):
+        name, at = xml.placed(file, e)
+        held = _inertial(at, xml.child(e, "inertial"))
         robot.add(RobotLink(name, np.eye(4), held, shapes=_shapes(at, e)))
     if not robot.links:
         raise DataError(f"{file}: <robot>: no link: expected one or more")
     _tree(robot, joints)
-    for e in children(root, "loop_joint"):
+    for e in xml.children(root, "loop_joint"):
         _loop(robot, e)
-    for e in children(root, "gazebo"):
-        for inner in children(e, "joint"):
+    for e in xml.children(root, "gazebo"):
+        for inner in xml.children(e, "joint"):
             sdf.read_joint(robot, inner)
     for e in joints:
-        mimic = child(e, "mimic")
+        mimic = xml.child(e, "mimic")
         if mimic is not None:
-            _mimic(robot, named(file, e), mimic)
+            robot.mimic(xml.named(file, e), xml.named(file, mimic, "joint"), mimic.attrib)
     _motors(robot, root)
     return robot
 
 
-def origin(at: At, element: Element | None) -> Array:
+def origin(at: xml.At, element: Element | None) -> Array:
     """Return the pose that an `<origin>` gives."""
     if element is None:
         return np.eye(4)
@@ -94,31 +89,31 @@ def origin(at: At, element: Element | None) -> Array:
     return pose(xyz, rpy(*angles))
 
 
-def _axis(at: At, element: Element, default: tuple[float, float, float]) -> list[float]:
+def _axis(at: xml.At, element: Element, default: tuple[float, float, float]) -> list[float]:
     """Return a joint's axis, of any length, in the joint's own axes."""
-    axis = child(element, "axis")
+    axis = xml.child(element, "axis")
     return at.numbers("axis", None if axis is None else axis.get("xyz"), 3, default)
 
 
-def _inertial(at: At, element: Element | None) -> Inertial | None:
+def _inertial(at: xml.At, element: Element | None) -> Inertial | None:
     if element is None:
         return None
-    mass, inertia = child(element, "mass"), child(element, "inertia")
+    mass, inertia = xml.child(element, "mass"), xml.child(element, "inertia")
     texts = {key: "0" if inertia is None else inertia.get(key, "0") for key in ROWS}
     for key, text in texts.items():
         at.number(f"inertia {key}", text)
     return Inertial(
         0.0 if mass is None else at.number("mass", mass.get("value")),
-        origin(at.inside("inertial"), child(element, "origin")),
+        origin(at.inside("inertial"), xml.child(element, "origin")),
         *printed(texts),
     )
 
 
-def _shapes(at: At, link: Element) -> list[tuple[Array, float]]:
+def _shapes(at: xml.At, link: Element) -> list[tuple[Array, float]]:
     """Return spheres around the shapes of a link; none where one has no size."""
     shapes = []
-    for e in children(link, "visual", "collision"):
-        geometry = child(e, "geometry")
+    for e in xml.children(link, "visual", "collision"):
+        geometry = xml.child(e, "geometry")
         for shape in () if geometry is None else geometry:
             sizes = [
                 (key, n)
@@ -126,15 +121,15 @@ def _shapes(at: At, link: Element) -> list[tuple[Array, float]]:
                 if shape.get(key) is not None
             ]
             size = [x for key, n in sizes for x in at.numbers(key, shape.get(key), n)]
-            radius = sphere_around(plain(shape), size)
+            radius = sphere_around(xml.plain(shape), size)
             if radius is None:
                 return []
-            shapes.append((origin(at, child(e, "origin"))[:3, 3], radius))
+            shapes.append((origin(at, xml.child(e, "origin"))[:3, 3], radius))
     return shapes
 
 
-def _end(robot: Robot, e: Element, tag: str, at: At) -> str:
-    element = child(e, tag)
+def _end(robot: Robot, e: Element, tag: str, at: xml.At) -> str:
+    element = xml.child(e, tag)
     name = None if element is None else element.get("link")
     if name is None:
         raise DataError(f"{robot.file}: {at.where}: <{tag} link=…> is missing")
@@ -146,7 +141,7 @@ def _tree(robot: Robot, joints: list[Element]) -> None:
     """Place every link; a link that has a parent already closes a loop."""
     waiting = []
     for e in joints:
-        name, at = placed(robot.file, e)
+        name, at = xml.placed(robot.file, e)
         waiting.append(_Joint(e, name, at, _end(robot, e, "parent", at), _end(robot, e, "child", at)))
     below = {joint.child for joint in waiting}
     roots = [name for name in robot.links if name not in below]
@@ -161,7 +156,7 @@ def _tree(robot: Robot, joints: list[Element]) -> None:
             raise DataError(f"{robot.file}: {waiting[0].at.where}: its links depend on each other alone")
         waiting = [joint for joint in waiting if joint.parent not in there]
         for joint in ready:
-            frame = robot.links[joint.parent].pose @ origin(joint.at, child(joint.element, "origin"))
+            frame = robot.links[joint.parent].pose @ origin(joint.at, xml.child(joint.element, "origin"))
             if joint.child in there:
                 closing.append((joint, frame))
                 continue
@@ -181,8 +176,8 @@ def _join(robot: Robot, joint: _Joint, frame: Array) -> None:
     made = RobotJoint(
         name, kind, parent, link, (frame[:3, 3], robot.links[link].pose[:3, 3]), direction, type=type_
     )
-    limit, dynamics = child(e, "limit"), child(e, "dynamics")
-    made.more = stated(
+    limit, dynamics = xml.child(e, "limit"), xml.child(e, "dynamics")
+    made.more = xml.stated(
         [] if limit is None else [limit.get(end) for end in ("lower", "upper")],
         None if dynamics is None else dynamics.get("friction"),
     )
@@ -193,46 +188,33 @@ def _join(robot: Robot, joint: _Joint, frame: Array) -> None:
 
 def _loop(robot: Robot, e: Element) -> None:
     """Read a `<loop_joint>`: each of its two links has the joint's place in its own axes."""
-    name, at = placed(robot.file, e)
+    name, at = xml.placed(robot.file, e)
     kind = KINDS.get(e.get("type", "revolute"), "other")
     sides = []
     for tag in ("link1", "link2"):
-        side = child(e, tag)
+        side = xml.child(e, tag)
         if side is None:
             raise DataError(f"{robot.file}: {at.where}: <{tag} link=… xyz=…> is missing")
-        link = robot.link(named(robot.file, side, "link"), at.where)
+        link = robot.link(xml.named(robot.file, side, "link"), at.where)
         sides.append((link.name, link.pose @ origin(at.inside(tag), side)))
     (a, frame), (b, other) = sides
     direction = frame[:3, :3] @ at.direction("axis", _axis(at, e, (0.0, 0.0, 1.0)))
     robot.join(RobotJoint(name, kind, a, b, (frame[:3, 3], other[:3, 3]), direction))
 
 
-def _mimic(robot: Robot, name: str, mimic: Element) -> None:
-    at = At(robot.file, f"joint '{name}'")
-    where = f"{at.where}, mimic"
-    other = named(robot.file, mimic, "joint")
-    if other not in robot.joints:
-        raise DataError(f"{robot.file}: {where}: no joint is called '{other}'")
-    factor, offset = (
-        at.number(f"mimic {key}", mimic.get(key, default))
-        for key, default in (("multiplier", "1"), ("offset", "0"))
-    )
-    robot.couple(name, name, other, factor, offset, where)
-
-
 def _motors(robot: Robot, root: Element) -> None:
     """Set the motors: the joints that a plug-in, a transmission or a command interface drives."""
     speeds: dict[str, float | None] = {}
-    for e in children(root, "gazebo"):
+    for e in xml.children(root, "gazebo"):
         speeds |= sdf.driven(robot.file, e)
-    for e in children(root, "transmission"):
-        for joint in children(e, "joint"):
-            speeds.setdefault(named(robot.file, joint), None)
-    for control in children(root, "ros2_control"):
-        for joint in children(control, "joint"):
-            if child(joint, "command_interface") is not None:
-                speeds.setdefault(named(robot.file, joint), None)
-    robot.motors = [Motor(name, [(name, 1.0)], speed) for name, speed in speeds.items()]
+    for e in xml.children(root, "transmission"):
+        for joint in xml.children(e, "joint"):
+            speeds.setdefault(xml.named(robot.file, joint), None)
+    for control in xml.children(root, "ros2_control"):
+        for joint in xml.children(control, "joint"):
+            if xml.child(joint, "command_interface") is not None:
+                speeds.setdefault(xml.named(robot.file, joint), None)
+    robot.drive(speeds)
 
 
 # --- writing ------------------------------------------------------------------------------------------------------
@@ -259,55 +241,55 @@ def write(s: Skeleton, comment: str) -> tuple[bytes, list[str]]:
     if len(gazebo):
         root.append(gazebo)
     lost = f"racks are left out: {racks}: <mimic> ties one joint to one other" if racks else ""
-    return document(root, comment), s.left_out(("massless",), lost)
+    return xml.document(root, comment), s.left_out(("massless",), lost)
 
 
 def _add_link(s: Skeleton, root: Element, name: str, origin: complex) -> None:
-    part, link = s.bodies[name], add(root, "link", name=name)
+    part, link = s.bodies[name], xml.add(root, "link", name=name)
     if part.mass > 0 or part.inertia > 0:
-        inertial = add(link, "inertial")
-        add(inertial, "origin", xyz=spatial(part.center - origin), rpy="0 0 0")
-        add(inertial, "mass", value=part.mass)
+        inertial = xml.add(link, "inertial")
+        xml.add(inertial, "origin", xyz=xml.spatial(part.center - origin), rpy="0 0 0")
+        xml.add(inertial, "mass", value=part.mass)
         # in the plane only izz acts
-        add(inertial, "inertia", None, **{n: part.inertia if n[1] == n[2] else 0.0 for n in ROWS})
+        xml.add(inertial, "inertia", None, **{n: part.inertia if n[1] == n[2] else 0.0 for n in ROWS})
     for middle, turn, sides in s.boxes(name):
-        visual = add(link, "visual")
-        add(visual, "origin", xyz=spatial(middle - origin), rpy=digits(0.0, 0.0, turn))
-        add(add(visual, "geometry"), "box", size=digits(*sides))
+        visual = xml.add(link, "visual")
+        xml.add(visual, "origin", xyz=xml.spatial(middle - origin), rpy=xml.digits(0.0, 0.0, turn))
+        xml.add(xml.add(visual, "geometry"), "box", size=xml.digits(*sides))
 
 
 def _add_joint(s: Skeleton, root: Element, b: Branching, origin: dict[str, complex]) -> None:
     j, parent, part = b.joint, s.bodies[b.parent], s.bodies[b.child]
     kind = "prismatic" if j.kind == "slide" else "continuous" if j.limits is None else "revolute"
-    made = add(root, "joint", name=j.name, type=kind)
+    made = xml.add(root, "joint", name=j.name, type=kind)
     at = parent.inside(part.world(origin[b.child])) - origin[b.parent]
-    add(made, "origin", xyz=spatial(at), rpy=digits(0.0, 0.0, part.turn - parent.turn))
-    add(made, "parent", link=b.parent)
-    add(made, "child", link=b.child)
-    add(made, "axis", xyz=digits(*j.axis(part, b.sense)))
+    xml.add(made, "origin", xyz=xml.spatial(at), rpy=xml.digits(0.0, 0.0, part.turn - parent.turn))
+    xml.add(made, "parent", link=b.parent)
+    xml.add(made, "child", link=b.child)
+    xml.add(made, "axis", xyz=xml.digits(*j.axis(part, b.sense)))
     if kind != "continuous" or j.input is not None:
-        limit = add(made, "limit")
+        limit = xml.add(made, "limit")
         low, high = (
             j.limits
             or (j.guide is not None and s.travel.way(j.guide))
             or (j.value - s.m.size, j.value + s.m.size)
         )
         if kind != "continuous":
-            limit.attrib |= {"lower": digits(low - j.value), "upper": digits(high - j.value)}
+            limit.attrib |= {"lower": xml.digits(low - j.value), "upper": xml.digits(high - j.value)}
         peak = 0.0 if j.input is None else s.travel.peak
         # the format wants both numbers; where nothing limits them they are large
-        limit.set("effort", digits(LARGE if peak is None else peak))
-        limit.set("velocity", digits(LARGE))
+        limit.set("effort", xml.digits(LARGE if peak is None else peak))
+        limit.set("velocity", xml.digits(LARGE))
 
 
 def _add_frames(s: Skeleton, root: Element, name: str, origin: complex) -> None:
     """Add named points that no joint holds as links without mass, fixed there."""
     for frame, z in s.free_points(name).items():
-        add(root, "link", name=frame)
-        made = add(root, "joint", name=f"{frame} fixed", type="fixed")
-        add(made, "origin", xyz=spatial(z - origin), rpy="0 0 0")
-        add(made, "parent", link=name)
-        add(made, "child", link=frame)
+        xml.add(root, "link", name=frame)
+        made = xml.add(root, "joint", name=f"{frame} fixed", type="fixed")
+        xml.add(made, "origin", xyz=xml.spatial(z - origin), rpy="0 0 0")
+        xml.add(made, "parent", link=name)
+        xml.add(made, "child", link=frame)
 
 
 def _add_gears(s: Skeleton, root: Element, gazebo: Element) -> int:
@@ -329,7 +311,7 @@ def _add_gears(s: Skeleton, root: Element, gazebo: Element) -> int:
             (other,) = (name for name in terms if name != last[-1])
             # of coordinates that may run against the pins' own sense
             factor = -terms[other] / terms[last[-1]]
-            add(joint, "mimic", joint=other, multiplier=factor)
+            xml.add(joint, "mimic", joint=other, multiplier=factor)
         elif isinstance(g, Rack):
             racks += 1
         else:

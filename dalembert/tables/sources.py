@@ -6,7 +6,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import islice
+from itertools import islice, takewhile
 from typing import TYPE_CHECKING
 
 from dalembert.dataclass import dataclass, field
@@ -292,7 +292,13 @@ def decoded(file: str, data: bytes, warnings: list[str]) -> str:
 
 
 def delimiter(text: str) -> str:
-    """Return the mark that parts the most of the first lines into equally many cells."""
+    r"""Return the mark that parts the most of the first lines into equally many cells.
+
+    A comma in the numbers of a single column, or before the unit in its header, parts nothing.
+
+    >>> delimiter("mass_g,angle_deg\n1,5"), delimiter("mass_g\n1,5"), delimiter("mass, g\n1.5")
+    (',', ';', ';')
+    """
     lines = (match.group() for match in LINE.finditer(text))
     first = list(islice((_QUOTED.sub("", line) for line in lines if line.strip()), LOOKED_AT))
 
@@ -300,4 +306,14 @@ def delimiter(text: str) -> str:
         counts = Counter(line.count(mark) for line in first if mark in line)
         return max(counts.values(), default=0)
 
-    return max("\t;,|", key=alike) if any(map(alike, "\t;,|")) else ","
+    marks = [mark for mark in "\t;|," if alike(mark)]
+    return ";" if marks == [","] and _is_one_column(first) else max(marks, key=alike, default=";")
+
+
+def _is_one_column(lines: Sequence[str]) -> bool:
+    """Whether lines with commas are a single column: a header, perhaps a row of units, then numbers."""
+    above = list(takewhile(lambda line: not _is_number(line), lines))
+    numbers = lines[len(above) :]
+    commas = [line for line in above if "," in line]
+    only_units = all(heading(line).unit for line in commas) and not any("," in line for line in numbers)
+    return bool(above and numbers) and all(map(_is_number, numbers)) and (not commas or only_units)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from dalembert.tables.table import read
 from tests.conftest import Dalembert
 
 FAN = """run;sensor;amplitude_mm_s;phase_deg;trial_plane;trial_mass_g;trial_angle_deg
@@ -119,3 +120,25 @@ def test_words_among_expected_numbers_keep_their_commas(dalembert: Dalembert, tm
     (tmp_path / "e.csv").write_text(text)
     done = dalembert("inspect", "watt.toml", "--expect", "e.csv")
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "mass_g\n1,5\n22,25\n",
+        "mass\n[g]\n1,5\n22,25\n",
+        "mass, g\n1.5\n22.25\n",
+        '"mass, g"\n"1,5"\n"22,25"\n',
+    ],
+)
+def test_a_single_column_needs_no_other_mark(text: str, tmp_path: Path) -> None:
+    (tmp_path / "table.csv").write_text(text)
+    column = read(str(tmp_path / "table.csv"), numbers={"mass": "mass"}).numbers["mass"]
+    assert (column.unit, column.values.tolist()) == ("g", [1.5, 22.25])
+
+
+def test_bars_part_cells_with_decimal_commas(tmp_path: Path) -> None:
+    """Of two marks that stand in every line the bar parts the cells: three commas a line, two bars."""
+    (tmp_path / "table.csv").write_text("mass, g|radius, mm|angle, deg\n1,5|20,5|30,25\n2,5|21,5|40,5\n")
+    table = read(str(tmp_path / "table.csv"), numbers={"mass": "mass", "radius": "length", "angle": "angle"})
+    assert table.numbers["angle"].values.tolist() == [30.25, 40.5]

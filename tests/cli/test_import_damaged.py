@@ -6,7 +6,7 @@ import pytest
 
 from cli.formats import read
 from dalembert.errors import DataError
-from tests.cli.imported import taken
+from tests.cli.imported import FORMATS, only, taken
 
 
 @pytest.mark.parametrize("mechanisms", ["3", '{"a": {}}', '"x"'])
@@ -52,3 +52,34 @@ def test_a_block_in_two_slides_stays_a_body() -> None:
     assert len(m.guides) == 3
     up = m.motion(m.at[0] + 0.25).at("block B", 0j).position[0] - m.motion().at("block B", 0j).position[0]
     assert tuple(up) == pytest.approx((0.25, 0.25), abs=1e-15)
+
+
+SIM = (FORMATS / "linkage_sim" / "four_bar.json").read_text(encoding="utf-8")
+PULLED = (FORMATS / "pmksweb" / "Force.txt").read_text(encoding="utf-8").strip()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"joints": {', '"joints": {"J9": 3,', "joint J9: 'type' is missing"),
+        ('"forces": [', '"forces": "", "others": [', "forces: found '', expected a list of objects"),
+    ],
+)
+def test_entries_of_linkage_sim_that_are_no_objects_are_refused(old: str, new: str, message: str) -> None:
+    assert old in SIM
+    with pytest.raises(DataError, match=message):
+        taken(SIM.replace(old, new))
+
+
+def test_keys_of_linkage_sim_that_are_not_read_are_named() -> None:
+    _, notes = taken(SIM.replace('"mass"', '"weight"').replace('"forces"', '"loads"'))
+    assert "body crank, weight: left out: it is not read" in notes
+    assert "loads: left out: it is not read" in notes
+
+
+def test_a_string_of_pmks_web_that_ends_inside_a_force_is_refused() -> None:
+    """Without the last part the numbers of the force would stand for the active object."""
+    assert only(PULLED).forces
+    for end in range(PULLED.rindex("2F1,") + 4, PULLED.rindex(".")):
+        with pytest.raises(DataError, match=r"the string ends there: .* is it cut off"):
+            taken(PULLED[:end])

@@ -352,6 +352,41 @@ def test_weight_that_does_not_act_in_mjcf_and_positions_that_sdf_starts_from_are
     assert "joint 'A': its initial_position is left out: the pose is that of coordinate 0" in taken(moved)[1]
 
 
+@pytest.mark.parametrize(
+    ("text", "old", "new", "note"),
+    [
+        (SDF, "<mass>2</mass>", "<masss>2</masss>", "<masss> in <inertial>: left out: it is not read"),
+        (SDF, "<link name=", "<include/><link name=", "<include> in the model: left out"),
+        (SDF, "</model>", "</model><model_2/>", "<model_2> in <sdf>: left out: it is not read"),
+        (SDF, '<link name="AB">', '<link name="AB"><gravity>0</gravity>', "link 'AB': its <gravity> is left out: its whole weight acts"),
+        (URDF.format(loop=""), '<link name="tip"/>', '<link name="tip"><inertia1/></link>', "<inertia1> in <link>: left out: it is not read"),
+        (URDF.format(loop=""), "</robot>", "<gazebo><springStiffness>3</springStiffness></gazebo></robot>", "<springStiffness> in <gazebo>: left out"),
+        (MJCF, "<actuator>", "<tendons/><actuator>", "<tendons> in <mujoco>: left out: it is not read"),
+        (MJCF, "<actuator>", '<tendon><fixed name="t" range="0 1"><joint joint="hip" coef="1"/></fixed></tendon><actuator>', "tendon 't': its limits are left out"),
+        (MJCF, "<actuator>", '<keyframe><key qvel="1 2"/></keyframe><actuator>', "key, qvel: left out: found 2 speeds, expected"),
+    ],
+)  # fmt: skip
+def test_what_is_not_read_is_named(text: str, old: str, new: str, note: str) -> None:
+    assert old in text
+    new = (
+        text.replace(old, new).replace("</inertial>", "</inertia1>")
+        if "inertia1" in new
+        else text.replace(old, new)
+    )
+    assert any(note in each for each in taken(new)[1])
+
+
+def test_an_equality_that_its_default_switches_off_is_left_out() -> None:
+    off = MJCF.replace("<worldbody>", '<default><equality active="false"/></default><worldbody>', 1)
+    assert any("left out: it is not active" in note for note in taken(off)[1])
+
+
+def test_default_sections_of_mjcf_add_up() -> None:
+    """Files that are included bring sections of their own."""
+    split = '<default><geom size=".1"/></default><worldbody>'
+    assert taken(MJCF.replace("<worldbody>", split, 1)) == taken(MJCF)
+
+
 def test_axes_rounded_to_a_few_digits_are_planar_and_said() -> None:
     m, notes = taken(URDF.format(loop=LOOPS["gazebo"]).replace(
         '<axis xyz="0 1 0"/>\n  <origin xyz="0 0 0.2"/>', '<axis xyz="0 0 1"/>\n  <origin xyz="0 0 0.2" rpy="-1.5708 0 0"/>'
@@ -413,6 +448,9 @@ def test_bombs_and_entities_are_refused(text: str, root: str) -> None:
         ("<mujoco>" + "<frame>" * 200 + "</frame>" * 200 + "</mujoco>", "nested more than 100 deep"),
         (MJCF.replace("<actuator>", '<tendon><fixed name="t" stiffness="3" springlength=""/></tendon><actuator>', 1), "tendon 't', springlength: found '', expected 1 or 2 numbers"),
         ("<robot name='r'><link name='a'><visual><geometry><cylinder radius='1 2' length='1'/></geometry></visual></link></robot>", "link 'a', radius: found '1 2', expected 1 number"),
+        (MJCF.replace("<actuator>", '<tendon><spatial class="none" stiffness="3"/></tendon><actuator>', 1), "<spatial>: no default class is called 'none'"),
+        (MJCF.replace("<actuator>", '<tendon><fixed class="none"/></tendon><actuator>', 1), "<fixed>: no default class is called 'none'"),
+        ('<mujoco><worldbody><body name="a"><joint name="j"/><geom size=".1" mass="-2"/></body></worldbody></mujoco>', "body 'a', geom mass: found -2, expected one of zero or more"),
         ("<html/>", "of no known kind: expected pmks-text"),
     ],
 )  # fmt: skip
