@@ -13,7 +13,7 @@ from balancing.picture import MOST, KnownMasses, known_masses
 from cli.balance.rotors import DIMENSIONS, Balancing
 from cli.show.picture import blank
 from dalembert.errors import DataError
-from dalembert.page import spelled, units
+from dalembert.page import spelled
 from dalembert.quantities import decimal_to_si
 from dalembert.units import UNITS, from_si, to_si
 
@@ -203,7 +203,6 @@ def sheet(b: Balancing) -> Page:
             }
             for name in columns
         ],
-        "units": units(DIMENSIONS[name] for name in columns),
         "couple": b.has_couple,
         "placed": b.planes.z is not None,
         "remove": request.remove,

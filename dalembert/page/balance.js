@@ -179,7 +179,7 @@ function csv() {
   const several = sheet.rotors.length > 1;
   const lines = [[...(several ? ["rotor"] : []), "name", ...sheet.columns.map((c) => c.header)].join(",")];
   for (const [r, rotor] of sheet.rotors.entries()) {
-    for (const row of sheet.rows[r]) lines.push([...(several ? [quoted(rotor.name)] : []), quoted(row), ...sheet.columns.map((c) => inUnit(values[cellName(rotor, row, c.name)], c.kind, c.unit))].join(","));
+    for (const row of sheet.rows[r]) lines.push([...(several ? [quoted(rotor.name)] : []), quoted(row), ...sheet.columns.map((c) => inUnit(values[cellName(rotor, row, c.name)], c.unit))].join(","));
   }
   return `${lines.join("\n")}\n`;
 }

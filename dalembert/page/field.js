@@ -2,7 +2,7 @@
 const solveTape = new Tape(tapes.solve);
 const splitTape = new Tape(tapes.split);
 const word = sheet.word;
-const amplitudeUnit = Object.keys(sheet.units.amplitude)[0];
+const amplitudeUnit = sheet.amplitude.unit;
 const reading = (k, s, what) => `${sheet.runs[k]}/${sheet.sensors[s]}/${what}`;
 const onRotor = (k, p, what) => `${sheet.runs[k]}/${sheet.planes[p]}/${what}`;
 const has = (name) => Number.isFinite(values[name] ?? NaN);
@@ -242,14 +242,14 @@ drawSheet = () => {
 function csv() {
   if (wrong.size) return "";
   const speeds = sheet.channels.some(([, speed]) => speed !== null);
-  const lines = [["run", "sensor", ...(speeds ? [`speed_${sheet.speedUnit}`] : []), `amplitude_${sheet.amplitude}`, "phase_deg", "trial_plane", `trial_${word}_${sheet.mass.header}`, "trial_angle_deg"].join(",")];
+  const lines = [["run", "sensor", ...(speeds ? [`speed_${sheet.speedUnit}`] : []), `amplitude_${sheet.amplitude.header}`, "phase_deg", "trial_plane", `trial_${word}_${sheet.mass.header}`, "trial_angle_deg"].join(",")];
   for (const [k, run] of sheet.runs.entries()) {
     if (!readIn(k)) continue;
     const on = k ? (standing[k] ?? sheet.planes.map(() => [0, 0])) : null;
     for (const [s, [sensor, speed]] of sheet.channels.entries()) {
       if (!has(reading(k, s, "amplitude"))) continue;
-      const masses = on ? [sheet.planes.join(";"), on.map(([size]) => inUnit(size, sheet.mass.kind, sheet.mass.unit)).join(";"), on.map(([, angle]) => inUnit(whole(angle), "angle", "deg")).join(";")] : ["", "", ""];
-      lines.push([quoted(run), quoted(sensor), ...(speeds ? [String(speed ?? "")] : []), String(values[reading(k, s, "amplitude")]), inUnit(values[reading(k, s, "phase")], "angle", "deg"), ...masses].join(","));
+      const masses = on ? [sheet.planes.join(";"), on.map(([size]) => inUnit(size, sheet.mass.unit)).join(";"), on.map(([, angle]) => inUnit(whole(angle), "deg")).join(";")] : ["", "", ""];
+      lines.push([quoted(run), quoted(sensor), ...(speeds ? [String(speed ?? "")] : []), String(values[reading(k, s, "amplitude")]), inUnit(values[reading(k, s, "phase")], "deg"), ...masses].join(","));
     }
   }
   return `${lines.join("\n")}\n`;

@@ -344,17 +344,20 @@ class Machine extends Way {
     return null;
   }
 
-  // how far the rows of a pose are from the same operations in 32 digits
-  errors(state, l) {
+  // how far the rows of a pose are from the same operations in 32 digits; `exactly` has the digits of a number of a kind
+  errors(state, l, exactly = (x) => [x, 0]) {
     if (state.interpolated?.has(l)) return null;
     const here = lane(state.entering, l);
+    const exact = Object.fromEntries([...this.kinds].map(([path, kind]) => [path, exactly(here[path], kind)]));
+    const inputs = (from) => Object.fromEntries(this.model.inputs.map(({ slides }, j) => [`q${j}`, exactly(from[`q${j}`], slides ? "length" : "angle")]));
     if (this.model.phases.length) {
-      const chosen = this.tapes.choice.twice(state.given).slice(5 * this.closed.length);
-      this.model.phases.forEach((i, k) => (here[`phase ${i}`] = chosen[k]));
+      const chosen = this.tapes.choice.twice({ ...state.given, ...exact, ...inputs(state.given) }).slice(5 * this.closed.length);
+      this.model.phases.forEach((i, k) => (exact[`phase ${i}`] = chosen[k]));
     }
-    if (this.tapes.statics) this.#unbalanced(here).forEach((x, i) => (here[`f ${i}`] = [here[`f ${i}`], x || 0]));
-    this.rubbing?.refine(here);
-    const twice = this.tapes.pose.twice(here);
+    Object.assign(exact, inputs(here));
+    if (this.tapes.statics) this.#unbalanced({ ...here, ...exact }).forEach((x, i) => (exact[`f ${i}`] = [here[`f ${i}`], x || 0]));
+    if (this.rubbing) Object.assign(exact, this.rubbing.refined(here, exact));
+    const twice = this.tapes.pose.twice({ ...here, ...exact });
     return twice.slice(0, -1).map(([high, low], r) => Math.abs(high - state.rows[r][l] + low));
   }
 

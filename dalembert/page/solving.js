@@ -167,12 +167,12 @@ class Fitted {
     return this.keys.map((_, i) => this.keys.map((_, j) => (i === j ? 1 : 0) - share * slopes[i * this.keys.length + j]));
   }
 
-  // f of one lane in 32 digits: by how much it does not fit there, taken away once
-  refine(here) {
-    const effect = this.effect.twice(here);
+  // f of one lane in 32 digits, of which `exact` has some numbers: by how much it does not fit there, taken away once
+  refined(here, exact) {
+    const effect = this.effect.twice({ ...here, ...exact });
     const rest = this.keys.map((key, k) => here[key] - effect[k][0] - effect[k][1]);
     const [step] = eliminated(this.#jacobian(here, 1), rest);
-    this.keys.forEach((key, k) => (here[key] = two.add([here[key], 0], [-step[k] || 0, 0])));
+    return Object.fromEntries(this.keys.map((key, k) => [key, two.add([here[key], 0], [-step[k] || 0, 0])]));
   }
 }
 
