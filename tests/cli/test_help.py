@@ -217,3 +217,8 @@ def test_progress_of_one_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
             assert stream.getvalue().endswith("\r")
         else:
             assert not lines
+
+
+@pytest.mark.parametrize("command", ["inspect", "equilibrium", "fit"])
+def test_an_option_that_the_command_refuses_is_not_in_its_help(command: str, dalembert: Dalembert) -> None:
+    assert "--at" not in dalembert(command, "--help").stdout.split()
