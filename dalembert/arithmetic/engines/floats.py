@@ -41,7 +41,7 @@ TWO: dict[str, Callable[[float, float], float]] = {
 def compiled(
     tape: Tape,
     passed: tuple[str, ...] = (),
-    found: tuple[str, ...] = (),
+    results: tuple[str, ...] = (),
     among: tuple[str, ...] = (),
     vectors: tuple[bool, ...] = (),
 ) -> Callable[..., tuple[Any, ...]]:
@@ -52,10 +52,10 @@ def compiled(
     Parameters
     ----------
     tape : Tape
-    passed, found : names, optional
-        Of the body of a `loop.Loop`: what each call is given, which may be nothing, and what it finds. Where `found`
-        is not empty the function that is called comes first among the arguments, and what calls are given is no
-        output. A call whose results nothing uses is left out.
+    passed, results : names, optional
+        Of the body of a `loop.Loop`: the arguments of each call, which may be none, and its results. Where there are
+        `results`, the called function comes first among the arguments, and the arguments of calls are no outputs. A call
+        whose results nothing uses is left out.
     among : names, optional
         The arguments, among which the inputs are; by default the inputs alone.
     vectors : tuple of bool, optional
@@ -84,10 +84,10 @@ def compiled(
             if of is None:
                 text.append(f"x{inputs.index(arguments[0])}")
             else:
-                text.append(f"c{of[0]}_{found.index(of[1])}")
+                text.append(f"c{of[0]}_{results.index(of[1])}")
                 if of[0] not in done:
                     passed_text = ", ".join(text[places[f"call {of[0]} {name}"]] for name in passed)
-                    to = "".join(f"c{of[0]}_{i}, " for i in range(len(found)))
+                    to = "".join(f"c{of[0]}_{i}, " for i in range(len(results)))
                     lines.append(f"{to}= f({passed_text})")
                     done.add(of[0])
             depth.append(0)
@@ -101,14 +101,14 @@ def compiled(
                 lines.append(f"v{number} = {expression}")
                 text.append(f"v{number}")
                 depth.append(0)
-    names = ", ".join([*(["f"] if found else []), *(f"x{k}" for k in range(len(inputs)))])
+    names = ", ".join([*(["f"] if results else []), *(f"x{k}" for k in range(len(inputs)))])
     values = [text[number] for name, number in tape.outputs if called(name) is None]
     if vectors:
         rest = iter(values)
         values = [f"complex({next(rest)}, {next(rest)})" if v else f"{next(rest)} + 0.0" for v in vectors]
-    results = "".join(f"{value}, " for value in values)
+    returned = "".join(f"{value}, " for value in values)
     source = (
-        f"def tape({names}):\n" + "".join(f"    {line}\n" for line in lines) + f"    return ({results})\n"
+        f"def tape({names}):\n" + "".join(f"    {line}\n" for line in lines) + f"    return ({returned})\n"
     )
     room: dict[str, object] = {name: getattr(math, name) for name in ("sin", "cos", "atan2", "sqrt")}
     room["binade"] = binade
