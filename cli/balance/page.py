@@ -163,7 +163,7 @@ def sheet(b: Balancing) -> Page:
             "planes": [b.planes.name[p] for p in at],
             "tapes": tapes[text],
             # a mass and a radius that are both given leave something
-            "given": bool(steps or (~np.isnan(b.given_mass[here]) & ~b.sought[here]).any()),
+            "made": bool(steps or (~np.isnan(b.given_mass[here]) & ~b.sought[here]).any()),
             "fixed": (~np.isnan(b.given_mass[here])).tolist(),
         }
         if limit is not None:

@@ -1,4 +1,4 @@
-// A mechanism whose dimensions are dragged and typed: handles, fields, undo, what is given back. `window.dalembert` is the same for scripts.
+// A mechanism whose dimensions are dragged and typed: handles, fields, undo, options and file to take away. `window.dalembert` is the same for scripts.
 const { model } = data;
 const main = document.querySelector("main");
 
@@ -44,9 +44,9 @@ let errors = [null, -1, null]; // state, pose, how far its rows are from 32 digi
 function errorAt(column, i) {
   if (!state.rows || "input" in column || "zero" in column) return 0;
   if (errors[0] !== state || errors[1] !== i) errors = [state, i, Number.isFinite(state.closed[i]) ? machine.errors(state, i, exactly) : null];
-  const found = errors[2];
-  if (!found) return NaN;
-  return (found[column.row] + (column.less === undefined ? 0 : found[column.less])) / (column.si ?? 1);
+  const rows = errors[2];
+  if (!rows) return NaN;
+  return (rows[column.row] + (column.less === undefined ? 0 : rows[column.less])) / (column.si ?? 1);
 }
 function fillHeld(cell, k, i, every) {
   const x = k === null ? NaN : whole.columns[k].values[i];
@@ -84,10 +84,10 @@ function soon() {
 const textOf = (x, kind) => `${shortest(x, unitOf(kind))} ${unitOf(kind)}`;
 function whyNot() {
   if (wrong.size) return "";
-  if (!state.chosen) return state.given?.open ? TEXTS.openAtGuess(state.given.open) : TEXTS.impossible;
+  if (!state.chosen) return state.fixed?.open ? TEXTS.openAtGuess(state.fixed.open) : TEXTS.impossible;
   if (Number.isFinite(state.closed[shown])) return "";
-  const found = machine.short(state, shown);
-  return found && Number.isFinite(found[1]) ? TEXTS.short(found[0], `${Number(Number(shortest(found[1], unitOf("length"))).toPrecision(3))} ${unitOf("length")}`) : TEXTS.open;
+  const gap = machine.short(state, shown);
+  return gap && Number.isFinite(gap[1]) ? TEXTS.short(gap[0], `${Number(Number(shortest(gap[1], unitOf("length"))).toPrecision(3))} ${unitOf("length")}`) : TEXTS.open;
 }
 function tell(text = "") {
   say(text || [...wrong.values()].join("; ") || whyNot());
@@ -96,11 +96,11 @@ let waiting = 0;
 function listLimits() {
   // where it stands nowhere there is nothing to say of limits
   const stands = !wrong.size && state.chosen && state.closed.some(Number.isFinite);
-  const found = stands ? machine.limits(numbers).map(([q]) => q) : [];
+  const limits = stands ? machine.limits(numbers).map(([q]) => q) : [];
   const unit = unitOf(inputKind(0));
-  const shownLimits = found.map((q) => `${short(Number(shortest(q, unit)))} ${unit}`);
+  const shownLimits = limits.map((q) => `${short(Number(shortest(q, unit)))} ${unit}`);
   const none = model.inputs[0].slides ? TEXTS.noLimitsOfSlide : TEXTS.noLimits;
-  $("limits").textContent = !machine.one || !stands ? "" : found.length ? TEXTS.limits(shownLimits.join(", ")) : none;
+  $("limits").textContent = !machine.one || !stands ? "" : limits.length ? TEXTS.limits(shownLimits.join(", ")) : none;
 }
 
 // --- buttons --------------------------------------------------------------------------------------------------------------
@@ -125,7 +125,7 @@ tool(TEXTS.saveFile, () => (model.toml ? saved(toml(), "application/toml", "toml
 tools.after(outbox);
 outbox.after(make("p", { id: "limits" }));
 
-// --- what is given back ---------------------------------------------------------------------------------------------------
+// --- options and file to take away --------------------------------------------------------------------------------------------
 const quoted = (text) => (/^[\w@%+=:,./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
 function optionText(name, x) {
   const kind = kindOf(name);

@@ -60,9 +60,9 @@ function factorLike(text, unit, into) {
 // --- numbers -------------------------------------------------------------------------------------------------------------------
 // a number with or without its unit in SI and radians, or in a unit `into`; NaN where it is none. A decimal times a power of ten is rounded once.
 function typed(text, unit, into) {
-  const found = /^\s*([+\-−]?)(\d+[.,]?\d*|[.,]\d+)(?:[eE]([+-]?\d+))?\s*(.*?)\s*$/.exec(text);
-  if (!found) return NaN;
-  const [, sign, digits, power = "0", own] = found;
+  const match = /^\s*([+\-−]?)(\d+[.,]?\d*|[.,]\d+)(?:[eE]([+-]?\d+))?\s*(.*?)\s*$/.exec(text);
+  if (!match) return NaN;
+  const [, sign, digits, power = "0", own] = match;
   const factor = factorLike(own || unit, unit, into);
   if (!factor) return NaN;
   const minus = sign === "-" || sign === "−" ? -1 : 1;

@@ -66,8 +66,8 @@ function shownVector(name, what, by, angle) {
 }
 const whole = (x) => (x < 0 ? (x + 2 * Math.PI < 2 * Math.PI ? x + 2 * Math.PI : 0) : x + 0);
 // the outputs of a tape by their names, with how far 32 digits are from them
-function solved(tape, names, given, twice) {
-  const [out, more] = [tape.one(given), tape.twice(twice)];
+function solved(tape, names, entering, twice) {
+  const [out, more] = [tape.one(entering), tape.twice(twice)];
   return new Map(names.map((name, k) => [name, [out[k], Math.abs(more[k][0] - out[k] + more[k][1]), more[k]]]));
 }
 $("entries").append(tools, outbox, alertLine);
@@ -119,7 +119,7 @@ function start() {
   build();
 }
 // a table of answers
-function listed(host, caption, heads, rows) {
+function answerTable(host, caption, heads, rows) {
   const table = put(put(host, "div", { class: "scroll" }), "table");
   put(table, "caption", {}, caption);
   const head = put(put(table, "thead"), "tr");
