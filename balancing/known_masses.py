@@ -1,6 +1,6 @@
-"""Rotors whose masses are known, on tapes: what a page needs to compute their corrections anew.
+"""Rotors with known masses, on tapes: what a page needs to compute their corrections anew.
 
-Corrections are linear in the unbalances, and what an unbalance of 1 asks of every plane is linear in its place: both numbers
+Corrections are linear in the unbalances, and the correction in every plane for an unbalance of 1 is linear in its place: both numbers
 come from `correct`; the tapes hold the vectors of the entries, their sums, sizes and angles.
 """
 
@@ -86,11 +86,11 @@ def known_masses(
     fixed: Real | None = None,
     modal: Modal | None = None,
 ) -> dict[str, Tape]:
-    """The tapes of a rotor whose masses are known.
+    """The tapes of a rotor with known masses.
 
     `mass` adds one entry (`amount`, kg, N or kg·m; `radius`; `angle`; `z`) to the sums and gives its share of every plane;
-    `result` has the corrections, the rotor's state before and after, and what the tolerance is held against; `given` the state
-    after corrections as they are given out (`mass P`, `radius P`, `angle P`), rounded for one.
+    `result` has the corrections, the rotor's state before and after, and the unbalances that the tolerance limits; `made` the state
+    after the corrections as they are made (`mass P`, `radius P`, `angle P`), rounded for example.
 
     Parameters
     ----------
@@ -167,12 +167,11 @@ def known_masses(
     outputs |= _left(static, couple, put, planes - about)
     if modal is not None:
         outputs |= modal.left(_modes(recorder, modal), put)
-    given = recorder.tape(outputs)
-    return {"mass": mass, "result": result, "given": given}
+    return {"mass": mass, "result": result, "made": recorder.tape(outputs)}
 
 
 def _factors(planes: Real, z: Number) -> list[Number]:
-    """Return the correction in every plane for an unbalance of 1 at z, so that force and couple vanish."""
+    """Return the correction in every plane for an unbalance of 1 at z: force and couple vanish."""
     first, slope, about = shares(planes)
     return [float(a) + float(b) * (z - about) for a, b in zip(first, slope, strict=True)]
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from balancing.tapes import measured, split
 from dalembert.angles import degrees
 from dalembert.arithmetic.engines.javascript import engine, written
-from dalembert.page import Page, spelled, units
+from dalembert.page import Page, spelled
 from dalembert.page import sheet as sheet_page
 from dalembert.units import to_si
 
@@ -94,7 +94,6 @@ def machine_sheet(
         values[f"{first}/{sensor}/amplitude"] = float(f"{abs(v):.15g}")
         values[f"{first}/{sensor}/phase"] = float(np.radians(turned))
     kind, unit = mass
-    amplitude = spelled(amplitude_unit)
     coefficients = [
         [
             sensor,
@@ -123,7 +122,7 @@ def machine_sheet(
         "outputs": list(tape.names),
         "against": against,
         "errors": errors,
-        "amplitude": amplitude_unit,
+        "amplitude": {"unit": spelled(amplitude_unit), "header": amplitude_unit},
         "mass": {"kind": kind, "unit": spelled(unit), "header": unit, "si": float(to_si(1.0, kind, unit))},
         "word": kind,
         "coefficients": coefficients,
@@ -134,7 +133,6 @@ def machine_sheet(
         "places": None
         if places is None
         else [list(place) for place in sorted(places, key=lambda place: place[1])],
-        "units": {**units([kind, "angle"]), "amplitude": {amplitude: [1.0, 1.0]}},
     }
     whole["id"] = sha256(repr(sorted(whole.items(), key=lambda item: item[0])).encode()).hexdigest()[:16]
     script = f"{engine()}\nconst tapes = {{ solve: {written(tape)}, split: {written(split())} }};\n"

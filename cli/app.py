@@ -208,7 +208,7 @@ def main(front: Callable[[str | None], Callable[..., object]] = build) -> None:
 
 
 def _silence() -> None:
-    """Send standard output nowhere, so that shutdown does not complain of what it cannot write."""
+    """Send standard output nowhere: shutdown then does not complain of what it cannot write."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

@@ -178,12 +178,13 @@ def _lowest(num: float, den: float) -> Factor:
     return num, den
 
 
-_SIGNS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "³": "3", "·": "*", "⋅": "*", "×": "*", MINUS: "-"})
+SIGNS = {"µ": "u", "μ": "u", "²": "2", "³": "3", "·": "*", "⋅": "*", "×": "*", MINUS: "-", "°": "deg"}
+_PLAIN = str.maketrans(SIGNS)
 # revolutions a minute, as instruments of several languages print them
-_PER_MINUTE = r"(?:1|r|rev|u|tr|giri|rot)\s*/\s*min|min\s*(?:\^?-1|⁻¹)"
+PER_MINUTE = r"(?:1|r|rev|u|tr|giri|rot)\s*/\s*min|min\s*(?:\^?-1|⁻¹)"
 
 
-_FULL = {
+_IN_FULL = {
     "m": "metre meter metres meters",
     "mm": "millimetre millimeter millimetres millimeters",
     "um": "micrometre micrometer micrometres micrometers micron microns",
@@ -201,9 +202,9 @@ _FULL = {
     "N": "newton newtons",
 }
 """Units in full, as people write them in files and options."""
-_ABBREVIATION = {word: unit for unit, words in _FULL.items() for word in words.split()}
+ABBREVIATIONS = {word: unit for unit, words in _IN_FULL.items() for word in words.split()}
 # products without a sign between their words: Nm, kNm, gmm, kgm2; `gm` may be grams
-_JOINED = re.compile(r"(?!gm\b)([kMm]?N|k?g|mg|oz|lbf?)(mm|cm|m|in|ft)(s?)(?![A-Za-z])")
+JOINED = r"(?!gm\b)([kMm]?N|k?g|mg|oz|lbf?)(mm|cm|m|in|ft)(s?)(?![A-Za-z])"
 
 
 def _spelled(text: str) -> str:
@@ -213,18 +214,18 @@ def _spelled(text: str) -> str:
     ['um', 'in', 'kN*m', 'g*mm', 'kg*m2', 'N*m/rad', 'gm', 'mm']
     """
     text = text.strip()
-    if "min" in text.lower() and re.fullmatch(_PER_MINUTE, text.lower()):
+    if "min" in text.lower() and re.fullmatch(PER_MINUTE, text.lower()):
         return "rpm"
-    text = text.translate(_SIGNS).replace("°", "deg").replace("**", "^")
+    text = text.translate(_PLAIN).replace("**", "^")
     return re.sub("[A-Za-z]+", _word, text)
 
 
 def _word(match: re.Match[str]) -> str:
     """A word of a unit as the table has it."""
     word = match[0]
-    if joined := _JOINED.fullmatch(word):
+    if joined := re.fullmatch(JOINED, word):
         return "*".join(filter(None, joined.groups()))
-    return _ABBREVIATION.get(word.lower(), word)
+    return ABBREVIATIONS.get(word.lower(), word)
 
 
 def unit_name(written: str) -> str:

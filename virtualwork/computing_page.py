@@ -17,7 +17,8 @@ import numpy as np
 from dalembert.arithmetic.engines.javascript import engine, literal
 from dalembert.arithmetic.recorded import Number
 from dalembert.arithmetic.tape import Tape
-from dalembert.page import Page, Shown, packed, units
+from dalembert.page import Page, Shown, packed, spelled
+from dalembert.units import LISTED
 from virtualwork.animation import JointForce, Series, moving_page
 from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.guess import informed
@@ -394,13 +395,13 @@ def computing_page(
         )
         # first: what is written for them says what the document has
         tapes = literal(formulas.tapes(numbers))
+        kinds = {"length", "angle", *(d.kind for d in formulas.dimensions.values())}
         model = formulas.document() | {
             "quantities": quantities,
             "drawn": places,
             "cams": cams(drawing, m),
             "handles": handles(m),
-            "units": units(["length", "angle", *(d.kind for d in formulas.dimensions.values())]),
-            "bare": dict(bare_units or {}),
+            "units": {kind: spelled(LISTED[kind][0]) for kind in kinds} | dict(bare_units or {}),
             "first": list(map(float, poses.inputs[0] if first is None else first)),
             **({"fine": series.fine_inputs, "traced": formulas.traced} if formulas.traced else {}),
         }

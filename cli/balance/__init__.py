@@ -33,7 +33,7 @@ Arguments:
 What:
   plane NAME[:Z]:RADIUS...  Correction plane, such as A:0mm:20mm; repeatable. One plane: static balancing.
   planes FILE.csv  Table of planes: plane, z_*, radius_*, rotor.
-  mass NAME:MASS...  Mass of a plane's correction, such as A:7kg. With --plane A:0mm:? the radius for it is found.
+  mass NAME:MASS...  Mass of a plane's correction, such as A:7kg. With --plane A:0mm:? the command computes the radius.
   gravity G=9.80665  Acceleration of gravity, m/s².
 How:
   remove  Give the material to remove (default: to add).
@@ -41,7 +41,7 @@ How:
   round_angle ANGLE  Round the angles to this step, such as 1deg.
   modes FILE.csv  Flexible rotor: table of mode shapes, z_* and columns.
 Tolerance:
-  center_z Z  Axial position of the centre of mass. The couple is about it, and the tolerance is shared by it.
+  center_z Z  Axial position of the centre of mass: reference of the couple, and of the shares of the tolerance.
   grade GRADE  Balance quality grade, such as G2.5 (ISO 21940-11), API (4W/N) or MIL (MIL-STD-167-1).
   speed SPEED  Highest service speed, such as 3000rpm.
   rotor_mass MASS  Mass of the rotor, such as 12kg.

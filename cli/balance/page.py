@@ -13,7 +13,7 @@ from balancing.picture import MOST, KnownMasses, known_masses
 from cli.balance.rotors import DIMENSIONS, Balancing
 from cli.show.picture import blank
 from dalembert.errors import DataError
-from dalembert.page import spelled, units
+from dalembert.page import spelled
 from dalembert.quantities import decimal_to_si
 from dalembert.units import UNITS, from_si, to_si
 
@@ -163,7 +163,7 @@ def sheet(b: Balancing) -> Page:
             "planes": [b.planes.name[p] for p in at],
             "tapes": tapes[text],
             # a mass and a radius that are both given leave something
-            "given": bool(steps or (~np.isnan(b.given_mass[here]) & ~b.sought[here]).any()),
+            "made": bool(steps or (~np.isnan(b.given_mass[here]) & ~b.sought[here]).any()),
             "fixed": (~np.isnan(b.given_mass[here])).tolist(),
         }
         if limit is not None:
@@ -203,7 +203,6 @@ def sheet(b: Balancing) -> Page:
             }
             for name in columns
         ],
-        "units": units(DIMENSIONS[name] for name in columns),
         "couple": b.has_couple,
         "placed": b.planes.z is not None,
         "remove": request.remove,

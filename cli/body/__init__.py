@@ -42,7 +42,7 @@ Shaft:
 Robot:
   check_inertias  Check the inertia tensors of a robot file.
 Further options (docs/commands.md describes them):
-  about X,Y,Z  Point about which angular momentum and inertia are given, m, fixed in space (default: --fixed, else the origin).
+  about X,Y,Z  Point of reference of angular momentum and inertia, m, fixed in space (default: --fixed, else the origin).
 """
 
 

@@ -137,7 +137,7 @@ def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
         for number, meet in d.without_length.items():
             note(
                 whole & meet,
-                f"the ends of [[springs]] {number} meet, so that its pull has no direction: the forces that hang "
+                f"the ends of [[springs]] {number} meet: its pull has no direction there, and the forces that depend "
                 "on it have no value",
             )
             whole = whole & ~meet

@@ -35,8 +35,8 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
 
     CYLINDERS has the columns cylinder, crank_deg, bank_deg, z_*, throw_*, rod_*, reciprocating_* and rotating_* (masses).
     The star is a unit. The crank pin stands at θ + crank_deg. bank_deg is the direction of the cylinder's axis,
-    counter-clockwise from +x (default 90). Forces are those on the frame, couples are Σ z·F about z = 0. One shaft balances a force; two of one
-    order and sense balance force and couple.
+    counter-clockwise from +x (default 90). Forces are those on the frame, couples are Σ z·F about z = 0. One shaft
+    balances a force; two of one order and sense balance force and couple.
     """
     from cli.engine.cylinders import Engine, read_cylinders, read_shafts
     from cli.engine.tables import METHOD, draw, tables, warnings, way

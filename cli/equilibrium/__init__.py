@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from cli.cases import CASES, FILE, WORKERS
+from cli.cases import FILE, RANGES, WORKERS
 from cli.show.output import command
 
 if TYPE_CHECKING:
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from cli.show.result import Result
 
 EXAMPLE = "desk-lamp"
-OPTIONS = f"{FILE}{CASES}{WORKERS}"
+OPTIONS = f"{FILE}{RANGES}{WORKERS}"
 
 
 @command(OPTIONS)

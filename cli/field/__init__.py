@@ -82,7 +82,7 @@ Further options (docs/commands.md describes them):
   suggest  Suggest the most informative next run within --max-mass.
   view static-couple  Show the corrections of two planes as a static part and a couple.
   zone_class 1-rigid|1-flexible|2-rigid|2-flexible  Show zone A to D of ISO 10816-3 for velocities: group 1 (above 300 kW) or 2 (15 to 300 kW), rigid or flexible support.
-  workers N=1  Processes that solve many machines.
+  workers N=1  Number of processes for many machines.
 """
 
 

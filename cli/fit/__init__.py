@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from cli.cases import CASES, FILE, WORKERS
+from cli.cases import FILE, VARIANTS, WORKERS
 from cli.show.output import command
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 EXAMPLE = "straight-line-fit"
 OPTIONS = f"""
 {FILE}  target TARGET.csv...  The target: columns H_x_mm, coupler_angle_deg, crank_torque_N_m, optionally input_deg.
-{CASES}{WORKERS}
+{VARIANTS}{WORKERS}
 Target and free dimensions:
   want NAME...  Quantity that meets the target: H, coupler.angle, B.position, crank.torque; repeatable.
   free NAME=LOW:HIGH...  Dimension to fit, with its bounds; repeatable.

@@ -44,9 +44,9 @@ def coefficient(text: str) -> float:
 def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Find the flywheel that keeps the speed of a shaft within a fluctuation, from a table of its torque.
 
-    TABLE has the columns angle_* and torque_*. The star is a unit: angle_deg, torque_N_m. The torque is linear between rows; two rows at one angle are a
-    step. The rows span whole turns of the shaft, the last row included: 0 to 360 deg, or 0 to 720 deg of a four-stroke
-    engine. The load is constant, the mean of the torque.
+    TABLE has the columns angle_* and torque_*. The star is a unit: angle_deg, torque_N_m. The torque is linear between
+    rows; two rows at one angle are a step. The rows span whole turns of the shaft, the last row included: 0 to 360 deg,
+    or 0 to 720 deg of a four-stroke engine. The load is constant, the mean of the torque.
     """
     from cli.flywheel.turns import METHOD, draw, read_torque, tables, warnings, way
     from cli.show.result import Result

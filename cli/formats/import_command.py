@@ -42,8 +42,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
 
     The result is a file for `dalembert mechanism`. In the drawn pose, which is that of input 0, the links' axes are
     parallel to the ground's; links of a robot keep their own axes. Standard error names what was not imported.
-    Several mechanisms in one file
-    become FILE-1.toml, FILE-2.toml and so on.
+    Several mechanisms in one file become FILE-1.toml, FILE-2.toml and so on.
     """
     from cli.formats.description import described
     from cli.formats.settled import settle

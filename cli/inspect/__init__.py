@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from cli.cases import CASES, FILE, WORKERS
+from cli.cases import FILE, VARIANTS, WORKERS
 from cli.show.output import command
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 EXAMPLE = "watt-six-bar"
 OPTIONS = f"""
-{FILE}{CASES}{WORKERS}
+{FILE}{VARIANTS}{WORKERS}
 Quantities:
   only NAME,...  Count the operations of these quantities in addition: H.x,coupler.omega,crank.torque.
 """
@@ -24,8 +24,7 @@ Quantities:
 def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Inspect a planar mechanism: mobility, groups, Grashof classes, limits, dead and change points, strokes.
 
-    The results hold for the whole range of the input. --over, --cases and --set change dimensions. A terminal shows
-    the order of solution in addition.
+    The results hold for the whole range of the input. A terminal shows the order of solution in addition.
     """
     from cli.cases.cases import Cases
     from cli.cases.loop import result

@@ -1,1 +1,1 @@
-"""What a user is given: tables of columns as text, CSV and JSON, digits that hold, expectations, pictures, files."""
+"""What a user receives: tables of columns as text, CSV and JSON, digits that hold, expectations, pictures, files."""

@@ -134,7 +134,7 @@ class ShowOptions(SimpleNamespace):
 
     @property
     def streams(self) -> bool:
-        """Whether a table is all that is asked for, so that it can be written block by block."""
+        """Whether the request is a table alone, which can be written block by block."""
         return self.form in (".csv", ".parquet", ".xlsx") and not (self.json or self._others)
 
     @property
@@ -204,7 +204,7 @@ def with_options(
     two = "about" in own
     if two:
         point, head = help_lines(options)["about"], help_lines(SHARED)["about"]
-        line = point._replace(help=f"{point.help} KEY=TEXT: {head.help}")
+        line = point._replace(help=f"{point.help} KEY=TEXT, {head.help[0].lower()}{head.help[1:]}")
         info = typer.Option(*line.flags, metavar=line.metavar, help=line.help)
         common["about"] = common["about"].replace(annotation=Annotated[list[str] | None, info])
 
@@ -379,7 +379,8 @@ def parameters(
     The placeholder of a value says what the value may be: `N` a whole number that is at least 1, `N(0-100)` one from 0 to 100,
     `NUMBER` and `NUMBER(0-1)` a number, `one|other` one of these words, `FILE(.html)` a file with such a suffix,
     `NAME...` an option that may be repeated, anything else a text. `=` and a value behind it is the default; without a
-    placeholder it is a flag. `[required]` ends the help of an option that cannot be left out.
+    placeholder it is a flag. `[required]` ends the help of an option that cannot be left out. An option without help is
+    hidden: the command refuses it, and its message names the right one.
 
     Parameters
     ----------
@@ -405,7 +406,7 @@ def parameters(
             required = words != line.help
             if default is None and not required:
                 kind = kind | None
-            info = typer.Option(*line.flags, help=words, **more)
+            info = typer.Option(*line.flags, help=words, hidden=not words, **more)
             default = Parameter.empty if required else default
         result[name] = Parameter(
             name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, info]

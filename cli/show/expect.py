@@ -203,7 +203,7 @@ def _match(
         if rows < length:
             missing = f"a key column ({', '.join(named)})" if named else "a row for each"
             raise DataError(
-                f"{file}: found {rows} of the result's {length} rows: expected {missing}, as it cannot be said which"
+                f"{file}: found {rows} of the result's {length} rows: expected {missing}; without it the rows cannot be matched"
             )
         yield from range(rows)
         return

@@ -285,7 +285,7 @@ class Form:
 
 
 def stream(result: Result, suffix: str, options: ShowOptions) -> int:
-    """Write a table that comes in parts, to standard output where no file is given; before it the files beside it.
+    """Write a table that comes in parts, to standard output without a file; before it the files that go with it.
 
     Returns
     -------
@@ -329,6 +329,6 @@ def _document(result: Result, parts: Iterator[bytes]) -> Iterator[bytes]:
 
     yield f'{{{json_members(result.documented())},\n "{result.blocks_name}": ['.encode()
     yield from parts
-    # what there is to say is known by now
+    # all warnings are there by now
     lines = [*result.warnings, *result.late_warnings()]
     yield f"\n ],{json_members({'warnings': lines})}\n}}\n".encode()

@@ -294,7 +294,7 @@ def _warn(warnings: Iterable[str], options: ShowOptions) -> None:
 def _unknown(count: int) -> list[str]:
     if not count:
         return []
-    return [f"--digits: of {count} numbers no digit is known to hold; their cells are empty"]
+    return [f"--digits: of {count} numbers no digit holds; their cells are empty"]
 
 
 def _json_parts(result: Result) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""A report of a result: what it holds, as a page of HTML that prints on A4 and Letter, or as Markdown with its pictures beside it."""
+"""A report of a result: what it holds, as a page of HTML that prints on A4 and Letter, or as Markdown with files of its pictures."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def report(
 ) -> Report:
     """Put a report together.
 
-    `call_options` are the command's own options that were given, and their values; `checked` is how the result compares with
+    `call_options` are the command's own options in the call, and their values; `checked` is how the result compares with
     what was expected. What the options say for its head goes before what the file itself says.
     """
     from datetime import date
@@ -140,7 +140,7 @@ def _plain_sheet(result: Result) -> Sheet:
 
 
 def _inputs(call_options: Mapping[str, str], files: Sequence[str]) -> Iterator[str | Table]:
-    """Yield the options that were given, and what the files hold."""
+    """Yield the options of the call, and what the files hold."""
     if call_options:
         yield "; ".join(
             name if value == "yes" else f"{name} {_spaced(value)}" for name, value in call_options.items()
@@ -314,7 +314,7 @@ _NO_PICTURE = "(No picture: matplotlib is not installed.)"
 def pages(
     result: Result, options: ShowOptions, call_options: Mapping[str, str], checked: Comparison | None = None
 ) -> dict[Path, bytes]:
-    """Return the files of a result's report: the page itself, and beside Markdown its pictures."""
+    """Return the files of a result's report: the page itself, and with Markdown its pictures."""
     path = options.report
     assert path is not None
     made = report(result, options, call_options, checked)

@@ -111,7 +111,7 @@ class Sheet:
     sections: Sequence[Section]
     figure: Callable[[], Figure] | None = None
     dense: bool = False
-    """Whether it is for who wants to know how: set small, so that it stays one page."""
+    """Whether it is for readers who check the method: set small, to stay on one page."""
 
 
 @dataclass(eq=False, repr=False)
@@ -166,7 +166,7 @@ class Result:
     toml: Callable[[], bytes] | None = None
     """The file of the resulting mechanism, for -o FILE.toml."""
     late_warnings: Callable[[], list[str]] = list
-    """Warnings that are known once all parts are written."""
+    """Warnings that depend on all written parts."""
 
     def documented(self) -> Document:
         """Return the JSON document, without its warnings."""
@@ -180,7 +180,7 @@ class Result:
 
 
 def with_found(result: Result, solution: Found) -> Result:
-    """Return the result with the number that --find found: above the table, in JSON, in addition to a table alone."""
+    """Return the result with the number of --find: above the table, in JSON, in addition to a table alone."""
     notes, document, aside = result.notes, result.documented, result.aside
     return replace(
         result,
@@ -236,7 +236,7 @@ def in_units(table: Table, chosen: Mapping[str, str]) -> Table:
 
 
 def finished(table: Table, units: str | None, digits: bool) -> tuple[Table, int]:
-    """Return the table in the chosen units, with --digits cut to its right digits, and of how many no digit is known."""
+    """Return the table in the chosen units, with --digits cut to its right digits, and the number of those without a right digit."""
     if units is not None:
         table = in_units(table, chosen_units(units))
     if not digits:

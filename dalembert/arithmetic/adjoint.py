@@ -73,7 +73,7 @@ def derivatives(tape: Tape, to: Iterable[str], of: Iterable[str] | None = None) 
     ----------
     tape : Tape
     to : names of inputs
-    of : names of outputs; all where not given
+    of : names of outputs; default: all
 
     Returns
     -------

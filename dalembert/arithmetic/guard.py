@@ -35,7 +35,7 @@ S = TypeVar("S", bound=Locked)
 
 
 def own_lock(of: object) -> Lock:
-    """The lock of an object that shares it with nobody, made when first asked for; it is in no pickle of a record."""
+    """The lock of an object that shares it with nobody, made on the first request; it is in no pickle of a record."""
     # one step of the interpreter: two threads get the same
     lock: Lock = vars(of).get("_lock") or vars(of).setdefault("_lock", RLock())
     return lock

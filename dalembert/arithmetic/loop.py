@@ -21,19 +21,19 @@ class Calls:
     Parameters
     ----------
     recorder : Recorder
-    passed, found : names of what each call is given, and of what it finds
+    passed, results : names of the arguments of each call, and of its results
     """
 
     def __init__(self, recorder: Recorder, passed: Sequence[str], results: Sequence[str]) -> None:
-        self.recorder, self.passed, self.found = recorder, tuple(passed), tuple(results)
+        self.recorder, self.passed, self.results = recorder, tuple(passed), tuple(results)
         self.count = 0
         self.outputs: dict[str, Number] = {}
 
     def __call__(self, inputs: Mapping[str, Number]) -> list[Number]:
-        """What one more call finds."""
+        """The results of one more call."""
         number, self.count = self.count, self.count + 1
         self.outputs |= {f"call {number} {name}": inputs[name] for name in self.passed}
-        return [self.recorder.input(f"call {number} {name}") for name in self.found]
+        return [self.recorder.input(f"call {number} {name}") for name in self.results]
 
 
 def called(name: str) -> tuple[int, str] | None:
@@ -56,11 +56,11 @@ class Loop:
     Attributes
     ----------
     body : Tape
-        Its outputs are the next state, by the names of the inputs that they take the place of, and what each call is
-        given, `call NUMBER NAME`; what a call finds are inputs of such names. `left` is among the states: lanes go on
-        as long as it is positive. Further inputs are given once for each lane.
+        Its outputs are the next state, by the names of the inputs that they take the place of, and the arguments of each
+        call, `call NUMBER NAME`; the results of a call are inputs with such names. `left` is among the states: lanes go on
+        as long as it is positive. A lane has one value of each further input.
     inner : Tape
-        Its inputs that a call does not give are those of the same name of the lane.
+        An input that is no argument of the call is the lane's input of this name.
     kept : names of states
         Written down after every round.
     fed : names, optional
@@ -94,12 +94,12 @@ class Loop:
 
     @cached_property
     def passed(self) -> tuple[str, ...]:
-        """What a call is given."""
+        """The names of the arguments of a call."""
         return tuple(of[1] for name in self.body.names if (of := called(name)) is not None and of[0] == 0)
 
     @cached_property
     def constants(self) -> tuple[str, ...]:
-        """What a lane is given once."""
+        """The names of the inputs of which a lane has one value."""
         own = [
             name
             for name in self.body.inputs

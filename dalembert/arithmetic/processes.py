@@ -106,7 +106,7 @@ def _write_result(file: Path, fn: Callable[..., Any], args: tuple[Any, ...], kwa
 
 
 def _ignore_interrupts() -> None:
-    """Ctrl-C is for the process that asked."""
+    """Ctrl-C is for the process that sent the work."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 

@@ -1,4 +1,4 @@
-"""Records of arrays: compared by their numbers, told in one line, laid out as a table.
+"""Records of arrays: compared by their numbers, shown in one line, laid out as a table.
 
 numpy is loaded by what needs it: the description of a mechanism is made of records without it.
 """
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Kind = TypeVar("Kind", bound=type)
 
 FEW = 9
-"""So many numbers are told one by one."""
+"""So many numbers are shown one by one."""
 
 
 def record(kind: Kind) -> Kind:

@@ -14,7 +14,7 @@ import base64
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from html import escape
@@ -25,7 +25,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dalembert.units import UNITS, to_si
+from dalembert.units import ABBREVIATIONS, AMPLITUDES, JOINED, LARGEST, PER_MINUTE, SIGNS, TAGS, WORDS, Factor
 
 Json = Any
 
@@ -84,28 +84,31 @@ def rounded(values: ArrayLike) -> list[float]:
     return [float(f"{x:.7g}") for x in np.asarray(values, dtype=float).ravel().tolist()]
 
 
-def units(kinds: Iterable[str]) -> dict[str, dict[str, list[float]]]:
-    """Return every unit of these dimensions that can be typed, with its value in SI and radians as a ratio."""
-    spellings = {}
-    for kind in dict.fromkeys(kinds):
-        listed = UNITS.get(kind, {})
-        si = min(listed, key=lambda unit: abs(float(to_si(1.0, kind, unit)) - 1.0), default="")
-        # the SI unit first
-        order = sorted(listed, key=lambda unit: unit != si)
-        spellings[kind] = {spelled(unit): [float(x) for x in listed[unit]] for unit in order}
-    return spellings
+def _unit_table() -> Json:
+    """The words of units with their factors and exponents, and their other spellings, from which a page reads units."""
+    marks: list[Mapping[str, Factor]] = [{tag[1:]: (1, 1)} for tag in TAGS[1:]]
+    marks += [AMPLITUDES["voltage"], AMPLITUDES["digital signal"]]
+    of_vibrations = {
+        word: [*factor, *(0,) * (4 + k), 1] for k, mark in enumerate(marks) for word, factor in mark.items()
+    }
+    return {
+        "words": {word: [*factor, *exponents] for word, (factor, exponents) in WORDS.items()} | of_vibrations,
+        "inFull": ABBREVIATIONS,
+        "signs": SIGNS,
+        "joined": JOINED,
+        "perMinute": PER_MINUTE,
+        "largest": LARGEST,
+    }
 
 
 def spelled(unit: str) -> str:
     """A unit of a header as people write it.
 
-    >>> spelled("m_s2"), spelled("N_m"), spelled("N_s_per_m"), spelled("kg_m3")
-    ('m/s2', 'N m', 'N s/m', 'kg m3')
+    >>> spelled("m_s2"), spelled("N_m"), spelled("N_s_per_m"), spelled("kg_m3"), spelled("mm_s_rms")
+    ('m/s2', 'N m', 'N s/m', 'kg/m3', 'mm/s rms')
     """
-    above, per, below = unit.partition("_per_")
-    if not per and re.search(r"[a-z]_s[23]?$", above):
-        above, per, below = above.rpartition("_")
-    return above.replace("_", " ") + (f"/{below.replace('_', ' ')}" if per else "")
+    divided = re.sub(r"(?<=[a-z])_(?=(s[23]?|c?m3)(_pk|_pp|_rms)?$)", "/", unit.replace("_per_", "/"))
+    return divided.replace("_", " ")
 
 
 @dataclass(frozen=True)
@@ -162,7 +165,8 @@ def page(
         if script
         else ["common.js", *own]
     )
-    return _filled(title, "page.html", script, ["texts.js", *own], {"series": series, **rest})
+    typed = {"unitTable": _unit_table()} if script else {}
+    return _filled(title, "page.html", script, ["texts.js", *own], {"series": series, **typed, **rest})
 
 
 def sheet(title: str, kind: Literal["balance", "field"], script: str, sheet: Json) -> Page:
@@ -179,7 +183,7 @@ def sheet(title: str, kind: Literal["balance", "field"], script: str, sheet: Jso
         What the script reads.
     """
     own = ["texts.js", "common.js", "entry.js", "sheet.js", f"{kind}.js"]
-    return _filled(title, "sheet.html", script, own, {"sheet": sheet})
+    return _filled(title, "sheet.html", script, own, {"unitTable": _unit_table(), "sheet": sheet})
 
 
 def _filled(title: str, html: str, script: str, names: Sequence[str], data: Mapping[str, Json]) -> Page:

@@ -32,7 +32,7 @@ const rulesOf = (name) => ({ positive: name !== "angle" && name !== "z", within:
 solveSheet = () => {
   polygons = [];
   for (const [r, rotor] of sheet.rotors.entries()) {
-    const { mass, result, given } = tapesOf[r];
+    const { mass, result, made } = tapesOf[r];
     const names = namesOf[r];
     const [sums, pairs] = [{}, {}];
     for (const name of names.mass) if (name.startsWith("sum ")) [sums[name], pairs[name]] = [0, [0, 0]];
@@ -47,19 +47,19 @@ solveSheet = () => {
     }
     const out = solved(result, names.result, sums, pairs);
     const before = new Map(out);
-    if (rotor.given) {
-      // the corrections as they are given out, and what these leave
+    if (rotor.made) {
+      // the corrections as they are made, and their residual
       const put = {};
       rotor.planes.forEach((_, p) => {
         for (const [name, from] of [["mass", `mass ${p}`], ["radius", `radius ${p}`], ["angle", `plane ${p} angle`]]) {
           const x = out.get(from)[0];
-          // a mass that is given stays
+          // a fixed mass stays
           const step = name === "mass" && rotor.fixed[p] ? null : sheet.steps[name];
           put[`${name} ${p}`] = !step ? x : name === "angle" ? marked(whole(x), step) : rounded(x, step);
           if (step) out.set(from, [put[`${name} ${p}`], 0]);
         }
       });
-      for (const [name, x] of solved(given, names.given, { ...sums, ...put }, { ...pairs, ...put })) out.set(name, x);
+      for (const [name, x] of solved(made, names.made, { ...sums, ...put }, { ...pairs, ...put })) out.set(name, x);
     }
     const set = (name, from, turn = false) => out.has(from) && answers.set(`${prefix(rotor)}${name}`, turn ? [whole(out.get(from)[0]), out.get(from)[1]] : out.get(from));
     rotor.planes.forEach((plane, p) => {
@@ -135,13 +135,13 @@ drawSheet = () => {
   const host = $("answers");
   host.replaceChildren();
   const [mass, unbalance] = [sheet.shown.mass, sheet.shown.unbalance];
-  listed(
+  answerTable(
     host,
     sheet.remove ? TEXTS.toRemove : TEXTS.toAdd,
     ["", `${TEXTS.mass}, ${mass.unit}`, `${TEXTS.angle}, deg`, `${TEXTS.unbalance}, ${unbalance.unit}`, ...(sheet.sought ? [`${TEXTS.radius}, ${sheet.shown.radius.unit}`] : [])],
     sheet.rotors.flatMap((rotor) => rotor.planes.map((plane) => [`${prefix(rotor)}${plane}`, ...shownVector(`${prefix(rotor)}${plane}.`, "mass", mass.si, "angle"), shownAnswer(`${prefix(rotor)}${plane}.unbalance`, unbalance.si), ...(sheet.sought ? [shownAnswer(`${prefix(rotor)}${plane}.radius`, sheet.shown.radius.si)] : [])])),
   );
-  listed(
+  answerTable(
     host,
     TEXTS.state,
     ["", TEXTS.before, `${TEXTS.angle}, deg`, TEXTS.after],
@@ -152,7 +152,7 @@ drawSheet = () => {
     ])),
   );
   if (sheet.modes) {
-    listed(
+    answerTable(
       host,
       `${TEXTS.modalSums}, ${unbalance.unit}`,
       [TEXTS.mode, TEXTS.before, `${TEXTS.angle}, deg`, TEXTS.after],
@@ -160,7 +160,7 @@ drawSheet = () => {
     );
   }
   if (sheet.rotors.some((rotor) => rotor.tolerance)) {
-    listed(
+    answerTable(
       host,
       `${TEXTS.tolerance}, ${unbalance.unit}`,
       ["", TEXTS.permissible, TEXTS.before, ""],
@@ -179,7 +179,7 @@ function csv() {
   const several = sheet.rotors.length > 1;
   const lines = [[...(several ? ["rotor"] : []), "name", ...sheet.columns.map((c) => c.header)].join(",")];
   for (const [r, rotor] of sheet.rotors.entries()) {
-    for (const row of sheet.rows[r]) lines.push([...(several ? [quoted(rotor.name)] : []), quoted(row), ...sheet.columns.map((c) => inUnit(values[cellName(rotor, row, c.name)], c.kind, c.unit))].join(","));
+    for (const row of sheet.rows[r]) lines.push([...(several ? [quoted(rotor.name)] : []), quoted(row), ...sheet.columns.map((c) => inUnit(values[cellName(rotor, row, c.name)], c.unit))].join(","));
   }
   return `${lines.join("\n")}\n`;
 }

@@ -5,10 +5,10 @@ const $ = (id) => document.getElementById(id);
 // --- elements: text is always text --------------------------------------------------------------------------------
 function make(name, attributes = {}, text) {
   const svg = ["svg", "g", "path", "circle", "line", "text", "title"].includes(name);
-  const found = svg ? document.createElementNS("http://www.w3.org/2000/svg", name) : document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) found.setAttribute(key, value);
-  if (text !== undefined) found.textContent = text;
-  return found;
+  const element = svg ? document.createElementNS("http://www.w3.org/2000/svg", name) : document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  if (text !== undefined) element.textContent = text;
+  return element;
 }
 function put(parent, ...rest) {
   return parent.appendChild(make(...rest));

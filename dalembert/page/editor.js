@@ -1,10 +1,10 @@
-// A mechanism whose dimensions are dragged and typed: handles, fields, undo, what is given back. `window.dalembert` is the same for scripts.
+// A mechanism whose dimensions are dragged and typed: handles, fields, undo, options and file to take away. `window.dalembert` is the same for scripts.
 const { model } = data;
 const main = document.querySelector("main");
 
 // --- what can be set ------------------------------------------------------------------------------------------------------
 const inputNames = model.inputs.map((input) => (machine.one ? "input" : input.name));
-const unitOf = (kind) => model.bare[kind] ?? { length: "m", angle: "deg" }[kind] ?? Object.keys(model.units[kind] ?? {})[0] ?? "";
+const unitOf = (kind) => model.units[kind];
 const inputKind = (j) => (model.inputs[j].slides ? "length" : "angle");
 const kindOf = (name) => (inputNames.includes(name) ? inputKind(inputNames.indexOf(name)) : machine.kinds.get(name));
 const shownInput = (j) => (shown < n ? machine.sweep[j][shown] : freePose[j]);
@@ -33,13 +33,20 @@ function nearestPose() {
   for (let i = 1; i < n; i++) if (Math.abs(machine.sweep[0][i] - freePose[0]) < Math.abs(machine.sweep[0][near] - freePose[0])) near = i;
   return near;
 }
+const digits = new Map(); // "kind number" -> the number in 32 digits
+function exactly(x, kind) {
+  const key = `${kind} ${x}`;
+  if (digits.size > 10000) digits.clear();
+  if (!digits.has(key)) digits.set(key, digitsOf(x, unitOf(kind)));
+  return digits.get(key);
+}
 let errors = [null, -1, null]; // state, pose, how far its rows are from 32 digits
 function errorAt(column, i) {
   if (!state.rows || "input" in column || "zero" in column) return 0;
-  if (errors[0] !== state || errors[1] !== i) errors = [state, i, Number.isFinite(state.closed[i]) ? machine.errors(state, i) : null];
-  const found = errors[2];
-  if (!found) return NaN;
-  return (found[column.row] + (column.less === undefined ? 0 : found[column.less])) / (column.si ?? 1);
+  if (errors[0] !== state || errors[1] !== i) errors = [state, i, Number.isFinite(state.closed[i]) ? machine.errors(state, i, exactly) : null];
+  const rows = errors[2];
+  if (!rows) return NaN;
+  return (rows[column.row] + (column.less === undefined ? 0 : rows[column.less])) / (column.si ?? 1);
 }
 function fillHeld(cell, k, i, every) {
   const x = k === null ? NaN : whole.columns[k].values[i];
@@ -74,13 +81,13 @@ function update() {
 function soon() {
   if (!due) due = requestAnimationFrame(update);
 }
-const lengthText = (x) => `${Number((x / (model.units.length[unitOf("length")][0] / model.units.length[unitOf("length")][1])).toPrecision(3))} ${unitOf("length")}`;
+const textOf = (x, kind) => `${shortest(x, unitOf(kind))} ${unitOf(kind)}`;
 function whyNot() {
   if (wrong.size) return "";
-  if (!state.chosen) return state.given?.open ? TEXTS.openAtGuess(state.given.open) : TEXTS.impossible;
+  if (!state.chosen) return state.fixed?.open ? TEXTS.openAtGuess(state.fixed.open) : TEXTS.impossible;
   if (Number.isFinite(state.closed[shown])) return "";
-  const found = machine.short(state, shown);
-  return found && Number.isFinite(found[1]) ? TEXTS.short(found[0], lengthText(found[1])) : TEXTS.open;
+  const gap = machine.short(state, shown);
+  return gap && Number.isFinite(gap[1]) ? TEXTS.short(gap[0], `${Number(Number(shortest(gap[1], unitOf("length"))).toPrecision(3))} ${unitOf("length")}`) : TEXTS.open;
 }
 function tell(text = "") {
   say(text || [...wrong.values()].join("; ") || whyNot());
@@ -89,11 +96,11 @@ let waiting = 0;
 function listLimits() {
   // where it stands nowhere there is nothing to say of limits
   const stands = !wrong.size && state.chosen && state.closed.some(Number.isFinite);
-  const found = stands ? machine.limits(numbers).map(([q]) => q) : [];
+  const limits = stands ? machine.limits(numbers).map(([q]) => q) : [];
   const unit = unitOf(inputKind(0));
-  const shownLimits = found.map((q) => `${short(Number(shortest(q, model.units[inputKind(0)], unit)))} ${unit}`);
+  const shownLimits = limits.map((q) => `${short(Number(shortest(q, unit)))} ${unit}`);
   const none = model.inputs[0].slides ? TEXTS.noLimitsOfSlide : TEXTS.noLimits;
-  $("limits").textContent = !machine.one || !stands ? "" : found.length ? TEXTS.limits(shownLimits.join(", ")) : none;
+  $("limits").textContent = !machine.one || !stands ? "" : limits.length ? TEXTS.limits(shownLimits.join(", ")) : none;
 }
 
 // --- buttons --------------------------------------------------------------------------------------------------------------
@@ -118,12 +125,12 @@ tool(TEXTS.saveFile, () => (model.toml ? saved(toml(), "application/toml", "toml
 tools.after(outbox);
 outbox.after(make("p", { id: "limits" }));
 
-// --- what is given back ---------------------------------------------------------------------------------------------------
+// --- options and file to take away --------------------------------------------------------------------------------------------
 const quoted = (text) => (/^[\w@%+=:,./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
 function optionText(name, x) {
   const kind = kindOf(name);
-  if (kind === "length") return `${shortest(x, model.units.length, "m")}m`;
-  if (kind === "angle") return `${shortest(x, model.units.angle, "deg")}deg`;
+  if (kind === "length") return `${shortest(x, "m")}m`;
+  if (kind === "angle") return `${shortest(x, "deg")}deg`;
   return String(x);
 }
 function options() {
@@ -149,7 +156,7 @@ put(panel, "p", { class: "soft" }, `${TEXTS.howTo} ${TEXTS.digits}`);
 const positive = new Set(["mass", "inertia"]);
 function change(name, x, text) {
   const kind = kindOf(name);
-  const why = refusal(name, x, text, `${shortest(present(name), model.units[kind], unitOf(kind))} ${unitOf(kind)}`, positive.has(kind));
+  const why = refusal(name, x, text, textOf(present(name), kind), positive.has(kind));
   if (why) wrong.set(name, why);
   else {
     if (!wrong.delete(name) || !Object.is(present(name), x)) remember();
@@ -159,10 +166,10 @@ function change(name, x, text) {
 }
 function numberRow(body, name) {
   const kind = kindOf(name);
-  const [units, unit] = [model.units[kind], unitOf(kind)];
+  const unit = unitOf(kind);
   const line = put(body, "div", { class: "number" });
   put(line, "label", {}, name);
-  const input = numberField(line, name, units, unit, !positive.has(kind), (x, text) => change(name, x, text));
+  const input = numberField(line, name, { unit }, !positive.has(kind), (x, text) => change(name, x, text));
   input.addEventListener("blur", listFields);
   put(line, "span", { class: "soft" }, unit);
   const range = put(line, "input", { type: "range", min: "0", max: "400", step: "1", "aria-label": TEXTS.slider(name) });
@@ -179,7 +186,7 @@ function numberRow(body, name) {
   });
   range.addEventListener("change", () => delete range.dataset.held);
   range.addEventListener("keydown", (event) => event.stopPropagation());
-  fields.set(name, { input, range, units, unit, place: (x) => Math.round((400 * (x - low)) / (2 * span)) });
+  fields.set(name, { input, range, unit, place: (x) => Math.round((400 * (x - low)) / (2 * span)) });
 }
 function listFields() {
   for (const [name, field] of fields) {
@@ -285,7 +292,8 @@ drawHandles = (stands) => {
     const far = Math.hypot(...way);
     const gap = Math.min(20, far);
     if (far > 1) [u, v] = [u + (gap * way[0]) / far, v + (gap * way[1]) / far];
-    const seen = gripped && Number.isFinite(u + v);
+    // a place beyond 32 bits is none in a browser
+    const seen = gripped && Math.hypot(u, v) < 1e9;
     group.style.display = seen ? "" : "none";
     if (!seen) continue;
     group.setAttribute("transform", `translate(${u.toFixed(1)} ${v.toFixed(1)})`);

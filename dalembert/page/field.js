@@ -2,7 +2,7 @@
 const solveTape = new Tape(tapes.solve);
 const splitTape = new Tape(tapes.split);
 const word = sheet.word;
-const amplitudeUnit = Object.keys(sheet.units.amplitude)[0];
+const amplitudeUnit = sheet.amplitude.unit;
 const reading = (k, s, what) => `${sheet.runs[k]}/${sheet.sensors[s]}/${what}`;
 const onRotor = (k, p, what) => `${sheet.runs[k]}/${sheet.planes[p]}/${what}`;
 const has = (name) => Number.isFinite(values[name] ?? NaN);
@@ -16,22 +16,22 @@ const settable = sheet.runs.flatMap((_, k) => [
 ]);
 
 function enter(last) {
-  const given = {};
+  const entering = {};
   for (let k = 0; k < sheet.runs.length; k++) {
     for (let s = 0; s < sheet.sensors.length; s++) {
       const there = k <= last && has(reading(k, s, "amplitude")) && has(reading(k, s, "phase"));
       // as the program takes them: the initial run tells the initial vibration, later ones where it was not read
-      given[`run ${k} there ${s}`] = there && (k === 0 || !has(reading(0, s, "amplitude"))) ? 1 : 0;
-      given[`run ${k} read ${s}`] = there ? 1 : 0;
-      given[`run ${k} amplitude ${s}`] = there ? values[reading(k, s, "amplitude")] : 0;
-      given[`run ${k} phase ${s}`] = there ? (sheet.against ? -1 : 1) * values[reading(k, s, "phase")] : 0;
+      entering[`run ${k} there ${s}`] = there && (k === 0 || !has(reading(0, s, "amplitude"))) ? 1 : 0;
+      entering[`run ${k} read ${s}`] = there ? 1 : 0;
+      entering[`run ${k} amplitude ${s}`] = there ? values[reading(k, s, "amplitude")] : 0;
+      entering[`run ${k} phase ${s}`] = there ? (sheet.against ? -1 : 1) * values[reading(k, s, "phase")] : 0;
     }
     for (let p = 0; k && p < sheet.planes.length; p++) {
-      given[`run ${k} mass ${p}`] = standing[k]?.[p][0] ?? 0;
-      given[`run ${k} angle ${p}`] = standing[k]?.[p][1] ?? 0;
+      entering[`run ${k} mass ${p}`] = standing[k]?.[p][0] ?? 0;
+      entering[`run ${k} angle ${p}`] = standing[k]?.[p][1] ?? 0;
     }
   }
-  return given;
+  return entering;
 }
 let standing = [];
 const readIn = (k) => sheet.sensors.some((_, s) => has(reading(k, s, "amplitude")) || has(reading(k, s, "phase")));
@@ -58,8 +58,8 @@ solveSheet = () => {
       });
     }
     last = k;
-    const given = enter(k);
-    out = solved(solveTape, sheet.outputs, given, given);
+    const entering = enter(k);
+    out = solved(solveTape, sheet.outputs, entering, entering);
   }
   if (!out) return;
   const turned = (name) => [whole(out.get(name)[0]), out.get(name)[1]];
@@ -218,16 +218,16 @@ drawSheet = () => {
     const [size, angle] = shownVector(`${lead}${plane}.`, word, sheet.mass.si, "angle");
     return [plane, sure(`${lead}${plane}.${word}`, sheet.mass.si, size), angle === "–" ? angle : sure(`${lead}${plane}.angle`, turn, angle)];
   });
-  listed(host, TEXTS.corrections, ["", `${TEXTS[word]}, ${sheet.mass.unit}`, `${TEXTS.angle}, deg`], vectors(""));
-  listed(host, TEXTS.trim, ["", `${TEXTS[word]}, ${sheet.mass.unit}`, `${TEXTS.angle}, deg`], vectors("trim."));
-  if (sheet.planes.some((plane) => answers.has(`fresh.${plane}.${word}`))) listed(host, TEXTS.fresh, ["", `${TEXTS[word]}, ${sheet.mass.unit}`, `${TEXTS.angle}, deg`], vectors("fresh."));
+  answerTable(host, TEXTS.corrections, ["", `${TEXTS[word]}, ${sheet.mass.unit}`, `${TEXTS.angle}, deg`], vectors(""));
+  answerTable(host, TEXTS.trim, ["", `${TEXTS[word]}, ${sheet.mass.unit}`, `${TEXTS.angle}, deg`], vectors("trim."));
+  if (sheet.planes.some((plane) => answers.has(`fresh.${plane}.${word}`))) answerTable(host, TEXTS.fresh, ["", `${TEXTS[word]}, ${sheet.mass.unit}`, `${TEXTS.angle}, deg`], vectors("fresh."));
   if (doubts.length) put(host, "p", { class: "doubt", role: "status" }, doubts.join(" "));
-  listed(host, TEXTS.expected, ["", `${TEXTS.amplitude}, ${amplitudeUnit}`, `${TEXTS.phase}, deg`], sheet.sensors.map((sensor) => [sensor, ...shownVector(`residual/${sensor}/`, "amplitude", 1, "phase")]));
+  answerTable(host, TEXTS.expected, ["", `${TEXTS.amplitude}, ${amplitudeUnit}`, `${TEXTS.phase}, deg`], sheet.sensors.map((sensor) => [sensor, ...shownVector(`residual/${sensor}/`, "amplitude", 1, "phase")]));
   const drawn = put(host, "div", { class: "polygons" });
   if (answers.size) for (const plane of sheet.planes) dial(drawn, plane);
   const box = put(host, "details");
   put(box, "summary", {}, TEXTS.coefficients);
-  listed(box, TEXTS.coefficients, [TEXTS.sensor, TEXTS.plane, TEXTS.per(amplitudeUnit, sheet.mass.unit), `${TEXTS.phase}, deg`], sheet.coefficients.map(([sensor, plane, size, angle, along, across]) => {
+  answerTable(box, TEXTS.coefficients, [TEXTS.sensor, TEXTS.plane, TEXTS.per(amplitudeUnit, sheet.mass.unit), `${TEXTS.phase}, deg`], sheet.coefficients.map(([sensor, plane, size, angle, along, across]) => {
     const error = (x) => (Number.isFinite(x) ? ` ± ${Number(x.toPrecision(2))}` : "");
     return [sensor, plane, short(size * sheet.mass.si) + error(along * sheet.mass.si), short(sheet.against ? (360 - angle) % 360 : angle) + error(across / turn)];
   }));
@@ -242,14 +242,14 @@ drawSheet = () => {
 function csv() {
   if (wrong.size) return "";
   const speeds = sheet.channels.some(([, speed]) => speed !== null);
-  const lines = [["run", "sensor", ...(speeds ? [`speed_${sheet.speedUnit}`] : []), `amplitude_${sheet.amplitude}`, "phase_deg", "trial_plane", `trial_${word}_${sheet.mass.header}`, "trial_angle_deg"].join(",")];
+  const lines = [["run", "sensor", ...(speeds ? [`speed_${sheet.speedUnit}`] : []), `amplitude_${sheet.amplitude.header}`, "phase_deg", "trial_plane", `trial_${word}_${sheet.mass.header}`, "trial_angle_deg"].join(",")];
   for (const [k, run] of sheet.runs.entries()) {
     if (!readIn(k)) continue;
     const on = k ? (standing[k] ?? sheet.planes.map(() => [0, 0])) : null;
     for (const [s, [sensor, speed]] of sheet.channels.entries()) {
       if (!has(reading(k, s, "amplitude"))) continue;
-      const masses = on ? [sheet.planes.join(";"), on.map(([size]) => inUnit(size, sheet.mass.kind, sheet.mass.unit)).join(";"), on.map(([, angle]) => inUnit(whole(angle), "angle", "deg")).join(";")] : ["", "", ""];
-      lines.push([quoted(run), quoted(sensor), ...(speeds ? [String(speed ?? "")] : []), String(values[reading(k, s, "amplitude")]), inUnit(values[reading(k, s, "phase")], "angle", "deg"), ...masses].join(","));
+      const masses = on ? [sheet.planes.join(";"), on.map(([size]) => inUnit(size, sheet.mass.unit)).join(";"), on.map(([, angle]) => inUnit(whole(angle), "deg")).join(";")] : ["", "", ""];
+      lines.push([quoted(run), quoted(sensor), ...(speeds ? [String(speed ?? "")] : []), String(values[reading(k, s, "amplitude")]), inUnit(values[reading(k, s, "phase")], "deg"), ...masses].join(","));
     }
   }
   return `${lines.join("\n")}\n`;

@@ -54,8 +54,8 @@ function drawLoose(i) {
     const spot = ([x, y]) => [side / 2 + scale_ * (x - middle[0]), side / 2 - scale_ * (y - middle[1])];
     if (real) drawLink(link, spot, each * scale_, side);
     link.words.done();
-    const said_ = link.torques.filter(({ torque }) => Math.abs(torque) > 1e-12 * largest * widest).map(({ n: name, torque }) => `${name} = ${four(torque)} N·m`);
-    link.line.textContent = real ? said_.join("; ") : "";
+    const torques = link.torques.filter(({ torque }) => Math.abs(torque) > 1e-12 * largest * widest).map(({ n: name, torque }) => `${name} = ${four(torque)} N·m`);
+    link.line.textContent = real ? torques.join("; ") : "";
   }
 }
 function drawLink({ b, points, forces, lines, words }, spot, each, side) {

@@ -4,16 +4,16 @@ const SLIDES = [1, 2, 4]; // sizes of the mechanism within which the limits of a
 
 class Machine extends Way {
   // what does not change along the input
-  #given(numbers) {
-    const given = { ...numbers };
+  #fixed(numbers) {
+    const entering = { ...numbers };
     for (const [j, input] of this.model.inputs.entries()) {
       for (const [k, name] of ["v", "a", "j"].entries()) {
         const path = input.paths[k + 1];
-        given[`${name}${j}`] = path && numbers[path] !== this.own[path] ? numbers[path] : this.rates[j][k];
+        entering[`${name}${j}`] = path && numbers[path] !== this.own[path] ? numbers[path] : this.rates[j][k];
       }
     }
-    if (this.time) given.time = this.time;
-    return given;
+    if (this.time) entering.time = this.time;
+    return entering;
   }
 
   // the inputs of the guess
@@ -21,38 +21,38 @@ class Machine extends Way {
     return this.model.inputs.map((input) => (input.follows && input.paths[0] ? numbers[input.paths[0]] : input.at));
   }
 
-  // how each loop closes at the guess: signs and unknowns in `given`, which has the dimensions; says whether it can be so at all
-  #choose(given, at) {
-    at.forEach((q, j) => (given[`q${j}`] = q));
-    for (const g of this.iterated) g.start.forEach((x, i) => (given[`x ${g.name} ${i}`] = x));
-    for (const g of this.closed) given[`sign ${g.name}`] = g.sign;
-    for (const body of this.winding) given[`near ${body}`] = NaN;
+  // how each loop closes at the guess: signs and unknowns in `entering`, which has the dimensions; says whether it can be so at all
+  #choose(entering, at) {
+    at.forEach((q, j) => (entering[`q${j}`] = q));
+    for (const g of this.iterated) g.start.forEach((x, i) => (entering[`x ${g.name} ${i}`] = x));
+    for (const g of this.closed) entering[`sign ${g.name}`] = g.sign;
+    for (const body of this.winding) entering[`near ${body}`] = NaN;
     // the constants of gears follow from what is placed so far
     const choose = () => {
-      const found = this.tapes.choice.one(given);
-      this.model.phases.forEach((i, k) => (given[`phase ${i}`] = found[5 * this.closed.length + k]));
-      return found;
+      const choice = this.tapes.choice.one(entering);
+      this.model.phases.forEach((i, k) => (entering[`phase ${i}`] = choice[5 * this.closed.length + k]));
+      return choice;
     };
-    let found = choose();
+    let choice = choose();
     for (const g of this.model.groups) {
       if (g.start) {
-        if (!this.#assemble(g, given)) return (given.open = g.name) && false;
-        found = choose();
+        if (!this.#assemble(g, entering)) return (entering.open = g.name) && false;
+        choice = choose();
         continue;
       }
       const k = 5 * this.closed.indexOf(g);
-      const margin = found[k];
+      const margin = choice[k];
       // two assemblies meet there: the one it was before
-      given[`sign ${g.name}`] = Math.abs(margin) < 1e-14 || !Number.isFinite(found[k + 4]) ? g.sign : found[k + 4];
-      for (const body of g.winds) given[`near ${body}`] = principal(this.tapes.winds.one(given)[this.winding.indexOf(body)]);
+      entering[`sign ${g.name}`] = Math.abs(margin) < 1e-14 || !Number.isFinite(choice[k + 4]) ? g.sign : choice[k + 4];
+      for (const body of g.winds) entering[`near ${body}`] = principal(this.tapes.winds.one(entering)[this.winding.indexOf(body)]);
     }
-    return !(found[found.length - 1] <= 0);
+    return !(choice[choice.length - 1] <= 0);
   }
 
   // the unknowns of an iterated group: iterated from the guess; where that does not close, the nearest of many assemblies
-  #assemble(g, given) {
-    const says = this.tapes.guessed.one(given).subarray(g.guess);
-    const put = (x) => g.keys.forEach((key, i) => (given[key] = x[i]));
+  #assemble(g, entering) {
+    const says = this.tapes.guessed.one(entering).subarray(g.guess);
+    const put = (x) => g.keys.forEach((key, i) => (entering[key] = x[i]));
     if (g.sure) {
       const x = Array.from(says.subarray(0, g.start.length));
       const wide = 1 + g.free.length;
@@ -60,14 +60,14 @@ class Machine extends Way {
       const slides = leastSquares(g.free.map((_, k) => rows.map((row) => row[1 + k])), rows.map((row) => row[0]));
       g.free.forEach((i, k) => (x[i] = slides[k]));
       put(x);
-      if (this.iterate(g, given)) return true;
+      if (this.iterate(g, entering)) return true;
     }
     let [least, best, others] = [Infinity, null, false];
     for (const start of spread(g, this.model.size)) {
       put(start);
-      if (!this.iterate(g, given)) continue;
-      const far = this.tapes.guessed.one(given)[g.guess + g.start.length + g.rows * (1 + g.free.length)];
-      const x = g.keys.map((key) => given[key]);
+      if (!this.iterate(g, entering)) continue;
+      const far = this.tapes.guessed.one(entering)[g.guess + g.start.length + g.rows * (1 + g.free.length)];
+      const x = g.keys.map((key) => entering[key]);
       others ||= best !== null && x.some((y, i) => (i < g.angles ? Math.hypot(Math.cos(y) - Math.cos(best[i]), Math.sin(y) - Math.sin(best[i])) : Math.abs(y - best[i]) / this.model.size) >= 1e-6);
       if (far < least) [least, best] = [far, x];
     }
@@ -79,47 +79,47 @@ class Machine extends Way {
 
   // what places enter by at inputs, one array for each input of the mechanism; `pose`: with its rates
   #closing(state, inputs, pose) {
-    const given = { ...state.given };
-    if (pose !== undefined) Object.assign(given, lane(given, pose));
-    inputs.forEach((q, j) => (given[`q${j}`] = q));
+    const entering = { ...state.fixed };
+    if (pose !== undefined) Object.assign(entering, lane(entering, pose));
+    inputs.forEach((q, j) => (entering[`q${j}`] = q));
     const [q] = inputs;
-    for (const g of this.closed) given[`sign ${g.name}`] = this.one ? this.signs(state, g, q) : state.given[`sign ${g.name}`];
-    if (this.one) this.turned(state, given, q);
+    for (const g of this.closed) entering[`sign ${g.name}`] = this.one ? this.signs(state, g, q) : state.fixed[`sign ${g.name}`];
+    if (this.one) this.turned(state, entering, q);
     if (this.iterated.length && this.one) {
       for (const g of this.iterated) {
         const keys = g.start.map((_, i) => `x ${g.name} ${i}`);
-        for (const key of keys) given[key] = this.between(state, key, q);
+        for (const key of keys) entering[key] = this.between(state, key, q);
         for (let round = 0; round < 3; round++) {
-          const out = this.tapes.steps.run(given, q.length);
+          const out = this.tapes.steps.run(entering, q.length);
           const bad = q.map((_, l) => (out[g.place][l] < 0.1 * this.model.size ? 0 : NaN));
-          keys.forEach((key, i) => (given[key] = out[g.place + 1 + i].map((x, l) => x + bad[l])));
+          keys.forEach((key, i) => (entering[key] = out[g.place + 1 + i].map((x, l) => x + bad[l])));
         }
         // a loop that stays open is not assembled
-        const open = this.tapes.steps.run(given, q.length)[g.place];
-        keys.forEach((key) => (given[key] = given[key].map((x, l) => (open[l] <= 1e-11 * this.model.size ? x : NaN))));
+        const open = this.tapes.steps.run(entering, q.length)[g.place];
+        keys.forEach((key) => (entering[key] = entering[key].map((x, l) => (open[l] <= 1e-11 * this.model.size ? x : NaN))));
       }
-    } else if (this.iterated.length + this.winding.length && !this.one) this.#alongLines(state, given, inputs);
-    return given;
+    } else if (this.iterated.length + this.winding.length && !this.one) this.#alongLines(state, entering, inputs);
+    return entering;
   }
 
   // all that enters the tapes at inputs
   #entering(state, inputs, pose) {
-    const given = this.#closing(state, inputs, pose);
-    if (this.tapes.twists) this.#wind(state, given, inputs);
-    if (this.tapes.over && pose === undefined) this.#load(given, this.tapes.over.run(given, inputs[0].length));
+    const entering = this.#closing(state, inputs, pose);
+    if (this.tapes.twists) this.#wind(state, entering, inputs);
+    if (this.tapes.over && pose === undefined) this.#load(entering, this.tapes.over.run(entering, inputs[0].length));
     if (!this.tapes.over || pose === undefined) {
-      const locked = this.#settle(given, inputs[0].length);
+      const locked = this.#settle(entering, inputs[0].length);
       if (pose === undefined) state.locked = new Set(locked);
     }
-    return given;
+    return entering;
   }
 
-  // what the forces of n lanes depend on and is found from tapes; where friction locks the joints
-  #settle(given, n) {
-    if (this.tapes.statics) this.#bear(given, n);
+  // what the forces of n lanes depend on and tapes compute; where friction locks the joints
+  #settle(entering, n) {
+    if (this.tapes.statics) this.#bear(entering, n);
     if (!this.rubbing) return [];
-    this.tapes.slips.run(given, n).forEach((slip, k) => (given[`slip ${k}`] = slip));
-    return this.rubbing.fit(given, n);
+    this.tapes.slips.run(entering, n).forEach((slip, k) => (entering[`slip ${k}`] = slip));
+    return this.rubbing.fit(entering, n);
   }
 
   // the equations of all links at one lane of the tape's outputs
@@ -131,12 +131,12 @@ class Machine extends Way {
   }
 
   // redundant statics: the forces that it determines enter the tape of the poses
-  #bear(given, n) {
+  #bear(entering, n) {
     const { count } = this.model.statics;
-    const out = this.tapes.statics.run(given, n);
-    const found = Array.from({ length: count }, () => new Float64Array(n));
-    for (let l = 0; l < n; l++) determined(...this.#system(out, l), count).forEach((x, i) => (found[i][l] = x));
-    found.forEach((x, i) => (given[`f ${i}`] = x));
+    const out = this.tapes.statics.run(entering, n);
+    const forces = Array.from({ length: count }, () => new Float64Array(n));
+    for (let l = 0; l < n; l++) determined(...this.#system(out, l), count).forEach((x, i) => (forces[i][l] = x));
+    forces.forEach((x, i) => (entering[`f ${i}`] = x));
   }
 
   // by how much the forces of a lane are off, as 32 digits show: what they leave of the equations, solved once more
@@ -153,14 +153,14 @@ class Machine extends Way {
   }
 
   // several inputs: every pose on its own straight line from the guess
-  #alongLines(state, given, inputs) {
+  #alongLines(state, entering, inputs) {
     const n = inputs[0].length;
     const keys = this.iterated.flatMap((g) => g.keys);
     const near = this.winding.map((body) => `near ${body}`);
-    const found = [...keys, ...near].map(() => new Float64Array(n).fill(NaN));
+    const reached = [...keys, ...near].map(() => new Float64Array(n).fill(NaN));
     for (let l = 0; l < n; l++) {
       const way = inputs.map((q, j) => q[l] - state.at[j]);
-      const here = { ...state.given };
+      const here = { ...state.fixed };
       let [gone, step] = [0, 1 / Math.max(1, Math.ceil(Math.max(...way.map(Math.abs)) / 0.1))];
       const [first, least] = [step, step / 2 ** 20];
       while (gone < 1 && step > least) {
@@ -174,13 +174,13 @@ class Machine extends Way {
           step = near.length ? Math.min(2 * step, first) : 2 * step;
         } else step /= 2;
       }
-      if (gone >= 1) [...keys, ...near].forEach((key, k) => (found[k][l] = here[key]));
+      if (gone >= 1) [...keys, ...near].forEach((key, k) => (reached[k][l] = here[key]));
     }
-    [...keys, ...near].forEach((key, k) => (given[key] = found[k]));
+    [...keys, ...near].forEach((key, k) => (entering[key] = reached[k]));
     // a pose that is not reached has no number of turns, and is not assembled
     for (const g of this.closed) for (const body of g.winds) {
-      const sign = given[`sign ${g.name}`];
-      given[`sign ${g.name}`] = given[`near ${body}`].map((x) => (Number.isFinite(x) ? sign : NaN));
+      const sign = entering[`sign ${g.name}`];
+      entering[`sign ${g.name}`] = entering[`near ${body}`].map((x) => (Number.isFinite(x) ? sign : NaN));
     }
   }
 
@@ -195,9 +195,9 @@ class Machine extends Way {
   }
 
   // the whole turns of torsion springs, followed from the guess
-  #wind(state, given, inputs) {
+  #wind(state, entering, inputs) {
     const [q] = inputs;
-    const within = this.tapes.twists.run(given, q.length);
+    const within = this.tapes.twists.run(entering, q.length);
     for (const [s, turns] of this.model.springs.entries()) {
       const near = within[s].map((x, l) => {
         if (!this.one || !state.twists) return x;
@@ -206,24 +206,24 @@ class Machine extends Way {
         const followed = values[Math.min(Math.max(place, 0), values.length - 1)];
         return x + TAU * Math.round((followed - x) / TAU);
       });
-      given[`near spring ${s}`] = near.map((x) => x + TAU * turns);
+      entering[`near spring ${s}`] = near.map((x) => x + TAU * turns);
     }
   }
 
   // the forces that tables give, of what they are over
-  #load(given, over) {
+  #load(entering, over) {
     for (const [i, table] of this.model.tables.entries()) {
-      given[`table ${i} x`] = tabled(table, table.x, over[i]);
-      given[`table ${i} y`] = tabled(table, table.y, over[i]);
+      entering[`table ${i} x`] = tabled(table, table.x, over[i]);
+      entering[`table ${i} y`] = tabled(table, table.y, over[i]);
     }
   }
 
   // all poses of the sweep and one more, the free one: numbers by their paths, the inputs of the free pose
   solve(numbers, free) {
-    const [given, at] = [this.#given(numbers), this.#start(numbers)];
+    const [fixed, at] = [this.#fixed(numbers), this.#start(numbers)];
     const inputs = this.sweep.map((q, j) => Float64Array.of(...q, free[j]));
-    const state = { given, at, inputs, flips: new Map(), limits: [], unknowns: new Map(), numbers };
-    state.chosen = Object.values(numbers).every(Number.isFinite) && this.#choose(given, at);
+    const state = { fixed, at, inputs, flips: new Map(), limits: [], unknowns: new Map(), numbers };
+    state.chosen = Object.values(numbers).every(Number.isFinite) && this.#choose(fixed, at);
     if (!state.chosen) return state;
     if (this.one) {
       const known = [...inputs[0].filter(Number.isFinite), ...(this.model.fine?.slice(0, 2) ?? [])];
@@ -289,21 +289,21 @@ class Machine extends Way {
         return turns ? x - TAU * Math.round(x / TAU) : Number.isFinite(x) ? x : NaN;
       };
       // the rates and the loads of a pose that has its own are kept at all nodes, so that what is interpolated is smooth
-      const lanes = this.tapes.over || Object.values(state.given).some((x) => typeof x !== "number") ? near.map((l) => [l]) : [near];
+      const lanes = this.tapes.over || Object.values(state.fixed).some((x) => typeof x !== "number") ? near.map((l) => [l]) : [near];
       // beside the change point the closed forms lose digits: the nodes are worked out with 32
-      const precise = (tape, given) => {
-        const each = Array.from(nodes, (_, k) => tape.twice(lane(given, k)));
+      const precise = (tape, entering) => {
+        const each = Array.from(nodes, (_, k) => tape.twice(lane(entering, k)));
         return tape.outputs.map((_, r) => Float64Array.from(each, (row) => row[r][0]));
       };
       for (const poses of lanes) {
-        const given = this.#entering(state, [nodes], poses[0]);
+        const entering = this.#entering(state, [nodes], poses[0]);
         if (this.tapes.over) {
-          const over = precise(this.tapes.over, given);
-          this.#load(given, over.map((row, i) => [between(row, poses[0], this.model.tables[i].turns)]));
-          for (const [name, x] of Object.entries(given)) if (name.startsWith("table ")) given[name] = x[0];
-          this.#settle(given, count);
+          const over = precise(this.tapes.over, entering);
+          this.#load(entering, over.map((row, i) => [between(row, poses[0], this.model.tables[i].turns)]));
+          for (const [name, x] of Object.entries(entering)) if (name.startsWith("table ")) entering[name] = x[0];
+          this.#settle(entering, count);
         }
-        const values = precise(this.tapes.pose, given);
+        const values = precise(this.tapes.pose, entering);
         if (!values.every((row) => row.every(Number.isFinite))) continue;
         for (const [r, row] of values.entries()) {
           for (const l of poses) {
@@ -317,9 +317,9 @@ class Machine extends Way {
 
   // the limits of the input over the turn from the guess: [input, side on which it is assembled, group]; of a slide those around it
   limits(numbers) {
-    const [given, at] = [this.#given(numbers), this.#start(numbers)];
-    const state = { given, at, flips: new Map(), limits: [], unknowns: new Map(), numbers };
-    if (!this.one || !this.#choose(given, at)) return [];
+    const [fixed, at] = [this.#fixed(numbers), this.#start(numbers)];
+    const state = { fixed, at, flips: new Map(), limits: [], unknowns: new Map(), numbers };
+    if (!this.one || !this.#choose(fixed, at)) return [];
     const [start] = at;
     if (!this.model.inputs[0].slides) {
       this.look(state, this.iterated.length ? start - TAU : start, start + TAU);
@@ -344,17 +344,20 @@ class Machine extends Way {
     return null;
   }
 
-  // how far the rows of a pose are from the same operations in 32 digits
-  errors(state, l) {
+  // how far the rows of a pose are from the same operations in 32 digits; `exactly` has the digits of a number of a kind
+  errors(state, l, exactly = (x) => [x, 0]) {
     if (state.interpolated?.has(l)) return null;
     const here = lane(state.entering, l);
+    const exact = Object.fromEntries([...this.kinds].map(([path, kind]) => [path, exactly(here[path], kind)]));
+    const inputs = (from) => Object.fromEntries(this.model.inputs.map(({ slides }, j) => [`q${j}`, exactly(from[`q${j}`], slides ? "length" : "angle")]));
     if (this.model.phases.length) {
-      const chosen = this.tapes.choice.twice(state.given).slice(5 * this.closed.length);
-      this.model.phases.forEach((i, k) => (here[`phase ${i}`] = chosen[k]));
+      const chosen = this.tapes.choice.twice({ ...state.fixed, ...exact, ...inputs(state.fixed) }).slice(5 * this.closed.length);
+      this.model.phases.forEach((i, k) => (exact[`phase ${i}`] = chosen[k]));
     }
-    if (this.tapes.statics) this.#unbalanced(here).forEach((x, i) => (here[`f ${i}`] = [here[`f ${i}`], x || 0]));
-    this.rubbing?.refine(here);
-    const twice = this.tapes.pose.twice(here);
+    Object.assign(exact, inputs(here));
+    if (this.tapes.statics) this.#unbalanced({ ...here, ...exact }).forEach((x, i) => (exact[`f ${i}`] = [here[`f ${i}`], x || 0]));
+    if (this.rubbing) Object.assign(exact, this.rubbing.refined(here, exact));
+    const twice = this.tapes.pose.twice({ ...here, ...exact });
     return twice.slice(0, -1).map(([high, low], r) => Math.abs(high - state.rows[r][l] + low));
   }
 
@@ -370,12 +373,12 @@ class Machine extends Way {
 
   // whether there are rates: the file has a speed, be it zero, or something moves
   moves(state) {
-    return this.model.inputs.some(({ rated }, j) => rated || ["v", "a", "j"].some((name) => state.given[`${name}${j}`]));
+    return this.model.inputs.some(({ rated }, j) => rated || ["v", "a", "j"].some((name) => state.fixed[`${name}${j}`]));
   }
 
   // the numbers of the drawing that follow from the dimensions
   drawn(state) {
-    return this.tapes.drawn.one(state.given);
+    return this.tapes.drawn.one(state.fixed);
   }
 
   // the points of a cam's profile, some on each piece of its law: their x, and their y
@@ -383,7 +386,7 @@ class Machine extends Way {
     const { counts } = this.model.cams[k];
     const places = counts.flatMap((count, piece) => Array.from({ length: count }, (_, j) => [piece, j / count]));
     const [piece, share] = [0, 1].map((i) => Float64Array.from(places, (place) => place[i]));
-    return this.tapes[`cam${k}`].run({ ...state.given, piece, share }, places.length);
+    return this.tapes[`cam${k}`].run({ ...state.fixed, piece, share }, places.length);
   }
 }
 

@@ -22,25 +22,25 @@ function carried([x, y, c, s], u, v) {
 const real = (stands) => stands.every((where) => where.every(Number.isFinite));
 // the points of a shape where its bodies stand
 function outline(shape, stands) {
-  const found = [];
+  const corners = [];
   const [p, ends] = [shape.p ?? shape.z, shape.ends];
   if (shape.n) {
     // one line n times, at steps of d
-    for (let t = 0; t < shape.n; t++) for (let k = 0; k < p.length; k += 2) found.push(carried(stands[shape.b], p[k] + t * shape.d[0], p[k + 1] + t * shape.d[1]));
-    return found;
+    for (let t = 0; t < shape.n; t++) for (let k = 0; k < p.length; k += 2) corners.push(carried(stands[shape.b], p[k] + t * shape.d[0], p[k + 1] + t * shape.d[1]));
+    return corners;
   }
   for (let k = 0; k < p.length; k += 2) {
-    if (!ends) found.push(carried(stands[shape.b], p[k], p[k + 1]));
+    if (!ends) corners.push(carried(stands[shape.b], p[k], p[k + 1]));
     else {
       // a spring: shares of its length, and sideways
       const from = carried(stands[ends[0]], ends[1], ends[2]);
       const to = carried(stands[ends[3]], ends[4], ends[5]);
       const way = [to[0] - from[0], to[1] - from[1]];
       const length = Math.hypot(...way) || 1;
-      found.push([from[0] + way[0] * p[k] - (way[1] / length) * p[k + 1], from[1] + way[1] * p[k] + (way[0] / length) * p[k + 1]]);
+      corners.push([from[0] + way[0] * p[k] - (way[1] / length) * p[k + 1], from[1] + way[1] * p[k] + (way[0] / length) * p[k + 1]]);
     }
   }
-  return found;
+  return corners;
 }
 
 // --- the room that is needed over all poses ---------------------------------------------------------------------------
@@ -187,11 +187,11 @@ function centreTable(on) {
   centreCells = undefined;
   if (!on) return;
   const scroll = put($("values"), "div", { class: "scroll", id: "centres" });
-  const found = put(scroll, "table");
-  put(found, "caption", {}, TEXTS.instantCentres);
-  const head = put(put(found, "thead"), "tr");
+  const element = put(scroll, "table");
+  put(element, "caption", {}, TEXTS.instantCentres);
+  const head = put(put(element, "thead"), "tr");
   for (const text of ["", ...pointHeads]) put(head, "th", {}, text);
-  const body = put(found, "tbody");
+  const body = put(element, "tbody");
   centreCells = pairs.map(([a, b]) => {
     const row = put(body, "tr");
     put(row, "th", {}, `${whole.bodies[a].name} / ${whole.bodies[b].name}`);
@@ -310,15 +310,15 @@ function labels(stands, i) {
   }
 }
 function legend() {
-  const said = [];
+  const lines = [];
   const [first, ...others] = data.series.filter((series) => !series.hidden?.()).map((series) => series.name);
-  if (others.length) said.push(TEXTS.ghosts(first || TEXTS.asItIs, others.slice(0, 4).join("; "), Math.max(0, others.length - 4)));
-  const of = (kind, unit) => longest[kind] && said.push(TEXTS.longest(TEXTS.arrows[kind], `${short(longest[kind])} ${unit}`));
+  if (others.length) lines.push(TEXTS.ghosts(first || TEXTS.asItIs, others.slice(0, 4).join("; "), Math.max(0, others.length - 4)));
+  const of = (kind, unit) => longest[kind] && lines.push(TEXTS.longest(TEXTS.arrows[kind], `${short(longest[kind])} ${unit}`));
   if (drawn.velocity) of("velocity", data.units.v);
   if (drawn.acceleration) of("acceleration", data.units.a);
   if (drawn.forces) of("force", data.units.f);
-  if (drawn.polygon) said.push(TEXTS.ofPolygon(data.units.v));
-  $("legend").textContent = said.join("; ");
+  if (drawn.polygon) lines.push(TEXTS.ofPolygon(data.units.v));
+  $("legend").textContent = lines.join("; ");
 }
 function drawAll(i) {
   const [stands] = figures.map((figure) => drawFigure(figure, i));

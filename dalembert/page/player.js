@@ -14,11 +14,11 @@ function show(i) {
   // the pose beyond the last is the free one of a page that computes
   shown = data.model && i === n ? n : Math.max(0, Math.min(n - 1, Math.round(i)));
   if (shown < n) $("slider").value = shown;
-  $("slider").setAttribute("aria-valuetext", said(shown));
-  $("pose").textContent = `${said(shown)}${n > 1 && shown < n ? `  (${TEXTS.poseOf(shown + 1, n)})` : ""}`;
+  $("slider").setAttribute("aria-valuetext", inputsText(shown));
+  $("pose").textContent = `${inputsText(shown)}${n > 1 && shown < n ? `  (${TEXTS.poseOf(shown + 1, n)})` : ""}`;
   for (const watch of watchers) watch(shown);
 }
-function said(i) {
+function inputsText(i) {
   return whole.over.map((k) => `${whole.columns[k].header} ${short(whole.columns[k].values[i])}`).join(", ");
 }
 // seconds at speed 1 at which each pose is due: the poses' own time, or some seconds for a turn of the input
@@ -117,11 +117,11 @@ function toggle(key, words, on, change, possible = true) {
 // rows: [name, [column or null, ...]]; the columns marked exact show every digit
 function table(caption, heads, rows, exactly, more) {
   const scroll = put($("values"), "div", { class: "scroll" });
-  const found = put(scroll, "table");
-  put(found, "caption", {}, caption);
-  const head = put(put(found, "thead"), "tr");
+  const element = put(scroll, "table");
+  put(element, "caption", {}, caption);
+  const head = put(put(element, "thead"), "tr");
   for (const text of ["", ...heads]) put(head, "th", { scope: "col" }, text);
-  const body = put(found, "tbody");
+  const body = put(element, "tbody");
   const cells = [];
   for (const [name, columns] of rows) {
     const row = put(body, "tr", { "data-name": name });

@@ -4,21 +4,22 @@ let values = { ...sheet.values }; // SI and radians, amplitudes as the file has 
 const own = { ...sheet.values };
 let answers = new Map(); // name -> [number, how far a second computation with 32 digits is from it]
 let solveSheet, drawSheet; // of the kind of sheet
-const inputs = new Map(); // name -> {input, units, unit}
+const inputs = new Map(); // name -> {input, unit, into, rules, kind}
 
 const snapshot = () => structuredClone({ values, rows: sheet.rows });
 const restore = (before) => ([values, sheet.rows] = [before.values, before.rows]);
 const anew = () => build();
 // a cell of a table: what was typed is checked at once, and a wrong one leaves no answer standing
 function cell(parent, name, kind, unit, rules = {}) {
-  const units = sheet.units[kind];
-  const input = numberField(parent, name, units, unit, !rules.positive && kind !== "angle", (x, text) => {
+  // an amplitude stays in the file's unit
+  const into = kind === "amplitude" ? unit : undefined;
+  const input = numberField(parent, name, { unit, into }, !rules.positive && kind !== "angle", (x, text) => {
     const empty = text.trim() === "";
     check(name, empty && rules.empty ? NaN : x, text, rules);
     update();
   });
   input.addEventListener("blur", listCells);
-  inputs.set(name, { input, units, unit, rules, kind });
+  inputs.set(name, { input, unit, into, rules });
   return input;
 }
 function check(name, x, text, rules) {
@@ -31,7 +32,7 @@ function check(name, x, text, rules) {
   }
   const slack = rules.within ? 1e-9 * (rules.within[1] - rules.within[0]) : 0;
   if (rules.within && (x < rules.within[0] - slack || x > rules.within[1] + slack)) {
-    const [low, high] = rules.within.map((end) => shortest(end, of.units, of.unit));
+    const [low, high] = rules.within.map((end) => shortest(end, of.unit));
     wrong.set(name, TEXTS.outside(name, text, low, `${high} ${of.unit}`));
     return;
   }
@@ -65,8 +66,8 @@ function shownVector(name, what, by, angle) {
 }
 const whole = (x) => (x < 0 ? (x + 2 * Math.PI < 2 * Math.PI ? x + 2 * Math.PI : 0) : x + 0);
 // the outputs of a tape by their names, with how far 32 digits are from them
-function solved(tape, names, given, twice) {
-  const [out, more] = [tape.one(given), tape.twice(twice)];
+function solved(tape, names, entering, twice) {
+  const [out, more] = [tape.one(entering), tape.twice(twice)];
   return new Map(names.map((name, k) => [name, [out[k], Math.abs(more[k][0] - out[k] + more[k][1]), more[k]]]));
 }
 $("entries").append(tools, outbox, alertLine);
@@ -81,7 +82,7 @@ tool(TEXTS.copyRows, () => copied(csv()));
 tool(TEXTS.saveRows, () => saved(csv(), "text/csv", "csv"));
 tool(TEXTS.print, () => print());
 const quoted = (text) => (/[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
-const inUnit = (x, kind, unit) => (Number.isNaN(x ?? NaN) ? "" : shortest(x, sheet.units[kind], unit));
+const inUnit = (x, unit) => shortest(x ?? NaN, unit);
 
 // vectors from one point to the next, and a last one that closes them
 function polygon(parent, title, vectors, closing, label) {
@@ -97,26 +98,28 @@ function polygon(parent, title, vectors, closing, label) {
   const at = ([x, y]) => [150 + k * (x - (xs[0] + xs[1]) / 2), 130 - k * (y - (ys[0] + ys[1]) / 2)];
   const words = texts(svg);
   words.begin(300, 260);
-  const line = (a, b, kind, text) => {
-    const [[x, y], [u, v]] = [at(a), at(b)];
+  const lines = [[corners.at(-1), all.at(-1), "closing", label], ...vectors.map(([name], i) => [corners[i], corners[i + 1], "share", name])].map(([a, b, ...rest]) => [at(a), at(b), ...rest]);
+  for (const [[x, y], [u, v], kind] of lines) {
     put(svg, "path", { class: kind, d: arrow(x, y, u - x, v - y) });
-    if (Math.hypot(u - x, v - y) < 12) return;
+    const steps = Math.ceil(Math.hypot(u - x, v - y) / 6) || 1;
+    for (let k = 0; k <= steps; k++) words.take(x + (k / steps) * (u - x), y + (k / steps) * (v - y), 1);
+  }
+  for (const [[x, y], [u, v], , text] of lines) {
+    if (Math.hypot(u - x, v - y) < 12) continue;
     const side = direction([v - y, x - u]);
-    const beside = [9, 18].flatMap((gap) => [0.5, 0.3, 0.7].flatMap((share) => [1, -1].map((sense) => {
+    const beside = [9, 13, 18].flatMap((gap) => [0.5, 0.3, 0.7, 0.15, 0.85].flatMap((share) => [1, -1].map((sense) => {
       const [du, dv] = aside(text, [sense * side[0], sense * side[1]], gap);
       return [x + share * (u - x) + du, y + share * (v - y) + dv];
     })));
     words.set(text, beside, "point");
-  };
-  line(corners.at(-1), all.at(-1), "closing", label);
-  vectors.forEach(([name], i) => line(corners[i], corners[i + 1], "share", name));
+  }
 }
 function start() {
   theme();
   build();
 }
 // a table of answers
-function listed(host, caption, heads, rows) {
+function answerTable(host, caption, heads, rows) {
   const table = put(put(host, "div", { class: "scroll" }), "table");
   put(table, "caption", {}, caption);
   const head = put(put(table, "thead"), "tr");

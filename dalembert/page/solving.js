@@ -69,7 +69,7 @@ function determined(a, b, count, none = 1e-9) {
 const CLOSE = 8e-14; // relative: what changes by less has settled
 
 // what is known of some lanes alone
-const chosen = (given, lanes) => Object.fromEntries(Object.entries(given).map(([name, x]) => [name, typeof x === "number" ? x : Float64Array.from(lanes, (l) => x[l])]));
+const chosen = (entering, lanes) => Object.fromEntries(Object.entries(entering).map(([name, x]) => [name, typeof x === "number" ? x : Float64Array.from(lanes, (l) => x[l])]));
 
 // the x of A·x = b, by elimination with the largest pivot, and the determinant
 function eliminated(a, b) {
@@ -104,20 +104,20 @@ class Fitted {
     Object.assign(this, { effect, slopes, keys });
   }
 
-  // f in `given` for n lanes, from zero on: put in again and again until nothing changes, else followed from a small effect on; NaN in
+  // f in `entering` for n lanes, from zero on: put in again and again until nothing changes, else followed from a small effect on; NaN in
   // lanes, which come back, where nothing fits
-  fit(given, n) {
-    for (const key of this.keys) given[key] = new Float64Array(n);
+  fit(entering, n) {
+    for (const key of this.keys) entering[key] = new Float64Array(n);
     let left = Array.from({ length: n }, (_, l) => l);
     const settled = new Uint8Array(n);
     for (let round = 0; round < 200 && left.length; round++) {
-      const out = this.effect.run(left.length < n ? chosen(given, left) : given, left.length);
+      const out = this.effect.run(left.length < n ? chosen(entering, left) : entering, left.length);
       left = left.filter((l, i) => {
         let change = 0;
         for (const [k, key] of this.keys.entries()) {
           const x = out[k][i];
-          change = Math.max(change, Math.abs(x - given[key][l]) / (x === 0 ? 1 : Math.abs(x)));
-          given[key][l] = x;
+          change = Math.max(change, Math.abs(x - entering[key][l]) / (x === 0 ? 1 : Math.abs(x)));
+          entering[key][l] = x;
         }
         // what is not there at all is not looked for; what has settled is put in a few times more, for its last digits
         if (round === 0 && !out.every((row) => Number.isFinite(row[i]))) return false;
@@ -127,9 +127,9 @@ class Fitted {
     }
     return left.filter((l) => {
       if (settled[l]) return false;
-      const here = lane(given, l);
+      const here = lane(entering, l);
       const f = this.#followed(here);
-      for (const [k, key] of this.keys.entries()) given[key][l] = f ? f[k] : NaN;
+      for (const [k, key] of this.keys.entries()) entering[key][l] = f ? f[k] : NaN;
       return !f;
     });
   }
@@ -167,12 +167,12 @@ class Fitted {
     return this.keys.map((_, i) => this.keys.map((_, j) => (i === j ? 1 : 0) - share * slopes[i * this.keys.length + j]));
   }
 
-  // f of one lane in 32 digits: by how much it does not fit there, taken away once
-  refine(here) {
-    const effect = this.effect.twice(here);
+  // f of one lane in 32 digits, of which `exact` has some numbers: by how much it does not fit there, taken away once
+  refined(here, exact) {
+    const effect = this.effect.twice({ ...here, ...exact });
     const rest = this.keys.map((key, k) => here[key] - effect[k][0] - effect[k][1]);
     const [step] = eliminated(this.#jacobian(here, 1), rest);
-    this.keys.forEach((key, k) => (here[key] = two.add([here[key], 0], [-step[k] || 0, 0])));
+    return Object.fromEntries(this.keys.map((key, k) => [key, two.add([here[key], 0], [-step[k] || 0, 0])]));
   }
 }
 

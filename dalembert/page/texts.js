@@ -71,6 +71,7 @@ const TEXTS = {
   handle: (name) => `${name}: drag it, or move it by the arrow keys`,
   slider: (name) => `${name}, slider`,
   wrong: (name, text, unit) => `${name}: found "${text}", expected a number${unit ? ` such as "${unit}"` : ""}`,
+  large: (name, text, most) => `${name}: found "${text}", expected a number of at most ${most}`,
   negative: (name, text) => `${name}: found "${text}", expected a number that is not negative`,
   outside: (name, text, low, high) => `${name}: found "${text}", expected a place between ${low} and ${high}, where the mode shapes are known`,
   unknown: (name) => `nothing is named "${name}"`,

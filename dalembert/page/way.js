@@ -8,7 +8,7 @@ const FAR = 1; // rad: what turns farther than this between two samples is looke
 const SHUT = 64 * Number.EPSILON; // a loop no farther open than this share of the size is closed
 
 // what enters a tape at one of its lanes
-const lane = (given, l) => Object.fromEntries(Object.entries(given).map(([name, x]) => [name, typeof x === "number" ? x : x[l]]));
+const lane = (entering, l) => Object.fromEntries(Object.entries(entering).map(([name, x]) => [name, typeof x === "number" ? x : x[l]]));
 
 // an angle in (−π, π]; what stands at half a turn but for its rounding is at +π
 const principal = (angle) => angle - TAU * Math.ceil((angle - Math.PI - 1e-9) / TAU);
@@ -57,16 +57,16 @@ class Way {
     for (const q of Object.values(model.quantities)) if (q.turns) this.angleRows.add(q.row);
   }
 
-  // Newton's method on the steps of a tape: the unknowns of a group in `given`; says whether its loops close
-  iterate(group, given, limit = 60) {
+  // Newton's method on the steps of a tape: the unknowns of a group in `entering`; says whether its loops close
+  iterate(group, entering, limit = 60) {
     const { name, start, angles, place } = group;
     const count = start.length;
     const keys = start.map((_, i) => `x ${name} ${i}`);
     const tape = this.tapes.steps;
-    let out = tape.one(given);
+    let out = tape.one(entering);
     const size = this.model.size;
     for (let round = 0; round < limit; round++) {
-      const x = keys.map((key) => given[key]);
+      const x = keys.map((key) => entering[key]);
       const open = out[place];
       if (!Number.isFinite(open)) return false;
       const far = Math.max(size, ...x.slice(angles).map(Math.abs));
@@ -76,8 +76,8 @@ class Way {
       if (open <= SHUT * far && big <= 1e-7) return true;
       let factor = Math.min(1, 1 / (big || 1));
       for (let half = 0; half < 12; half++) {
-        for (let i = 0; i < count; i++) given[keys[i]] = x[i] + factor * step[i];
-        out = tape.one(given);
+        for (let i = 0; i < count; i++) entering[keys[i]] = x[i] + factor * step[i];
+        out = tape.one(entering);
         if (out[place] <= open * (1 + 1e-12) || open <= SHUT * far) break;
         factor /= 2;
       }
@@ -90,7 +90,7 @@ class Way {
   // the sign of a closed form at inputs, with the change points between the guess and them
   signs(state, group, q) {
     const flips = state.flips.get(group.name);
-    const base = state.given[`sign ${group.name}`];
+    const base = state.fixed[`sign ${group.name}`];
     if (!flips?.length) return base;
     const count = (x) => flips.reduce((sum, f) => sum + (f <= x ? 1 : 0), 0);
     const before = count(state.at[0]);
@@ -141,9 +141,9 @@ class Way {
   }
 
   // angles with their whole turns at inputs, of the bodies that are followed so far
-  turned(state, given, q) {
-    for (const body of this.winding) given[`near ${body}`] = NaN;
-    for (const [body, { nodes, values }] of state.turns) given[`near ${body}`] = Float64Array.from(q, (at) => interpolated(nodes, values, at));
+  turned(state, entering, q) {
+    for (const body of this.winding) entering[`near ${body}`] = NaN;
+    for (const [body, { nodes, values }] of state.turns) entering[`near ${body}`] = Float64Array.from(q, (at) => interpolated(nodes, values, at));
   }
 
   // along the one input from low to high: change points, limits, the unknowns of iterated groups
@@ -154,27 +154,27 @@ class Way {
     const steps = Math.min(40000, Math.max(8, Math.ceil((PER_TURN * this.model.pace * (high - low)) / turn)));
     const grid = Float64Array.from({ length: steps + 7 }, (_, i) => low + ((high - low) * (i - 2.5)) / steps);
     Object.assign(state, { grid, flips: new Map(), limits: [], unknowns: new Map(), ends: new Map(), turns: new Map(), turn });
-    const given = { ...state.given, q0: grid };
-    for (const g of this.iterated) g.start.forEach((_, i) => (given[`x ${g.name} ${i}`] = NaN));
-    for (const body of this.winding) given[`near ${body}`] = NaN;
+    const entering = { ...state.fixed, q0: grid };
+    for (const g of this.iterated) g.start.forEach((_, i) => (entering[`x ${g.name} ${i}`] = NaN));
+    for (const body of this.winding) entering[`near ${body}`] = NaN;
     let margins;
     for (const g of this.model.groups) {
       if (g.start) {
-        this.march(state, g, given);
+        this.march(state, g, entering);
         margins = undefined;
         continue;
       }
-      margins ??= this.tapes.margins.run(given, grid.length);
+      margins ??= this.tapes.margins.run(entering, grid.length);
       const k = this.closed.indexOf(g);
       const flips = this.touches(state, g, k, grid, margins[k], [low, high]);
       if (flips.length) {
         state.flips.set(g.name, flips);
-        given[`sign ${g.name}`] = this.signs(state, g, grid);
+        entering[`sign ${g.name}`] = this.signs(state, g, grid);
         margins = undefined;
       }
       for (const body of g.winds) {
         state.turns.set(body, this.follow(state, this.winding.indexOf(body), grid));
-        this.turned(state, given, grid);
+        this.turned(state, entering, grid);
         margins = undefined;
       }
     }
@@ -189,12 +189,12 @@ class Way {
     }
     if (this.tapes.twists) {
       const at = Math.round((state.at[0] - grid[0]) / (grid[1] - grid[0]));
-      const whole = this.tapes.twists.run(given, grid.length);
+      const whole = this.tapes.twists.run(entering, grid.length);
       state.twists = whole.map((values) => {
-        const found = Float64Array.from(values);
-        for (let i = at + 1; i < found.length; i++) found[i] += TAU * Math.round((found[i - 1] - found[i]) / TAU) || 0;
-        for (let i = at - 1; i >= 0; i--) found[i] += TAU * Math.round((found[i + 1] - found[i]) / TAU) || 0;
-        return found;
+        const unwrapped = Float64Array.from(values);
+        for (let i = at + 1; i < unwrapped.length; i++) unwrapped[i] += TAU * Math.round((unwrapped[i - 1] - unwrapped[i]) / TAU) || 0;
+        for (let i = at - 1; i >= 0; i--) unwrapped[i] += TAU * Math.round((unwrapped[i + 1] - unwrapped[i]) / TAU) || 0;
+        return unwrapped;
       });
     }
   }
@@ -203,12 +203,12 @@ class Way {
   touches(state, g, k, grid, m, [low, high]) {
     if (!m.some((x) => x < DIP)) return [];
     const margin = (q) => this.tapes.margins.run(this.beside(state, q), q.length)[k];
-    const found = [];
+    const flips = [];
     const note = (q) => {
       const same = 1e-6 * state.turn;
       // a guess at one of them means the branch beyond it
       const here = Math.abs(q - state.at[0]) < 1e-9 * state.turn ? Math.min(q, state.at[0]) : q;
-      if (q > low - same && q < high + same && !found.some((f) => Math.abs(f - q) < same)) found.push(here);
+      if (q > low - same && q < high + same && !flips.some((f) => Math.abs(f - q) < same)) flips.push(here);
     };
     const zero = (x) => Math.abs(x) <= TOUCHES;
     for (let i = 1; i + 1 < grid.length; i++) {
@@ -236,7 +236,7 @@ class Way {
       const q = this.crossing(margin, grid[i], grid[i + 1]);
       if (q >= low - 1e-9 * state.turn && q <= high + 1e-9 * state.turn) state.limits.push([q, m[i] >= 0 ? -1 : 1, g.name]);
     }
-    return found.sort((a, b) => a - b);
+    return flips.sort((a, b) => a - b);
   }
 
   // a root between two inputs: regula falsi (Illinois), then the last bits by halves
@@ -260,27 +260,27 @@ class Way {
 
   // what enters at further inputs, as far as groups are looked through
   beside(state, q) {
-    const given = { ...state.given, q0: q };
-    for (const g of this.closed) given[`sign ${g.name}`] = this.signs(state, g, q);
-    this.turned(state, given, q);
+    const entering = { ...state.fixed, q0: q };
+    for (const g of this.closed) entering[`sign ${g.name}`] = this.signs(state, g, q);
+    this.turned(state, entering, q);
     for (const g of this.iterated) {
       g.start.forEach((_, i) => {
         const key = `x ${g.name} ${i}`;
-        given[key] = state.unknowns.has(key) ? this.between(state, key, q) : NaN;
+        entering[key] = state.unknowns.has(key) ? this.between(state, key, q) : NaN;
       });
     }
-    return given;
+    return entering;
   }
 
   // an iterated group from the guess both ways, each pose from the last ones
-  march(state, g, given) {
+  march(state, g, entering) {
     const { grid } = state;
     const keys = g.start.map((_, i) => `x ${g.name} ${i}`);
     state.ends.set(g.name, [-Infinity, Infinity]);
-    const nodes = [[state.at[0], keys.map((key) => state.given[key])]];
+    const nodes = [[state.at[0], keys.map((key) => state.fixed[key])]];
     const scalar = (q) => {
       // what does not change is not copied
-      const here = Object.assign(Object.create(state.given), { q0: q });
+      const here = Object.assign(Object.create(state.fixed), { q0: q });
       for (const [body, { nodes, values }] of state.turns) here[`near ${body}`] = interpolated(nodes, values, q);
       for (const other of this.closed) {
         const sign = this.signs(state, other, [q]);
@@ -298,7 +298,7 @@ class Way {
     const stride = g === this.model.groups.at(-1) ? 6 : 1;
     for (const way of [1, -1]) {
       let q = state.at[0];
-      let x = keys.map((key) => state.given[key]);
+      let x = keys.map((key) => state.fixed[key]);
       let slope = x.map(() => 0);
       const far = (i) => (i < g.angles ? 1 : Math.max(size, Math.abs(x[i]))); // a slide that runs away is measured by itself
       let fresh = true;
@@ -342,7 +342,7 @@ class Way {
     const at = Float64Array.from(nodes, ([q]) => q);
     keys.forEach((key, k) => {
       state.unknowns.set(key, { nodes: at, values: Float64Array.from(nodes, ([, x]) => x[k]), ends: state.ends.get(g.name) });
-      given[key] = this.between(state, key, grid);
+      entering[key] = this.between(state, key, grid);
     });
   }
 }

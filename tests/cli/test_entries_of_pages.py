@@ -69,7 +69,7 @@ def test_degrees_of_a_table_stand_as_in_the_file(dalembert: Dalembert, tmp_path:
     assert page("return dalembert.csv()") == rows
 
 
-@pytest.mark.parametrize("text", ["1e400", "-1e400", "", "abc"])
+@pytest.mark.parametrize("text", ["1e400", "-1e400", "", "abc", "1e70"])
 def test_what_is_no_number_is_marked_and_named(
     text: str, dalembert: Dalembert, tmp_path: Path, browser: Any
 ) -> None:
@@ -106,6 +106,34 @@ def test_a_pose_beside_the_cases_has_the_rates_of_the_file(
     (tmp_path / "m.toml").write_text(CRANK)
     assert dalembert("mechanism", "m.toml", "--at", "0deg", "--page", "m.html").returncode == 0
     assert math.isnan(Computing(browser, tmp_path / "m.html").get("crank.omega"))
+
+
+def test_names_of_a_polygon_lie_beside_its_arrows(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """Riul's rotor: the sides of both triangles are close to each other; no name lies on any of them."""
+    planes = ("--plane", "A:0mm:20mm", "--plane", "B:90mm:20mm", "--page", "r.html")
+    assert dalembert("balance", EXAMPLES / "riul-rotor" / "rotor.csv", *planes).returncode == 0
+    page = Computing(browser, tmp_path / "r.html")
+    crossed = page(
+        "const over = []; let count = 0; for (const svg of document.querySelectorAll('svg.polygon')) {"
+        "const lines = [...svg.querySelectorAll('path')].filter((p) => p.getAttribute('d'));"
+        "const on = lines.flatMap((p) => Array.from({length: 200}, (_, k) => p.getPointAtLength((k / 199) * p.getTotalLength())));"
+        "for (const text of svg.querySelectorAll('text')) { count++; const b = text.getBBox();"
+        "if (on.some(({x, y}) => x > b.x && x < b.x + b.width && y > b.y + 2 && y < b.y + b.height - 2)) over.push(text.textContent); } }"
+        "return [count, over]"
+    )
+    assert crossed == [6, []]
+
+
+def test_zero_of_exact_numbers_is_shown_as_zero(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """A piston on a vertical guide over a level crank: the rod does not turn there, for 90° is a right angle and not a float's π/2."""
+    at = ("--over", "0deg:90deg:30deg", "--page", "e.html")
+    assert dalembert("forces", EXAMPLES / "engine" / "engine.toml", *at).returncode == 0
+    page = Computing(browser, tmp_path / "e.html")
+    assert page.table("Links")["rod"][1] == "0"
+    assert page.table("Joint forces")["B: ground on piston"][1] == "0"
+    page.set(1)
+    assert float(page.table("Links")["rod"][1]) == pytest.approx(page.get("rod.omega"), rel=1e-5)
+    assert page.faults() == []
 
 
 @pytest.mark.slow

@@ -301,3 +301,8 @@ def test_suffixes_of_the_output_are_those_that_the_command_writes(dalembert: Dal
         assert "expected .csv, .json, .xlsx, .parquet, .md, .tex\n" in done.stderr
     assert dalembert("fit", "x.toml", "t.csv", "-o", "x.html").returncode == 2
     assert ".tex, .toml; --report" in dalembert("fit", "x.toml", "t.csv", "-o", "x.html").stderr
+
+
+@pytest.mark.parametrize("command", ["inspect", "equilibrium", "fit"])
+def test_an_option_that_the_command_refuses_is_not_in_its_help(command: str, dalembert: Dalembert) -> None:
+    assert "--at" not in dalembert(command, "--help").stdout.split()

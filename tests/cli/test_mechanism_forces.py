@@ -404,7 +404,7 @@ free_length = 0.5
 damping = {damping}
 """
     )
-    named = "the ends of [[springs]] 1 meet, so that its pull has no direction"
+    named = "the ends of [[springs]] 1 meet: its pull has no direction"
     for poses in (
         ["--at", "0deg"],
         ["--at", "0deg", "--at", "90deg"],

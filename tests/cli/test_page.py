@@ -26,12 +26,12 @@ def assert_digits_hold(shown: str, exact: str) -> None:
 
 @pytest.fixture
 def four_bar(dalembert: Dalembert, tmp_path: Path, browser: Any) -> tuple[Opened, list[Row], list[Row]]:
-    """Return the page, its poses and its forces as CSV."""
+    """Return the page, its poses with the digits that hold and its forces as CSV."""
     (tmp_path / "m.toml").write_text(FOUR_BAR)
     sweep = ("m.toml", "--over", "0:360:1")
     done = dalembert("forces", *sweep, "--page", "m.html")
     assert done.returncode == 0, done.stderr
-    poses = dalembert("mechanism", *sweep, "--only", ",".join((*POINTS, "crank", "rocker", EVIL)))
+    poses = dalembert("mechanism", *sweep, "--only", ",".join((*POINTS, "crank", "rocker", EVIL)), "--digits")
     assert poses.returncode == 0, poses.stderr
     rows = [list(csv.DictReader(out.splitlines())) for out in (poses.stdout, done.stdout)]
     return Opened(browser, tmp_path / "m.html"), rows[0], rows[1]

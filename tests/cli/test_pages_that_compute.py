@@ -102,6 +102,8 @@ def test_what_is_typed_takes_a_unit_and_a_wrong_entry_leaves_no_answer(klann: Co
     before = klann.get("H.x")
     klann.type("links.crank.B.x", "125 mm")
     assert klann.get("links.crank.B.x") == 0.125
+    klann.type("links.crank.B.x", "5 inches")
+    assert klann.get("links.crank.B.x") == 0.127
     klann.type("links.crank.B.x", "121")
     assert klann.get("links.crank.B.x") == 0.121
     standing = klann.get("H.x")

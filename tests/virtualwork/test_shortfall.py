@@ -24,7 +24,7 @@ def test_two_links_too_short():
         guess=Guess(1.0, {"coupler": -1.0, "rocker": 1.5}),
     )
     found = m.assembly.reach.shortfall((math.pi,))
-    assert (found.gap.needed, found.gap.given) == pytest.approx((1.264, 1.2), abs=1e-15)
+    assert (found.gap.needed, found.gap.available) == pytest.approx((1.264, 1.2), abs=1e-15)
     assert "reach 1200 mm, 1264 mm needed: 64 mm short" in found.text(lambda v: f"{v * 1e3:.6g} mm")
     # d² = 764² + 500² − 2·764·500·cos θ = 1200²
     edge = math.acos((0.764**2 + 0.25 - 1.44) / (0.764))
@@ -38,7 +38,7 @@ def test_two_links_too_short():
         guess=m.guess,
     )
     found = near.assembly.reach.shortfall((0.0,))
-    assert (found.gap.needed, found.gap.given) == pytest.approx((0.05, 0.2), abs=1e-15)
+    assert (found.gap.needed, found.gap.available) == pytest.approx((0.05, 0.2), abs=1e-15)
     assert "come no nearer than 0.2 m, 0.05 m needed: 0.15 m too long" in found.text()
 
 
@@ -66,7 +66,7 @@ def test_a_slot_that_runs_past_its_pin():
         guess=Guess(2.0, {"bar": 0.0}),
     )
     found = m.assembly.reach.shortfall((0.0,))
-    assert (found.gap.needed, found.gap.given) == pytest.approx((0.01, 0.02), abs=1e-15)
+    assert (found.gap.needed, found.gap.available) == pytest.approx((0.01, 0.02), abs=1e-15)
     assert "0.01 m too far" in found.text()
     edge = math.acos((0.05**2 + 0.06**2 - 0.02**2) / (2 * 0.05 * 0.06))
     assert found.nearest == pytest.approx(edge, abs=1e-10)

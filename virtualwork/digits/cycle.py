@@ -65,8 +65,8 @@ class CycleRun:
     @cached_property
     def effort(self) -> Any:
         """The effort, (n,)."""
-        ((found,),) = self.errors.estimates.second.doubled([Effort(0)]).values()
-        exact = DoubledArray.of(found) + np.zeros(len(self._values))
+        ((effort,),) = self.errors.estimates.second.doubled([Effort(0)]).values()
+        exact = DoubledArray.of(effort) + np.zeros(len(self._values))
         # close to a change point another run than this one knows the effort, at a limit none
         off = exact.off(self._values)
         others = ~((off <= 2 * self.errors.effort[:, 0]) & np.isfinite(off))

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from dalembert.arithmetic.doubled import Doubled
 from dalembert.arithmetic.engines.doubled import OWN, estimated
 from dalembert.arithmetic.guard import guarded
-from virtualwork.digits.second_run import Found, SecondRun, answer, apart, parts
+from virtualwork.digits.second_run import Results, SecondRun, answer, apart, parts
 from virtualwork.formulas.kinematics import Angle, Point, Slide, Turn
 from virtualwork.formulas.lanes import MANY_POSES, Lanes
 from virtualwork.formulas.loops import Margin
@@ -89,8 +89,8 @@ class Estimates:
             # of groups that none of these depend on nothing is formed
             depended = {group for key in new for group in key.groups(self.second.exact)}
             margins = [key for key in margins if key.group in depended]
-        estimates, found = self.second.compared(values, margins)
-        self._undecided |= self._doubted({key.group: found[key][0].value for key in margins})
+        estimates, results = self.second.compared(values, margins)
+        self._undecided |= self._doubted({key.group: results[key][0].value for key in margins})
         rows = self._close_to_change
         if rows.any():
             self._pass(rows, values, estimates)
@@ -121,18 +121,18 @@ class Estimates:
 
     def _doubted(self, margins: Mapping[str, Any]) -> dict[str, NDArray[np.bool_]]:
         """The poses so near a limit of a group that rounding may have taken the one of its two assemblies for the other."""
-        found = {}
+        results = {}
         for group in self.second.exact.closed:
             if group.name not in margins:
                 continue
             exact = margins[group.name]
-            found[group.name] = np.zeros(self.n, dtype=bool)
+            results[group.name] = np.zeros(self.n, dtype=bool)
             if group.name in self.second.exact.folded or not np.any(np.abs(exact) < NEAR):
                 continue
             (margin,) = self.poses.taped([Margin(group.name)])
             off = np.abs(margin - exact) > DOUBTED * np.abs(exact)
-            found[group.name] = (np.abs(exact) < NEAR) & off & ~self._close_to_change
-        return found
+            results[group.name] = (np.abs(exact) < NEAR) & off & ~self._close_to_change
+        return results
 
     # --- change points ----------------------------------------------------------------------------------------------
     @cached_property
@@ -165,24 +165,24 @@ class Estimates:
             smooth = np.maximum(*(estimated(each[key], answered, answer(key).turning) for each in beside))
             estimates[key][rows] = np.where(meet, smooth, estimates[key][rows])
 
-    def _interpolated(self, keys: Sequence[Quantity], rows: NDArray[np.bool_]) -> list[Found]:
+    def _interpolated(self, keys: Sequence[Quantity], rows: NDArray[np.bool_]) -> list[Results]:
         """The quantities close to change points from poses farther off, two times: how far these are apart tells of both."""
         q = self.poses.inputs[rows, 0]
         places = self.branch.change_points
         nearest = [min(places, key=lambda place: abs(x - place[0])) for x in q.tolist()]
-        found = []
+        results = []
         for farther in FARTHER:
             steps = np.cos((np.arange(NODES) + 0.5) * (math.pi / NODES))
             nodes = np.array([at + farther * reach * steps for at, reach in nearest])
             lanes = self.second.again(np.flatnonzero(rows), nodes).doubled(keys)
             weights = _weights(nodes, Doubled(q, self.second.rest[rows, 0]))
-            found.append(
+            results.append(
                 {
                     key: [_weighted(part, weights, nodes.shape) for part in parts]
                     for key, parts in lanes.items()
                 }
             )
-        return found
+        return results
 
 
 def _without_nan(estimates: Reals, values: Any) -> Reals:

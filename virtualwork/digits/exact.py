@@ -1,7 +1,7 @@
 """The formulas of an assembly with every number of its description as an input, for a second run in 32 digits.
 
 What the plan forms of dimensions, differences of coordinates and sums of angles, is then on the tape too, and rounds in
-the second run as little as all the rest. A file's decimals enter as they are written there; numbers that were given as
+the second run as little as all the rest. A file's decimals enter as they are written there; numbers that came as
 floats are exactly these.
 
 Further inputs of the tape
@@ -171,7 +171,7 @@ class Exact(Recording):
         self.phases: dict[str, float] = {}
         open_gears = {g for turn in turns(order.steps) for g, _ in turn.angle.gears}
         if open_gears:
-            # found by placing the links as the guess has them
+            # from the links in the place of the guess
             self.phases = {f"phase {g}": branch.phases[g] for g in open_gears}
             phases: dict[int, Any] = {
                 g: numbers.enter(f"phase {g}", branch.phases[g], Doubled(branch.phases[g]))
@@ -200,7 +200,7 @@ class Exact(Recording):
 
     def _close(self, group: Group, st: State) -> None:
         if group.name in self.folded and not self.enters(group):
-            # where the numbers as given do not quite meet, the root says how far off the assemblies are
+            # where the numbers do not quite meet, the root says how far off the assemblies are
             kind, st.kind = st.kind, MEETING
             self.cases[group.name].solve(st, 1.0, bare(self.mechanism.size))
             st.kind = kind

@@ -38,7 +38,7 @@ STEPS, SMALL = 8, 2.0**-60
 # the last change of any friction, relative; by what share it is moved to see what depends on it
 SETTLED, NUDGE = 2.0**-72, 2.0**-40
 
-Found = dict[Quantity, list[Doubled]]
+Results = dict[Quantity, list[Doubled]]
 NONE: Mapping[str, Doubled] = MappingProxyType({})
 
 
@@ -59,9 +59,9 @@ class SecondRun:
         self._solutions: dict[str, Doubled] = {}
 
     def _rest(self) -> Reals:
-        given = self.poses.input_rest
-        if given is not None:
-            rest = given() if callable(given) else np.asarray(given, dtype=float)
+        own = self.poses.input_rest
+        if own is not None:
+            rest = own() if callable(own) else np.asarray(own, dtype=float)
             return np.broadcast_to(rest, self.poses.inputs.shape)
         rest = np.zeros(self.poses.inputs.shape)
         if self.n == 1:
@@ -105,36 +105,36 @@ class SecondRun:
         some.time = None if self.poses.time is None else np.asarray(self.poses.time)[each]
         return SecondRun(some, np.zeros((len(each), 1)))
 
-    def doubled(self, keys: Sequence[Quantity], changed: Mapping[str, Doubled] | None = None) -> Found:
+    def doubled(self, keys: Sequence[Quantity], changed: Mapping[str, Doubled] | None = None) -> Results:
         """The quantities, real or as two parts, each Doubled of (n,) or of a number.
 
         `changed` inputs enter in place of their own numbers.
         """
         tape = taped(self.branch, self.exact, tuple(keys))
         changed = dict(changed or {})
-        found = run(tape, self.entering(tape.inputs, changed))
+        results = run(tape, self.entering(tape.inputs, changed))
         zero = Doubled(0.0)
-        return {key: [found.get(name, zero) for name in key.names] for key in keys}
+        return {key: [results.get(name, zero) for name in key.names] for key in keys}
 
     def compared(
         self,
         values: Mapping[Quantity, Any],
         others: Sequence[Quantity] = (),
         changed: Mapping[str, Doubled] | None = None,
-    ) -> tuple[dict[Quantity, Reals], Found]:
+    ) -> tuple[dict[Quantity, Reals], Results]:
         """Estimates (n,) of the errors of quantities as they were handed out, (n,) each; and other quantities as `doubled`."""
         tape = taped(self.branch, self.exact, (*values, *others))
         changed = dict(changed or {})
         entering = self.entering(tape.inputs, changed)
         answers = {answer(key): parts(key, value) for key, value in values.items()}
-        estimates, found = compared(tape, entering, answers)
+        estimates, results = compared(tape, entering, answers)
         zero = Doubled(0.0)
         return (
             {
                 key: of if np.shape(of) == (self.n,) else np.full(self.n, of)
                 for key, of in zip(values, estimates, strict=True)
             },
-            {key: [found.get(name, zero) for name in key.names] for key in others},
+            {key: [results.get(name, zero) for name in key.names] for key in others},
         )
 
     def uncertain(self, key: Quantity) -> list[Reals]:
@@ -174,40 +174,40 @@ class SecondRun:
     # --- what enters ------------------------------------------------------------------------------------------------
     def entering(self, inputs: Iterable[str], changed: Mapping[str, Doubled] = NONE) -> dict[str, Any]:
         """The inputs of a tape, by their names; `changed` ones in place of their own numbers."""
-        found: dict[str, Any] = dict(changed)
+        entering: dict[str, Any] = dict(changed)
         others: list[str] = []
         unknown: list[Doubled] = []
         for name in inputs:
             kind, _, of = name.partition(" ")
-            if name in found:
+            if name in entering:
                 continue
             if name in self.exact.known:
-                found[name] = self.exact.known[name]
+                entering[name] = self.exact.known[name]
             elif kind == "x":
-                found[name] = self._unknown(*of.rsplit(" ", 1))
+                entering[name] = self._unknown(*of.rsplit(" ", 1))
             elif kind in ("friction", "slip"):
-                found[name] = self._rubbing(name)
+                entering[name] = self._rubbing(name)
             elif kind == "f":
                 unknown = unknown or self._unknown_forces(changed)
-                found[name] = unknown[int(of)]
+                entering[name] = unknown[int(of)]
             elif kind == "table":
                 number, part = of.split()
-                found[name] = self._table(int(number))[part == "y"]
+                entering[name] = self._table(int(number))[part == "y"]
             elif kind == "slope":
                 number, part = of.split()
-                found[name] = self._slope(int(number))[part == "y"]
+                entering[name] = self._slope(int(number))[part == "y"]
             elif not of and name[0] == "q":
-                found[name] = self._input(int(name[1:]))
+                entering[name] = self._input(int(name[1:]))
             elif not of:
                 order, j = NAMES.index(name[0]), int(name[1:])
                 rate = self.poses.rates[order - 1][j]
                 own = ("speed", "acceleration", "jerk")[order - 1]
-                found[name] = (
+                entering[name] = (
                     rate if np.ndim(rate) else Doubled(float(rate), self._decimals(j, own, float(rate)))
                 )
             else:
                 others.append(name)
-        return found | self.poses.entering(others)
+        return entering | self.poses.entering(others)
 
     def _input(self, j: int) -> Doubled:
         return Doubled(self.poses.inputs[:, j], self.rest[:, j])
@@ -235,10 +235,10 @@ class SecondRun:
         first = self.poses.entering(inputs)
         self._solutions |= {name: Doubled(x) for name, x in first.items()}
         for _ in range(STEPS if keys else 0):
-            found = self.doubled(keys)
+            results = self.doubled(keys)
             steps = 0.0
             for name, key in zip(inputs, keys, strict=True):
-                new, old = found[key][0], self._solutions[name]
+                new, old = results[key][0], self._solutions[name]
                 steps = max(steps, float(np.nanmax(np.abs((new - old).value), initial=0.0)))
                 self._solutions[name] = new
             if not steps > SMALL * max(1.0, self.poses.mechanism.size):
@@ -254,9 +254,9 @@ class SecondRun:
         statics = self.poses.statics
         value, least = statics.solved[0], np.nan_to_num(statics.least[0])
         # what statics does not determine has a part in the balance too
-        known = {f"f {i}": Doubled(column) for i, column in enumerate(least.T)}
+        least_forces = {f"f {i}": Doubled(column) for i, column in enumerate(least.T)}
         keys: list[Quantity] = [Balance(row) for row in range(statics.rows)]
-        left = self.doubled(keys, {**changed, **known})
+        left = self.doubled(keys, {**changed, **least_forces})
         rest = np.stack([np.broadcast_to(left[key][0].value, self.n) for key in keys], axis=1)
         off = np.full(value.shape, np.nan)
         system = statics.system[0]
@@ -288,10 +288,10 @@ class SecondRun:
     def _unfit(self, names: Sequence[str], changed: Mapping[str, Doubled] | None = None) -> list[Doubled]:
         """By how much the forces of the contacts ask for other friction than enters, (n,) each."""
         keys: list[Quantity] = [Rub(int(of.removeprefix("friction "))) for of in names]
-        found = self.doubled(keys, changed)
+        results = self.doubled(keys, changed)
         enters = {of: self._solutions[of] for of in names} | dict(changed or {})
         zero = np.zeros(self.n)
-        return [found[key][0] - enters[of] + zero for key, of in zip(keys, names, strict=True)]
+        return [results[key][0] - enters[of] + zero for key, of in zip(keys, names, strict=True)]
 
     def _slopes(self, names: Sequence[str]) -> Reals:
         """How what does not fit falls with each friction, (n, contacts, contacts), for Newton's method."""

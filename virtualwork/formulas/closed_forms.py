@@ -24,19 +24,19 @@ from virtualwork.plan.steps import Angle, Group, Term
 
 @dataclass(frozen=True)
 class Gap:
-    """By how much a loop does not close: the length that it needs and the one that there is, m.
+    """By how much a loop does not close: the length that it needs and the available one, m.
 
-    `what` has the places {needed}, {given} and {by}, the difference, for lengths as they are to be shown.
+    `what` has the places {needed}, {available} and {by}, the difference, for lengths as they are to be shown.
     """
 
     needed: float
-    given: float
+    available: float
     what: str
 
     def text(self, show: Callable[[float], str]) -> str:
         """The sentence, with lengths as `show` writes them."""
-        by = show(abs(self.needed - self.given))
-        return self.what.format(needed=show(self.needed), given=show(self.given), by=by)
+        by = show(abs(self.needed - self.available))
+        return self.what.format(needed=show(self.needed), available=show(self.available), by=by)
 
 
 def gap_of(kind: str, names: tuple[str, ...], w: complex, v: complex, u: complex) -> Gap | None:
@@ -49,18 +49,18 @@ def gap_of(kind: str, names: tuple[str, ...], w: complex, v: complex, u: complex
         d, r1, r2 = abs(w), abs(v), abs(u)
         both = f"{names[0]} and {names[1]}"
         if d > r1 + r2:
-            return Gap(d, r1 + r2, f"{both} together reach {{given}}, {{needed}} needed: {{by}} short")
+            return Gap(d, r1 + r2, f"{both} together reach {{available}}, {{needed}} needed: {{by}} short")
         if d < abs(r1 - r2):
-            what = f"{both} come no nearer than {{given}}, {{needed}} needed: {{by}} too long"
+            what = f"{both} come no nearer than {{available}}, {{needed}} needed: {{by}} too long"
             return Gap(d, abs(r1 - r2), what)
     elif kind == "RRP":
         y, r = abs(cross(u, w)) / abs(u), abs(v)
         if y > r:
-            return Gap(y, r, f"{names[0]} reaches {{given}}, {{needed}} needed: {{by}} short")
+            return Gap(y, r, f"{names[0]} reaches {{available}}, {{needed}} needed: {{by}} short")
     elif kind == "RPR":
         d, q = abs(w), abs(cross(u, v)) / abs(u)
         if d < q:
-            what = f"the guide at {names[0]} runs past at {{given}}, {{needed}} needed: {{by}} too far"
+            what = f"the guide at {names[0]} runs past at {{available}}, {{needed}} needed: {{by}} too far"
             return Gap(d, q, what)
     else:
         offset = abs(cross(u, w)) / abs(u)
@@ -128,7 +128,7 @@ def two_angles(
     outer, inner = r1 + r2, r1 - r2
     radicand = (outer * outer - d2) * (d2 - inner * inner)
     half = 0.5 / d2
-    # the apex lies at a − ih from the start: seen from V1, the turn to V2 has the sign asked for
+    # the apex lies at a − ih from the start: seen from V1, the turn to V2 has the requested sign
     t = kind.join((d2 + outer * inner) * half, _root(radicand, sign, kind) * -half)
     arm = t * w
     return arm * (-1 / v1), (arm - w) * (1 / v2), radicand * (0.25 / (r1 * r2) / (r1 * r2))

@@ -257,7 +257,7 @@ def _free(jacobian: Reals) -> Reals | None:
 def _settled(
     m: Description, x: Reals, phases: Mapping[int, float], driving: Reals | None = None
 ) -> Reals | None:
-    """The pose nearby at which all joints close, with the inputs free or given; None where there is none."""
+    """The pose nearby at which all joints close, with the inputs free or fixed; None where there is none."""
     for _ in range(30):
         here = Constraints.at(m, x, phases)
         values, jacobian = here.values, here.jacobian

@@ -34,7 +34,7 @@ from virtualwork.plan.steps import Joint
 
 @guarded
 class Dynamics:
-    """The forces of poses; each is formed when first asked for. `Motion.dynamics` is one.
+    """The forces of poses; each is formed on the first request. `Motion.dynamics` is one.
 
     Attributes
     ----------
@@ -105,14 +105,14 @@ class Dynamics:
     @cached_property
     def without_length(self) -> dict[int, NDArray[np.bool_]]:
         """Of the springs whose pull needs a direction, by number: the poses in which their ends meet, (n,)."""
-        m, found = self.poses.mechanism, {}
+        m, result = self.poses.mechanism, {}
         for number, spring in enumerate(m.springs, 1):
             if (spring.stiffness and spring.free_length) or (spring.damping and self.scene.moves):
                 a, b = (self.poses.point(link, m.place(link, p)) for link, p in spring.between)
                 meet = np.broadcast_to(np.abs(a - b) <= TOGETHER * m.size, self.poses.n)
                 if meet.any():
-                    found[number] = meet
-        return found
+                    result[number] = meet
+        return result
 
     @cached_property
     def effort(self) -> Reals:

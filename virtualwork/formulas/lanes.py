@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 # poses from which on a second request brings all of its kind, and how many times the operations of those requested
 MANY_POSES, WASTE = 10_000, 4
-# times that one pose is asked for from which on the tape pays
+# requests of one pose from which on the tape pays
 OFTEN = 50
 
 
@@ -68,7 +68,7 @@ class Lanes(Solving):
     def values(self, keys: Sequence[Quantity], forces: Callable[[], Dynamics] | None = None) -> list[Any]:
         """The quantities, each (n,), real or complex, in arrays of the caller's own.
 
-        Of many poses they come from the tape, of one from the formulas on floats. One pose that is asked for often comes from the
+        Of many poses they come from the tape, of one from the formulas on floats. One pose that is requested often comes from the
         tape too, as a function of floats; its forces from what `forces` gives.
         """
         new = tuple([key for key in keys if key not in self._taped])
@@ -79,7 +79,7 @@ class Lanes(Solving):
             new = self._foreseen(new)
             if self.many or not self.one(new):
                 self._fill(new)
-            # not before: what a table is over is asked for on the way, and may be among these
+            # not before: the quantity of a table is requested on the way, and may be among these
             self._taped |= dict.fromkeys(new, True)
         # what was handed out once stays as it is, to its last digit
         without = [key for key in keys if not self._taped[key]]
@@ -111,8 +111,8 @@ class Lanes(Solving):
         return [self.known[key].copy() for key in keys]
 
     def _often(self, keys: tuple[Quantity, ...]) -> bool:
-        """Whether one pose has been asked for so often that to write the tape pays: some milliseconds."""
-        counts = self.branch.recordings.setdefault("asked", {})
+        """Whether requests of one pose are so many that writing the tape pays, which takes some milliseconds."""
+        counts = self.branch.recordings.setdefault("requests", {})
         counts[keys] = counts.get(keys, 0) + 1
         return bool(counts[keys] > OFTEN)
 
@@ -142,8 +142,8 @@ class Lanes(Solving):
 
     def one(self, keys: tuple[Quantity, ...]) -> bool:
         """Work out one pose that depends on nothing but its input, by a function of floats; False where it depends on more."""
-        given = [self.inputs, *(rates[0] for rates in self.rates)]
-        values = [x if isinstance(x, float) else float(np.ravel(x)[0]) for x in given]
+        inputs = [self.inputs, *(rates[0] for rates in self.rates)]
+        values = [x if isinstance(x, float) else float(np.ravel(x)[0]) for x in inputs]
         function = ready(self.branch, tuple(x != 0.0 for x in values[1:]), keys)
         if function is None or self._nowhere is not None:
             return False
@@ -160,9 +160,9 @@ class Lanes(Solving):
         kept = self._kept
         known = frozenset(kept) if self.n > 1 and not self.once else None
         later = cut(self.branch, self.recording, (*keys, *doubts), known, not self.known)
-        given = self.entering(name for name in later.tape.inputs if name not in later.takes)
-        given |= {name: kept[number] for name, number in later.takes.items()}
-        out = run(later.tape, given, pairs=[key.names[0] for key in keys if key.is_vector])
+        entering = self.entering(name for name in later.tape.inputs if name not in later.takes)
+        entering |= {name: kept[number] for name, number in later.takes.items()}
+        out = run(later.tape, entering, pairs=[key.names[0] for key in keys if key.is_vector])
         self._kept.update((number, out[name]) for name, number in later.leaves.items())
         for key in doubts:
             self._bad[key] = self._where_bad(key, out[key.names[0]])

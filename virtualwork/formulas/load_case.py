@@ -110,10 +110,10 @@ class LoadCase:
     @cached_property
     def contacts(self) -> list[tuple[Joint, str, str, float, float]]:
         """What rubs: (joint, body, the body it rubs on, coefficient, radius)."""
-        m, found = self.mechanism, []
-        known = joints(m) if m.friction and self.moves else []
+        m, result = self.mechanism, []
+        every = joints(m) if m.friction and self.moves else []
         for i, entry in enumerate(m.friction if self.moves else (), 1):
-            here = [joint for joint in known if joint.name == entry.joint]
+            here = [joint for joint in every if joint.name == entry.joint]
             if not here:
                 raise DescriptionError(
                     f"[[friction]] {i} joint: '{entry.joint}' is no joint: nothing is pinned or guided there"
@@ -121,11 +121,11 @@ class LoadCase:
             for joint in here:
                 if joint.guide is not None:
                     g = m.guides[joint.guide]
-                    found.append((joint, g.link, g.on, entry.coefficient, entry.radius))
+                    result.append((joint, g.link, g.on, entry.coefficient, entry.radius))
                 elif entry.radius or len(here) == 1:
                     first, *others = joint.bodies
-                    found += [(joint, body, first, entry.coefficient, entry.radius) for body in others]
-        return found
+                    result += [(joint, body, first, entry.coefficient, entry.radius) for body in others]
+        return result
 
     @cached_property
     def friction(self) -> list[FrictionLoad]:

@@ -318,7 +318,7 @@ class LoadPaths:
     def rest(self, body: str) -> Combination:
         """ΣM of a body's loads and joint forces: what torques must balance.
 
-        About the joint whose force was found last, from ΣF = 0, so that this force has no lever.
+        About the joint whose force was computed last, from ΣF = 0: this force has no lever.
         """
         key = "rest", body
         if key not in self._known:

@@ -1,6 +1,6 @@
 """A pose as the loads see it: where points lie, how far they move, what has been formed there already.
 
-Whatever depends on loads, a load's value or a quantity made of several, is formed once, when it is first asked for.
+Whatever depends on loads, a load's value or a quantity made of several, is formed once, on the first request.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ class Setting(Shared):
         return np.broadcast_to(turns, (1, along.n))
 
     def _counted(self, spring: TorsionSpring) -> Samples:
-        """The twist of a torsion spring followed from the guess over all poses asked for."""
+        """The twist of a torsion spring followed from the guess over all requested poses."""
         if spring not in self._followed:
             m = self.mechanism
             inputs, at = self.poses.inputs[:, 0], m.at[0]
@@ -150,7 +150,7 @@ class Formed(Protocol):
 
 
 class Table(Protocol):
-    """A load given by a table."""
+    """A load with a table."""
 
     def place_in(self, pose: LoadedPose) -> Number:
         """What the table is over, at a pose."""

@@ -169,7 +169,7 @@ class Follower(Load):
 
 @dataclass(frozen=True, eq=False)
 class Tabled(Load):
-    """A force or a torque given by a table, linear between its rows; periodic where the table is one.
+    """A force or a torque of a table, linear between its rows; periodic where the table is one.
 
     Its `axis` is the one input, the time, or the angle or speed of the link it acts on.
     """
@@ -224,7 +224,7 @@ class Tabled(Load):
         return first + (angle - first) % (2 * np.pi)
 
     def over(self, q: Number) -> Number:
-        """The force at places of the table, in the axes that it is given in; NaN outside."""
+        """The force at places of the table, in the axes of the load; NaN outside."""
         at, force, q = self._in_cycle(q)
         outside = (q < at[0]) | (q > at[-1])
         values = np.where(outside, np.nan, np.interp(q, at, force.real) + 1j * np.interp(q, at, force.imag))

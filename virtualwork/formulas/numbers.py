@@ -81,7 +81,7 @@ def leave_out(values: NDArray[Any], which: NDArray[np.bool_]) -> None:
 def real_array(name: str, value: ArrayLike, once: bool = False) -> Reals:
     """Read real numbers as an array of its own; ValueError names what holds something else.
 
-    A motion is solved when it is first asked for: what the caller does to his array in between does not change it. What is
+    A motion is solved on the first request: what the caller does to his array in between does not change it. What is
     solved at `once` may read the caller's own.
 
     >>> real_array("angle", "abc")

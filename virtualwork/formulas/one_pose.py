@@ -1,6 +1,6 @@
-"""One pose of a motion as a function of floats, straight through: the way of an evaluator, for a motion asked again and again.
+"""One pose of a motion as a function of floats, straight through: the way of an evaluator, for a motion with many requests.
 
-A loop asks each of its motions for the same quantities, one after the other. What motions of an assembly were often asked for
+A loop requests the same quantities of each of its motions, one after the other. What was often requested of motions of an assembly
 after the same first request comes with it from then on, by one function for all of it.
 """
 

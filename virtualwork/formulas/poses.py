@@ -1,4 +1,4 @@
-"""Poses: where an assembly stands at given inputs, and of one pose all derivatives, solved as far as asked, and never twice.
+"""Poses: where an assembly stands at given inputs, and of one pose all derivatives, solved as far as requested, and never twice.
 
 With one input, derivatives are taken once with respect to the input (the velocity coefficients K = dx/dq, L = d²x/dq²,
 M = d³x/dq³), so that ẋ = K·q̇,  ẍ = K·q̈ + L·q̇²,  x⃛ = K·q⃛ + 3L·q̇·q̈ + M·q̇³.  With several inputs they are taken along
@@ -95,8 +95,8 @@ class Poses:
         self.mechanism = m = branch.mechanism
         k = len(m.inputs)
         if angle is None:
-            given = [e.value for e in m.inputs]
-            angle = [a if v is None else v for v, a in zip(given, m.at, strict=True)]
+            own = [e.value for e in m.inputs]
+            angle = [a if v is None else v for v, a in zip(own, m.at, strict=True)]
             angle = angle if k == 1 else [angle]
         self.inputs = q = as_inputs(angle, k, once)
         self.n = len(q)

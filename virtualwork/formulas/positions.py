@@ -276,7 +276,7 @@ def follow(
     Returns
     -------
     nodes, angles : array (m,)
-        More than asked for where the angle turns far between two of them, and towards the end of a branch.
+        More than requested where the angle turns far between two of them, and towards the end of a branch.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Derivatives of every order along given derivatives of the inputs.
+"""Derivatives of every order along derivatives of the inputs.
 
 They follow Leibniz's rule on e^{iθ}:  (e^{iθ})⁽ᵏ⁾ = i Σ_j C(k−1, j) θ⁽ʲ⁺¹⁾ (e^{iθ})⁽ᵏ⁻¹⁻ʲ⁾. The part of a loop's k-th
 derivative that holds no unknown of order k is its right-hand side; the columns of the Jacobian are the same for every
@@ -41,7 +41,7 @@ class Passage(Protocol):
 
 
 class Rates:
-    """Derivatives of every order along given input derivatives, over the poses of one `State`.
+    """Derivatives of every order along derivatives of the inputs, over the poses of one `State`.
 
     Attributes
     ----------

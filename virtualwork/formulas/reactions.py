@@ -1,4 +1,4 @@
-"""Joint forces by Newton and Euler, each formed when it is asked for.
+"""Joint forces by Newton and Euler, each formed on request.
 
 How they follow from each other is worked out once for a mechanism (`load_paths`); here the combinations become numbers of a pose.
 """
@@ -55,7 +55,7 @@ class JointForces:
         value = self.on_side(pose, (joint.key, body))
         guide = joint.guide
         if guide is not None and value is not None and self.is_pushed(guide):
-            # along a driven guide the joint's own equilibrium leaves the effort, which is given apart, or a tooth force
+            # along a driven guide the joint's own equilibrium leaves the effort, which is a result of its own, or a tooth force
             rail = self.rail(pose, guide)
             value = value - dot(value, rail) * rail
         value = plus(value, self.borne(pose, joint, body))
@@ -90,7 +90,7 @@ class JointForces:
     def contact(self, pose: LoadedPose, cam: int, push: Number = None) -> Number:
         """How hard a cam presses on its follower along the normal; below zero it would have to pull.
 
-        `push`: what it does along the follower's coordinate, where statics has told it.
+        `push`: what it does along the follower's coordinate, where statics determines it.
         """
         touch = self.paths.touches.every[cam]
         if push is None:

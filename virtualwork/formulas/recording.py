@@ -11,7 +11,7 @@ Inputs of a tape
 `x GROUP 0`              the unknowns of a group without a closed form: angles, then slides
 `near BODY`              the angle, with its whole turns, of a body of which the angle itself is needed
 `near spring 0`          the same of a torsion spring's twist
-`table 0 x`, `table 0 y` the force of the first load that is given by a table
+`table 0 x`, `table 0 y` the force of the first load with a table
 `slope 0 x`, `slope 0 y` its derivative to what the table is over
 `time`                   where a table is over it
 
@@ -53,7 +53,7 @@ NAMES = ("q", "v", "a", "j")
 
 @guarded
 class Recording:
-    """The formulas of an assembly, written down as far as they are asked for.
+    """The formulas of an assembly, written down as far as requested.
 
     Parameters
     ----------
@@ -103,9 +103,9 @@ class Recording:
         ]
         self.cases = {g.name: Case(g, bare) for g in plan.groups if g.kind != "Newton"}
         self.by = [self.rates_of(j, [[1.0] if i == j else [] for i in range(k)]) for j in range(k)]
-        given = [[rate[j] for rate in self.rates] for j in range(k)]
+        rates = [[rate[j] for rate in self.rates] for j in range(k)]
         # in time, with several inputs
-        self.together = self.rates_of(k, given) if k > 1 else None
+        self.together = self.rates_of(k, rates) if k > 1 else None
         self._done: set[tuple[int, int, int]] = set()
         # what is solved, to which order
         self._solved: dict[str, int] = {}
@@ -123,9 +123,9 @@ class Recording:
         """That of the recorder, into which motions of one assembly, and variants, write."""
         return own_lock(self.recorder)
 
-    def rates_of(self, way: int, given: list[list[Number]]) -> Rates:
+    def rates_of(self, way: int, rates: list[list[Number]]) -> Rates:
         """The derivatives over an input, or in time with several inputs (`way` is their count), before any is written down."""
-        return Rates(self.plan, self.st, given)
+        return Rates(self.plan, self.st, rates)
 
     # --- solving ------------------------------------------------------------------------------------------------
     def enters(self, group: Group) -> bool:
@@ -273,8 +273,8 @@ class Entering(Recording):
         self.right: dict[tuple[str, int, int], list[Number]] = {}
         super().__init__(*of, **more)
 
-    def rates_of(self, way: int, given: list[list[Number]]) -> Rates:
-        return _Entering(self, way, given)
+    def rates_of(self, way: int, rates: list[list[Number]]) -> Rates:
+        return _Entering(self, way, rates)
 
     def enters(self, group: Group) -> bool:
         return group.name in self.entering
@@ -309,8 +309,8 @@ class RightSide(Quantity, kind="right side"):
 class _Entering(Rates):
     """Derivatives of which those of some groups enter."""
 
-    def __init__(self, recording: Entering, way: int, given: list[list[Number]]) -> None:
-        super().__init__(recording.plan, recording.st, given)
+    def __init__(self, recording: Entering, way: int, rates: list[list[Number]]) -> None:
+        super().__init__(recording.plan, recording.st, rates)
         self.recording, self.way = recording, way
 
     def _group(self, group: Group, k: int) -> None:

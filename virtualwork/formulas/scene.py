@@ -1,4 +1,4 @@
-"""The loads of a mechanism at its poses: what acts, and the forces as far as they are asked for."""
+"""The loads of a mechanism at its poses: what acts, and the requested forces."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Scene:
 
     @property
     def on_tape(self) -> bool:
-        """Whether forces come from the tape: of many poses, and where friction is to be found."""
+        """Whether forces come from the tape: of many poses, and where there is friction to solve."""
         return self.poses.many or bool(self.case.contacts)
 
     @cached_property

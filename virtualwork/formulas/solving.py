@@ -268,16 +268,16 @@ class Solving(Poses):
             if key not in self._bad:
                 self._bad[key] = self._where_bad(key, key.of_rows(rows, self.n))
 
-    def _where_bad(self, key: Quantity, found: Any) -> NDArray[np.bool_] | None:
+    def _where_bad(self, key: Quantity, values: Any) -> NDArray[np.bool_] | None:
         """The poses that a doubt is right about; None where it is right about none."""
         if is_closed(key):
-            bad = ~np.isfinite(found)
+            bad = ~np.isfinite(values)
         else:
             least = NEAR if isinstance(key, Margin) else SINGULAR
             # mostly of no pose: that takes one pass
-            if np.size(found) and np.min(found) >= least:
+            if np.size(values) and np.min(values) >= least:
                 return None
-            bad = np.abs(found) < least
+            bad = np.abs(values) < least
         return np.broadcast_to(bad, self.n) if np.any(bad) else None
 
     @cached_property

@@ -75,7 +75,7 @@ class SpringEnd(SpringSide):
             return None
         d = self._between(pose.position)
         if not s.free_length:
-            # the pull is k·d: no direction is needed, and none is asked for at zero length
+            # the pull is k·d: no direction is needed, and none exists at zero length
             return s.stiffness * d
         return s.stiffness * (1 - s.free_length * self._inverse(pose, d)) * d
 

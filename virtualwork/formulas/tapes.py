@@ -114,7 +114,7 @@ def _made(branch: Branch, moves: tuple[bool, ...], keys: tuple[Quantity, ...]) -
     arguments = tuple(f"{name}0" for name in NAMES)
     if not floats.takes(tape) or not set(tape.inputs) <= set(arguments):
         return None
-    return floats.compiled(tape, among=arguments, results=tuple(key.names for key in keys))
+    return floats.compiled(tape, among=arguments, numbers=tuple(key.names for key in keys))
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ class LinkStates:
     force, torque : (..., n)
         The applied force (complex, N) and torque (N·m) on each link.
     point_velocity : complex, (..., n), optional
-        Velocity of the force's point of application, m/s; the centre of mass's where it is not given.
+        Velocity of the force's point of application, m/s; default: that of the centre of mass.
     gravity : complex
         m/s², such as −9.81j.
 

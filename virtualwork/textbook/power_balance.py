@@ -47,7 +47,7 @@ class Balance:
     """(...): condition number of the coefficients, rows and columns scaled; 1 for one unknown."""
     power: Real
     """(..., k): the power of the known loads in each field, W."""
-    given: tuple[LinkStates, tuple[UnitLoad, ...]] | None = field(default=None, repr=False, compare=False)
+    problem: tuple[LinkStates, tuple[UnitLoad, ...]] | None = field(default=None, repr=False, compare=False)
     """The states and the unknowns that were balanced."""
 
     def plot(self, links: Sequence[str] = (), figure: FigureBase | None = None) -> NDArray[np.object_]:
@@ -64,8 +64,8 @@ class Balance:
         """
         from virtualwork.textbook.picture import UNKNOWN, ledger, over_steps
 
-        assert self.given is not None
-        states, unknowns = self.given
+        assert self.problem is not None
+        states, unknowns = self.problem
         named = links or [str(i + 1) for i in range(states.shape[-1])]
         loads = [
             (" and ".join(n for n, acts in zip(named, u.acts.tolist(), strict=True) if acts), u.unit)
@@ -96,8 +96,8 @@ class Balance:
         Examples
         --------
         >>> states = LinkStates(velocity=[0, 3], omega=[0.7, 0], force=[0, 5])
-        >>> found = balance(states, [UnitLoad(torque=[1, 0])])
-        >>> float(found.value[0]), bool(0 < found.error_estimate()[0] < 1e-14)
+        >>> result = balance(states, [UnitLoad(torque=[1, 0])])
+        >>> float(result.value[0]), bool(0 < result.error_estimate()[0] < 1e-14)
         (-21.42857142857143, True)
         """
         value = np.where(self.determined, self.value, 0.0)
@@ -109,8 +109,8 @@ class Balance:
         What the floats leave in 32 digits of C x + P, C⁺ times that, is what they are off by (iterative refinement: N. J.
         Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., §12.1).
         """
-        assert self.given is not None
-        states, unknowns = (self.given[0].in_32_digits, self.given[1]) if exact is None else exact
+        assert self.problem is not None
+        states, unknowns = (self.problem[0].in_32_digits, self.problem[1]) if exact is None else exact
         coefficient, power = _coefficients(states, unknowns), states.whole_power
         if len(unknowns) == 1:
             coefficient, power = coefficient[..., None, :], power[..., None]
@@ -199,7 +199,7 @@ def balance(states: LinkStates, unknowns: Sequence[UnitLoad]) -> Balance:
             states.power[..., None],
             (states, tuple(unknowns)),
         )
-    return replace(_solve(coefficient, states.power), given=(states, tuple(unknowns)))
+    return replace(_solve(coefficient, states.power), problem=(states, tuple(unknowns)))
 
 
 def _coefficients(states: LinkStates, unknowns: Sequence[UnitLoad]) -> Any:

@@ -49,7 +49,7 @@ class Outputs(Mapping[str, Any]):
         return self.table[self.tape.rows[name]]
 
     def complex(self, real: str, imaginary: str) -> Any:
-        """Two outputs as one complex number: without a copy where the run was told that they are `pairs`."""
+        """Two outputs as one complex number: without a copy where they are among the run's `pairs`."""
         row = self.tape.rows.get(real, -1)
         if row in self.pairs and self.tape.rows.get(imaginary) == row + 1:
             return self.pairs[row]
@@ -76,7 +76,7 @@ def run(
     inputs : mapping of name to float, or array (n,)
         A float is the same for every lane. Further names are ignored.
     engine : "python", "numpy" or "llvm"
-        Chosen by the size of the work where not given.
+        Default: chosen by the size of the work.
     pairs : names of outputs
         Each and the output after it are the parts of a complex number, and are laid side by side for it.
 
@@ -231,7 +231,7 @@ def lanes_in_all(n: int) -> int:
 
 
 def chosen(tape: Tape, n: int) -> str:
-    """The engine for n lanes: compiled code only once the tape has been asked for so often that it pays."""
+    """The engine for n lanes: compiled code only after so many requests of the tape that it pays."""
     if lanes_in_all(n) <= FEW:
         return "python"
     return "llvm" if work_on(tape, n) > PAYS else "numpy"

@@ -81,7 +81,7 @@ def run(tape: Tape, inputs: Mapping[str, Any], direct: bool = False) -> dict[str
         common = _run(tape, numbers, uniform, {}, {})
         if alone:
             return {name: common[number] for name, number in tape.outputs}
-        found: dict[int, Any] = {
+        results: dict[int, Any] = {
             number: common[number] if number in common else Doubled(np.empty(n), np.empty(n))
             for number in dict.fromkeys(number for _, number in tape.outputs)
         }
@@ -89,10 +89,10 @@ def run(tape: Tape, inputs: Mapping[str, Any], direct: bool = False) -> dict[str
             rows = slice(start, min(start + BLOCK, n))
             here = {name: _rows(x, rows) for name, x in numbers.items()}
             values = _run(tape, here, varying, dict(common), last)
-            for number, whole in found.items():
+            for number, whole in results.items():
                 if number not in common:
                     whole.high[rows], whole.low[rows] = values[number].high, values[number].low
-    return {name: found[number] for name, number in tape.outputs}
+    return {name: results[number] for name, number in tape.outputs}
 
 
 def compared(
@@ -127,13 +127,13 @@ def compared(
     others = [name for name in tape.names if name not in compared_with]
     engine = _engine(tape, n) if n > FEW else None
     if engine is None:
-        found = run(tape, inputs, direct=True)
+        results = run(tape, inputs, direct=True)
         with np.errstate(all="ignore"):
             estimates = [
-                estimated([found.get(part, ZERO) for part in answer.parts], parts, answer.turning)
+                estimated([results.get(part, ZERO) for part in answer.parts], parts, answer.turning)
                 for answer, parts in answers.items()
             ]
-        return estimates, {name: found[name] for name in others}
+        return estimates, {name: results[name] for name in others}
     entering = {
         f"answer {part}": x
         for answer, parts in answers.items()
@@ -251,7 +251,7 @@ def _split(
     tape: Tape, arrays: frozenset[str]
 ) -> tuple[tuple[int, ...], tuple[int, ...], dict[int, tuple[int, ...]]]:
     """The operations that are the same for all lanes, the others, and what each of these is the last to use."""
-    lanes = tape.hang({name: int(name in arrays) for name in tape.inputs})
+    lanes = tape.dependence({name: int(name in arrays) for name in tape.inputs})
     uniform = tuple(number for number, varies in enumerate(lanes) if not varies)
     varying = tuple(number for number, varies in enumerate(lanes) if varies)
     outputs = {number for _, number in tape.outputs}

@@ -221,13 +221,13 @@ class Tape {
   }
 
   // the outputs of n lanes, each a Float64Array; what enters is a number, or an array of n
-  run(given, n) {
+  run(entering, n) {
     const values = new Array(this.size);
     const free = [];
     const shared = new Set();
     for (const [k, name] of this.enters.entries()) {
-      const x = given[name];
-      if (x === undefined) throw new Error(`nothing given for ${name}`);
+      const x = entering[name];
+      if (x === undefined) throw new Error(`no input ${name}`);
       values[k] = typeof x === "number" ? Float64Array.of(x) : x;
       shared.add(values[k]);
     }
@@ -278,10 +278,10 @@ class Tape {
   }
 
   // the outputs of one lane; what enters is a number
-  one(given) {
+  one(entering) {
     const v = (this.room ??= new Float64Array(this.size));
     let k = 0;
-    for (const name of this.enters) v[k++] = given[name];
+    for (const name of this.enters) v[k++] = entering[name];
     for (const x of this.constants) v[k++] = x;
     const code = this.operations;
     for (let i = 0; i < code.length; k++) {
@@ -307,8 +307,8 @@ class Tape {
   }
 
   // the outputs of one lane in 32 digits, [high, low] each; what enters is a number, or such a pair
-  twice(given) {
-    const values = this.enters.map((name) => (typeof given[name] === "number" ? [given[name], 0] : given[name]));
+  twice(entering) {
+    const values = this.enters.map((name) => (typeof entering[name] === "number" ? [entering[name], 0] : entering[name]));
     for (const x of this.constants) values.push([x, 0]);
     for (const [kind, to, ...from] of this.steps) {
       if (kind === PICK) {

@@ -41,9 +41,9 @@ TWO: dict[str, Callable[[float, float], float]] = {
 def compiled(
     tape: Tape,
     passed: tuple[str, ...] = (),
-    found: tuple[str, ...] = (),
+    results: tuple[str, ...] = (),
     among: tuple[str, ...] = (),
-    results: tuple[tuple[str, ...], ...] = (),
+    numbers: tuple[tuple[str, ...], ...] = (),
 ) -> Callable[..., tuple[Any, ...]]:
     """The tape as a function of floats: inputs in the order of `tape.inputs`, outputs in that of `tape.outputs`.
 
@@ -52,13 +52,13 @@ def compiled(
     Parameters
     ----------
     tape : Tape
-    passed, found : names, optional
-        Of the body of a `loop.Loop`: what each call is given, which may be nothing, and what it finds. Where `found`
-        is not empty the function that is called comes first among the arguments, and what calls are given is no
-        output. A call whose results nothing uses is left out.
+    passed, results : names, optional
+        Of the body of a `loop.Loop`: the arguments of each call, which may be none, and its results. Where there are
+        `results`, the called function comes first among the arguments, and the arguments of calls are no outputs. A call
+        whose results nothing uses is left out.
     among : names, optional
         The arguments, among which the inputs are; by default the inputs alone.
-    results : tuple of names, optional
+    numbers : tuple of names, optional
         The output of each real number, which has no −0 then, and the two of each complex one; default: all outputs as they are.
     """
     inputs = list(among) or [name for name in tape.inputs if called(name) is None]
@@ -84,10 +84,10 @@ def compiled(
             if of is None:
                 text.append(f"x{inputs.index(arguments[0])}")
             else:
-                text.append(f"c{of[0]}_{found.index(of[1])}")
+                text.append(f"c{of[0]}_{results.index(of[1])}")
                 if of[0] not in done:
                     passed_text = ", ".join(text[places[f"call {of[0]} {name}"]] for name in passed)
-                    to = "".join(f"c{of[0]}_{i}, " for i in range(len(found)))
+                    to = "".join(f"c{of[0]}_{i}, " for i in range(len(results)))
                     lines.append(f"{to}= f({passed_text})")
                     done.add(of[0])
             depth.append(0)
@@ -101,9 +101,9 @@ def compiled(
                 lines.append(f"v{number} = {expression}")
                 text.append(f"v{number}")
                 depth.append(0)
-    names = ", ".join([*(["f"] if found else []), *(f"x{k}" for k in range(len(inputs)))])
-    if results:
-        parts = [[text[places[name]] for name in each] for each in results]
+    names = ", ".join([*(["f"] if results else []), *(f"x{k}" for k in range(len(inputs)))])
+    if numbers:
+        parts = [[text[places[name]] for name in each] for each in numbers]
         values = [f"complex({', '.join(of)})" if len(of) > 1 else f"{of[0]} + 0.0" for of in parts]
     else:
         values = [text[number] for name, number in tape.outputs if called(name) is None]

@@ -238,7 +238,7 @@ def loaded(name: str, symbol: str, written: Callable[[int], Any]) -> tuple[int, 
             raise RuntimeError("the compiled function is not found")
         return width, engine, address
     except Exception as error:
-        # whatever LLVM and the system say: the work is done by numpy, and said so once
+        # after any error of LLVM or the system numpy does the work, with one warning
         _unusable.append(str(error))
         warnings.warn(
             f"no code can be made at run time ({error}); numpy does the work", RuntimeWarning, stacklevel=2

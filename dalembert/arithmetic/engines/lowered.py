@@ -53,24 +53,24 @@ def lowered(tape: Tape, inputs: str, outputs: str, width: int) -> ir.Module:
             return _everywhere(row, v, row.load(row.gep(sources[k], [r])))
         return lane.load(vector_at(lane, bases[k], i), align=8)
 
-    hangs = tape.hang(dict(zip(tape.inputs, ("urcb".index(what) for what in inputs), strict=True)))
-    values = body(tape, v, [(once, row, lane, lane)[on] for on in hangs], enter)
-    found = [values[place] for _, place in tape.outputs]
+    levels = tape.dependence(dict(zip(tape.inputs, ("urcb".index(what) for what in inputs), strict=True)))
+    values = body(tape, v, [(once, row, lane, lane)[on] for on in levels], enter)
+    results_of = [values[place] for _, place in tape.outputs]
 
     now: dict[int, ir.Value] = {}
     for k, what in enumerate(outputs):
         if what == "h":
-            now[k] = lane.and_(so_far[k], lane.fcmp_ordered(">", found[k], v.constant(0.0)))
+            now[k] = lane.and_(so_far[k], lane.fcmp_ordered(">", results_of[k], v.constant(0.0)))
         elif what == "p":
             twice = lane.add(i, i)
             base = row.gep(targets[k], [row.add(begin, begin)])
             for half, at in enumerate((twice, lane.add(twice, number(width)))):
                 turn = [j // 2 + (width if j % 2 else 0) for j in range(half * width, (half + 1) * width)]
                 mask = ir.Constant(ir.VectorType(ir.IntType(32), width), turn)
-                both = lane.shuffle_vector(found[k], found[k + 1], mask)
+                both = lane.shuffle_vector(results_of[k], results_of[k + 1], mask)
                 lane.store(both, vector_at(lane, base, at), align=8)
         elif outputs[k - 1 : k] != "p":
-            lane.store(found[k], vector_at(lane, row.gep(targets[k], [begin]), i), align=8)
+            lane.store(results_of[k], vector_at(lane, row.gep(targets[k], [begin]), i), align=8)
 
     following = lane.add(i, number(width))
     over = lane.icmp_signed(">", following, last)

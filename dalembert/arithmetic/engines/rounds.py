@@ -78,7 +78,7 @@ def run(
     given, state : mapping of name to float or array (n,)
         Constants and the state to begin with.
     engine : "numpy" or "llvm"
-        Chosen by the work done so far where not given.
+        Default: chosen by the work done so far.
     fed : mapping of name to array (capacity, n), optional
         What every round has of its own.
 
