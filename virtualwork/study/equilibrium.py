@@ -21,16 +21,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.branch.assembly import Assembly
-from virtualwork.branch.limits import TURNED
 from virtualwork.digits.balance import Balance
 from virtualwork.formulas.numbers import EPS, Reals
-from virtualwork.study.loads_at_rest import Rest
+from virtualwork.study.loads_at_rest import AROUND, Rest, goes_round, turns_of_loads
 
 SAMPLES = 1440
-# steps of a turn in which usual loads are looked at
-AROUND = 72
-# positions in which the loads some turns later are compared, and what makes no difference, as a share of their terms
-COMPARED, ALIKE = 24, 1e-9
 # of a turn: a range in which the loads' usual work cannot be seen
 NARROW = 0.1
 # halvings of the way from the last sample to a limit, and how far behind the limit a range ends, of a turn
@@ -220,7 +215,7 @@ def _searched(assembly: Assembly) -> tuple[tuple[int | None, ...], Reals]:
     """After how many turns of each input the loads come back, and the range that is searched of each, (k, 2)."""
     m, at, turn = assembly.mechanism, np.asarray(assembly.mechanism.at, dtype=float), 2 * np.pi
     one = len(at) == 1
-    turns = [None if entry.is_slide else _turns(assembly, j) for j, entry in enumerate(m.inputs)]
+    turns = [None if entry.is_slide else turns_of_loads(assembly, j) for j, entry in enumerate(m.inputs)]
     limits = np.array([-np.inf, np.inf])
     if one and (m.torsion_springs or not (turns[0] or m.inputs[0].is_slide)):
         # beyond them no way leads from the guess, along which turns would be counted
@@ -234,34 +229,8 @@ def _searched(assembly: Assembly) -> tuple[tuple[int | None, ...], Reals]:
         elif entry.is_slide:
             ranges[j] += np.array([-2.0, 2.0]) * (assembly.track.length if one else m.size)
         else:
-            ranges[j] += np.array([-turn, turn]) / (1 if one or _goes_round(assembly, j) else 2)
+            ranges[j] += np.array([-turn, turn]) / (1 if one or goes_round(assembly, j) else 2)
     return tuple(turns), np.where(np.isfinite(limits), limits, ranges)
-
-
-def _turns(assembly: Assembly, j: int) -> int | None:
-    """After how many turns of an input the loads come back, whatever the others are; None where not within the `TURNED`."""
-    at = np.asarray(assembly.mechanism.at, dtype=float)
-    shares = np.multiply.outer(np.arange(1.0, COMPARED + 1), np.sqrt(np.arange(2.0, 2 + len(at)))) % 1.0
-    rest = Rest(assembly, at + 2 * np.pi * shares)
-    force, size = rest.force()
-    slope, tried = np.abs(rest.hessian()[:, :, j]), 0
-    for last in TURNED:
-        turns = np.arange(tried + 1, last + 1)
-        later = rest.inputs + 2 * np.pi * np.multiply.outer(turns, np.eye(len(at))[[j]])
-        off = np.abs(Rest(assembly, later.reshape(-1, len(at))).force()[0].reshape(later.shape) - force)
-        # what is not assembled contradicts nothing
-        back = ~(off > ALIKE * size + 4 * EPS * np.abs(later[:, :, [j]]) * slope).any(axis=(1, 2))
-        if back.any():
-            return int(turns[np.argmax(back)])
-        tried = last
-    return None
-
-
-def _goes_round(assembly: Assembly, j: int) -> bool:
-    """Whether one of several inputs turns all the way round with the others as in the guess."""
-    ways = np.tile(np.asarray(assembly.mechanism.at, dtype=float), (AROUND + 1, 1))
-    ways[:, j] += np.linspace(-np.pi, np.pi, AROUND + 1)
-    return bool(Rest(assembly, ways).poses.assembled.all())
 
 
 def _one(assembly: Assembly, span: Reals, samples: int, turns: int | None) -> Equilibria:
@@ -319,11 +288,11 @@ def _one(assembly: Assembly, span: Reals, samples: int, turns: int | None) -> Eq
             low, middle, high = q[touch][twice], flat[twice], q[touch + 1][twice]
             roots += list(_refine(assembly, low, middle, force[touch][twice], value[twice]))
             roots += list(_refine(assembly, middle, high, value[twice], force[touch + 1][twice]))
-    roots = sorted(roots)
-    if len(roots) > 1 and roots[-1] - roots[0] > period - 1e-9:
-        roots.pop()
     unit = 1.0 if not assembly.mechanism.inputs[0].is_slide else assembly.track.length
-    distinct = [root for i, root in enumerate(roots) if i == 0 or root - roots[i - 1] > 1e-8 * unit]
+    distinct: list[float] = []
+    for root in sorted(roots):
+        if all(abs(math.remainder(root - other, period)) > 1e-8 * unit for other in distinct):
+            distinct.append(root)
     return _judged(assembly, np.array(distinct)[:, None], scale)
 
 
