@@ -180,8 +180,8 @@ def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int 
         torsion spring is wound up; of a slide two sizes of the mechanism either way, where its loops are no farther from
         their ends. With torsion springs, and where turns count, it is the range of the one input between its limits.
     samples : int
-        How finely a turn of one input, or the range of a slide, is looked through for sign changes, more finely where a body
-        turns faster; every root is then exact to rounding.
+        How finely a turn of one input, or a shorter range, is looked through for sign changes, more finely where a body turns
+        faster; every root is then exact to rounding.
 
     Returns
     -------
@@ -250,10 +250,7 @@ def _one(assembly: Assembly, span: Reals, samples: int, turns: int | None) -> Eq
         # nor is it about a position of rest, where all terms may vanish
         beside = q.mean() + turn * np.linspace(-0.5, 0.5, AROUND + 1)
         scale = max(scale, _usual(Rest(assembly, beside[:, None]).force()[1][:, 0]))
-    # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart; but for dwells
-    cams = bool(assembly.mechanism.cams)
-    vanishes = not (np.max if cams else np.median)(np.abs(force[good])) > 1e-12 * (largest if cams else scale)
-    if vanishes and len(q) > 1:
+    if len(q) > 1 and _vanishes(assembly, force[good], largest, scale):
         return Equilibria((), everywhere=True, loaded=scale > 0)
     ends = _towards_limits(assembly, q, good)
     if len(ends):
@@ -267,7 +264,7 @@ def _one(assembly: Assembly, span: Reals, samples: int, turns: int | None) -> Eq
     tiny = np.abs(force) <= 64 * EPS * size + shift
     sign = np.where(tiny, 0.0, np.sign(force))
     rests = tiny & good
-    if cams:
+    if assembly.mechanism.cams:
         # of a dwell, in which every position is one of rest, its ends
         rests[1:-1] &= ~(rests[:-2] & rests[2:])
     roots = list(q[rests])
@@ -304,6 +301,12 @@ def _usual(size: Reals) -> float:
     """
     some = size[(size > 0) & np.isfinite(size)]
     return float(np.median(some)) if len(some) else 0.0
+
+
+def _vanishes(assembly: Assembly, force: Reals, largest: float, scale: float) -> bool:
+    """Whether Q vanishes everywhere: it is analytic, and does where it does on half of the samples; but for a cam's dwells."""
+    middle, size = (np.max, largest) if assembly.mechanism.cams else (np.median, scale)
+    return not middle(np.abs(force)) > 1e-12 * size
 
 
 def _towards_limits(assembly: Assembly, q: Reals, good: NDArray[np.bool_]) -> Reals:
@@ -389,9 +392,7 @@ def _many(
         return Equilibria(())
     x = x[good]
     largest, scale = float(size[good].max()), _usual(size[good])
-    # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart; but for dwells
-    cams = bool(assembly.mechanism.cams)
-    if not (np.max if cams else np.median)(np.abs(force[good])) > 1e-12 * (largest if cams else scale):
+    if _vanishes(assembly, force[good], largest, scale):
         return Equilibria((), everywhere=True, loaded=scale > 0)
     # the most promising starts: where no neighbour is nearer to balance would do; a few hundred suffice
     x = x[np.argsort(np.abs(force[good]).max(axis=1))[:400]]
