@@ -231,6 +231,44 @@ def test_equilibrium_of_a_wound_spring(dalembert: Dalembert) -> None:
     assert abs(found["poses"][0]["effort"]["input_torque_N_m"]) < 1e-13 * 9.81
 
 
+@pytest.mark.parametrize(
+    ("ratio", "searched"), [("-0.5", None), ("0.7", None), ("-0.7071", "from -360 to 360 deg")]
+)
+def test_equilibrium_of_gears(dalembert: Dalembert, ratio: str, searched: str | None) -> None:
+    """The loads of a pair 1:2 come back after two turns, of 7:10 after ten, of 7071:10000 after no number that is tried."""
+    text = f"""
+    gravity = [0, -9.81]
+    [ground]
+    O = [0, 0]
+    Q = [1, 0]
+    [links.crank]
+    points = {{ O = [0, 0] }}
+    mass = 2
+    center = [0.5, 0]
+    [links.gear]
+    points = {{ Q = [0, 0] }}
+    mass = 3
+    center = [0.4, 0]
+    [[gears]]
+    links = ["crank", "gear"]
+    ratio = {ratio}
+    [input]
+    link = "crank"
+    [guess]
+    at = 0
+    gear = 0
+    """
+    found = run_json(dalembert, "equilibrium", "-", stdin=text)
+    at = [e["input_deg"] for e in found["equilibria"]]
+    text_of = "no number of turns of crank brings the loads back: searched {}; --over sets another range"
+    assert found["warnings"] == ([text_of.format(searched)] if searched else [])
+    r = float(ratio)
+    for x in map(math.radians, at):
+        assert abs(2 * 0.5 * math.cos(x) + 3 * 0.4 * r * math.cos(r * x)) < 1e-12
+    assert (min(at) < 0) is (searched is not None)
+    assert (max(at) > 360) is (searched is None)
+
+
 def test_counterweights(dalembert: Dalembert) -> None:
     found = run_json(
         dalembert,

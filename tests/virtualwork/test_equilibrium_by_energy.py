@@ -140,6 +140,9 @@ def test_a_root_at_both_ends_of_the_turn_counts_once() -> None:
     m = bar(gravity=-G + 0j)
     assert [e.inputs[0] for e in m.equilibria().found] == pytest.approx([0.0, math.pi], abs=1e-12)
     assert [e.stable for e in m.equilibria().found] == [False, True]
+    # of two turns each position once, of one and a half too
+    for end in (4 * math.pi, 3 * math.pi):
+        assert [e.stable for e in m.equilibria([[0.0, end]]).found] == [False, True]
 
 
 def test_a_weight_on_a_spring_at_a_slide() -> None:

@@ -21,16 +21,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.branch.assembly import Assembly
-from virtualwork.branch.limits import TURNED
 from virtualwork.digits.balance import Balance
 from virtualwork.formulas.numbers import EPS, Reals
-from virtualwork.study.loads_at_rest import Rest
+from virtualwork.study.loads_at_rest import AROUND, Rest, goes_round, turns_of_loads
 
 SAMPLES = 1440
-# steps of a turn in which usual loads are looked at
-AROUND = 72
-# positions in which the loads some turns later are compared, and what makes no difference, as a share of their terms
-COMPARED, ALIKE = 24, 1e-9
 # of a turn: a range in which the loads' usual work cannot be seen
 NARROW = 0.1
 # halvings of the way from the last sample to a limit, and how far behind the limit a range ends, of a turn
@@ -185,8 +180,8 @@ def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int 
         torsion spring is wound up; of a slide two sizes of the mechanism either way, where its loops are no farther from
         their ends. With torsion springs, and where turns count, it is the range of the one input between its limits.
     samples : int
-        How finely a turn of one input, or the range of a slide, is looked through for sign changes, more finely where a body
-        turns faster; every root is then exact to rounding.
+        How finely a turn of one input, or a shorter range, is looked through for sign changes, more finely where a body turns
+        faster; every root is then exact to rounding.
 
     Returns
     -------
@@ -220,7 +215,7 @@ def _searched(assembly: Assembly) -> tuple[tuple[int | None, ...], Reals]:
     """After how many turns of each input the loads come back, and the range that is searched of each, (k, 2)."""
     m, at, turn = assembly.mechanism, np.asarray(assembly.mechanism.at, dtype=float), 2 * np.pi
     one = len(at) == 1
-    turns = [None if entry.is_slide else _turns(assembly, j) for j, entry in enumerate(m.inputs)]
+    turns = [None if entry.is_slide else turns_of_loads(assembly, j) for j, entry in enumerate(m.inputs)]
     limits = np.array([-np.inf, np.inf])
     if one and (m.torsion_springs or not (turns[0] or m.inputs[0].is_slide)):
         # beyond them no way leads from the guess, along which turns would be counted
@@ -234,34 +229,8 @@ def _searched(assembly: Assembly) -> tuple[tuple[int | None, ...], Reals]:
         elif entry.is_slide:
             ranges[j] += np.array([-2.0, 2.0]) * (assembly.track.length if one else m.size)
         else:
-            ranges[j] += np.array([-turn, turn]) / (1 if one or _goes_round(assembly, j) else 2)
+            ranges[j] += np.array([-turn, turn]) / (1 if one or goes_round(assembly, j) else 2)
     return tuple(turns), np.where(np.isfinite(limits), limits, ranges)
-
-
-def _turns(assembly: Assembly, j: int) -> int | None:
-    """After how many turns of an input the loads come back, whatever the others are; None where not within the `TURNED`."""
-    at = np.asarray(assembly.mechanism.at, dtype=float)
-    shares = np.multiply.outer(np.arange(1.0, COMPARED + 1), np.sqrt(np.arange(2.0, 2 + len(at)))) % 1.0
-    rest = Rest(assembly, at + 2 * np.pi * shares)
-    force, size = rest.force()
-    slope, tried = np.abs(rest.hessian()[:, :, j]), 0
-    for last in TURNED:
-        turns = np.arange(tried + 1, last + 1)
-        later = rest.inputs + 2 * np.pi * np.multiply.outer(turns, np.eye(len(at))[[j]])
-        off = np.abs(Rest(assembly, later.reshape(-1, len(at))).force()[0].reshape(later.shape) - force)
-        # what is not assembled contradicts nothing
-        back = ~(off > ALIKE * size + 4 * EPS * np.abs(later[:, :, [j]]) * slope).any(axis=(1, 2))
-        if back.any():
-            return int(turns[np.argmax(back)])
-        tried = last
-    return None
-
-
-def _goes_round(assembly: Assembly, j: int) -> bool:
-    """Whether one of several inputs turns all the way round with the others as in the guess."""
-    ways = np.tile(np.asarray(assembly.mechanism.at, dtype=float), (AROUND + 1, 1))
-    ways[:, j] += np.linspace(-np.pi, np.pi, AROUND + 1)
-    return bool(Rest(assembly, ways).poses.assembled.all())
 
 
 def _one(assembly: Assembly, span: Reals, samples: int, turns: int | None) -> Equilibria:
@@ -281,10 +250,7 @@ def _one(assembly: Assembly, span: Reals, samples: int, turns: int | None) -> Eq
         # nor is it about a position of rest, where all terms may vanish
         beside = q.mean() + turn * np.linspace(-0.5, 0.5, AROUND + 1)
         scale = max(scale, _usual(Rest(assembly, beside[:, None]).force()[1][:, 0]))
-    # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart; but for dwells
-    cams = bool(assembly.mechanism.cams)
-    vanishes = not (np.max if cams else np.median)(np.abs(force[good])) > 1e-12 * (largest if cams else scale)
-    if vanishes and len(q) > 1:
+    if len(q) > 1 and _vanishes(assembly, force[good], largest, scale):
         return Equilibria((), everywhere=True, loaded=scale > 0)
     ends = _towards_limits(assembly, q, good)
     if len(ends):
@@ -298,7 +264,7 @@ def _one(assembly: Assembly, span: Reals, samples: int, turns: int | None) -> Eq
     tiny = np.abs(force) <= 64 * EPS * size + shift
     sign = np.where(tiny, 0.0, np.sign(force))
     rests = tiny & good
-    if cams:
+    if assembly.mechanism.cams:
         # of a dwell, in which every position is one of rest, its ends
         rests[1:-1] &= ~(rests[:-2] & rests[2:])
     roots = list(q[rests])
@@ -319,11 +285,11 @@ def _one(assembly: Assembly, span: Reals, samples: int, turns: int | None) -> Eq
             low, middle, high = q[touch][twice], flat[twice], q[touch + 1][twice]
             roots += list(_refine(assembly, low, middle, force[touch][twice], value[twice]))
             roots += list(_refine(assembly, middle, high, value[twice], force[touch + 1][twice]))
-    roots = sorted(roots)
-    if len(roots) > 1 and roots[-1] - roots[0] > period - 1e-9:
-        roots.pop()
     unit = 1.0 if not assembly.mechanism.inputs[0].is_slide else assembly.track.length
-    distinct = [root for i, root in enumerate(roots) if i == 0 or root - roots[i - 1] > 1e-8 * unit]
+    distinct: list[float] = []
+    for root in sorted(roots):
+        if all(abs(math.remainder(root - other, period)) > 1e-8 * unit for other in distinct):
+            distinct.append(root)
     return _judged(assembly, np.array(distinct)[:, None], scale)
 
 
@@ -335,6 +301,12 @@ def _usual(size: Reals) -> float:
     """
     some = size[(size > 0) & np.isfinite(size)]
     return float(np.median(some)) if len(some) else 0.0
+
+
+def _vanishes(assembly: Assembly, force: Reals, largest: float, scale: float) -> bool:
+    """Whether Q vanishes everywhere: it is analytic, and does where it does on half of the samples; but for a cam's dwells."""
+    middle, size = (np.max, largest) if assembly.mechanism.cams else (np.median, scale)
+    return not middle(np.abs(force)) > 1e-12 * size
 
 
 def _towards_limits(assembly: Assembly, q: Reals, good: NDArray[np.bool_]) -> Reals:
@@ -420,9 +392,7 @@ def _many(
         return Equilibria(())
     x = x[good]
     largest, scale = float(size[good].max()), _usual(size[good])
-    # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart; but for dwells
-    cams = bool(assembly.mechanism.cams)
-    if not (np.max if cams else np.median)(np.abs(force[good])) > 1e-12 * (largest if cams else scale):
+    if _vanishes(assembly, force[good], largest, scale):
         return Equilibria((), everywhere=True, loaded=scale > 0)
     # the most promising starts: where no neighbour is nearer to balance would do; a few hundred suffice
     x = x[np.argsort(np.abs(force[good]).max(axis=1))[:400]]

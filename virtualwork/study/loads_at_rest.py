@@ -14,13 +14,19 @@ from itertools import combinations, combinations_with_replacement
 import numpy as np
 
 from virtualwork.branch.assembly import Assembly
+from virtualwork.branch.limits import TURNED
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.at_rest import mass, mass_reads, potential, second_variation
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.loaded_pose import LoadedPose
-from virtualwork.formulas.numbers import Number, Reals, plus
+from virtualwork.formulas.numbers import EPS, Number, Reals, plus
 from virtualwork.formulas.scene import Scene
 from virtualwork.plan.steps import path_reads
+
+# steps of a turn in which usual loads are looked at
+AROUND = 72
+# positions in which the loads some turns later are compared, and what makes no difference, as a share of their terms
+COMPARED, ALIKE = 24, 1e-9
 
 
 class Rest:
@@ -124,3 +130,29 @@ class Rest:
 
     def _stored(self, pose: LoadedPose) -> Number:
         return potential(self.scene.loads, pose)
+
+
+def turns_of_loads(assembly: Assembly, j: int) -> int | None:
+    """After how many turns of an input the loads come back, whatever the others are; None where not within the `TURNED`."""
+    at = np.asarray(assembly.mechanism.at, dtype=float)
+    shares = np.multiply.outer(np.arange(1.0, COMPARED + 1), np.sqrt(np.arange(2.0, 2 + len(at)))) % 1.0
+    rest = Rest(assembly, at + 2 * np.pi * shares)
+    force, size = rest.force()
+    slope, tried = np.abs(rest.hessian()[:, :, j]), 0
+    for last in TURNED:
+        turns = np.arange(tried + 1, last + 1)
+        later = rest.inputs + 2 * np.pi * np.multiply.outer(turns, np.eye(len(at))[[j]])
+        off = np.abs(Rest(assembly, later.reshape(-1, len(at))).force()[0].reshape(later.shape) - force)
+        # what is not assembled contradicts nothing
+        back = ~(off > ALIKE * size + 4 * EPS * np.abs(later[:, :, [j]]) * slope).any(axis=(1, 2))
+        if back.any():
+            return int(turns[np.argmax(back)])
+        tried = last
+    return None
+
+
+def goes_round(assembly: Assembly, j: int) -> bool:
+    """Whether one of several inputs turns all the way round with the others as in the guess."""
+    ways = np.tile(np.asarray(assembly.mechanism.at, dtype=float), (AROUND + 1, 1))
+    ways[:, j] += np.linspace(-np.pi, np.pi, AROUND + 1)
+    return bool(Rest(assembly, ways).poses.assembled.all())
