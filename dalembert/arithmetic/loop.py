@@ -21,19 +21,19 @@ class Calls:
     Parameters
     ----------
     recorder : Recorder
-    passed, found : names of what each call is given, and of what it finds
+    passed, results : names of what each call takes, and of what it returns
     """
 
     def __init__(self, recorder: Recorder, passed: Sequence[str], results: Sequence[str]) -> None:
-        self.recorder, self.passed, self.found = recorder, tuple(passed), tuple(results)
+        self.recorder, self.passed, self.results = recorder, tuple(passed), tuple(results)
         self.count = 0
         self.outputs: dict[str, Number] = {}
 
     def __call__(self, inputs: Mapping[str, Number]) -> list[Number]:
-        """What one more call finds."""
+        """The results of one more call."""
         number, self.count = self.count, self.count + 1
         self.outputs |= {f"call {number} {name}": inputs[name] for name in self.passed}
-        return [self.recorder.input(f"call {number} {name}") for name in self.found]
+        return [self.recorder.input(f"call {number} {name}") for name in self.results]
 
 
 def called(name: str) -> tuple[int, str] | None:

@@ -147,21 +147,21 @@ class Tape:
             lines.append(f"v{number} = {(SIGNS | DOUBLED)[kind].format(*(names[a] for a in arguments))}")
         return "\n".join([*lines, *(f"{name}: {names[number]}" for name, number in self.outputs)])
 
-    def hang(self, on: Mapping[str, int]) -> list[int]:
+    def dependences(self, on: Mapping[str, int]) -> list[int]:
         """What each operation depends on, as bits that its inputs have by their names.
 
         >>> from dalembert.arithmetic.recorded import Recorder
         >>> recorder = Recorder()
-        >>> recorder.tape({"x": recorder.input("a") + recorder.input("b")}).hang({"a": 1, "b": 2})
+        >>> recorder.tape({"x": recorder.input("a") + recorder.input("b")}).dependences({"a": 1, "b": 2})
         [1, 2, 3]
         """
-        hangs: list[int] = []
+        result: list[int] = []
         for kind, *arguments in self.operations:
             if kind == "input":
-                hangs.append(on[arguments[0]])
+                result.append(on[arguments[0]])
             else:
-                hangs.append(0 if kind == "const" else reduce(or_, (hangs[a] for a in arguments)))
-        return hangs
+                result.append(0 if kind == "const" else reduce(or_, (result[a] for a in arguments)))
+        return result
 
     def on(self, inputs: Mapping[str, Any], kind: Kind) -> dict[str, Any]:
         """The outputs, worked out operation by operation on any kind of number."""

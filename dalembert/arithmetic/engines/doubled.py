@@ -251,7 +251,7 @@ def _split(
     tape: Tape, arrays: frozenset[str]
 ) -> tuple[tuple[int, ...], tuple[int, ...], dict[int, tuple[int, ...]]]:
     """The operations that are the same for all lanes, the others, and what each of these is the last to use."""
-    lanes = tape.hang({name: int(name in arrays) for name in tape.inputs})
+    lanes = tape.dependences({name: int(name in arrays) for name in tape.inputs})
     uniform = tuple(number for number, varies in enumerate(lanes) if not varies)
     varying = tuple(number for number, varies in enumerate(lanes) if varies)
     outputs = {number for _, number in tape.outputs}

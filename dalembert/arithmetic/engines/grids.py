@@ -30,7 +30,7 @@ class Grid(Blocks):
 
     def lanes_of(self, tape: Tape, uniform: frozenset[str]) -> list[bool]:
         """Which operations depend on the row and on the column."""
-        return [on == 3 for on in tape.hang(self.by)]
+        return [on == 3 for on in tape.dependences(self.by)]
 
     def over(self, inputs: Mapping[str, Any], out: Sequence[NDArray[Any]], shape: tuple[int, int]) -> None:
         """Run: inputs are numbers, (r, 1), (1, c) or (r, c); of each output (r, c), or for a test (r,)."""

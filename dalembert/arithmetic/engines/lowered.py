@@ -53,8 +53,8 @@ def lowered(tape: Tape, inputs: str, outputs: str, width: int) -> ir.Module:
             return _everywhere(row, v, row.load(row.gep(sources[k], [r])))
         return lane.load(vector_at(lane, bases[k], i), align=8)
 
-    hangs = tape.hang(dict(zip(tape.inputs, ("urcb".index(what) for what in inputs), strict=True)))
-    values = body(tape, v, [(once, row, lane, lane)[on] for on in hangs], enter)
+    varies = tape.dependences(dict(zip(tape.inputs, map("urcb".index, inputs), strict=True)))
+    values = body(tape, v, [(once, row, lane, lane)[on] for on in varies], enter)
     found = [values[place] for _, place in tape.outputs]
 
     now: dict[int, ir.Value] = {}

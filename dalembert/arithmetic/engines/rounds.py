@@ -75,7 +75,7 @@ def run(
     Parameters
     ----------
     loop : Loop
-    given, state : mapping of name to float or array (n,)
+    inputs, state : mapping of name to float or array (n,)
         Constants and the state to begin with.
     engine : "numpy" or "llvm"
         Chosen by the work done so far where not given.
