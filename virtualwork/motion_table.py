@@ -7,9 +7,9 @@ from typing import Any
 from virtualwork.describe.description import Description
 from virtualwork.formulas.kinematics import Angle, Point
 from virtualwork.formulas.poses import Poses
+from virtualwork.quantities import LINK, POINT
 
-POINT = (("x_m", "y_m"), ("vx_m_s", "vy_m_s"), ("ax_m_s2", "ay_m_s2"))
-LINK = ("angle_rad", "omega_rad_s", "alpha_rad_s2")
+ANGLE = ("angle_rad", *LINK[1:])
 
 
 def columns(poses: Poses) -> dict[str, Any]:
@@ -25,7 +25,7 @@ def columns(poses: Poses) -> dict[str, Any]:
 
 def moving_columns(m: Description, poses: Poses, orders: int) -> dict[str, Any]:
     """Return the columns of links and points that move, up to this order."""
-    links = {f"{name}_{LINK[k]}": Angle(name, k) for name in m.links for k in range(orders)}
+    links = {f"{name}_{ANGLE[k]}": Angle(name, k) for name in m.links for k in range(orders)}
     points = [
         (name, k, Point(body, 0j, name, k))
         for name, (body, _) in m.points.items()

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cli.read.options import Steps
-from dalembert.angles import read_degrees
+from dalembert.angles import read_degrees, read_radians
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.units import UNITS
 
@@ -219,7 +219,12 @@ def listed(
     time: Reals | None = None,
 ) -> Axis:
     """Return an axis of rows."""
-    rows = Values(shown, _in_si(names, shown) if si is None else si)
+    if si is None:
+        si = shown.copy()
+        for j, name in enumerate(names):
+            if name.unit == "deg":
+                si[:, j] = list(map(read_radians, shown[:, j].tolist()))
+    rows = Values(shown, si)
     return Axis(option, tuple(names), rows=rows, labels=labels, time=time)
 
 
@@ -293,15 +298,16 @@ class Inputs:
         return float(self.values[:, 0].min()), float(self.values[:, 0].max())
 
     def rest(self) -> Reals:
-        """Return the exact inputs, by their decimals in degrees or metres, less the floats in SI, (n, k)."""
+        """Return the exact inputs, by their decimals in degrees, metres or radians, less the floats in SI, (n, k)."""
         from dalembert.arithmetic.doubled import PI, Doubled
 
         rest = np.zeros(self.values.shape)
         for j, (si, shown) in enumerate(zip(self.values.T, self.shown.T, strict=True)):
-            exact = decimals(shown)
-            if not np.array_equal(si, shown):
-                exact = exact * (PI / 180.0)
-            rest[:, j] = (exact - Doubled(si)).value
+            exact, unit = decimals(shown), 1.0 if np.array_equal(si, shown) else PI / 180.0
+            if exact is None and (exact := decimals(si)) is not None:
+                # it is written in radians
+                unit = 1.0
+            rest[:, j] = ((exact or Doubled(shown)) * unit - Doubled(si)).value
         return rest
 
     def part(self, low: int, high: int) -> Inputs:
@@ -313,8 +319,8 @@ class Inputs:
         )
 
 
-def decimals(shown: Reals) -> Doubled:
-    """Return the decimals of numbers in 32 digits; numbers with many decimals stay as they are.
+def decimals(shown: Reals) -> Doubled | None:
+    """Return the decimals of numbers in 32 digits; None of numbers with many decimals.
 
     >>> float(decimals(np.array([0.1, 2.5])).low[0])
     -5.551115123125783e-18
@@ -325,7 +331,7 @@ def decimals(shown: Reals) -> Doubled:
         whole = np.rint(shown * 10.0**places)
         if (np.abs(whole) < 2.0**53).all() and (whole / 10.0**places == shown).all():
             return Doubled(whole) / 10.0**places
-    return Doubled(shown)
+    return None
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ run.
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
@@ -287,19 +288,22 @@ def _parts(x: Any, name: str) -> Any:
     return getattr(x, name) if isinstance(x, DoubledComplex) else x
 
 
-def _quotient(a: DoubledComplex, b: DoubledComplex) -> DoubledComplex:
-    above, below = a * b.conj(), b.real * b.real + b.imag * b.imag
-    return DoubledComplex(above.real / below, above.imag / below)
+def _of_vectors(function: Callable[..., Vectors]) -> Callable[..., DoubledComplex]:
+    """An operation of vectors, of complex arrays."""
+
+    def work(*z: DoubledComplex) -> DoubledComplex:
+        with np.errstate(all="ignore"):
+            return DoubledComplex.of(function(*(each.vectors for each in z)))
+
+    return work
 
 
 _COMPLEX: dict[Any, Callable[..., Any]] = {
-    np.add: lambda a, b: DoubledComplex(a.real + b.real, a.imag + b.imag),
-    np.subtract: lambda a, b: DoubledComplex(a.real - b.real, a.imag - b.imag),
-    np.multiply: lambda a, b: DoubledComplex(
-        a.real * b.real - a.imag * b.imag, a.real * b.imag + a.imag * b.real
-    ),
-    np.true_divide: _quotient,
-    np.negative: lambda z: DoubledComplex(-z.real, -z.imag),
+    np.add: _of_vectors(operator.add),
+    np.subtract: _of_vectors(operator.sub),
+    np.multiply: _of_vectors(operator.mul),
+    np.true_divide: _of_vectors(operator.truediv),
+    np.negative: _of_vectors(operator.neg),
     np.conjugate: lambda z: z.conj(),
     np.absolute: lambda z: np.hypot(z.real, z.imag),
 }

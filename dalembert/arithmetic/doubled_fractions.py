@@ -5,18 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 
-import numpy as np
-
-from dalembert.arithmetic.doubled import Doubled
 from dalembert.arithmetic.doubled_arrays import DoubledArray
+from dalembert.arithmetic.doubled_vectors import doubled_array
 
 
 def exactly(numbers: Iterable[Fraction], shape: tuple[int, ...]) -> DoubledArray:
     """Exact numbers as a doubled array of this shape."""
-    each = [Doubled.of(x) for x in numbers]
-    return DoubledArray(
-        np.array([x.high for x in each]).reshape(shape), np.array([x.low for x in each]).reshape(shape)
-    )
+    return DoubledArray.of(doubled_array(numbers, shape))
 
 
 def by_fractions(formula: Callable[..., Fraction], *numbers: DoubledArray) -> DoubledArray:

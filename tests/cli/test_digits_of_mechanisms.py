@@ -95,6 +95,43 @@ def four_bar(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.parametrize("off", ["1e-5", pytest.param("1e-3", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("where", ["file", "--at", pytest.param("--cases", marks=pytest.mark.slow)])
+def test_angles_in_radians(dalembert: Dalembert, four_bar: Path, where: str, off: str) -> None:
+    """An angle that is written in radians has its decimals there, not in degrees."""
+    with mp.workdps(40):
+        a, b, c, d = map(mp.mpf, LENGTHS)
+        limit = mp.acos((a**2 + d**2 - (b + c) ** 2) / (2 * a * d))
+        angles = [mp.nstr(limit - mp.mpf(off) * (1 + mp.mpf(k) / 7), 11) for k in range(6)]
+    rows = []
+    if where == "--cases":
+        four_bar.with_name("cases.csv").write_text("\n".join(["crank_rad", *angles]))
+    for angle in angles:
+        poses = {"--at": ["--at", f"{angle}rad"], "--cases": ["--cases", four_bar.with_name("cases.csv")]}
+        if where == "file":
+            four_bar.write_text(
+                FOUR_BAR.replace('link = "crank"\nspeed', f'link = "crank"\nangle = {angle}\nspeed')
+            )
+        call = (
+            "mechanism",
+            four_bar,
+            *poses.get(where, []),
+            "--only",
+            "C",
+            "--order",
+            "velocity",
+            "--digits",
+        )
+        rows += table(dalembert(*call))
+        if where == "--cases":
+            break
+    with mp.workdps(40):
+        for angle, row in zip(angles, rows, strict=True):
+            pin, v, *_ = coupler_point(a, b, c, d, mp.mpf(angle), 1, mp.mpf("3.3"))
+            true = {"C_x_m": pin.real, "C_y_m": pin.imag, "C_vx_m_s": v.real, "C_vy_m_s": v.imag}
+            assert all(holds(row[name], x) >= 7 for name, x in true.items())
+
+
 @pytest.mark.parametrize(("angle", "least"), POSES)
 def test_motion(dalembert: Dalembert, four_bar: Path, angle: str, least: int) -> None:
     """The decimals of the file and of the angle are the data: what units and binary digits do to them counts too."""

@@ -19,7 +19,7 @@ from virtualwork.formulas.numbers import Number, plus, times
 
 
 def generalized_force(paths: LoadPaths, pose: LoadedPose, j: int) -> Number:
-    """What the loads do for a unit of input j ; None where nothing."""
+    """The work of the loads for a unit of input j; None where they do none."""
     total: Number = None
     for body, guide, load in paths.working:
         moved = pose.by[j].slide[guide][0] if body is None else pose.turning(body, j)

@@ -94,13 +94,7 @@ class Topology:
     def __init__(self, group: Group) -> None:
         self.recorder = Recorder()
         self.constants: list[str] = []
-        self.group = replace(
-            group,
-            closures=tuple(
-                replace(closure, terms=tuple(map(self._term, closure.terms))) for closure in group.closures
-            ),
-            ties=tuple(map(self._tie, group.ties)),
-        )
+        self.group = _with_constants(group, self._constant)
         tied = [tie.angle for tie in group.ties]
         self.inputs = sorted({j for angle in tied for j, _ in angle.inputs})
         self.reads = list(_reads(group))
@@ -117,17 +111,9 @@ class Topology:
         """Of the recorder."""
         return own_lock(self)
 
-    def _constant(self) -> Number:
+    def _constant(self, _: float) -> Number:
         self.constants.append(f"constant {len(self.constants)}")
         return self.recorder.input(self.constants[-1])
-
-    def _term(self, term: Term) -> Term:
-        # zeros stay, and cost nothing
-        z = WRITTEN.join(*(self._constant() if part else 0.0 for part in (term.z.real, term.z.imag)))
-        return replace(term, z=z)
-
-    def _tie(self, tie: Turn) -> Turn:
-        return replace(tie, angle=replace(tie.angle, const=self._constant())) if tie.angle.const else tie
 
     def state(self, x: Sequence[Number]) -> State:
         """What the group depends on, recorded, with some unknowns put into it."""
@@ -249,28 +235,20 @@ def _reads(group: Group) -> list[tuple[str, Any]]:
     ]
 
 
-@lru_cache(maxsize=64)
-def _topology(pattern: Group) -> Topology:
-    return Topology(pattern)
+_topology = lru_cache(maxsize=64)(Topology)
 
 
-def _pattern(group: Group) -> tuple[Group, list[float]]:
-    """A group with ones in place of its constants, zeros but, and these constants."""
-    constants: list[float] = []
+def _with_constants(group: Group, number: Callable[[float], Number]) -> Group:
+    """A group with other numbers in place of its constants; zeros stay, and cost nothing."""
 
-    def one(value: float) -> float:
-        constants.extend([float(value)] if value else [])
-        return 1.0 if value else 0.0
+    def term(t: Term) -> Term:
+        return replace(t, z=WRITTEN.join(*(number(part) if part else 0.0 for part in (t.z.real, t.z.imag))))
 
-    closures = tuple(
-        replace(
-            closure,
-            terms=tuple(replace(t, z=complex(one(t.z.real), one(t.z.imag))) for t in closure.terms),
-        )
-        for closure in group.closures
-    )
-    ties = tuple(replace(t, angle=replace(t.angle, const=one(t.angle.const))) for t in group.ties)
-    return replace(group, closures=closures, ties=ties), constants
+    def tie(t: Turn) -> Turn:
+        return replace(t, angle=replace(t.angle, const=number(t.angle.const))) if t.angle.const else t
+
+    closures = tuple(replace(of, terms=tuple(map(term, of.terms))) for of in group.closures)
+    return replace(group, closures=closures, ties=tuple(map(tie, group.ties)))
 
 
 class Loops:
@@ -292,8 +270,13 @@ class Loops:
 
     def __init__(self, group: Group) -> None:
         self.group = group
-        pattern, self._constants = _pattern(group)
-        self._of = _topology(pattern)
+        self._constants: list[Number] = []
+
+        def one(value: float) -> float:
+            self._constants.append(float(value))
+            return 1.0
+
+        self._of = _topology(_with_constants(group, one))
 
     @property
     def tape(self) -> Tape:

@@ -2,7 +2,7 @@
 
 The order of solution places every body by one joint of a tree and closes loops at the others. A force at
 P = P[base] + Σ z·s·e^{iθ} bears on the base as it is, on each angle with its lever, (z s e^{iθ}) × F, on each slide
-along it. What bears on an angle θ or a slide of the tree, its generalized force Q, is so a sum whose coefficients hang
+along it. What bears on an angle θ or a slide of the tree, its generalized force Q, is so a sum whose coefficients depend
 on the mechanism alone. The links' inertia appears in it as in the equations of an open chain of links: a link's
 inertia about the point that carries it, times α, and its mass times that point's acceleration.
 
@@ -46,7 +46,7 @@ from virtualwork.plan.joint_forces import Order, Side
 from virtualwork.plan.steps import Group, Place, Term, Turn, key_of
 
 # lever (None: the point itself), sign, source of the force
-Hung = tuple[Term | None, float, tuple[str, Any]]
+Borne = tuple[Term | None, float, tuple[str, Any]]
 
 # a combination on its way down a chain of links is formed where it has more terms than this, and is one from there
 LONG = 4
@@ -65,10 +65,10 @@ class LoadPaths:
         self._known: dict[Any, Combination] = {}
         self._on_group: dict[str, list[Combination]] = {}
         self._sides: dict[Side, Combination] = {}
-        self._hung: dict[str, list[Hung]] = {}
+        self._borne: dict[str, list[Borne]] = {}
         self._tied: dict[str, list[tuple[Coordinate, float]]] = {}
         self.touches = Touches(self.mechanism, self.plan)
-        self._hang()
+        self._note_bases()
         # from the last link inward, or long chains would nest the calls
         for step in reversed(self.plan.steps):
             if isinstance(step, Place):
@@ -85,7 +85,7 @@ class LoadPaths:
         return terms.value(pose)
 
     # --- the tree ---------------------------------------------------------------------------------------------
-    def _hang(self) -> None:
+    def _note_bases(self) -> None:
         """Note for each node, angle and slide what bears on it."""
 
         def bear(
@@ -95,13 +95,13 @@ class LoadPaths:
             along: Iterable[Term] | None = None,
         ) -> None:
             if base is not None:
-                self._hung.setdefault(f"point:{base}", []).append((None, 1.0, source))
+                self._borne.setdefault(f"point:{base}", []).append((None, 1.0, source))
             for t in terms:
                 if t.body != GROUND:
-                    self._hung.setdefault(f"angle:{t.body}", []).append((t, 1.0, source))
+                    self._borne.setdefault(f"angle:{t.body}", []).append((t, 1.0, source))
             for t in terms if along is None else along:
                 if t.slide is not None:
-                    self._hung.setdefault(f"slide:{t.slide}", []).append((t, 1.0, source))
+                    self._borne.setdefault(f"slide:{t.slide}", []).append((t, 1.0, source))
 
         for load in self.case.everything:
             if load.path is not None and load.body != GROUND:
@@ -120,7 +120,7 @@ class LoadPaths:
                     source = ("loop", (step, c))
                     bear(closure.start, closure.terms, source)
                     if closure.end is not None:
-                        self._hung.setdefault(f"point:{closure.end}", []).append((None, -1.0, source))
+                        self._borne.setdefault(f"point:{closure.end}", []).append((None, -1.0, source))
 
     def _source(self, source: tuple[str, Any], free: bool) -> Combination:
         kind, of = source
@@ -135,7 +135,7 @@ class LoadPaths:
         key = node, free
         if key not in self._known:
             total = Combination()
-            for _, sign, source in self._hung.get(f"point:{node}", ()):
+            for _, sign, source in self._borne.get(f"point:{node}", ()):
                 total.add(self._source(source, free), sign)
             self._known[key] = (
                 Combination({self.force_terms(Transmitted, total): 1.0}) if len(total) > LONG else total
@@ -151,7 +151,7 @@ class LoadPaths:
         if name not in self._known:
             levers: dict[tuple[str, int | None], Combination] = {}
             along = key.startswith("slide:")
-            for t, _, source in self._hung.get(key, ()):
+            for t, _, source in self._borne.get(key, ()):
                 if t is None or (source[0] == "loop" and source[1][0] is without):
                     continue
                 force = levers.setdefault((t.body, None if along else t.slide), Combination())

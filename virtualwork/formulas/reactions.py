@@ -140,7 +140,7 @@ class JointForces:
         return d if on == GROUND else d * pose.st.turn[on]
 
     def guide_moment(self, pose: LoadedPose, guide: int, body: str) -> Number:
-        """The moment a guide puts on one of its bodies about its point,."""
+        """The moment of a guide on one of its bodies about its point."""
         g = self.mechanism.guides[guide]
         if not g.is_slider:
             return None

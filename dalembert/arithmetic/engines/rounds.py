@@ -75,7 +75,7 @@ def run(
     Parameters
     ----------
     loop : Loop
-    given, state : mapping of name to float or array (n,)
+    inputs, state : mapping of name to float or array (n,)
         Constants and the state to begin with.
     engine : "numpy" or "llvm"
         Default: chosen by the work done so far.
