@@ -50,8 +50,8 @@ def complete(run: Callable[..., object], command: str) -> None:
     if command == "examples":
         _add(run, {"name": _one_of(_examples)})
         return
-    dimension, quantity = _one_of(_dimensions), _one_of(_quantities)
-    words = {"set": dimension, "over": dimension, "free": dimension, "want": quantity, "column": _headers}
+    dimension, target = _one_of(_dimensions), _one_of(_targets)
+    words = {"set": dimension, "over": dimension, "free": dimension, "want": target, "column": _headers}
     # of `work` and `export` --only names something else
     words |= {"only": partial(_after_comma, _quantities)} if "over" in signature(run).parameters else {}
     _add(run, words)
@@ -116,10 +116,17 @@ def _quantities(ctx: typer.Context) -> list[str]:
 
     m = _mechanism()
     every = quantities.places(m, 3)
-    if ctx.info_name in ("forces", "simulate", "tolerance"):
+    if ctx.info_name in ("forces", "inspect", "simulate", "tolerance"):
         every += quantities.forces(m, pairs(joints(m)))
     owners = [name for each in every for name in each.owners]
     return list(dict.fromkeys([*owners, *(name for each in every for name in each.names[:1])]))
+
+
+def _targets(_: typer.Context) -> list[str]:
+    """The names that --want takes."""
+    from cli.fit.targets import every_wanted
+
+    return [name for each in every_wanted(_mechanism()) for name in each.names]
 
 
 def _dimensions(_: typer.Context) -> list[str]:
