@@ -51,7 +51,8 @@ def complete(run: Callable[..., object], command: str) -> None:
         _add(run, {"name": _one_of(_examples)})
         return
     dimension, target = _one_of(_dimensions), _one_of(_targets)
-    words = {"set": dimension, "over": dimension, "free": dimension, "want": target, "column": _headers}
+    ranges = _one_of(lambda ctx: [*_inputs(ctx), *_dimensions(ctx)])
+    words = {"set": dimension, "over": ranges, "free": dimension, "want": target, "column": _headers}
     # of `work` and `export` --only names something else
     words |= {"only": partial(_after_comma, _quantities)} if "over" in signature(run).parameters else {}
     _add(run, words)
@@ -130,12 +131,15 @@ def _targets(_: typer.Context) -> list[str]:
 
 
 def _dimensions(_: typer.Context) -> list[str]:
-    """The paths of a mechanism's numbers, and its inputs for --over."""
+    """The paths of a mechanism's numbers."""
     from virtualwork.describe.dimensions import dimensions
 
-    m = _mechanism()
-    inputs = [e.name for e in m.inputs]
-    return [f"{name}=" for name in (*inputs, *dimensions(m))]
+    return [f"{name}=" for name in dimensions(_mechanism())]
+
+
+def _inputs(_: typer.Context) -> list[str]:
+    """The inputs of a mechanism."""
+    return [f"{entry.name}=" for entry in _mechanism().inputs]
 
 
 def _headers(_: typer.Context, incomplete: str) -> list[str]:

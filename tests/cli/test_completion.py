@@ -70,6 +70,7 @@ def test_bash_completes(line: list[str], wanted: list[str], tmp_path: Path) -> N
         (("fit", "klann.toml", "t.csv", "--want", "H"), {"H"}, {"H.x"}),
         (("fit", "klann.toml", "t.csv", "--want", "c"), {"coupler.angle", "crank.torque"}, {"crank.omega"}),
         (("mechanism", "klann.toml", "--set", "links.crank."), {"links.crank.B.x="}, {"ground.A.x="}),
+        (("mechanism", "klann.toml", "--set", "cra"), set(), {"crank="}),
         (("mechanism", "klann.toml", "--over", "cra"), {"crank="}, set()),
         (("fit", "klann.toml", "t.csv", "--free", "ground.A"), {"ground.A.x="}, {"ground.B.x="}),
         (("balance", "rotor.csv", "--column", "mass_kg=M"), {"mass_kg=Masse"}, {"mass_kg=Radius_mm"}),
