@@ -50,8 +50,9 @@ def complete(run: Callable[..., object], command: str) -> None:
     if command == "examples":
         _add(run, {"name": _one_of(_examples)})
         return
-    dimension, quantity = _one_of(_dimensions), _one_of(_quantities)
-    words = {"set": dimension, "over": dimension, "free": dimension, "want": quantity, "column": _headers}
+    dimension, target = _one_of(_dimensions), _one_of(_targets)
+    ranges = _one_of(lambda ctx: [*_inputs(ctx), *_dimensions(ctx)])
+    words = {"set": dimension, "over": ranges, "free": dimension, "want": target, "column": _headers}
     # of `work` and `export` --only names something else
     words |= {"only": partial(_after_comma, _quantities)} if "over" in signature(run).parameters else {}
     _add(run, words)
@@ -116,19 +117,29 @@ def _quantities(ctx: typer.Context) -> list[str]:
 
     m = _mechanism()
     every = quantities.places(m, 3)
-    if ctx.info_name in ("forces", "simulate", "tolerance"):
+    if ctx.info_name in ("forces", "inspect", "simulate", "tolerance"):
         every += quantities.forces(m, pairs(joints(m)))
     owners = [name for each in every for name in each.owners]
     return list(dict.fromkeys([*owners, *(name for each in every for name in each.names[:1])]))
 
 
+def _targets(_: typer.Context) -> list[str]:
+    """The names that --want takes."""
+    from cli.fit.targets import every_wanted
+
+    return [name for each in every_wanted(_mechanism()) for name in each.names]
+
+
 def _dimensions(_: typer.Context) -> list[str]:
-    """The paths of a mechanism's numbers, and its inputs for --over."""
+    """The paths of a mechanism's numbers."""
     from virtualwork.describe.dimensions import dimensions
 
-    m = _mechanism()
-    inputs = [e.name for e in m.inputs]
-    return [f"{name}=" for name in (*inputs, *dimensions(m))]
+    return [f"{name}=" for name in dimensions(_mechanism())]
+
+
+def _inputs(_: typer.Context) -> list[str]:
+    """The inputs of a mechanism."""
+    return [f"{entry.name}=" for entry in _mechanism().inputs]
 
 
 def _headers(_: typer.Context, incomplete: str) -> list[str]:

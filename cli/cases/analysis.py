@@ -239,7 +239,8 @@ class Analysis:
         if word is None:
             return
         if unknown(forces, [word]) is None:
-            raise DataError(f"{self.file}: --only {word}: this is a force: dalembert forces shows it")
+            where = "dalembert forces shows it, dalembert simulate with --forces"
+            raise DataError(f"{self.file}: --only {word}: this is a force: {where}")
         names = {name for each in components for name in (*each.names, *each.owners)}
         owner = word.rpartition(".")[0]
         parts = [

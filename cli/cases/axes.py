@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -229,21 +228,26 @@ def cases_axis(m: Mechanism, path: str, elsewhere: set[int], remarks: list[str])
         shown.append(in_degrees if name.unit == "deg" else value)
     order = list(columns)
     values = np.array(si).T
-    time = next((table.numbers[t].si for t in TIMES if t in table.numbers), None)
+    times = [table.numbers[t] for t in TIMES if t in table.numbers]
+    if len(times) > 1:
+        raise DataError(
+            f"{table.file}: the column of time stands twice ({', '.join(t.header for t in times)}): expected it once"
+        )
+    time = times[0] if times else None
+    if time is not None and not (np.diff(time.si) > 0).all():
+        raise DataError(f"{table.file}: column {time.header}: expected rows with rising time")
     rates = [name for name in order if isinstance(name, Driven) and name.order]
     if rates:
         order, shown, values = _with_rates_at_rest(m, order, shown, values)
     elif time is not None and driven_here:
         here = [i for i, name in enumerate(order) if isinstance(name, Driven)]
         exact = [_exact(columns[order[i]]) for i in here]
-        times = next(_exact(table.numbers[t]) for t in TIMES if t in table.numbers)
-        speed, acceleration = rates_over_time(path, times, exact)
+        speed, acceleration = rates_over_time(f"{table.file}: column {time.header}", _exact(time), exact)
         order = [*order, *(order[i].rate(1) for i in here), *(order[i].rate(2) for i in here)]  # type: ignore[union-attr]
         shown = [*shown, *speed.T, *acceleration.T]
         values = np.concatenate([values, speed, acceleration], axis=1)
-    if time is not None and not (np.diff(time) > 0).all():
-        raise DataError(f"{path}: time_s: expected rows with rising time")
-    return listed("--cases", order, np.array(shown).T, values, table.texts.get("step"), time)
+    seconds = None if time is None else time.si
+    return listed("--cases", order, np.array(shown).T, values, table.texts.get("step"), seconds)
 
 
 def _headers(of: Driven) -> str:
@@ -272,24 +276,27 @@ def _exact(column: Numbers) -> list[Decimal]:
 
 
 def rates_over_time(
-    path: str, time: Sequence[Decimal], q: Sequence[Sequence[Decimal]]
+    place: str, time: Sequence[Decimal], q: Sequence[Sequence[Decimal]]
 ) -> tuple[Reals, Reals]:
-    """Return speed and acceleration (n, k) of a law of motion over time, from the cubic spline through its rows; `q`: a list for each input."""
+    """Return speed and acceleration (n, k) of a law of motion over time, from the cubic spline through its rows.
+
+    `q` has a list for each input, `place` names the column of time in messages.
+    """
     from dalembert.arithmetic.splines import rates
 
-    if len(time) < 4 or not all(a < b for a, b in pairwise(time)):
-        raise DataError(
-            f"{path}: time_s: expected at least 4 rows with rising time, for the speeds of the law of motion"
-        )
+    if len(time) < 4:
+        raise DataError(f"{place}: expected at least 4 rows, for the speeds of the law of motion")
     of_inputs = [rates(time, values) for values in q]
     speed, acceleration = (np.array([[*map(float, of[k])] for of in of_inputs]).T for k in range(2))
     if not (np.isfinite(speed).all() and np.isfinite(acceleration).all()):
-        raise DataError(f"{path}: time_s: rows too close in time for the speeds of the law of motion")
+        raise DataError(f"{place}: rows too close in time for the speeds of the law of motion")
     return speed, acceleration
 
 
 def history_axis(m: Mechanism) -> Axis:
     """Return the axis of the laws of motion that the file has as tables over time."""
+    from virtualwork.describe import DescriptionError
+
     laws = [np.array(e.history) if e.history else None for e in m.inputs]
     first = next(law for law in laws if law is not None)
     time = first[:, 0]
@@ -301,7 +308,7 @@ def history_axis(m: Mechanism) -> Axis:
         elif np.array_equal(law[:, 0], time):
             q[:, j] = law[:, 1]
         else:
-            raise DataError("[[input]] law: the tables of several inputs must have the same times")
+            raise DescriptionError("[[input]] law: the tables of several inputs must have the same times")
     # loaded where a file has a table over time
     from dalembert.arithmetic.splines import sums
 
@@ -309,7 +316,11 @@ def history_axis(m: Mechanism) -> Axis:
         return sums(values, [m.decimals.rest(dimension, x) if m.decimals else 0.0 for x in values])
 
     columns = [exact(q[:, name.j].tolist(), name.dimension) for name in names]
-    speed, acceleration = rates_over_time("[input] law", exact(time.tolist(), "time"), columns)
+    try:
+        speed, acceleration = rates_over_time("[input] law", exact(time.tolist(), "time"), columns)
+    except DataError as error:
+        # the name of the file is added to it
+        raise DescriptionError(str(error)) from None
     shown = np.array([[name.shown(v) for name, v in zip(names, row, strict=True)] for row in q])
     order = [*names, *(name.rate(1) for name in names), *(name.rate(2) for name in names)]
     si = np.concatenate([q, speed, acceleration], axis=1)

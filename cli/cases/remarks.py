@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from virtualwork.branch.assembly import Assembly
+    from virtualwork.branch.change_point import ChangePoint
     from virtualwork.describe.cams import CamDrive
     from virtualwork.describe.description import Description
     from virtualwork.motion import Motion
@@ -96,25 +97,29 @@ def _branch_lines(analysis: Analysis, assembly: Assembly) -> list[str]:
     low, high = min(least, track.start), max(largest, track.start)
     lines = []
     for changes in track.changes.values():
-        inside = [c for c in changes if low - 1e-12 <= c.input <= high + 1e-12]
-        if not inside:
-            continue
-        at = _on_branch(analysis, assembly, [c.input for c in inside], 9)
-        c = inside[0]
-        group = next(g for g in assembly.plan.groups if g.name == c.group)
-        names = [*group.angles, *(analysis.mechanism.guides[g].point for g in group.slides)]
-
-        def rates(values: Iterable[float], names: list[str] = names) -> str:
-            return ", ".join(
-                f"d{n}/dq = {round(float(v), 12) + 0.0:.6g}" for n, v in zip(names, values, strict=True)
-            )
-
-        text = f"change point at {_listed(at, 10)} {analysis.unit}: the branches of {c.group} cross; "
-        text += f"the motion goes on along its tangent ({rates(c.rates[0])})"
-        if c.other is not None:
-            text += f", the other branch would go with {rates(c.other)}"
-        lines.append(text)
+        # the points at which the branches cross alike
+        alike: dict[str, list[float]] = {}
+        for c in changes:
+            if low - 1e-12 <= c.input <= high + 1e-12:
+                alike.setdefault(_crossing(analysis, assembly, c), []).append(c.input)
+        for text, inputs in alike.items():
+            at = _listed(_on_branch(analysis, assembly, inputs, 9), 10)
+            lines.append(f"change point at {at} {analysis.unit}: {text}")
     return lines
+
+
+def _crossing(analysis: Analysis, assembly: Assembly, change: ChangePoint) -> str:
+    """Return which branches cross at a change point, the tangent that the motion takes, and the other one."""
+    group = next(g for g in assembly.plan.groups if g.name == change.group)
+    names = [*group.angles, *(analysis.mechanism.guides[g].point for g in group.slides)]
+
+    def rates(values: Iterable[float]) -> str:
+        return ", ".join(
+            f"d{n}/dq = {round(float(v), 12) + 0.0:.6g}" for n, v in zip(names, values, strict=True)
+        )
+
+    text = f"the branches of {change.group} cross; the motion goes on along its tangent ({rates(change.rates[0])})"
+    return text if change.other is None else f"{text}, the other branch would go with {rates(change.other)}"
 
 
 def of_forces(analysis: Analysis) -> list[str]:

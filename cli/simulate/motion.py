@@ -259,6 +259,13 @@ class Simulation(Study):
         """Whether a table has the bounds of its numbers: of variants only where digits are cut by them."""
         return self.show.digits or not self.cases.names
 
+    def warnings(self) -> list[str]:
+        """Return the names of --only that no released input has."""
+        nominal = self.cases.nominal
+        efforts = {name for each in nominal.forces if each.path[:1] == ("effort",) for name in each.names}
+        names = [name for name in nominal.request.only or () if name in efforts]
+        return [f"--only {name}: a released input has no effort: left out" for name in names]
+
     def levels(self, m: Mechanism) -> dict[str, float] | None:
         """Return the inputs at which it ends, SI."""
         if self.until is None:

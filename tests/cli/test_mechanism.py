@@ -192,6 +192,22 @@ def test_change_points_are_marked_and_both_branches_named(dalembert: Dalembert) 
     assert "the other branch" in found["warnings"][0]
 
 
+def test_each_change_point_has_its_own_other_branch(dalembert: Dalembert) -> None:
+    """In line, B and C move across it and the second derivatives of the loop balance along it."""
+    toml = EXAMPLES / "parallelogram" / "parallelogram.toml"
+    lines = dalembert("mechanism", toml, "--over", "0deg:360deg:90deg").stderr.splitlines()
+    assert len(lines) == 2
+    # the crank of 40 mm, the coupler of 100 mm and the rocker of 40 mm point along x, the crank and the rocker to and fro
+    for line, at, side in zip(lines, ("0", "180"), (1, -1), strict=True):
+        assert line.startswith(f"warning: change point at {at} deg: the branches of coupler + rocker cross")
+        coupler, rocker = (
+            float(rate.split(" = ")[1]) for rate in line.rpartition("would go with ")[2].split(", ")
+        )
+        assert side * 40 + 100 * coupler == pytest.approx(side * 40 * rocker, rel=1e-5)
+        assert side * 40 + 100 * coupler**2 == pytest.approx(side * 40 * rocker**2, rel=1e-5)
+        assert coupler != pytest.approx(0)
+
+
 def test_several_inputs(dalembert: Dalembert, tmp_path: Path) -> None:
     toml = EXAMPLES / "five-bar" / "five-bar.toml"
     found = answer(dalembert("mechanism", toml, "--at", "left=110deg,right=65deg", "--json"))

@@ -102,10 +102,16 @@ def test_a_picture(dalembert: Dalembert, pendulum: Path, tmp_path: Path) -> None
         (("--time", "0:1:0.1", "--check"), 2, "--check is now dalembert inspect"),
         (("--until", "bob=3"), 2, "such as --time 0:10:0.01"),
         (("--time", "0:1:0.1", "--only", "Q"), 1, "no link or point is named 'Q'"),
+        (("--time", "0:1:0.1", "--only", "bob.torque"), 1, "dalembert simulate with --forces"),
+        (
+            ("--time", "0:1:1", "--only", "bob.torque", "--forces"),
+            0,
+            "--only bob.torque: a released input has no effort",
+        ),
         (("--time", "0:1:0.1", "--set", "links.bob.mass=0"), 1, "no mass moves with input 'bob'"),
     ],
 )
-def test_what_is_refused(
+def test_what_is_refused_or_left_out(
     dalembert: Dalembert, pendulum: Path, words: tuple[str, ...], status: int, said: str
 ) -> None:
     done = dalembert("simulate", str(pendulum), *words)

@@ -156,3 +156,30 @@ def test_digits_beside_another_table(dalembert: Dalembert) -> None:
             assert bool(cut) == bool(full[key])
             assert not cut or float(cut) == pytest.approx(float(full[key]), rel=1e-13)
     assert dalembert("equilibrium", "m.toml", "--digits", "--text").returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("t_s,crank_deg\n0,1\n0.1,2\n0.2,4\n", "column t_s: expected at least 4 rows"),
+        ("t_s,crank_deg\n0,1\n0.1,2\n0.3,4\n0.2,5\n", "column t_s: expected rows with rising time"),
+        ("t_s,time_s,crank_deg\n0,0,1\n", "the column of time stands twice (time_s, t_s): expected it once"),
+    ],
+)
+def test_a_wrong_column_of_time_is_named_as_the_file_has_it(
+    table: str, message: str, dalembert: Dalembert, tmp_path: Path
+) -> None:
+    (tmp_path / "t.csv").write_text(table)
+    for name, stdin in (("t.csv", ""), ("-", table)):
+        done = dalembert("mechanism", "m.toml", "--cases", name, stdin=stdin)
+        assert done.returncode == 1
+        file = "standard input" if name == "-" else name
+        assert done.stderr.startswith(f"dalembert: {file}: {message}")
+
+
+def test_a_short_law_of_motion_names_the_mechanism(dalembert: Dalembert, tmp_path: Path) -> None:
+    (tmp_path / "law.csv").write_text("t_s,angle_deg\n0,1\n1,2\n2,4\n")
+    (tmp_path / "m.toml").write_text(FOUR_BAR.replace('speed = "30 rad/s"', 'law = "law.csv"'))
+    done = dalembert("mechanism", "m.toml")
+    assert done.returncode == 1
+    assert done.stderr.startswith("dalembert: m.toml: [input] law: expected at least 4 rows")

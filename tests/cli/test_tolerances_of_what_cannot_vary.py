@@ -97,6 +97,10 @@ def test_the_command_shows_what_varies_alone(dalembert, tmp_path):
     assert its["columns"]["R_y_m"]["worst"] == pytest.approx([slopes.sum() * 5e-5], rel=1e-12)
     table = dalembert("tolerance", "m.toml", "--only", "R").stdout.splitlines()[0]
     assert "R_x_m,R_y_m,R_y_worst_m,R_y_sd_m,R_vx_m_s,R_vy_m_s,R_vy_worst" in table
+    # a pin's moment is zero whatever the dimensions are
+    for name in ("R.rod.moment", "crank.difference_torque"):
+        zero = dalembert("tolerance", "m.toml", "--only", name, "--json")
+        assert (zero.returncode, json.loads(zero.stdout)["tolerance"]["columns"]) == (0, {})
     none = dalembert("tolerance", "m.toml", "--only", "block", "--plot", "p.svg", "--json")
     assert json.loads(none.stdout)["tolerance"] == {"columns": {}, "shares": []}
     assert "none of the numbers shown varies with [tolerances]" in none.stderr

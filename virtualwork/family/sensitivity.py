@@ -145,6 +145,9 @@ class Sensitivities:
         tape = self._formulas(enters).along(
             tuple(keys), tuple(zip(self._entering(every), steps, strict=True))
         )
+        if not tape.outputs:
+            # nothing of them depends on any dimension
+            return [(False,) * len(key.names) for key in keys]
         rows = there[np.unique(np.linspace(0, len(there) - 1, LOOKED_AT).astype(int))]
         entering = {
             name: np.asarray(value, dtype=float)[rows] if np.ndim(value) else np.full(len(rows), value)
