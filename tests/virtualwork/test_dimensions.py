@@ -10,6 +10,7 @@ import pytest
 
 from virtualwork import Force, Guess, Guide, Input, Link, Mechanism, Spring
 from virtualwork.describe import DescriptionError
+from virtualwork.describe import dimensions as dimensions_module
 from virtualwork.describe.dimensions import changed, dimensions, named, value
 from virtualwork.describe.parts import Polar
 
@@ -203,3 +204,48 @@ def test_loads_at_names_that_are_not_there_are_refused():
         Mechanism(
             {"O": 0j}, crank, inputs=Input("crank"), springs=[Spring((("crank", "P"), ("ground", "P")))]
         )
+
+
+def test_a_number_is_read_without_listing_the_others(monkeypatch):
+    def chain(n):
+        links = {
+            f"l{i}": Link({"O": 0j, f"P{i}": 1 + 2j, "tip.end": 3j, "Q": Polar("O", 2.0, 0.5)})
+            for i in range(n)
+        }
+        return Mechanism({"O": 0j, "A.b": 1j}, links, inputs=[Input(f"l{i}") for i in range(n)])
+
+    made = []
+    declared = dimensions_module.Dimension
+    monkeypatch.setattr(dimensions_module, "Dimension", lambda *given: made.append(given) or declared(*given))
+    paths = {
+        "links.l1.P1.x": 1.0, "links.l1.P1": 1 + 2j, "links.l1.tip.end.y": 3.0, "links.l1.Q.angle": 0.5,
+        "ground.A.b.y": 1.0, "gravity.y": 0.0, "input.2.speed": 0.0,
+    }  # fmt: skip
+    counts = []
+    for m in (chain(2), chain(50)):
+        counts.append([])
+        for path, number in paths.items():
+            made.clear()
+            assert m.value(path) == number
+            counts[-1].append(len(made))
+    assert counts[0] == counts[1]
+    assert max(counts[1]) < 20
+
+
+def test_paths_that_two_names_share_are_read_as_they_are_listed():
+    m = Mechanism(
+        {"O": 0j},
+        {"a": Link({"O": 0j, "b.c": 1 + 0j}), "a.b": Link({"O": 0j, "c": 2 + 0j})},
+        inputs=[Input("a"), Input("a.b")],
+    )
+    every = dimensions(m)
+    for path in (*every, "links.a.b.c", "links.a", "links.a.b.c.z", "ground.O", ""):
+        listed, own = (answer(m, path, *given) for given in ((every,), ()))
+        assert listed == own
+
+
+def answer(m, path, *every):
+    try:
+        return named(m, path, *every)
+    except DescriptionError as refused:
+        return str(refused)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from importlib.resources import files
+
 import numpy as np
 import pytest
 
+from dalembert.arithmetic.recorded import Recorder
+from virtualwork import Guess, Input, Link, Mechanism
 from virtualwork.branch.continuation import Continuation
 from virtualwork.describe import MechanismError
 from virtualwork.describe.dimensions import dimensions, value
+from virtualwork.family import family
 
 Q = np.linspace(-1.0, 7.0, 13)
 
@@ -20,14 +25,14 @@ def drawn(m, rng, v, spread):
 
 def compared(m, numbers, q):
     """Hold every variant against what it does alone, which no other has led; how many pairs of poses were assembled."""
-    family = m.vary(numbers)
-    motion = family.motion(q, 1.5, -0.7)
+    variants = m.vary(numbers)
+    motion = variants.motion(q, 1.5, -0.7)
     places = {name: motion.point(name) for name in m.points}
     rates = {name: motion.link(name) for name in m.links}
     assembled = 0
-    for i in range(len(family)):
+    for i in range(len(variants)):
         try:
-            alone = family[i].motion(q, 1.5, -0.7)
+            alone = variants[i].motion(q, 1.5, -0.7)
             there = alone.assembled
         except MechanismError as refused:
             reason = str(refused)
@@ -61,21 +66,108 @@ def test_a_triad_stands_as_alone(spread, random_mechanism):
     assert compared(m, drawn(m, rng, 2, spread), Q[::3])
 
 
-def test_a_variant_goes_along_the_nominal_way_at_once(random_mechanism, monkeypatch):
-    m = random_mechanism("triad", np.random.default_rng(0))
-    steps = []
-    advance = Continuation._advance
-    monkeypatch.setattr(Continuation, "_advance", lambda *given: steps.append(given) or advance(*given))
-    path = next(p for p in dimensions(m) if p.startswith("links"))
-    own = float(value(m, path).real)
-    motion = m.vary({path: own * (1 + np.linspace(0.0, 1e-3, 3))}).motion(Q)
-    assert motion.assembled.all()
-    # the way of the nominal mechanism, gone step by step once; not once more for each
-    nominal = len(steps)
-    steps.clear()
-    for i in range(3):
-        m.vary({path: own * (1 + np.linspace(0.0, 1e-3, 3))})[i].motion(Q).assembled.all()
-    assert 3 * nominal < 1.2 * len(steps)
+def stephenson():
+    """The worked example, a crank that turns round in the five-bar loop of a Stephenson chain, with masses."""
+    m = Mechanism.from_toml(str(files("cli") / "examples" / "stephenson-six-bar" / "stephenson.toml"))
+    return m.changed({"gravity.y": -9.81, "links.coupler.mass": 2.0, "links.rod.mass": 0.5})
+
+
+def chain(rng):
+    """A crank drives a triad, whose coupler drives another one, whose coupler drives a dyad; assembled at its guess."""
+    names = "GFEBCADHUVWXYKM"
+    at = dict(zip(names, rng.uniform(-1, 1, len(names)) + 1j * rng.uniform(-1, 1, len(names)), strict=True))
+    at["F"] = at["G"] + 0.15 * (at["F"] - at["G"])
+    bodies = {
+        "crank": "GF", "rod": "FE", "coupler": "EBCH", "left": "BA", "right": "CD",
+        "rod2": "HU", "coupler2": "UVWM", "left2": "VX", "right2": "WY", "short": "MK",
+    }  # fmt: skip
+    at["Z"] = at["K"] + 0.9 - 0.4j
+    bodies["last"] = "KZ"
+    turned = {name: rng.uniform(-3, 3) for name in bodies}
+    links = {
+        name: Link({p: (at[p] - at[points[0]]) * np.exp(-1j * turned[name]) for p in points})
+        for name, points in bodies.items()
+    }
+    ground = {p: at[p] for p in "GADXYZ"}
+    return Mechanism(ground, links, inputs=Input("crank"), guess=Guess(turned["crank"], turned))
+
+
+def test_the_formulas_of_all_variants_are_written_down_once(monkeypatch):
+    m = stephenson()
+    written, followed = [], []
+    tape, begin = Recorder.tape, Continuation.__init__
+    monkeypatch.setattr(Recorder, "tape", lambda *given: written.append(given) or tape(*given))
+    monkeypatch.setattr(Continuation, "__init__", lambda *given: followed.append(given) or begin(*given))
+    counts = []
+    for v in (2, 40):
+        written.clear()
+        family = m.vary({"links.crank.F.x": np.linspace(0.0175, 0.0185, v)})
+        motion = family.motion(np.arange(0.0, 6.0), 5.0)
+        assert np.isfinite(motion.point("C").acceleration).all()
+        assert np.isfinite(motion.effort).all()
+        counts.append(len(written))
+    assert counts[1] <= counts[0]
+    # the nominal mechanism's way alone is gone step by step
+    assert len(followed) == 1
+
+
+@pytest.mark.parametrize("count", [1, 3, 200])
+def test_no_number_depends_on_how_many_variants_there_are(count):
+    m, q = stephenson(), np.arange(0.5, 6.5)
+    lengths = np.linspace(0.0175, 0.0185, count)
+    motion = m.vary({"links.crank.F.x": lengths}).motion(q, 5.0, 2.0)
+    for i in {0, count // 2, count - 1}:
+        alone = m.changed({"links.crank.F.x": lengths[i]}).motion(q, 5.0, 2.0)
+        known = 4e-15 * alone.condition
+        for order, scale in ((0, 1.0), (1, 5.0), (2, 25.0)):
+            apart = np.abs(motion.point("E").complex(order)[i] - alone.point("E").complex(order))
+            assert (apart <= known * alone.condition**order * m.size * scale).all()
+        own = alone.effort
+        assert (np.abs(motion.effort[i] - own) <= known * alone.condition**2 * np.abs(own).max()).all()
+
+
+def test_a_group_that_another_group_drives_and_one_in_closed_form_behind_it():
+    # two triads one after the other, and a dyad on the last: the signs behind depend on the unknowns before
+    rng = np.random.default_rng(5)
+    m = chain(rng)
+    numbers = drawn(m, rng, 4, 1e-3)
+    motion = m.vary(numbers).motion(m.at[0] + np.linspace(-0.1, 0.1, 3), 1.5)
+    _ = motion.assembled
+    (solver,) = [s for (name, _), s in family._solvers.items() if name == motion._name]
+    assert solver.together.all()
+    assert compared(m, numbers, m.at[0] + np.linspace(-0.1, 0.1, 3)) == 12
+
+
+def test_refusals_and_limits_are_those_of_each_variant_alone():
+    m, q = stephenson(), np.arange(0.0, 6.3, 0.5)
+    # a rod with which the crank turns round, one with which it does not, one that is too short at the guess
+    numbers = {"links.rod.E.x": np.array([0.105, 0.092, 0.05])}
+    assert compared(m, numbers, q) == 20
+    motion = m.vary(numbers).motion(q)
+    assert [motion.reason(0), motion.assembled.sum(axis=1).tolist()] == [None, [13, 7, 0]]
+    assert "its loops stay" in motion.reason(1)
+    with pytest.raises(MechanismError) as refused:
+        m.changed({"links.rod.E.x": 0.05}).motion(q).assembled.any()
+    assert motion.reason(2) == str(refused.value)
+
+
+def test_derivatives_of_the_effort_to_dimensions_of_a_group_without_a_closed_form():
+    """Against differences of the effort of mechanisms that are described alone."""
+    m, q = stephenson(), np.array([1.0, 2.0, 4.0])
+    design = m.design(["links.rod.E.x", "links.coupler.mass"], "effort.crank")
+    x = np.array([0.105, 2.0])
+    np.testing.assert_allclose(design(x, q)[0], m.motion(q).effort, rtol=1e-12)
+
+    def effort(q, *step):
+        names = ("links.rod.E.x", "links.coupler.mass")
+        return m.changed(dict(zip(names, x + step, strict=True))).motion(q).effort
+
+    h = 1e-6
+    slopes = design.slopes(x, q)[0]
+    for column, off, turned in ((0, (h, 0.0), 0.0), (1, (0.0, h), 0.0), (2, (0.0, 0.0), h)):
+        back = tuple(-each for each in off)
+        expected = (effort(q + turned, *off) - effort(q - turned, *back)) / (2 * h)
+        np.testing.assert_allclose(slopes[:, column], expected, rtol=1e-6)
 
 
 @pytest.mark.slow

@@ -14,7 +14,6 @@ from virtualwork.branch.sampling import depths, vanishes
 from virtualwork.describe.description import Description
 from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.group_loops import Loops
-from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.positions import State, principal, run
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Step, geared
@@ -75,14 +74,6 @@ class Choice(Record):
         if group not in self.systems:
             self.systems[group] = Loops(group)
         return self.systems[group]
-
-    @cached_property
-    def seeds(self) -> dict[str, tuple[Reals, Reals]]:
-        """Nodes (inputs, unknowns) of groups without a closed form, of a mechanism much like this one, by their names.
-
-        A `Continuation` begins with what they lead to, as far as that goes on from the guess: no number depends on them.
-        """
-        return {}
 
     @cached_property
     def merged(self) -> tuple[Plan, Group | None]:

@@ -155,43 +155,10 @@ class Continuation:
     def extend(self, a: float, b: float) -> None:
         """Go on until the nodes cover a to b."""
         h = self.track.length / NODES
-        for side, to in ((1, b + h), (-1, a - h)):
-            if self.group.name in self.assembly.seeds and not self.stopped[side]:
-                self._lead(side, to)
         while not self.stopped[1] and b + h - self.q[-1] > SEAM * self.track.length:
             self._advance(1, min(h, b + h - self.q[-1]))
         while not self.stopped[-1] and self.q[0] - (a - h) > SEAM * self.track.length:
             self._advance(-1, min(h, self.q[0] - (a - h)))
-
-    def _lead(self, side: int, to: float) -> None:
-        """Lay down the nodes that another mechanism's lead to, all at once, as far as each goes on from the one before.
-
-        A step has to be what it is in `_advance`; from the first one that is not, the way is gone step by step.
-        """
-        q, x = self.assembly.seeds[self.group.name]
-        end, seam = (-1 if side > 0 else 0), SEAM * self.track.length
-        some = (side * (q - self.q[end]) > seam) & (side * (q - to) <= seam)
-        if not some.any():
-            return
-        q, x = (
-            np.concatenate([own[None], its[some][::side]])
-            for own, its in ((np.array(self.q[end]), q), (self.x[end], x))
-        )
-        st = State([q])
-        with np.errstate(all="ignore"):
-            self.track.run(self.before, st)
-            x, closed = newton(self.loops, st, x, self.size, limit=8)
-            rate, det = self._rates(st, x)
-            x[0], rate[0] = self.x[end], self.rate[end]
-            far = np.maximum(np.abs(x[:-1]), self.size)
-            far[:, : len(self.group.angles)] = 1.0
-            fine = self._fine(np.diff(q)[:, None], np.diff(x, axis=0), rate[:-1], rate[1:], far)
-            fine &= (
-                closed[1:] & np.isfinite(rate[1:]).all(axis=1) & (np.sign(det[1:]) == np.sign(self.det[end]))
-            )
-        count = len(fine) if fine.all() else int(np.argmin(fine))
-        for i in range(1, count + 1):
-            self._put(side, float(q[i]), x[i], rate[i], float(det[i]))
 
     def _put(self, side: int, q: float, x: Reals, rate: Reals, det: float) -> None:
         """Lay down a node at one end."""
@@ -200,15 +167,6 @@ class Continuation:
         self.x.insert(place, x)
         self.rate.insert(place, rate)
         self.det.insert(place, det)
-
-    def _fine(self, step: Number, moved: Reals, rate: Reals, new: Reals, far: Reals) -> Any:
-        """Whether a step is short enough: by how much the unknowns moved, their rates at both ends, and their scales."""
-        # the cubic's own defect: what the two rates say of the step, against what it was
-        defect = np.abs((moved - step * 0.5 * (rate + new)) / far).max(axis=-1)
-        change = np.abs(moved / far).max(axis=-1)
-        # gears alone may turn a link many times in a step, but evenly
-        even = (np.abs(moved - step * rate) <= 1e-9 * far).all(axis=-1)
-        return (defect <= 0.05 * np.maximum(change, 1e-6)) & ((change < 0.5) | even)
 
     def _advance(self, side: int, h: float) -> None:
         """Lay down one more node, at most h away: what the group depends on is known no farther."""
@@ -230,7 +188,7 @@ class Continuation:
                 # a slide that runs away is measured by itself
                 far = np.maximum(np.abs(x), self.size)
                 far[: len(self.group.angles)] = 1.0
-                if np.isfinite(new).all() and self._fine(side * step, solution[0] - x, rate, new, far):
+                if np.isfinite(new).all() and fine_steps(side * step, solution[0] - x, rate, new, far):
                     if np.sign(det) != np.sign(self.det[end]):
                         crossed.append((min(q, to), max(q, to)))
                     self._put(side, to, solution[0], new, det)
@@ -380,12 +338,7 @@ class Continuation:
             t = ((q - nodes[i]) / h)[:, None]
             low, high = (0.0 if self.stopped[side] else 2 * SEAM * self.track.length for side in (-1, 1))
             inside = (q >= nodes[0] - low) & (q <= nodes[-1] + high)
-            a, b, h = x[i], x[i + 1], h[:, None]
-            start = (
-                a * (1 + 2 * t) * (1 - t) ** 2
-                + b * t * t * (3 - 2 * t)
-                + h * (rate[i] * t * (1 - t) ** 2 - rate[i + 1] * t * t * (1 - t))
-            )
+            start = cubic(h[:, None], t, x[i], x[i + 1], rate[i], rate[i + 1])
         if self.upright is not None:
             low, middle, high = self.upright
             k = int(np.searchsorted(nodes, middle))
@@ -417,3 +370,19 @@ class Continuation:
         st.margin[self.group.name] = (
             np.where(closed & inside, 1.0, -1.0) if st.many else (1.0 if closed[0] else -1.0)
         )
+
+
+def fine_steps(step: Number, moved: Reals, rate: Reals, new: Reals, far: Reals) -> Any:
+    """Whether steps are short enough: by how much the unknowns moved, their rates at both ends, and their scales, (…, unknowns)."""
+    # the cubic's own defect: what the two rates say of the step, against what it was
+    defect = np.abs((moved - step * 0.5 * (rate + new)) / far).max(axis=-1)
+    change = np.abs(moved / far).max(axis=-1)
+    # gears alone may turn a link many times in a step, but evenly
+    even = (np.abs(moved - step * rate) <= 1e-9 * far).all(axis=-1)
+    return (defect <= 0.05 * np.maximum(change, 1e-6)) & ((change < 0.5) | even)
+
+
+def cubic(h: Reals, t: Reals, a: Reals, b: Reals, before: Reals, after: Reals) -> Reals:
+    """Between a and b, h apart, at a share t of the way: Hermite's cubic, with the rates at both ends."""
+    value = a * (1 + 2 * t) * (1 - t) ** 2 + b * t * t * (3 - 2 * t)
+    return np.asarray(value + h * (before * t * (1 - t) ** 2 - after * t * t * (1 - t)))

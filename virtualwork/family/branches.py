@@ -14,10 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.arithmetic.engines import run, run_grid
+from dalembert.arithmetic.tape import Tape
+from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.guess import BESIDE, informed
 from virtualwork.branch.sampling import TURNED
 from virtualwork.describe.description import Description
 from virtualwork.family.varied_formulas import CHOICE, CLOSE, DIP, TOLD, VariedFormulas
+from virtualwork.family.ways import Ways, nodes_of
 from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.loops import Margin
 from virtualwork.formulas.numbers import Reals
@@ -31,6 +34,8 @@ STEP = 2 * np.pi / 90
 WIDER, AT_ONCE = 2, 8
 # what a dip has to go down to for two branches to meet there
 MEETS = 1e-8
+# of the decisions on variants: how their groups without a closed form go
+WAYS = "ways"
 # lanes worked on together
 LANES = 1 << 18
 
@@ -56,7 +61,7 @@ def chosen(
     steps = -(-(_count(written, m, low, high) - 1) // WIDER) if one and n else 0
     at_once, way = steps < AT_ONCE and not _levers(written), np.empty((0, 1))
     if steps and at_once:
-        way = _way(m, low, high, steps + 1)
+        way = _way(written, m, low, high, steps + 1)
         # at the guess it is looked at anyhow
         way = way[[not (q == m.at[0]).all() for q in way]]
     tape = written.told(len(way))
@@ -72,9 +77,57 @@ def chosen(
     if one and not (at_once and clear.all()):
         rest = np.flatnonzero(decided & ~clear if at_once else decided)
         entering = _of(with_signs(numbers, result), rest)
-        first, last = (end if len(end) == 1 else end[rest] for end in (low, high))
-        decided[rest] = ~meet_on_the_way(written, m, entering, len(rest), first, last)
+        decided[rest] = ~meet_on_the_way(written, m, entering, len(rest), *_ends(rest, low, high))
     return result, decided
+
+
+def followed(
+    written: VariedFormulas,
+    own: Assembly,
+    numbers: Mapping[str, Reals],
+    n: int,
+    inputs: Reals,
+    low: Reals,
+    high: Reals,
+) -> tuple[dict[str, Reals], dict[str, Reals], Mask]:
+    """The same where groups have no closed form; and their unknowns at inputs (n or 1, k), (n, k, u) by the group's name."""
+    k = inputs.shape[1]
+    sizes = {group.name: len(group.angles) + len(group.slides) for group in written.iterated}
+    signs_of = {group.name: np.ones(n) for group in written.closed}
+    unknowns = {name: np.full((n, k, u), np.nan) for name, u in sizes.items()}
+    decided, m, nodes = (
+        np.zeros(n, dtype=bool),
+        own.mechanism,
+        nodes_of(own, float(low.min()), float(high.max())),
+    )
+    if not nodes:
+        return signs_of, unknowns, decided
+    each = max(1, LANES // max(k, *(len(q) for q, _ in nodes.values())))
+    for a in range(0, n, each):
+        here = slice(a, min(a + each, n))
+        ends, some = _ends(here, low, high), _of(numbers, here)
+        ways = Ways(written, own, nodes, some, here.stop - a, *ends)
+        chosen, fine = signs(written, m, some | ways.starts, ways.n)
+        ways.given |= with_signs({}, chosen)
+        fine &= ways.followed
+        margins = at_guess(written, m, some | ways.starts, ways.n)
+        fine &= np.logical_and.reduce([margin > 0 for margin in margins.values()], initial=True)
+        left = np.flatnonzero(fine)
+        way = ways.of(left)
+        fine[left] = ~meet_on_the_way(written, m, way.given | {WAYS: way}, way.n, *_ends(left, *ends))
+        for group in written.iterated:
+            x = ways.unknowns(group, inputs[here] if len(inputs) > 1 else inputs)
+            unknowns[group.name][here] = x
+            fine &= np.isfinite(x).all(axis=(1, 2))
+        decided[here] = fine
+        for name, sign in chosen.items():
+            signs_of[name][here] = sign
+    return signs_of, unknowns, decided
+
+
+def _ends(rows: Any, low: Reals, high: Reals) -> tuple[Reals, Reals]:
+    """The ends of the way of some variants, where they are not the same of all."""
+    return low if len(low) == 1 else low[rows], high if len(high) == 1 else high[rows]
 
 
 def signs(
@@ -148,7 +201,7 @@ def meet_on_the_way(
             with np.errstate(invalid="ignore"):
                 result[here] |= (np.abs(np.diff(turn, axis=0)) > TURNED).any(axis=0)
         clear = np.empty(count, dtype=bool)
-        run_grid(written.clear, _across(some) | {"q0": q.T}, (count, len(q)), [clear])
+        run_grid(written.clear, _over(written.clear, some, q), (count, len(q)), [clear])
         left = np.flatnonzero(~clear)
         if len(left):
             its, near = _of(some, left), q if q.shape[1] == 1 else q[:, left]
@@ -176,12 +229,15 @@ def stays_within(
 
 
 def samples(written: VariedFormulas, m: Description, span: float) -> int:
-    """Return the number of samples of a way, of a turn at most; more if a gear turns a body fast."""
+    """Return the number of samples of a way; more if a gear turns a body fast."""
     fast = max((abs(k) for t in turns(written.plan.steps) for _, k in t.angle.inputs), default=1.0)
-    return (
-        int(np.ceil(min(span / (m.size if m.inputs[0].is_slide else 1.0), 2 * np.pi) * max(fast, 1.0) / STEP))
-        + 2
-    )
+    unit = m.size if m.inputs[0].is_slide else 1.0
+    return int(np.ceil(min(span, longest(written, m)) / unit * max(fast, 1.0) / STEP)) + 2
+
+
+def longest(written: VariedFormulas, m: Description) -> float:
+    """Return how far a way has to be looked through: a turn, where a turn brings every group back to where it stood."""
+    return np.inf if m.inputs[0].is_slide or written.iterated else 2 * np.pi
 
 
 def _levers(written: VariedFormulas) -> list[str]:
@@ -202,8 +258,8 @@ def _along(
     each = max(1, LANES // count)
     for a in range(0, n, each):
         here = slice(a, min(a + each, n))
-        first, last = (end if len(end) == 1 else end[here] for end in (low, high))
-        yield here, _of(entering, here), _way(m, first, last, count)
+        first, last = _ends(here, low, high)
+        yield here, _of(entering, here), _way(written, m, first, last, count)
 
 
 def _count(written: VariedFormulas, m: Description, low: Reals, high: Reals) -> int:
@@ -211,30 +267,37 @@ def _count(written: VariedFormulas, m: Description, low: Reals, high: Reals) -> 
     return samples(written, m, float(np.max(high - low, initial=0.0)))
 
 
-def _way(m: Description, low: Reals, high: Reals, count: int) -> Reals:
-    """Inputs from low to high, of a turn at most: (count, n), or (count, 1) where all share them."""
+def _way(written: VariedFormulas, m: Description, low: Reals, high: Reals, count: int) -> Reals:
+    """Inputs from low to high, as far as the way is looked through: (count, n), or (count, 1) where all share them."""
     if len(low) > 1 and (low == low[0]).all() and (high == high[0]).all():
         low, high = low[:1], high[:1]
-    return np.linspace(low, np.minimum(high, low + (np.inf if m.inputs[0].is_slide else 2 * np.pi)), count)
+    return np.linspace(low, np.minimum(high, low + longest(written, m)), count)
 
 
 def _of(entering: Mapping[str, Any], rows: Any) -> dict[str, Any]:
-    """The decisions on some variants."""
-    return {name: values[rows] if np.ndim(values) else values for name, values in entering.items()}
+    """The decisions on some variants, and their ways."""
+    some = {name: x[rows] if np.ndim(x) else x for name, x in entering.items() if name != WAYS}
+    return some | ({WAYS: entering[WAYS].of(rows)} if WAYS in entering else {})
 
 
 def _across(entering: Mapping[str, Any]) -> dict[str, Any]:
     """The decisions on each variant, as the rows of a grid."""
-    return {name: values[:, None] if np.ndim(values) else values for name, values in entering.items()}
+    return {name: x[:, None] if np.ndim(x) else x for name, x in entering.items() if name != WAYS}
+
+
+def _over(tape: Tape, entering: Mapping[str, Any], q: Reals) -> dict[str, Any]:
+    """What enters a tape over a grid of variants and inputs (samples, n or 1)."""
+    unknowns = entering[WAYS].entering(tape.inputs, q.T) if WAYS in entering else {}
+    return _across(entering) | {"q0": q.T} | unknowns
 
 
 def _sampled(written: VariedFormulas, key: Quantity, entering: Mapping[str, Any], q: Reals, n: int) -> Reals:
     """A quantity at inputs (samples, n or 1): (samples, n)."""
     tape = written.tape([key])
     shape = len(q), n
-    across = {name: values[None] if np.ndim(values) else values for name, values in entering.items()}
+    turned = {name: np.transpose(x) if np.ndim(x) else x for name, x in _over(tape, entering, q).items()}
     with np.errstate(all="ignore"):
-        return run_grid(tape, across | {"q0": q}, shape)[0]
+        return run_grid(tape, turned, shape)[0]
 
 
 def _meets(entering: Mapping[str, Any], q: Reals, radicand: Callable[..., Reals], n: int) -> Mask:
@@ -246,7 +309,7 @@ def _meets(entering: Mapping[str, Any], q: Reals, radicand: Callable[..., Reals]
     places, lanes = np.nonzero(dips)
     if not len(lanes):
         return meets
-    here = {name: values if np.ndim(values) == 0 else values[lanes] for name, values in entering.items()}
+    here = _of(entering, lanes)
     of = lanes if q.shape[1] > 1 else np.zeros_like(lanes)
     centre, half = q[places + 1, of], q[1, of] - q[0, of]
     every = np.arange(len(lanes))

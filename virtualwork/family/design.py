@@ -88,9 +88,15 @@ class Design:
         return sum(len(key.names) for key in self.keys)
 
     @property
+    def _written(self) -> VariedFormulas | None:
+        """The formulas; None where a branch is more than signs."""
+        written = self._first.written
+        return None if written is None or written.iterated else written
+
+    @property
     def exact(self) -> bool:
         """Whether derivatives are exact: unless a gear's phase depends on links that have to be placed first."""
-        return self._first.written is not None or self._alone.written is not None
+        return self._written is not None or self._alone.written is not None
 
     def hold(self, numbers: Reals | None) -> bool:
         """Close every loop from here on as the guess has it at these numbers; None: as it has it at each design's own.
@@ -98,7 +104,7 @@ class Design:
         Held, designs pass through places where the guess does not decide, as a search has to; what it finds must be looked
         at unheld. Returns whether it can be: not where the branch is more than signs.
         """
-        written = self._first.written
+        written = self._written
         self._held, self._chosen = None, (b"", None)
         if numbers is not None and written is not None:
             chosen, _ = signs(written, self.mechanism, by_path(self.dimensions, numbers.tolist()), 1)
@@ -123,7 +129,7 @@ class Design:
             m; rad within (−π, π]. NaN where a pose cannot be assembled.
         """
         x, q = np.asarray(numbers, dtype=float), np.asarray(inputs, dtype=float)
-        if self._first.written is not None:
+        if self._written is not None:
             rows, fine = self._evaluated(x, q, None)
             if fine or self._goes(x, q):
                 self.evaluations += 1
@@ -140,7 +146,7 @@ class Design:
         """
         x, q = np.asarray(numbers, dtype=float), np.asarray(inputs, dtype=float)
         enters = ("q0",) if inputs_alone else (*self._paths, "q0")
-        if self._first.written is not None and self._chosen != (x.tobytes(), None):
+        if self._written is not None and self._chosen != (x.tobytes(), None):
             slopes, fine = self._evaluated(x, q, enters)
             if fine or self._known(x) is not None:
                 return slopes.reshape(self.rows, len(enters), len(q)).transpose(0, 2, 1)
@@ -161,8 +167,8 @@ class Design:
         key, same = (enters, own_signs), q.tobytes()
         kept = self._kept.get(key)
         if kept is None or kept[0] != same:
-            assert self._first.written is not None
-            tape = self._first.written.evaluation(self.keys, enters, own_signs)
+            assert self._written is not None
+            tape = self._written.evaluation(self.keys, enters, own_signs)
             lanes = self._with_way(q) if own_signs and enters is None else q
             kept = self._kept[key] = same, Repeated(tape, {"q0": lanes}, tested=own_signs)
         return kept[1]
@@ -175,7 +181,7 @@ class Design:
         return self._chosen[1]
 
     def _enters(self, x: Reals) -> dict[str, Any] | None:
-        written, m = self._first.written, self.mechanism
+        written, m = self._written, self.mechanism
         if written is None:
             return None
         numbers = by_path(self.dimensions, x.tolist())
@@ -186,7 +192,7 @@ class Design:
 
     def _goes(self, x: Reals, q: Reals) -> bool:
         """Whether a design goes by its signs: the guess decides them, and no other branch is met on the way to the poses."""
-        entering, written = self._known(x), self._first.written
+        entering, written = self._known(x), self._written
         if entering is None or written is None:
             return False
         low, high = self._ends(q)
@@ -199,7 +205,7 @@ class Design:
 
     def _with_way(self, q: Reals) -> Reals:
         """Inputs, and behind them samples of the way from the guess over all of them, of a turn at most."""
-        m, written = self.mechanism, self._first.written
+        m, written = self.mechanism, self._written
         assert written is not None
         low, high = self._ends(q)
         last = min(high, low + (np.inf if m.inputs[0].is_slide else 2 * np.pi))

@@ -1,7 +1,7 @@
 """A self-contained part of a family: some variants over given inputs, solved on the tape together or one by one.
 
-On the tape a lane is one variant in one pose. Variants whose branch is not decided by a comparison at the guess, and
-mechanisms whose branch is more than signs (groups without a closed form, gears), are described one by one.
+On the tape a lane is one variant in one pose. Variants whose branch is not decided by a comparison at the guess, and by nodes that
+go on from there where groups have no closed form, are described one by one; so are mechanisms whose gears count whole turns.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, by_path, changed
-from virtualwork.family.branches import at_guess, chosen, stays_within, with_signs
+from virtualwork.family.branches import at_guess, chosen, followed, stays_within, with_signs
 from virtualwork.family.friction import friction_of
 from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.formulas.forces import Force
@@ -28,7 +28,7 @@ from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.loops import Closed, Twist
 from virtualwork.formulas.numbers import Number, Reals, leave_out
 from virtualwork.formulas.quantity import Quantity
-from virtualwork.formulas.recording import NAMES, NEAR
+from virtualwork.formulas.recording import NAMES
 
 
 class Assembled(Quantity, kind="assembled"):
@@ -37,7 +37,6 @@ class Assembled(Quantity, kind="assembled"):
 
 ASSEMBLED = Assembled()
 Mask = NDArray[np.bool_]
-Seeds = dict[str, tuple[Reals, Reals]]
 RATES = ("speed", "acceleration", "jerk")
 # rad: a torsion spring that is twisted by no more all along its way counts no whole turns
 HALF = 2.6
@@ -85,8 +84,8 @@ class Part:
         """The i-th variant."""
         return changed(self.mechanism, by_path(self.dimensions, self.values[i].tolist()))
 
-    def poses(self, i: int, seeds: Seeds) -> Lanes:
-        """The i-th variant, put together alone; `seeds`: see `seeds_of`.
+    def poses(self, i: int) -> Lanes:
+        """The i-th variant, put together alone.
 
         Raises
         ------
@@ -95,7 +94,6 @@ class Part:
         one = self.some(slice(i, i + 1))
         q = one.inputs[0]
         assembly = Assembly.from_guess(self.described(i))
-        assembly.seeds.update(seeds)
         result = Lanes(assembly, q if q.shape[1] > 1 else q[:, 0], 0.0, 0.0, 0.0)
         result.rates = [
             [float(np.ravel(r)[0]) if np.size(r) == 1 else np.broadcast_to(r, (1, len(q)))[0] for r in order]
@@ -145,7 +143,7 @@ class Solver:
         """The formulas with the dimensions as inputs; None where the branch is more than signs."""
         m = self.part.mechanism
         own = self.assembly
-        if own is None or own.geared or own.folded or any(g.kind == "Newton" for g in own.plan.groups):
+        if own is None or own.geared or own.folded:
             return None
         if m.guess.at is None and any(
             d.where[0] == "inputs" and d.where[-1] == "value" for d in self.part.dimensions
@@ -156,7 +154,7 @@ class Solver:
         if key not in own.recordings:
             own.recordings[key] = VariedFormulas(own, fixed, self.moves, own_signs=True)
         result: VariedFormulas = own.recordings[key]
-        return None if result.open_gears else result
+        return None if result.open_gears or (result.iterated and not result.follows) else result
 
     @cached_property
     def _given(self) -> dict[str, Reals]:
@@ -165,12 +163,15 @@ class Solver:
         }
 
     @cached_property
-    def _chosen(self) -> tuple[dict[str, Reals], Mask]:
-        """The sign of each closed form, and which variants are on the tape."""
-        part, written = self.part, self.written
-        if written is None:
-            return {}, np.zeros(part.shape[0], dtype=bool)
-        return chosen(written, part.mechanism, self._given, part.shape[0], *self._span)
+    def _chosen(self) -> tuple[dict[str, Reals], dict[str, Reals], Mask]:
+        """The sign of each closed form, the unknowns of groups without one, and which variants are on the tape."""
+        part, written, v = self.part, self.written, self.part.shape[0]
+        if written is None or self.assembly is None:
+            return {}, {}, np.zeros(v, dtype=bool)
+        if written.iterated:
+            return followed(written, self.assembly, self._given, v, part.inputs[:, :, 0], *self._span)
+        signs, together = chosen(written, part.mechanism, self._given, v, *self._span)
+        return signs, {}, together
 
     @cached_property
     def _span(self) -> tuple[Reals, Reals]:
@@ -191,12 +192,12 @@ class Solver:
     @property
     def together(self) -> Mask:
         """Which variants are on the tape, (v,)."""
-        return self._chosen[1]
+        return self._chosen[-1]
 
     @cached_property
     def open_at_guess(self) -> Mask:
         """Which variants on the tape are not assembled at the input of the guess itself, (v,)."""
-        if self.written is None or not self.written.closed:
+        if self.written is None or not self.written.closed or self.written.iterated:
             return np.zeros(self.part.shape[0], dtype=bool)
         margins = at_guess(self.written, self.part.mechanism, self._given, self.part.shape[0])
         return np.asarray(~np.logical_and.reduce([margin > 0 for margin in margins.values()]))
@@ -259,7 +260,7 @@ class Solver:
         result = np.ones(v, dtype=bool)
         if self.written is None:
             return result
-        if len(m.inputs) > 1:
+        if len(m.inputs) > 1 or self.written.iterated:
             # each counts along lines of its own
             fixed = (self.written.plan.angles[body].by_inputs for s in m.torsion_springs for body in s.links)
             return np.full(v, all(fixed))
@@ -309,16 +310,16 @@ class Solver:
         v, n = len(rows), self.part.shape[1]
         written = self.written
         closed = {key: Closed(key.groups(written.recording)) for key in keys}
-        margins = written.margins if any(key.is_force for key in keys) else []
+        doubts = written.doubts(keys)
         requested = [key for key in keys if key != ASSEMBLED]
         whole = list(dict.fromkeys(closed.values()))
-        tape = written.tape((*requested, *whole, *margins))
+        tape = written.tape((*requested, *whole, *doubts))
         table = run_grid(tape, {name: self._entering(name, rows) for name in tape.inputs}, (v, n))
         outputs = Outputs(tape, np.reshape(table, (-1, v * n)))
-        lanes = {key: key.of_rows(outputs, v * n).reshape(v, n) for key in (*requested, *whole, *margins)}
+        lanes = {key: key.of_rows(outputs, v * n).reshape(v, n) for key in (*requested, *whole, *doubts)}
         near = np.zeros(v, dtype=bool)
-        for key in margins:
-            near |= (np.abs(lanes[key]) < NEAR).any(axis=1)
+        for key, least in doubts.items():
+            near |= (np.abs(lanes[key]) < least).any(axis=1)
         gaps = {key: ~np.isfinite(lanes[key]) for key in whole}
         values = [np.zeros((v, n)) if key == ASSEMBLED else lanes[key] for key in keys]
         for key, here in zip(keys, values, strict=True):
@@ -357,6 +358,9 @@ class Solver:
             return self._given[name][rows, None]
         if kind == "friction":
             return self._friction(rows)[int(group)]
+        if kind == "x":
+            of, i = group.rsplit(" ", 1)
+            return self._chosen[1][of][rows, :, int(i)]
         if kind == "near":
             # a torsion spring that counts no whole turns
             return 0.0
@@ -375,17 +379,11 @@ class Solver:
             return float(np.ravel(value)[0])
         return value[rows] if len(value) > 1 else value
 
-    @cached_property
-    def _seeds(self) -> Seeds:
-        """Return the starting points of the iterations of variants described alone."""
-        low, high = self._span
-        return {} if self.assembly is None else seeds_of(self.assembly, float(low.min()), float(high.max()))
-
     def _one(self, i: int, keys: Sequence[Quantity], out: list[Any]) -> None:
         """Describe one variant alone."""
         if i not in self._poses or self._poses[i] is None:
             try:
-                poses: Lanes | None = None if i in self.reasons else self.part.poses(i, self._seeds)
+                poses: Lanes | None = None if i in self.reasons else self.part.poses(i)
             except MechanismError as error:
                 poses = None
                 self.reasons[i] = str(error)
@@ -432,19 +430,3 @@ def assembled(mechanism: Description) -> Assembly:
                 _assembled.pop(next(iter(_assembled)), None)
             result = _assembled[id(mechanism)] = Assembly.from_guess(mechanism)
         return result
-
-
-_seeding = Lock()
-
-
-def seeds_of(own: Assembly, low: float, high: float) -> Seeds:
-    """The nodes of a mechanism's groups without a closed form over inputs from low to high: for mechanisms much like it."""
-    if all(group.kind != "Newton" for group in own.plan.groups):
-        return {}
-    with _seeding:
-        try:
-            own.cover(low, high)
-        except MechanismError:
-            return {}
-        ways = own.track.continuations
-        return {name: way.nodes[:2] for name, way in ways.items()}

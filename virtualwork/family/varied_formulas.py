@@ -21,9 +21,9 @@ from virtualwork.describe.dimensions import Dimension, changed, value
 from virtualwork.describe.keys import keys_of
 from virtualwork.describe.parts import Link
 from virtualwork.formulas.closed_forms import Case, missing
-from virtualwork.formulas.group_loops import gaps, put_unknowns, unknowns
-from virtualwork.formulas.loops import Closed, Margin
-from virtualwork.formulas.numbers import PARTS, WRITTEN, Number
+from virtualwork.formulas.group_loops import Loops, gaps, put_unknowns, unknowns
+from virtualwork.formulas.loops import Closed, Margin, Regularity, Size
+from virtualwork.formulas.numbers import PARTS, SINGULAR, WRITTEN, Number
 from virtualwork.formulas.positions import State, columns, principal_of, run
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import NEAR, Recording
@@ -103,6 +103,37 @@ class VariedFormulas:
         return [g for g in self.plan.groups if g.kind not in ("Newton", "PRP")]
 
     @cached_property
+    def iterated(self) -> list[Group]:
+        """The groups without a closed form."""
+        return [g for g in self.plan.groups if g.kind == "Newton"]
+
+    @property
+    def follows(self) -> bool:
+        """Whether the groups without a closed form can be followed along the one input, for all variants at once.
+
+        The guess has to say all their angles, and the ratios of what is tied to them are those of all variants.
+        """
+        angles, _ = known_by_guess(self.mechanism)
+        tied = [tie.angle for group in self.iterated for tie in group.ties]
+        factors = [r for angle in tied for _, r in (*angle.inputs, *angle.bases)]
+        return len(self.mechanism.inputs) == 1 and not (
+            any(isinstance(r, Varied) for r in factors)
+            or any(angle.cams for angle in tied)
+            or any(body not in angles for group in self.iterated for body in group.angles)
+            or any(2 * len(g.closures) != len(g.angles) + len(g.slides) for g in self.iterated)
+        )
+
+    def doubts(self, keys: Iterable[Quantity]) -> dict[Quantity, float]:
+        """What has to be above which number for the tape to have quantities: of poses at which it is not no digit is left."""
+        keys = tuple(keys)
+        result: dict[Quantity, float] = {}
+        if any(key.is_force for key in keys):
+            result |= dict.fromkeys(self.margins, NEAR)
+        if any(key.is_force or key.order for key in keys):
+            result |= {Regularity(group.name): SINGULAR for group in self.iterated}
+        return result
+
+    @cached_property
     def margins(self) -> list[Quantity]:
         """The keys of their radicands."""
         return [Margin(group.name) for group in self.closed]
@@ -128,8 +159,7 @@ class VariedFormulas:
     def _tested(self, keys: tuple[Quantity, ...], also: tuple[Quantity, ...]) -> Tape:
         closed = [Closed(key.groups(self.recording)) for key in (*keys, *also)]
         sound = [sys.float_info.max - abs(self.recording.value(key)) for key in dict.fromkeys(closed)]
-        if any(key.is_force for key in keys):
-            sound += [abs(self.recording.value(key)) - NEAR for key in self.margins]
+        sound += [abs(self.recording.value(key)) - least for key, least in self.doubts(keys).items()]
         return self.recording.tape(keys, {"sound": every(sound)})
 
     @cached_property
@@ -172,6 +202,27 @@ class VariedFormulas:
             outputs[f"open {group.name}"] = of.open_loops[group.name]
             outputs |= {f"next {group.name} {i}": x for i, x in enumerate(solved)}
         return of.recorder.tape(outputs)
+
+    def enters(self, group: str) -> Tape:
+        """The tape of what enters the loops of a group without a closed form (`Loops.entering`), and of the mechanism's size."""
+        return self._once(self._enters, group)
+
+    def _enters(self, group: str) -> Tape:
+        of = self.recording
+        entering = Loops(of.solved(group)).entering(of.st)
+        return of.recorder.tape({str(i): x for i, x in enumerate((*entering, of.value(Size())))})
+
+    def rates(self, group: str) -> Tape:
+        """The tape of how fast its unknowns change with the input, and of how far it is from singular."""
+        return self._once(self._rates, group)
+
+    def _rates(self, group: str) -> Tape:
+        of, g = self.recording, self.recording.solved(group)
+        of.solve(self.plan.writes(g), 1)
+        (rates,) = of.by
+        firsts = [*(rates.angle[body][0] for body in g.angles), *(rates.slide[i][0] for i in g.slides)]
+        values = {str(i): 0.0 if rate is None else bare(rate) for i, rate in enumerate(firsts)}
+        return of.recorder.tape({**values, "regularity": of.value(Regularity(group))})
 
     def told(self, samples: int) -> Tape:
         """The tape of how all closed forms close at the inputs of the guess, and whether that is certain.

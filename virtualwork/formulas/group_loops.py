@@ -16,7 +16,7 @@ import numpy as np
 
 from dalembert.arithmetic.engines import floats, lanes_in_all, run
 from dalembert.arithmetic.guard import Lock, guarded, own_lock
-from dalembert.arithmetic.recorded import RECORDED, Recorder, squared
+from dalembert.arithmetic.recorded import RECORDED, Recorder, bare, squared
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.numbers import EPS, PARTS, WRITTEN, Number, Reals, solve
@@ -238,7 +238,7 @@ def _reads(group: Group) -> list[tuple[str, Any]]:
 _topology = lru_cache(maxsize=64)(Topology)
 
 
-def _with_constants(group: Group, number: Callable[[float], Number]) -> Group:
+def _with_constants(group: Group, number: Callable[[Number], Number]) -> Group:
     """A group with other numbers in place of its constants; zeros stay, and cost nothing."""
 
     def term(t: Term) -> Term:
@@ -268,12 +268,14 @@ class Loops:
             [3., 0.]]]))
     """
 
+    few = FEW
+
     def __init__(self, group: Group) -> None:
         self.group = group
         self._constants: list[Number] = []
 
-        def one(value: float) -> float:
-            self._constants.append(float(value))
+        def one(value: Number) -> float:
+            self._constants.append(value)
             return 1.0
 
         self._of = _topology(_with_constants(group, one))
@@ -288,24 +290,24 @@ class Loops:
 
         A state of one pose goes with any number of unknowns, one of n poses with as many.
         """
-        return partial(self._linear, self._fixed(st))
+        return partial(self._linear, self.fixed(st))
 
     def bent(self, st: State, x: Reals, v: Reals) -> Reals:
         """The derivative of J·v along each unknown, (n, 2·loops, unknowns), for directions v (n, unknowns)."""
         names = [*self._of.unknowns, *self._of.directions]
-        table = self._run(self._of.bent, self._fixed(st), names, np.concatenate([x, v], axis=1).T)
+        table = self._run(self._of.bent, self.fixed(st), names, np.concatenate([x, v], axis=1).T)
         return np.broadcast_to(table.T, (len(x), len(table))).reshape(len(x), -1, v.shape[1])
 
-    def search(self, st: State, start: Reals, size: float, limit: int) -> tuple[Reals, Reals]:
+    def search(self, st: State, start: Reals, size: Number, limit: int) -> tuple[Reals, Reals]:
         """Where a damped Newton search of so many steps ends, (n, unknowns), and the gap that it leaves, (n,) m."""
-        of, fixed, (n, count) = self._of, [*self._fixed(st), size], start.shape
+        of, fixed, (n, count) = self._of, [*self.fixed(st), size], start.shape
         order = (*of.constants, *of.enters, "size", *of.unknowns, *of.directions, *SEARCH)
         order = order if of.whole else (*order, *of.solved)
         state = np.zeros((2 * count + len(SEARCH), n))
         state[:count] = start.T
         state[2 * count :].T[:] = np.inf, np.inf, 1.0, 1.0, limit + 1.0
         # the digits of a pose depend on how many there are in all, and of one pose on nothing
-        one, few = _one_pose(fixed), lanes_in_all(n) <= FEW
+        one, few = _one_pose(fixed), lanes_in_all(n) <= self.few
         on_floats, going = floats.takes(of.search), np.arange(n)
         while going.size:
             here = [value[going] if isinstance(value, np.ndarray) else value for value in fixed]
@@ -351,15 +353,19 @@ class Loops:
 
         The gaps alone do not say it: what both ends of a loop share is not in them.
         """
-        return np.isfinite(sum(self._fixed(st)))
+        return np.isfinite(sum(self.fixed(st)))
 
-    def _fixed(self, st: State) -> list[Number]:
-        """The constants of the group and what it depends on in a state: floats, or arrays (n,)."""
+    def entering(self, st: State) -> list[Number]:
+        """The constants of the group and what it depends on in a state, recorded ones too."""
         values = [st.inputs[j] for j in self._of.inputs]
         for store, key in self._of.reads:
             value = getattr(st, store)[key]
             values += [value.real, value.imag] if store in VECTORS else [value]
-        return self._constants + [v if isinstance(v, np.ndarray) else float(v) for v in values]
+        return [bare(value) for value in (*self._constants, *values)]
+
+    def fixed(self, st: State) -> list[Number]:
+        """The same of floats, or arrays (n,)."""
+        return [v if isinstance(v, np.ndarray) else float(v) for v in self.entering(st)]
 
     def _linear(self, fixed: list[Number], x: Reals) -> tuple[Reals, Reals]:
         """See `over`."""

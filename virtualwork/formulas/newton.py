@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from dalembert.arithmetic.exact import EPS
 from virtualwork.formulas.group_loops import Loops
-from virtualwork.formulas.numbers import SINGULAR, Reals, singular_values
+from virtualwork.formulas.numbers import SINGULAR, Number, Reals, singular_values
 from virtualwork.formulas.positions import State
 
 # of Gauss-Newton to a double root, from half of the digits
@@ -29,7 +29,7 @@ MANY = CLOSED / (8 * EPS)
 
 
 def newton(
-    loops: Loops, st: State, start: Reals, size: float, limit: int = 60
+    loops: Loops, st: State, start: Reals, size: Number, limit: int = 60
 ) -> tuple[Reals, NDArray[np.bool_]]:
     """Close the loops of a group from a start, over all poses at once.
 
@@ -40,7 +40,7 @@ def newton(
         What the group depends on.
     start : array (n, unknowns)
         Angles in rad, then slides in m.
-    size : float
+    size : float, or array (n,)
         The mechanism's size, m; a loop is closed when its gap is at rounding of it, or of a slide beyond it.
     limit : int
         The most steps.
@@ -51,7 +51,7 @@ def newton(
     closed : array (n,) of bool
     """
     x, gap = loops.search(st, start, size, limit)
-    far = np.abs(x[:, len(loops.group.angles) :]).max(axis=1, initial=size)
+    far = np.maximum(np.abs(x[:, len(loops.group.angles) :]).max(axis=1, initial=0.0), size)
     for tie in loops.group.ties:
         # a body that gears turn by many turns: its angle rounds by more than its loops
         turned = sum(abs(f) * np.abs(x[:, j]) for j, f in loops.group.shares.get(tie.body, {}).items())

@@ -233,7 +233,7 @@ class _Lanes:
             return None
         part = Part(m, family.dimensions, family.values, q[:, None], [[1.0] * k, [1.0] * k, [0.0] * k])
         solver = Solver(part, family.alike)
-        if solver.written is None or not solver.together.any():
+        if solver.written is None or solver.written.iterated or not solver.together.any():
             return None
         family.alike = solver
         entering = {d.path: family.values[:, i] for i, d in enumerate(family.dimensions)}
