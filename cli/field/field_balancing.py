@@ -272,8 +272,8 @@ class FieldBalancing:
                 self.warnings.append(
                     "with these weights a residual is beyond --max-residual, which without them could be met"
                 )
-            if fix.status != "optimal":
-                self.warnings.append(f"{self.of(group, i)}{fix.status}")
+            if fix.of_largest > solved.objective.minimax:
+                self.warnings.append(f"{self.of(group, i)}the limits leave the minimax corrections alone")
             answers.append(fix)
         return answers
 
