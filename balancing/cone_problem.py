@@ -52,6 +52,8 @@ class ConeProblem:
     square: Complex | None
     at: Complex | None
     to_w: Complex
+    cut: float
+    """The share of the largest singular value of a step's equations below which one is none."""
 
     def __post_init__(self) -> None:
         self.with_t = bool(self.f.any())
@@ -371,7 +373,7 @@ def _step(
         part = along[chosen]
         system[:n, :n], system[n:, :n], system[:n, n:] = upper, part, part.T
         rhs[:n], rhs[n:] = slope, above[chosen]
-        solution = _consistent(system, -rhs, largest)
+        solution = _consistent(system, -rhs, largest, problem.cut)
         if not np.isfinite(solution).all():
             return None
         moved, pulls = solution[:n], solution[n:]
@@ -397,7 +399,7 @@ def _active(s: Real, z: Real) -> NDArray[np.bool_]:
     return np.asarray(slack / np.abs(s).max() < z[0] / np.abs(z).max())
 
 
-def _consistent(system: Real, rhs: Real, largest: float) -> Real:
+def _consistent(system: Real, rhs: Real, largest: float, cut: float) -> Real:
     """Solve a symmetric system; of a singular one (the optimum is not unique) a solution of least norm in like units."""
     try:
         u = np.asarray(np.linalg.solve(system, rhs))
@@ -411,8 +413,6 @@ def _consistent(system: Real, rhs: Real, largest: float) -> Real:
         size = np.sqrt(np.abs(scale[:, None] * system * scale).max(axis=1))
         scale /= np.where(size > 0, size, 1.0)
     try:
-        return np.asarray(
-            scale * np.linalg.lstsq(scale[:, None] * system * scale, scale * rhs, rcond=1e-11)[0]
-        )
+        return np.asarray(scale * np.linalg.lstsq(scale[:, None] * system * scale, scale * rhs, rcond=cut)[0])
     except np.linalg.LinAlgError:
         return np.full(len(rhs), np.nan)

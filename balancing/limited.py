@@ -42,6 +42,9 @@ TIGHT = 1e-8
 """Limits of residuals that are nearer to the smallest that can be met, relatively, are kept by the minimax corrections."""
 ROOM = 4.0
 """Units of the last place of a row's terms that it keeps from its limit where an answer is solved again."""
+CUTS = 1e-11, 1e-14, 1e-11, 1e-14
+"""Where an answer is solved again, the share of the largest singular value below which one is none: the finer one where planes
+are nearly dependent, the coarser one where the optimum is not unique."""
 SQUARES = 10.0
 """The squares count so often as much as the room that the limits leave: then the multipliers have the size of 1."""
 
@@ -213,17 +216,18 @@ class _Limited:
         """Solve, again from what was reached where the gap is not closed; refuse what is not the optimum."""
         start = self.start
         best: Optimum | None = None
-        for again in range(3):
+        for again, cut in enumerate(CUTS):
             # where digits are missing, what is left is taken in 32 of them
             residual = _in_32_digits if again else _in_floats
             unit = float(np.abs(residual(self.a, self.b, start)).max()) or 1.0
-            problem = self._problem(start, unit, residual)
-            if again and self.squares is not None:
+            problem = self._problem(start, unit, residual, cut)
+            if again:
                 # limits that leave room for rounding each row, so that the masses need not be moved away from all of them
                 e, offset = self.cones
-                own = np.concatenate(
-                    [np.abs(offset) + np.abs(e) @ np.abs(start), np.full(len(self.limited), 1 / ROOM)]
+                own = (
+                    0 * np.abs(offset) if self.squares is None else np.abs(offset) + np.abs(e) @ np.abs(start)
                 )
+                own = np.concatenate([own, np.ones(len(self.limited))])
                 problem.h -= np.minimum(ROOM * EPS * own, PROVEN)
             step, force = solve(problem)
             w = self._within(start + step)
@@ -242,7 +246,7 @@ class _Limited:
             raise NotConverged(best.gap, float(sigma[0] / sigma[-1]) if sigma[-1] > 0 else np.inf)
         return best
 
-    def _problem(self, start: Complex, unit: float, residual: Residual) -> ConeProblem:
+    def _problem(self, start: Complex, unit: float, residual: Residual, cut: float) -> ConeProblem:
         """Put the steps from `start` into coordinates in which its rows are orthonormal, and neither κ(α) nor any unit is left.
 
         Where masses are limited the limits' own rows |w_p/m_p| stand below the coefficients: with QR of both together
@@ -266,6 +270,7 @@ class _Limited:
             None if free else self.a * root,
             None if free else residual(self.a, self.b, start) * root,
             to_w,
+            cut,
         )
 
     def _within(self, w: Complex) -> Complex:
@@ -345,19 +350,27 @@ class _Limited:
             # the squares in units in which they stand beside those of the limits
             rows, at = np.concatenate([self.a / unit, e]), np.concatenate([self.b / unit, offset])
             forces = np.concatenate([pulls[0] / unit, pulls[1]])
+        none = np.zeros(len(w), dtype=complex)
+        pull = residual(adjoint(rows), none, forces)
         if loose.any():
-            u, sigma, _ = np.linalg.svd(columns_scaled(rows[:, loose])[0], full_matrices=False)
-            u = u[:, sigma > 1e-13 * sigma[0]]
+            scaled, scale = columns_scaled(rows[:, loose])
+            u, sigma, vh = np.linalg.svd(scaled, full_matrices=False)
+            kept = sigma > 1e-13 * sigma[0]
+            u, undo = u[:, kept], (vh[kept].T / sigma[kept]).T * scale
             for _ in range(2):
                 forces = forces - u @ (u.conj().T @ forces)
+            pull = residual(adjoint(rows), none, forces)
+            if residual is _in_32_digits:
+                # rounding of the forces leaves a pull: it is taken off in further digits
+                more = u @ (undo @ pull[loose])
+                forces, pull = forces - more, residual(adjoint(rows), pull, -more)
         total = float(np.abs(forces[len(forces) - len(offset) :]).sum())
         constant = 0.0
         if self.squares is not None:
             constant = 0.5 * float(np.square(np.abs(forces[: len(self.b)])).sum()) + total
         elif total > 0:
-            forces = forces / total
-        left = residual(rows, at, w)
-        size = np.abs(pull := residual(adjoint(rows), np.zeros(len(w), dtype=complex), forces))
+            forces, pull = forces / total, pull / total
+        left, size = residual(rows, at, w), np.abs(pull)
         lost = size * reach
         k = self.limited
         # m_p|pull| + Re pull* w: its parts along and across as products, for both terms are large

@@ -200,6 +200,17 @@ def test_units_far_apart_are_solved_to_the_end(seed: int, case: int) -> None:
     assert minimax(one.a, one.v, one.limit).gap <= 1e-12
 
 
+@pytest.mark.parametrize(("seed", "case"), [(918098262, 129), (918098262, 120), (918098261, 246)])
+def test_nearly_dependent_planes_are_solved_to_the_end(seed: int, case: int) -> None:
+    """Conditions of 3e6 to 7e7, gaps of 1e-9 to 3e-8 once.
+
+    The first held both planes at limits of which one holds; the bound of the others was rounded with its forces.
+    """
+    one = next(islice(drawn(seed), case, None))
+    assert one is not None
+    assert minimax(one.a, one.v, one.limit).gap <= 1e-12
+
+
 @pytest.mark.parametrize("above", [0, 1e-15, 1e-12, 1e-10, 1e-9, 3e-9])
 def test_the_smallest_limit_leaves_the_minimax_corrections(above: float) -> None:
     """Goodman's data: 0.4 can be met by 1 and 1.8 alone. The squares once had any gap there."""
