@@ -28,7 +28,7 @@ from dalembert.units import amplitude_kind, from_si, to_si
 
 
 def predicted(b: FieldBalancing, solved: Solved) -> tuple[Complex, Real]:
-    """What every channel should read in the run to be predicted, and one standard deviation, (g, s) each."""
+    """The predicted readings of every channel, and their standard deviations, (g, s) each."""
     balance = solved.fitted
     on = np.broadcast_to(b.run_to_predict(solved.planes), solved.corrections.shape)
     return balance.fit.fitted(on[:, None])[:, 0], balance.vibration_deviation(on, reading=True)
