@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from balancing.flywheel import TorqueCycle, torque_cycle
     from balancing.indexing import Indexed, index_balancing
     from balancing.influence import influence_coefficients
-    from balancing.limited import Doubtful, Infeasible, NotConverged
+    from balancing.limited import Infeasible, NotConverged
     from balancing.log_balance import LogBalance, region_factor, spread
     from balancing.modal import ModalCorrection, UnreachedMode, modal_corrections, shapes_at
     from balancing.next_run import NextRun, suggest_run
@@ -65,7 +65,7 @@ _HOMES = {
     "balancing.indexing": "Indexed index_balancing",
     "balancing.influence": "influence_coefficients",
     "balancing.run_log": "JointFit Undetermined determined initial_alone joint_fit",
-    "balancing.limited": "Doubtful Infeasible NotConverged",
+    "balancing.limited": "Infeasible NotConverged",
     "balancing.modal": "ModalCorrection UnreachedMode modal_corrections shapes_at",
     "balancing.log_balance": "LogBalance region_factor spread",
     "balancing.next_run": "NextRun suggest_run",
@@ -103,7 +103,6 @@ __all__ = [
     "Correction",
     "DependentPlanes",
     "DependentTrials",
-    "Doubtful",
     "Drift",
     "ErrorBudget",
     "FewestWeights",

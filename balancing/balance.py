@@ -6,7 +6,6 @@ component, with limits on masses and residuals where requested.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from balancing.checked_data import OUT_OF_RANGE, checked, is_in_range, limits_of, require_size
 from balancing.dependence import DependentPlanes, condition_number
-from balancing.limited import DOUBTFUL, Doubtful, limited_least_squares, smallest_maximum
+from balancing.limited import limited_least_squares, smallest_maximum
 from balancing.phase import angle_of
 from balancing.qr import smallest_squares
 from dalembert.arithmetic.exact import EPS
@@ -48,14 +47,16 @@ class Balance:
     corrections: Complex
     """The masses to ADD, (..., p), complex kg."""
     weights: Real | None = None
-    """The weights that were requested, (..., s)."""
+    """The weights that were requested, (..., s); one over the limits of the residual where these leave minimax alone."""
     bound: float | None = None
     """No corrections within the limits leave less than this (from the dual problem): of minimax the largest (weighted)
     residual, of least squares with limits Σ w|r|²; None for least squares without limits."""
     gap: float = 0.0
-    """By what share what is left may lie above the least there is, rounding aside: what is left held against `bound`."""
+    """By what share what is left may lie above the least there is, rounding aside: what is left held against `bound`. 1e-9
+    at most."""
     of_largest: bool = False
-    """Whether the largest residual is the least there is (minimax), and not the sum of squares."""
+    """Whether the largest (weighted) residual is the least there is, and not the sum of squares: of minimax, and of least
+    squares whose limits are within 1e-8 of the smallest that can be met."""
     ridge: float = 0.0
     max_mass: Real | None = None
     """The limits of the corrections that were requested, (p,)."""
@@ -126,17 +127,6 @@ class Balance:
         return before_and_after(
             self.initial, self.residual, self.corrections, amplitude, sensors, planes, figure=figure
         )
-
-    @property
-    def status(self) -> str:
-        """ "optimal", or by how much what is left may lie above the optimum, and why."""
-        if self.gap <= DOUBTFUL:
-            return "optimal"
-        what = "the largest residual" if self.of_largest else "the sum of squares"
-        text = f"{what} is proven to be the least only to a share of {self.gap:.1e}"
-        if self.condition_number > 1e5:
-            return f"{text}: the planes are nearly dependent (condition number {float(self.condition_number):.2g})"
-        return f"{text}: the limits hardly leave a choice"
 
     @cached_property
     def residual(self) -> Complex:
@@ -297,8 +287,7 @@ def least_squares(
     Infeasible
         `max_residual` cannot be met: the smallest that can is named.
     NotConverged
-        The corrections under limits cannot be proven optimal to a millionth (`Balance.gap`); above 1e-9 a warning
-        `Doubtful` says so.
+        The corrections under limits cannot be proven optimal to nine digits (`Balance.gap`).
     ValueError
         Not finite, or shapes that do not fit.
 
@@ -328,9 +317,9 @@ def least_squares(
             limits_of("max_mass", max_mass, alpha.shape[1]),
             limits_of("max_residual", max_residual, len(v)),
         )
-        corrections, bound, gap = limited_least_squares(alpha, v, root, limit, ceiling)
-        capped, held = _given(limit), _given(ceiling)
-        return _warned(Balance(alpha, v, corrections, w, bound, gap, max_mass=capped, max_residual=held))
+        corrections, bound, gap, of_largest = limited_least_squares(alpha, v, root, limit, ceiling)
+        w, limits = 1 / ceiling if of_largest else w, (_given(limit), _given(ceiling))
+        return Balance(alpha, v, corrections, w, bound, gap, of_largest, 0.0, *limits)
     a, b = (alpha, v) if root is None else (alpha * root[..., None], v * root)
     with np.errstate(over="ignore", invalid="ignore"):
         solution, sigma = smallest_squares(a, b, ridge)
@@ -370,7 +359,7 @@ def minimax(
     DependentPlanes
         The sensors cannot distinguish the planes, and no limit keeps their masses finite.
     NotConverged
-        The corrections cannot be proven optimal to a millionth (`Balance.gap`); above 1e-9 a warning `Doubtful` says so.
+        The corrections cannot be proven optimal to nine digits (`Balance.gap`).
     ValueError
         Not finite, or shapes that do not fit.
 
@@ -403,18 +392,12 @@ def minimax(
         a, b = a[moved], b[moved]
     if not len(b):
         raise DependentPlanes("the readings show no plane at all", np.eye(alpha.shape[1], dtype=complex)[0])
-    corrections, bound, gap = smallest_maximum(a, b, limit)
+    corrections, bound, gap, _ = smallest_maximum(a, b, limit)
     if floor > bound:
         # what no plane moves may be all that is left
         reached = float((np.abs(b + a @ corrections)).max())
         bound, gap = floor, gap if reached > floor else 0.0
-    return _warned(Balance(alpha, v, corrections, w, bound, gap, True, max_mass=_given(limit)))
-
-
-def _warned(fix: Balance) -> Balance:
-    if fix.gap > DOUBTFUL:
-        warnings.warn(fix.status, Doubtful, stacklevel=3)
-    return fix
+    return Balance(alpha, v, corrections, w, bound, gap, True, max_mass=_given(limit))
 
 
 def _within(z: Complex, limit: Real | None) -> bool:

@@ -33,6 +33,8 @@ STEPS, CHANGES = 12, 6
 """Steps of Newton's method, and changes of the active constraints in each of them."""
 FAR = 20.0
 """A step that multiplies the error by this was not a step to the optimum."""
+EVEN = 8
+"""Times that rows and columns of a system are brought to like size (Ruiz, RAL-TR-2001-034)."""
 MOST = 200
 """Rounds of the interior-point method; some ten are the rule."""
 
@@ -50,6 +52,8 @@ class ConeProblem:
     square: Complex | None
     at: Complex | None
     to_w: Complex
+    cut: float
+    """The share of the largest singular value of a step's equations below which one is none."""
 
     def __post_init__(self) -> None:
         self.with_t = bool(self.f.any())
@@ -369,7 +373,7 @@ def _step(
         part = along[chosen]
         system[:n, :n], system[n:, :n], system[:n, n:] = upper, part, part.T
         rhs[:n], rhs[n:] = slope, above[chosen]
-        solution = _consistent(system, -rhs, largest)
+        solution = _consistent(system, -rhs, largest, problem.cut)
         if not np.isfinite(solution).all():
             return None
         moved, pulls = solution[:n], solution[n:]
@@ -395,15 +399,20 @@ def _active(s: Real, z: Real) -> NDArray[np.bool_]:
     return np.asarray(slack / np.abs(s).max() < z[0] / np.abs(z).max())
 
 
-def _consistent(system: Real, rhs: Real, largest: float) -> Real:
-    """Solve a symmetric system; of a singular one (the optimum is not unique) the solution of least norm."""
+def _consistent(system: Real, rhs: Real, largest: float, cut: float) -> Real:
+    """Solve a symmetric system; of a singular one (the optimum is not unique) a solution of least norm in like units."""
     try:
         u = np.asarray(np.linalg.solve(system, rhs))
         if np.isfinite(u).all() and np.abs(u).max() <= largest:
             return u
     except np.linalg.LinAlgError:
         pass
+    # rows and columns of like size: what is small by its units alone is not cut off
+    scale = np.ones(len(rhs))
+    for _ in range(EVEN):
+        size = np.sqrt(np.abs(scale[:, None] * system * scale).max(axis=1))
+        scale /= np.where(size > 0, size, 1.0)
     try:
-        return np.asarray(np.linalg.lstsq(system, rhs, rcond=1e-11)[0])
+        return np.asarray(scale * np.linalg.lstsq(scale[:, None] * system * scale, scale * rhs, rcond=cut)[0])
     except np.linalg.LinAlgError:
         return np.full(len(rhs), np.nan)

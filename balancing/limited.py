@@ -11,7 +11,7 @@ than
     ½ Σ |r_s|²  >= Re xᴴV - ½|x|² + Re yᴴV - Σ c_s |y_s| - Σ m_p |(αᴴ(x + y))_p|,
 
 where αᴴy, αᴴ(x + y) are zero for planes without a limit (Boyd and Vandenberghe, Convex Optimization, section 5.2). What
-the masses leave is held against that: the gap comes with the answer, and above `REFUSED` there is none.
+the masses leave is held against that: the gap comes with the answer, and above `PROVEN` there is none.
 """
 
 from __future__ import annotations
@@ -36,12 +36,15 @@ Residual = Callable[[Complex, Complex, Complex], Complex]
 
 CLOSED = 1e-12
 """An answer whose gap is at most this, or rounding, is not solved again."""
-DOUBTFUL = 1e-9
-"""Above this gap an answer comes with a warning."""
+PROVEN = 1e-9
+"""Above this gap there is no answer."""
+TIGHT = 1e-8
+"""Limits of residuals that are nearer to the smallest that can be met, relatively, are kept by the minimax corrections."""
 ROOM = 4.0
 """Units of the last place of a row's terms that it keeps from its limit where an answer is solved again."""
-REFUSED = 1e-6
-"""Above this gap there is no answer."""
+CUTS = 1e-11, 1e-14, 1e-11, 1e-14
+"""Where an answer is solved again, the share of the largest singular value below which one is none: the finer one where planes
+are nearly dependent, the coarser one where the optimum is not unique."""
 SQUARES = 10.0
 """The squares count so often as much as the room that the limits leave: then the multipliers have the size of 1."""
 
@@ -67,10 +70,6 @@ class Infeasible(ValueError):
         return f"{float(Context(prec=6, rounding=ROUND_CEILING).create_decimal_from_float(least)):g}"
 
 
-class Doubtful(UserWarning):
-    """Corrections under limits are proven optimal to fewer than nine digits."""
-
-
 class NotConverged(ArithmeticError):
     """The best corrections are not proven optimal; `gap` is the largest relative excess of their residual."""
 
@@ -86,11 +85,15 @@ class NotConverged(ArithmeticError):
 
 
 class Optimum(NamedTuple):
-    """Corrections (p,), a lower bound of the objective, and by what share the objective may lie above its least value."""
+    """Corrections (p,), a lower bound of the objective, and by what share the objective may lie above its least value.
+
+    `of_largest`: the objective is the largest residual in units of its limits, as no other corrections keep these.
+    """
 
     corrections: Complex
     bound: float
     gap: float
+    of_largest: bool = False
 
 
 def limited_least_squares(
@@ -116,7 +119,7 @@ def limited_least_squares(
         # as `Balance.residual` is computed: another order of sums may differ by a unit in the last place
         return bool((np.abs(v + np.matvec(alpha, w)) <= ceiling).all() and (np.abs(w) <= limit).all())
 
-    inside = None
+    inside, room = None, 1.0
     if capped.any():
         # the corrections farthest within all limits, in units of these
         caps = _caps(limit)
@@ -124,13 +127,21 @@ def limited_least_squares(
         inside = smallest_maximum(
             np.concatenate([e, caps]), np.concatenate([offset, none]), nowhere
         ).corrections
+        least = None
         if not kept(inside):
-            inside = smallest_maximum(e, offset, limit).corrections
+            least = smallest_maximum(e, offset, limit)
+            inside = least.corrections
             factor = float((np.abs(v + alpha @ inside)[capped] / ceiling[capped]).max())
             # the smallest limit itself can be missed by rounding
-            if factor > 1 + min(_rounding(e, offset, inside), DOUBTFUL):
+            if factor > 1 + min(_rounding(e, offset, inside), PROVEN):
                 raise Infeasible(factor, ceiling[capped])
-    return _Limited(limit, (a, b), (e, offset), inside, kept).solved()
+        room = 1 - max(float(np.abs(offset + e @ inside).max()), float((np.abs(inside) / limit).max()))
+        if room <= TIGHT:
+            least = least or smallest_maximum(e, offset, limit)
+            w = least.corrections
+            if float(np.abs(offset + e @ w).max()) >= 1 - TIGHT:
+                return Optimum(w if kept(w) else inside, least.bound, least.gap, of_largest=True)
+    return _Limited(limit, (a, b), (e, offset), inside, kept, room=room).solved()
 
 
 def smallest_maximum(a: Complex, b: Complex, limit: Real) -> Optimum:
@@ -191,38 +202,36 @@ class _Limited:
         inside: Complex | None = None,
         kept: Callable[[Complex], bool] | None = None,
         start: Complex | None = None,
+        room: float = 1.0,
     ) -> None:
         nothing = np.zeros(len(limit), dtype=complex)
         self.start = inside if inside is not None else nothing if start is None else start
         self.limit, self.squares, self.cones, self.inside, self.kept = limit, squares, cones, inside, kept
         self.limited = np.flatnonzero(np.isfinite(limit))
         self.a, self.b = cones if squares is None else squares
-        self.tight, self.room = False, 1.0
-        if inside is not None:
-            # limits that leave nothing to choose from in all digits that count: any corrections within them will do
-            room = 1 - float(np.abs(cones[1] + cones[0] @ inside).max())
-            self.room = min(room, 1 - float((np.abs(inside) / limit).max()))
-            self.tight = self.room <= DOUBTFUL
+        # next to infeasible the multipliers are large without this factor of the squares
+        self.share = float(np.clip(SQUARES * room, TIGHT, 1.0))
 
     def solved(self) -> Optimum:
         """Solve, again from what was reached where the gap is not closed; refuse what is not the optimum."""
         start = self.start
         best: Optimum | None = None
-        for again in range(1 if self.tight else 3):
+        for again, cut in enumerate(CUTS):
             # where digits are missing, what is left is taken in 32 of them
             residual = _in_32_digits if again else _in_floats
             unit = float(np.abs(residual(self.a, self.b, start)).max()) or 1.0
-            problem = self._problem(start, unit, residual)
-            if again and self.squares is not None:
+            problem = self._problem(start, unit, residual, cut)
+            if again:
                 # limits that leave room for rounding each row, so that the masses need not be moved away from all of them
                 e, offset = self.cones
-                own = np.concatenate(
-                    [np.abs(offset) + np.abs(e) @ np.abs(start), np.full(len(self.limited), 1 / ROOM)]
+                own = (
+                    0 * np.abs(offset) if self.squares is None else np.abs(offset) + np.abs(e) @ np.abs(start)
                 )
-                problem.h -= np.minimum(ROOM * EPS * own, DOUBTFUL)
+                own = np.concatenate([own, np.ones(len(self.limited))])
+                problem.h -= np.minimum(ROOM * EPS * own, PROVEN)
             step, force = solve(problem)
             w = self._within(start + step)
-            force = force[: len(self.cones[1])] / self._share
+            force = force[: len(self.cones[1])] / self.share
             # of the step as it was solved: w is rounded, which shows where it leaves little
             stepped = residual(self.a, self.b, start) + self.a @ step
             reached = self._judged(w, stepped, force, unit, problem.to_w, residual)
@@ -232,17 +241,12 @@ class _Limited:
                 break
             start = best.corrections
         assert best is not None
-        if not (best.gap <= REFUSED or self.tight):
+        if best.gap > PROVEN:
             sigma = np.linalg.svd(columns_scaled(self.a)[0], compute_uv=False)
             raise NotConverged(best.gap, float(sigma[0] / sigma[-1]) if sigma[-1] > 0 else np.inf)
         return best
 
-    @property
-    def _share(self) -> float:
-        """The factor of the squares in the problem as it is solved: next to infeasible the multipliers are large without it."""
-        return float(np.clip(SQUARES * self.room, DOUBTFUL, 1.0))
-
-    def _problem(self, start: Complex, unit: float, residual: Residual) -> ConeProblem:
+    def _problem(self, start: Complex, unit: float, residual: Residual, cut: float) -> ConeProblem:
         """Put the steps from `start` into coordinates in which its rows are orthonormal, and neither κ(α) nor any unit is left.
 
         Where masses are limited the limits' own rows |w_p/m_p| stand below the coefficients: with QR of both together
@@ -256,7 +260,7 @@ class _Limited:
         readings, ones, none = len(offset), np.ones(len(caps)), np.zeros(len(caps), dtype=complex)
         free = self.squares is None
         of_cones = unit if free else 1.0
-        exact, root = residual is _in_32_digits, np.sqrt(self._share) / unit
+        exact, root = residual is _in_32_digits, np.sqrt(self.share) / unit
         return ConeProblem(
             np.concatenate([e / of_cones, caps]),
             np.concatenate([residual(e, offset, start) / of_cones, residual(caps, none, start)]),
@@ -266,6 +270,7 @@ class _Limited:
             None if free else self.a * root,
             None if free else residual(self.a, self.b, start) * root,
             to_w,
+            cut,
         )
 
     def _within(self, w: Complex) -> Complex:
@@ -305,7 +310,7 @@ class _Limited:
         left = residual(self.a, self.b, w)
         reach = self._reach(to_w, unit, left)
         # the rounding of a residual that is small against the readings is no gap
-        excused = min(2 * _rounding(self.a, self.b, w), DOUBTFUL * float(np.abs(self.b).max()))
+        excused = min(2 * _rounding(self.a, self.b, w), PROVEN * float(np.abs(self.b).max()))
         if self.squares is None:
             value = float(np.abs(left).max())
         else:
@@ -345,19 +350,27 @@ class _Limited:
             # the squares in units in which they stand beside those of the limits
             rows, at = np.concatenate([self.a / unit, e]), np.concatenate([self.b / unit, offset])
             forces = np.concatenate([pulls[0] / unit, pulls[1]])
+        none = np.zeros(len(w), dtype=complex)
+        pull = residual(adjoint(rows), none, forces)
         if loose.any():
-            u, sigma, _ = np.linalg.svd(columns_scaled(rows[:, loose])[0], full_matrices=False)
-            u = u[:, sigma > 1e-13 * sigma[0]]
+            scaled, scale = columns_scaled(rows[:, loose])
+            u, sigma, vh = np.linalg.svd(scaled, full_matrices=False)
+            kept = sigma > 1e-13 * sigma[0]
+            u, undo = u[:, kept], (vh[kept].T / sigma[kept]).T * scale
             for _ in range(2):
                 forces = forces - u @ (u.conj().T @ forces)
+            pull = residual(adjoint(rows), none, forces)
+            if residual is _in_32_digits:
+                # rounding of the forces leaves a pull: it is taken off in further digits
+                more = u @ (undo @ pull[loose])
+                forces, pull = forces - more, residual(adjoint(rows), pull, -more)
         total = float(np.abs(forces[len(forces) - len(offset) :]).sum())
         constant = 0.0
         if self.squares is not None:
             constant = 0.5 * float(np.square(np.abs(forces[: len(self.b)])).sum()) + total
         elif total > 0:
-            forces = forces / total
-        left = residual(rows, at, w)
-        size = np.abs(pull := residual(adjoint(rows), np.zeros(len(w), dtype=complex), forces))
+            forces, pull = forces / total, pull / total
+        left, size = residual(rows, at, w), np.abs(pull)
         lost = size * reach
         k = self.limited
         # m_p|pull| + Re pull* w: its parts along and across as products, for both terms are large

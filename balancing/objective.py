@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from balancing.balance import Balance, least_squares, minimax
-from balancing.limited import Doubtful, Infeasible, NotConverged
+from balancing.limited import Infeasible, NotConverged
 from balancing.log_balance import LogBalance, spread
 
 Real = NDArray[np.float64]
@@ -66,13 +65,13 @@ class Objective:
         Infeasible, NotConverged, DependentPlanes
         """
         if not self.minimax:
-            limits = {"max_mass": self.max_mass, "max_residual": self.max_residual}
-            return _quietly(least_squares, alpha, here, weights, **limits), False
+            masses, ceiling = self.max_mass, self.max_residual
+            return least_squares(alpha, here, weights, max_mass=masses, max_residual=ceiling), False
         ceiling = self.max_residual
-        fix = _quietly(minimax, alpha, here, self.max_mass, weights=weights)
+        fix = minimax(alpha, here, self.max_mass, weights=weights)
         if ceiling is None or float(fix.residual_max) <= ceiling * ROUNDED:
             return fix, False
-        least = _quietly(minimax, alpha, here, self.max_mass) if weights is not None else fix
+        least = minimax(alpha, here, self.max_mass) if weights is not None else fix
         if float(least.residual_max) > ceiling * ROUNDED:
             raise Infeasible(float(least.residual_max) / ceiling, np.array([ceiling]))
         return fix, True
@@ -112,19 +111,12 @@ class Objective:
         for alpha, v in problems:
             here = v + alpha @ standing
             if self.minimax:
-                fix = _quietly(minimax, alpha, here, self.max_mass, weights=weights)
+                fix = minimax(alpha, here, self.max_mass, weights=weights)
             else:
                 try:
                     fix, _ = self.solve(alpha, here, weights)
                 except Infeasible:
                     # readings from which the limit cannot be met: as near to it as can be
-                    fix = _quietly(minimax, alpha, here, self.max_mass)
+                    fix = minimax(alpha, here, self.max_mass)
             samples.append(fix.corrections)
         return np.stack(samples)
-
-
-def _quietly(solve: Callable[..., Balance], *data: object, **limits: object) -> Balance:
-    """Solve without Python's warning: the status of the result has it."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Doubtful)
-        return solve(*data, **limits)

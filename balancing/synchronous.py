@@ -20,6 +20,10 @@ REFINED = 4
 """Steps of refinement in 32 digits, where one is not enough."""
 BLOCK = 8192
 """Samples that are worked on together."""
+SUDDEN = 1.5
+"""No speed changes by this factor from one pulse of a mark to the next."""
+FEWEST, MOST = 7, 255
+"""Marks in a row that one cubic is fitted to."""
 
 
 @record
@@ -76,16 +80,16 @@ class Marks(NamedTuple):
 
     at: Any
     """(n,), s."""
-    low: Any = None
-    """The last low sample before each, (n,), s; None where the times lie between the samples."""
-    high: Any = None
-    """The first high sample of each, (n,), s."""
+    low: Any
+    """When it rises at the earliest, (n,), s: the last low sample."""
+    high: Any
+    """When it rises at the latest, (n,), s: the first high sample."""
     even: bool = False
     """Whether the distances from each to the next are alike."""
 
     def slack(self, place: float) -> Any:
         """Return by how much they may all be shifted at a place among them, to either side, s; the first one is at 0."""
-        if self.low is None or not len(self.at):
+        if not len(self.at):
             return 0.0
         if not self.even:
             apart = self.high - self.low
@@ -108,13 +112,14 @@ class Marks(NamedTuple):
 def marks(t: ArrayLike, mark: ArrayLike) -> Marks:
     """Find the times at which a mark rises through half its height.
 
-    A mark of two levels rises somewhere between its last low sample and its first high one: in the middle, half an interval
-    either way. Where the marks are even within the samples they are taken as even, in the middle of what all of
-    them allow. Any other mark rises between two samples by linear interpolation.
+    A mark of two levels, noise aside, rises somewhere between its last low sample and its first high one: in the middle, half
+    an interval either way. Where the marks are even within the samples they are taken as even, in the middle of what all of
+    them allow; where they lie on cubics within the samples, on these. Any other mark rises between two samples by linear
+    interpolation, which a bend of the mark puts in doubt.
 
     >>> one, other = marks([0, 1, 2, 3], [0, 0, 1, 0]), marks([0, 1, 2, 3], [0, 0, 3, 4])
-    >>> one.at, float(one.slack(0)), other.at.round(9), other.slack(0)
-    (array([1.5]), 0.5, array([1.66666667]), 0.0)
+    >>> one.at, float(one.slack(0)), other.at.round(9), float(other.slack(0))
+    (array([1.5]), 0.5, array([1.66666667]), 0.125)
     """
     time, level = as_array(t), as_array(mark)
     nearest = _floats(level)
@@ -122,7 +127,8 @@ def marks(t: ArrayLike, mark: ArrayLike) -> Marks:
     half = (low + high) / 2
     # decisions are those of floats
     rises = np.flatnonzero((nearest[:-1] < float(half)) & (nearest[1:] >= float(half)))
-    if ((nearest == float(low)) | (nearest == float(high))).all():
+    share = (nearest - float(low)) / (float(high - low) or 1.0)
+    if ((share > 0.1) & (share < 0.9)).sum() <= 0.2 * len(rises):
         rises = rises + 1
         falls = np.flatnonzero((nearest[:-1] >= float(half)) & (nearest[1:] < float(half))) + 1
         whole = rises[rises < falls[-1:].max(initial=0)]
@@ -134,8 +140,13 @@ def marks(t: ArrayLike, mark: ArrayLike) -> Marks:
             first += float(falls[0] == lengths.min())
         before = np.concatenate([time[:1] - (time[1:2] - time[:1]) * first, time[:-1]])
         return _even(before[rises], time[rises])
-    share = (half - level[rises]) / (level[rises + 1] - level[rises])
-    return Marks(time[rises] + share * (time[rises + 1] - time[rises]))
+    # a line errs by up to an eighth of the second differences beside it
+    last = len(level) - 1
+    rise, long = level[rises + 1] - level[rises], time[rises + 1] - time[rises]
+    before, after = level[np.maximum(rises - 1, 0)], level[np.minimum(rises + 2, last)]
+    bend = np.maximum(abs(rise - level[rises] + before), abs(after - level[rises + 1] - rise))
+    at, off = time[rises] + (half - level[rises]) / rise * long, np.minimum(bend / rise / 8, 0.5) * long
+    return Marks(at, at - off, at + off)
 
 
 def _floats(x: Any) -> Any:
@@ -155,8 +166,28 @@ def _even(low: Any, high: Any) -> Marks:
     below, above = low - slope * k, high - slope * k
     first, last = below[below.argmax()], above[above.argmin()]
     if not first < last:
-        return each
+        return _on_cubics(each, slope * k)
     return Marks((first + last) / 2 + slope * k, low, high, even=True)
+
+
+def _on_cubics(marks: Marks, line: Any) -> Marks:
+    """Return marks where cubics through the middles of their intervals pass, if all pass these, rounding of samples aside.
+
+    Each mark has a cubic of its own, through the most marks around it (A. Savitzky, M. J. E. Golay, Anal. Chem. 36 (1964)
+    1627-1639). The cubics are fitted to the distances from a `line`.
+    """
+    n = len(line)
+    wide, off = min(n, MOST), marks.at - line
+    room = _floats(marks.high - marks.low) / 2
+    while wide >= FEWEST:
+        q = np.linalg.qr(np.vander(np.linspace(-1, 1, wide), 4))[0]
+        begin = np.clip(np.arange(n) - wide // 2, 0, n - wide)
+        weights = (q @ q.T)[np.arange(n) - begin]
+        fitted = (off[begin[:, None] + np.arange(wide)] * weights).sum(axis=-1)
+        if (np.abs(_floats(fitted - off)) <= 1.5 * room).all():
+            return marks._replace(at=np.minimum(np.maximum(fitted + line, marks.low), marks.high))
+        wide //= 2
+    return marks
 
 
 def _envelope(k: Any, y: Any) -> Any:
@@ -257,7 +288,7 @@ def once_per_turn(
 
     Notes
     -----
-    The angle grows evenly from pulse to pulse. In each turn the signal is fitted by a constant and up to three orders of
+    From pulse to pulse the angle is a cubic of time, which is exact at a constant acceleration. In each turn the signal is fitted by a constant and up to three orders of
     cos and sin of that angle (least squares), so that neither the sampling nor other orders leak into the first;
     the mean over turns is the synchronous average of the first order.
 
@@ -299,6 +330,7 @@ def _averaged(time: Any, x: Any, level: Any, pulses: int, tacho: Any) -> OncePer
         knots, at, pulses, resolution = _counted(time, tacho, rises)
     else:
         knots, at = rises.at, rises.at[::pulses]
+        _require_each(_floats(knots))
         resolution = rises.resolution((len(at) - 1) * pulses / 2, pulses)
     each = at[1:] - at[:-1]
     vectors = _turns(time, x, at, knots, pulses)
@@ -318,6 +350,19 @@ def _averaged(time: Any, x: Any, level: Any, pulses: int, tacho: Any) -> OncePer
         deviation, of_speed, sure = map(in_32_digits, (deviation, of_speed, speed * resolution))
         return OncePerTurn(mean, deviation, speed, of_speed, turns, sure)
     return OncePerTurn(mean, deviation, float(speed), float(of_speed), turns, float(speed * resolution))
+
+
+def _require_each(knots: Real) -> None:
+    """Raise ValueError where a pulse comes much sooner or later than the ones beside it."""
+    apart = np.diff(knots)
+    faster = apart[:-1] / apart[1:]
+    odd = np.flatnonzero(np.maximum(faster, 1 / faster) > SUDDEN)
+    if len(odd):
+        k = int(odd[0])
+        raise ValueError(
+            f"from the pulse at {knots[k + 1]:g} s to the next it takes {1 / faster[k]:.3g} times as long as to it: one was missed "
+            "between two samples, or noise was taken for one: expected a mark of two levels, each longer than a sample"
+        )
 
 
 def _counted(time: Any, tacho: Any, rises: Marks) -> tuple[Any, Any, int, Any]:
@@ -377,9 +422,21 @@ def _turns(t: Any, x: Any, at: Any, knots: Any, pulses: int) -> Any:
 
 
 def _interpolated(t: Any, knots: Any) -> Any:
-    """Return how many pulses there have been at times, parts of them by even growth."""
+    """Return how many pulses there have been at times, parts of them by cubics.
+
+    Each is the mean of the two parabolas through three pulses that share its part, the nearer one with more weight.
+    """
     i = np.clip(np.searchsorted(_floats(knots), _floats(t), side="right") - 1, 0, len(knots) - 2)
-    return (t - knots[i]) / (knots[i + 1] - knots[i]) + i
+    h = knots[1:] - knots[:-1]
+    share = (t - knots[i]) / h[i]
+    if len(h) == 1:
+        return share + i
+    # parabolas share + bend·share·(1 - share), with the part before and with the one after
+    turn = (h[1:] - h[:-1]) / (h[1:] + h[:-1])
+    before, after = turn * h[1:] / h[:-1], turn * h[:-1] / h[1:]
+    before, after = np.concatenate([after[:1], before]), np.concatenate([after, before[-1:]])
+    left = 1.0 - share
+    return share * left * (left * before[i] + share * after[i]) + share + i
 
 
 def _first_order(angle: Any, x: Any, there: Any, orders: int) -> Any:

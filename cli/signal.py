@@ -26,6 +26,10 @@ Arguments:
 What:
   pulses N(1-10000)=1  Number of pulses of the mark in one turn.
 """
+FINE = 1e-4
+"""Phases that hold to this, rad, come without a warning."""
+STEADY = 0.02
+"""Turns whose speeds have a larger standard deviation, relatively, come with a warning."""
 MARKS = ("mark", "tacho", "keyphasor", "pulse", "trigger")
 
 
@@ -118,10 +122,15 @@ def read_recording(path: str, pulses: int) -> Recording:
             f"{table.file}: phases count from the first of {pulses} pulses in the recording, and another recording may begin at "
             "another one: add a column mark, once in a turn, in addition to the tacho"
         )
-    if result.phase_resolution:
+    if result.phase_resolution > FINE:
         table.warnings.append(
-            f"{table.file}: the mark rises between two samples, and the middle is taken: phases hold to "
+            f"{table.file}: the mark rises between two samples: phases hold to "
             f"± {np.degrees(result.phase_resolution):.2g}°; more samples in each turn reduce this"
+        )
+    if result.speed_deviation > STEADY * result.speed:
+        table.warnings.append(
+            f"{table.file}: the speed varies (standard deviation {100 * result.speed_deviation / result.speed:.2g} %), and the "
+            "vectors are means over it: near a resonance record at a steady speed"
         )
     exact = partial(_exact, table, (time, mark, tacho), list(units), pulses)
     return Recording(sensors, unit, result, table.warnings, exact)

@@ -8,7 +8,7 @@ A name that says too little without its package is longer here: `rigidbody3d.che
 docs/library.md has the first sentence of each; `help(dalembert.correct)` shows all of one.
 
 Rotors (`balancing`):
-    AmplitudeFit, Balance, CoincidentPlanes, Correction, DependentPlanes, DependentTrials, Doubtful,
+    AmplitudeFit, Balance, CoincidentPlanes, Correction, DependentPlanes, DependentTrials,
     Drift, ErrorBudget, FewestWeights, GRADES, Indexed, Infeasible, JointFit, LogBalance,
     ModalCorrection, NextRun, NotConverged, OncePerTurn, Placement, Prior, TorqueCycle, TrialEffect,
     Unbalances, Undetermined, UnreachedMode, ZONE_BOUNDARIES, allocate_tolerance, api_unbalance,

@@ -69,16 +69,28 @@ def even_marks(low: Sequence[Any], high: Sequence[Any]) -> list[Any]:
     return [(first + last) / 2 + best * i for i in k] if width > 0 else middles
 
 
+def _lagrange(marks: Sequence[Any], among: Sequence[int], at: Any) -> Any:
+    """Return the polynomial that is k at marks[k], for k `among` some."""
+    return mp.fsum(
+        k * mp.fprod((at - marks[j]) / (marks[k] - marks[j]) for j in among if j != k) for k in among
+    )
+
+
 def once_per_turn(
     t: Sequence[Any], x: Sequence[Any], marks: Sequence[Any], harmonics: int
 ) -> tuple[Any, Any]:
     """Return the mean over turns of the first order of a signal, and its standard deviation, by normal equations."""
     vectors = []
-    for start, end in pairwise(marks):
+    for k, (start, end) in enumerate(pairwise(marks)):
         rows, right = [], []
+        # turns by Lagrange's parabolas through the mark before and through the one after
+        before = range(max(k - 1, 0), min(max(k - 1, 0) + 3, len(marks)))
+        after = range(max(min(k, len(marks) - 3), 0), min(k, len(marks) - 3) + 3)
         for at, value in zip(t, x, strict=True):
             if start <= at < end:
-                angle = 2 * mp.pi * (at - start) / (end - start)
+                share = (at - start) / (end - start)
+                turns = (1 - share) * _lagrange(marks, before, at) + share * _lagrange(marks, after, at)
+                angle = 2 * mp.pi * turns
                 orders = range(1, harmonics + 1)
                 rows.append(
                     [mp.mpf(1), *(mp.cos(j * angle) for j in orders), *(mp.sin(j * angle) for j in orders)]

@@ -40,7 +40,7 @@ class Modes:
 
     @property
     def conditions(self) -> list[str]:
-        """What is to vanish."""
+        """The sums that must vanish."""
         return [*(["force", "couple"] if self.rigid else []), *(f"mode {name}" for name in self.names)]
 
     @property

@@ -113,7 +113,7 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Request:
-    """What the options ask for."""
+    """The request of the options."""
 
     gravity: float
     remove: bool

@@ -53,7 +53,7 @@ class Request:
 
 
 class CorrectionMass(NamedTuple):
-    """What goes into a correction plane of a shaft; or the errors of these numbers."""
+    """The mass in a correction plane of a shaft; or the errors of its numbers."""
 
     plane: str
     z: float
@@ -132,7 +132,7 @@ class MovingBody:
 
     @cached_property
     def point(self) -> Array:
-        """The point of the quantities `…_about`, (3,): that of --about, else of --fixed, else the origin."""
+        """The point of the quantities `…_about`, (3,): --about, else --fixed, else the origin."""
         return self._numbers(self.request.about or self.request.fixed or ORIGIN)
 
     @property

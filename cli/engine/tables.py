@@ -181,7 +181,7 @@ def shafts(e: Engine) -> Table:
 
 
 def locomotive(e: Engine) -> Table:
-    """What a driver of a locomotive and the track feel of the first order."""
+    """The first order as the driver of a locomotive and the track feel it."""
 
     def along(couple: bool) -> Of:
         return lambda e: np.hypot(*e.residual.coefficients(couple)[0, 0])[None]

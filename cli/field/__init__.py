@@ -42,7 +42,6 @@ FEWEST_DRAWS = 40  # they give a standard deviation to a ninth
 REQUESTED = (
     "predict", "suggest", "suggest_gain", "robust", "static", "couple", "split", "trim_split", "tolerance", "zones",
 )  # fmt: skip
-"""Tables that an option requests: where a pipe takes the corrections, standard error has them in words."""
 OPTIONS = """
 Arguments:
   runs RUNS  CSV of runs; - is standard input.
@@ -237,11 +236,6 @@ def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -
 
         return way(b)
 
-    def aside() -> list[str]:
-        from cli.field.fit_tables import in_words
-
-        return [line for name in REQUESTED if name in made for line in in_words(name, made[name]())]
-
     beside: dict[Path, Callable[[], bytes]] = {} if save_influence is None else {save_influence: stored}
     if page is not None:
         from cli.field.report import machine_page
@@ -256,7 +250,7 @@ def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -
             "convention": sense(b),
             "amplitude_unit": b.runs.amplitude_unit,
         },
-        aside=aside,
+        requested=REQUESTED,
         companions=[name for name in ("prediction", "split", "predict", "zones") if name in made],
         figure=figure,
         method=METHOD,

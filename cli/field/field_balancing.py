@@ -79,7 +79,7 @@ class Solved:
 
     @property
     def standing(self) -> Complex:
-        """What is on the rotor in its last run, (g, p)."""
+        """The masses on the rotor in its last run, (g, p)."""
         return self.group.standing
 
     @property
@@ -108,12 +108,12 @@ class Solved:
 
     @property
     def total(self) -> Complex:
-        """What is added to the rotor in its initial state, (g, p)."""
+        """The masses to add to the rotor in its initial state, (g, p)."""
         return self.corrections + self.start
 
     @cached_property
     def trim(self) -> Complex:
-        """What is added to the rotor as it stands in its last run, (g, p)."""
+        """The masses to add to the rotor as it stands in its last run, (g, p)."""
         trim = self.corrections + (self.start - self.standing)
         terms = np.abs(self.total) + np.abs(self.standing)
         return np.where(np.abs(trim) > 4 * EPS * terms, trim, 0)
@@ -272,8 +272,8 @@ class FieldBalancing:
                 self.warnings.append(
                     "with these weights a residual is beyond --max-residual, which without them could be met"
                 )
-            if fix.status != "optimal":
-                self.warnings.append(f"{self.of(group, i)}{fix.status}")
+            if fix.of_largest > solved.objective.minimax:
+                self.warnings.append(f"{self.of(group, i)}the limits leave the minimax corrections alone")
             answers.append(fix)
         return answers
 

@@ -376,7 +376,7 @@ def exact_errors(group: Group, request: Request, fit: ExactFit) -> ExactErrors:
 
 
 def _as_stated(errors: tuple[float, float]) -> tuple[Doubled, Doubled]:
-    """Return the standard deviations of --reading-error with its decimals: relative (amplitude), and in rad (phase)."""
+    """Return the standard deviations that --reading-error states, as written: relative (amplitude), and in rad (phase)."""
     from cli.read.exact import rates, writtens
 
     return writtens(errors[0]), rates(errors[1]).doubled

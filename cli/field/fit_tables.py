@@ -22,15 +22,13 @@ from cli.field.rotor import Rotor, each
 from cli.field.tables import READINGS, Rows, amplitude, masses, masses_text, vibration
 from cli.read.options import bad
 from cli.read.runs.runs import Before, Complex, Real
-from cli.show.output import ROWS
 from dalembert.angles import degrees
 from dalembert.results.columns import ABSENT, Column, Table, names, number
-from dalembert.results.text import heading, printed
 from dalembert.units import amplitude_kind, from_si, to_si
 
 
 def predicted(b: FieldBalancing, solved: Solved) -> tuple[Complex, Real]:
-    """What every channel should read in the run to be predicted, and one standard deviation, (g, s) each."""
+    """The predicted readings of every channel, and their standard deviations, (g, s) each."""
     balance = solved.fitted
     on = np.broadcast_to(b.run_to_predict(solved.planes), solved.corrections.shape)
     return balance.fit.fitted(on[:, None])[:, 0], balance.vibration_deviation(on, reading=True)
@@ -278,21 +276,6 @@ def predicted_run(b: FieldBalancing) -> Table:
     planes = b.solved[0].planes
     above = f"a run with {masses_text(b, planes, b.run_to_predict(planes)) or 'no masses'} should read"
     return rows.table(columns, READINGS, "predict[]", above)
-
-
-def in_words(name: str, table: Table) -> list[str]:
-    """Write the rows of a table as sentences, of many the first ones."""
-    lead = f"{heading(name)}{': ' * bool(table.above)}{table.above}"
-    cells = {header: printed(header, values)[:ROWS] for header, values in table.cells.items()}
-    rows = zip(*cells.values(), strict=True)
-    pairs = ([f"{header} {cell}" for header, cell in zip(cells, row, strict=True) if cell] for row in rows)
-    lines = [f"{lead}: {', '.join(row)}" for row in pairs]
-    if not table.columns:
-        return []
-    more = (
-        [f"{lead}: … and {table.length - ROWS} further rows: --json has all"] if table.length > ROWS else []
-    )
-    return [*lines, *more] if table.length else [lead]
 
 
 def _suggestions(b: FieldBalancing) -> Iterator[tuple[Rotor, NextRun]]:

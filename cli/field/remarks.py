@@ -20,7 +20,7 @@ NEARLY = 0.1  # a plane whose effect others bring about but for this share count
 
 
 def warnings(b: FieldBalancing) -> list[str]:
-    """What was done otherwise than a reader might expect, each once."""
+    """Sentences about assumptions and doubts that a reader might not expect, each once."""
     groups = [_Group(b, solved) for solved in b.solved]
     sentences = (sentence for group in groups for sentence in group.warnings())
     fits = (sentence for group in groups for sentence in group.of_fit()) if b.runs.fitted else ()

@@ -160,7 +160,7 @@ class _Pages:
             yield from self.parts("trim_split")
 
     def _people(self, masses: Complex, reasons: list[str] | None = None) -> Table:
-        """What to add in each plane, as people write it: 95.1 ± 0.9."""
+        """The mass to add in each plane, as people write it: 95.1 ± 0.9."""
         b, i = self.b, self.i
         along, across = (of[i].tolist() for of in self.solved.uncertainty(masses))
         sizes = zip(np.abs(masses[i]).tolist(), along, strict=True)

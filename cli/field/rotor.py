@@ -86,7 +86,7 @@ class LastRun(NamedTuple):
 
     run: str
     on: Complex
-    """What was on the rotor, SI, (p,)."""
+    """The masses on the rotor, SI, (p,)."""
     vibration: Complex
     """The readings less the run-out, (s,); NaN where a sensor was not read."""
 
@@ -100,7 +100,7 @@ class Reading(NamedTuple):
     residual: complex
     standardized: float
     outlier: bool
-    """Whether it does not go with the others."""
+    """Whether the other readings contradict it."""
     chance: float
     """How often by chance a residual is as large."""
 
@@ -140,12 +140,12 @@ class Rotor:
 
     @property
     def channels(self) -> list[Channel]:
-        """What was read."""
+        """The channels that were read."""
         return self.group.channels
 
     @property
     def standing(self) -> Complex:
-        """What is on it in its last run, (p,)."""
+        """The masses on it in its last run, (p,)."""
         return np.asarray(self.solved.standing[self.i])
 
     @property
@@ -187,12 +187,12 @@ class Rotor:
 
     @property
     def last_reading(self) -> Complex:
-        """What was read in its last run, run-out off, (s,); NaN where a sensor was not read."""
+        """The vibration of its last run, run-out off, (s,); NaN where a sensor was not read."""
         return self._read(self.group.last[self.i])
 
     @property
     def first_reading(self) -> Complex | None:
-        """What was read in the first run without masses, run-out off, (s,); None where there is no such run."""
+        """The vibration of the first run without masses, run-out off, (s,); None where there is no such run."""
         bare = next((run for run, on in self._runs.items() if not on.any()), None)
         return None if bare is None else self._read(bare)
 

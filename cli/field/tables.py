@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Tables = dict[str, Callable[[], Table]]
 
 READINGS = ("rotor", "sensor", "state", "speed_rpm")
-"""What names a row that is of a sensor."""
+"""The keys of a row of a sensor."""
 
 
 @dataclass(eq=False, repr=False)
@@ -326,14 +326,14 @@ def digits(balancing: FieldBalancing, solved: Solved, warnings: list[str]) -> li
 
 
 def standing(b: FieldBalancing) -> Table:
-    """What is on the rotors in their last run, of the document alone: the trim shows it."""
+    """The masses on the rotors in their last run, for JSON alone: the trim shows it."""
     rows = Rows.planes(b)
     on = masses(b, rows.numbers(lambda solved: solved.standing))
     return rows.table(on, ("rotor", "plane"), "standing[]", shown=False)
 
 
 def trim(b: FieldBalancing) -> Table:
-    """What to add to the rotors as they stand in their last run, and whether that is needed."""
+    """The masses to add to the rotors as they stand in their last run, and whether they are needed."""
     rows, of_group = Rows.planes(b), cache(lambda solved: Trim(b, solved))
     on = rows.numbers(lambda solved: solved.standing)
     reasons = rows.numbers(lambda solved: np.array(of_group(solved).reasons, dtype=object)).tolist()

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
 from importlib import import_module
+from itertools import chain
 from pathlib import Path
 from shutil import get_terminal_size
 from types import SimpleNamespace
@@ -157,8 +158,27 @@ def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> 
         options.json or options.text or (checked is None and options.output is None and sys.stdout.isatty())
     )
     if not shown and options.form != ".json":
-        for line in result.aside():
+        requested = (
+            _in_words(name, result.tables[name]()) for name in result.requested if name in result.tables
+        )
+        for line in chain(*requested, result.aside()):
             print(f"note: {one_line(line)}", file=sys.stderr)
+
+
+def _in_words(name: str, table: Table) -> list[str]:
+    """Write the rows of a table as sentences, of many the first ones, and what stands below it."""
+    from dalembert.results.text import heading, printed
+
+    lead = f"{heading(name)}{': ' * bool(table.above)}{table.above}"
+    cells = {header: printed(header, values)[:ROWS] for header, values in table.cells.items()}
+    rows = zip(*cells.values(), strict=True)
+    pairs = ([f"{header} {cell}" for header, cell in zip(cells, row, strict=True) if cell] for row in rows)
+    lines = [f"{lead}: {', '.join(row)}" for row in pairs]
+    if not table.columns:
+        return []
+    if table.length > ROWS:
+        lines.append(f"{lead}: … and {table.length - ROWS} further rows: --json has all")
+    return [*(lines or [lead]), *([f"{lead}: {table.below}"] if table.below else [])]
 
 
 def _with_way(result: Result) -> Result:

@@ -124,6 +124,8 @@ class Result:
     """Name -> table; the first is the CSV."""
     head: Mapping[str, Json] = field(default_factory=dict)
     """The top of the JSON document, in front of the tables."""
+    requested: Sequence[str] = ()
+    """Which further tables an option requests: where the first table alone is shown, standard error has them in words."""
     companions: Sequence[str] = ()
     """Which further tables go beside a file that holds one table, as FILE-name.csv."""
     screen: Callable[[], Sequence[Table]] | None = None

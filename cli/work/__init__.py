@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 
 
 EXAMPLE = "riul-slider-crank"
+METHOD = (
+    "Virtual power: the applied forces and the inertia forces −m·a, −I·α together do no work on the given velocities "
+    "(d'Alembert and Lagrange; J. A. Riul, Dinâmica das Máquinas, unit II, eqs. 1–5)."
+)
 OPTIONS = """
 Arguments:
   states STATES  CSV of link states with the unknown marked ?; - is standard input.
@@ -37,9 +41,8 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """
     g = 0j if options.gravity is None else plane_vector("--gravity", options.gravity, "acceleration")
     from cli.show.result import Result
-    from cli.work.power import METHOD, WorkBalance, draw, tables
+    from cli.work.power import WorkBalance, draw, tables, way
     from cli.work.states import read_states
-    from cli.work.way import way
 
     table = read_states(options.states)
     balance = WorkBalance(table, g)

@@ -1,4 +1,4 @@
-"""Virtual power of link states: their unknown loads and the power of every term; tables and picture."""
+"""Virtual power of link states: their unknown loads and the power of every term; tables, picture, worked solution."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cli.cases.ledger import Entry, why_not
+from cli.cases.ledger import ledger as ledger_topic
 from cli.show.picture import blank
 from cli.work.states import COLUMNS, LOADS, Cell, Real, StateTable, Unknown
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table, finite, names, number
+from dalembert.results.way import Topic, figures
 from virtualwork.textbook import picture
 from virtualwork.textbook.link_states import KINDS, LinkStates, UnitLoad
 from virtualwork.textbook.power_balance import Again, Balance, balance
@@ -24,10 +27,11 @@ if TYPE_CHECKING:
     from dalembert.arithmetic.doubled import Doubled
 
 
-def _unit_load(x: Any, y: Any, torque: Any) -> UnitLoad:
-    force = np.zeros_like(x, dtype=complex)
-    force.real, force.imag = x, y
-    return UnitLoad(force, torque)
+def _vector(x: Any, y: Any) -> Any:
+    """Return x + iy, of floats or of numbers in 32 digits."""
+    z = np.zeros_like(x, dtype=complex)
+    z.real, z.imag = x, y
+    return z
 
 
 class Term(NamedTuple):
@@ -61,7 +65,8 @@ class WorkBalance:
             self.places.append((members, rows))
             states = self._link_states(self.states.values, rows)
             with np.errstate(over="ignore", invalid="ignore"):
-                solved = balance(states, [_unit_load(*of) for of in self.states.unit_loads(members, rows)])
+                loads = self.states.unit_loads(members, rows)
+                solved = balance(states, [UnitLoad(_vector(x, y), torque) for x, y, torque in loads])
             if not (np.isfinite(solved.power).all() and np.isfinite(solved.value[solved.determined]).all()):
                 raise DataError(f"{self.states.table.file}: the powers are too large to be computed with")
             for place, index in enumerate(members):
@@ -78,10 +83,8 @@ class WorkBalance:
 
         def vector(x: str, y: str) -> Any:
             a, b = (arrays.get(name, zero) + zero for name in (x, y))
-            z = np.zeros_like(a + b, dtype=complex)
             # both of one kind of number
-            z.real, z.imag = a + 0.0 * b, b + 0.0 * a
-            return z
+            return _vector(a + 0.0 * b, b + 0.0 * a)
 
         return LinkStates(
             velocity=vector("vx", "vy"),
@@ -171,7 +174,8 @@ class WorkBalance:
             states = self._link_states(self.states.exact, rows)
             gravity: Any = DoubledComplex(plain(self.gravity.real), plain(self.gravity.imag))
             states = replace(states, gravity=gravity)
-            unknowns = [_unit_load(*map(plain, of)) for of in self.states.unit_loads(members, rows)]
+            loads = (map(plain, of) for of in self.states.unit_loads(members, rows))
+            unknowns = [UnitLoad(_vector(x, y), torque) for x, y, torque in loads]
             groups.append((states, solved.second_run((states, unknowns))))
         return groups
 
@@ -206,8 +210,7 @@ class WorkBalance:
     def sums(self, index: int) -> list[float]:
         """The sum of the powers of each velocity field of a step, W."""
         _, solved, place = self.at(index)
-        sums: list[float] = solved.sum[place].tolist()
-        return sums
+        return [float(power) for power in solved.sum[place]]
 
     def condition(self, index: int) -> float | None:
         """The condition number of a step's equations; None where they do not determine the unknowns."""
@@ -222,12 +225,6 @@ class WorkBalance:
         ):
             for cell in unknown.cells:
                 yield unknown, cell, None if value != value else value * cell.factor
-
-
-METHOD = (
-    "Virtual power: the applied forces and the inertia forces −m·a, −I·α together do no work on the given velocities "
-    "(d'Alembert and Lagrange; J. A. Riul, Dinâmica das Máquinas, unit II, eqs. 1–5)."
-)
 
 
 def tables(w: WorkBalance, *, ledger_first: bool = False) -> dict[str, Callable[[], Table]]:
@@ -353,3 +350,98 @@ def draw(w: WorkBalance) -> Figure:
         x = np.arange(1.0, len(instants) + 1)
     picture.over_steps(x, series, figure)
     return figure
+
+
+def way(w: WorkBalance) -> list[Topic]:
+    """The worked solution: the ledger of every step, the equation of the first with its numbers."""
+    steps = [([names("step", [step.name])], list(entries(w, i))) for i, step in enumerate(w.states.steps)]
+    return [ledger_topic("steps[]", steps, _equations(w, [instants for _, instants in steps]))]
+
+
+def entries(w: WorkBalance, index: int) -> Iterator[Entry]:
+    """Yield every load of a step, those that do no work too; the unknown's in the end."""
+    step, (states, solved, place) = w.states.steps[index], w.at(index)
+    products = states.products()
+    for f, (of, rows) in enumerate(step.fields.items()):
+        here: tuple[int, ...] = (place,) if len(step.fields) == 1 else (place, f)
+
+        def at(values: object, here: tuple[int, ...] = here) -> Any:
+            return np.broadcast_to(np.asarray(values), states.shape)[here].tolist()
+
+        fastest = [float(largest[here][..., 0]) for largest in states.fastest]
+        for kind in KINDS:
+            if kind not in states.terms:
+                continue
+            term = states.terms[kind]
+            loads, rates = map(at, products[kind])
+            for i, row in enumerate(rows):
+                works, workless = bool(term.works[(*here, i)]), term.workless[(*here, i)]
+                if works or workless:
+                    power = float(term.power[(*here, i)])
+                    yield _entry(w.states.links[row], kind, loads[i], rates[i], power, works, fastest, of)
+        velocities, omegas = at(states.applied_velocity), at(states.omega)
+        by_cell = {(w.states.links[row], w.states.occurrence[row]): i for i, row in enumerate(rows)}
+        for unknown, cell, load in w.unknowns(index):
+            j, k = step.unknowns.index(unknown), by_cell.get((cell.link, cell.occurrence))
+            if load is None or not solved.determined[place, j] or k is None:
+                continue
+            turns = cell.quantity == "torque"
+            direction = 1j if cell.quantity == "fy" else 1.0
+            rate = omegas[k] if turns else velocities[k]
+            along = (direction * rate.conjugate()).real
+            whole = load * direction
+            yield _entry(cell.link, "unknown", whole, rate, load * along, along != 0, fastest, of)
+
+
+def _entry(
+    link: str,
+    kind: str,
+    load: complex | float,
+    rate: complex | float,
+    power: float,
+    works: bool,
+    fastest: list[float],
+    field: str,
+) -> Entry:
+    """A force at a velocity, or a torque, a plain number, at an angular velocity."""
+    if isinstance(load, float) and isinstance(rate, float):
+        why = why_not(load, rate, works, fastest[1])
+        return Entry(link, kind, torque=load, omega=rate, power=power, workless=why, field=field)
+    why = why_not(load, rate, works, fastest[0])
+    return Entry(link, kind, complex(load), complex(rate), power=power, workless=why, field=field)
+
+
+def _equations(w: WorkBalance, steps: list[list[Entry]]) -> list[str]:
+    """The equation in symbols, each product with its numbers, and the solution, of the first step."""
+    step, terms = w.states.steps[0], steps[0]
+    _, solved, at = w.at(0)
+    lines = []
+    if len(steps) > 1:
+        lines.append(f"Step {step.name}; the others in the same way.")
+    idle: dict[str, list[str]] = {}
+    for entry in terms:
+        if entry.workless:
+            idle.setdefault(entry.workless, []).append(f"{entry.symbol} ({entry.kind})")
+    lines += [f"No work, {why}: {', '.join(dict.fromkeys(which))}." for why, which in idle.items()]
+    for place, of in enumerate(step.fields):
+        here = [entry for entry in terms if entry.field == of and not entry.workless]
+        if not here:
+            continue
+        name = f" in the velocity field {of}" if of else ""
+        lines.append(f"ΣF·V + ΣT·ω = 0{name}:")
+        lines.append("  " + " + ".join(f"{e.symbol}·{e.rate}" for e in here) + " = 0")
+        loads = [entry for entry in here if entry.kind != "unknown"]
+        lines += [f"  {entry.equation()}" for entry in loads]
+        power = sum(entry.power for entry in loads)
+        coefficients = solved.coefficient[at, place]
+        left = [
+            f"{figures(float(c))}·{u.name or u.cells[0].symbol}"
+            for c, u in zip(coefficients, step.unknowns, strict=True)
+            if c
+        ]
+        lines.append(f"  {' + '.join(left)} + ({figures(power)}) = 0" if left else f"  {figures(power)} = 0")
+    for unknown, cell, value in w.unknowns(0):
+        unit = "N·m" if cell.quantity == "torque" else "N"
+        answer = "not determined" if value is None else f"{figures(value)} {unit}"
+        lines.append(f"{unknown.name or cell.symbol} = {answer}")
+    return lines

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cli.cases.ledger import of_link
 from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number
 from dalembert.tables.headers import spellings
@@ -41,6 +42,11 @@ class Cell(NamedTuple):
     occurrence: int
     quantity: str
     factor: float
+
+    @property
+    def symbol(self) -> str:
+        """How an equation calls the load."""
+        return of_link(LOADS[self.quantity].split("_")[0].replace("torque", "T"), self.link)
 
 
 @dataclass(frozen=True)

@@ -339,14 +339,12 @@ def computed_twice(name: str, seed: int, trials: int) -> None:
     assert np.median(estimate[wrong] / error[wrong]) <= 1.05
 
 
-@pytest.mark.filterwarnings("ignore::balancing.Doubtful")
 @pytest.mark.parametrize("name", TWICE)
 def test_computed_twice(name: str) -> None:
     computed_twice(name, 1, 12)
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::balancing.Doubtful")
 @pytest.mark.parametrize("name", TWICE)
 def test_computed_twice_by_campaign(name: str, first_seed: int) -> None:
     computed_twice(name, first_seed, 600)

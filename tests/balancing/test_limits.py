@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from balancing import (
     Balance,
     DependentPlanes,
-    Doubtful,
     Infeasible,
     NotConverged,
     least_squares,
@@ -72,7 +71,7 @@ def proven(fix: Balance) -> None:
         float(fix.residual_max) if fix.of_largest else squares(fix.influence, fix.initial, fix.corrections)
     )
     assert fix.bound is not None
-    assert fix.status == "optimal"
+    assert fix.gap <= 1e-12
     assert -1e-14 <= (value - fix.bound) / value < 1e-12
     if fix.max_mass is not None:
         assert (np.abs(fix.corrections) <= fix.max_mass).all()
@@ -166,7 +165,6 @@ def test_units_change_neither_answer_nor_proof(power: int) -> None:
         assert there.corrections * unit == pytest.approx(here.corrections, rel=1e-9)
 
 
-@pytest.mark.filterwarnings("ignore::balancing.Doubtful")
 def test_nearly_dependent_planes_are_right_or_refused_by_name() -> None:
     rng, refused = np.random.default_rng(11), {1e99: "nearly dependent (condition number"}
     for kappa in (1e5, 1e6, 1e7, 1e8, 1e9, 1e10):
@@ -186,12 +184,42 @@ def test_nearly_dependent_planes_are_right_or_refused_by_name() -> None:
     assert all("nearly dependent (condition number" in text for text in refused.values())
 
 
-def test_a_gap_is_said() -> None:
+def test_a_gap_that_rounding_leaves_open_is_refused() -> None:
+    """The best doubles for masses of 1e9 kg leave some 1e-7 more than the optimum: once an answer with a warning."""
     a, v, limit = problem(np.random.default_rng(11), 24, 5, kappa=1e10)
-    with pytest.warns(Doubtful, match=r"only to a share of .*nearly dependent \(condition number"):
-        fix = minimax(a, v, limit)
-    assert 1e-9 < fix.gap < 1e-6
-    assert fix.status != "optimal"
+    with pytest.raises(NotConverged, match=r"nearly dependent \(condition number") as caught:
+        minimax(a, v, limit)
+    assert 1e-9 < caught.value.gap < 1e-6
+
+
+@pytest.mark.parametrize(("seed", "case"), [(499987952, 276), (499987952, 116), (499987952, 173)])
+def test_units_far_apart_are_solved_to_the_end(seed: int, case: int) -> None:
+    """Conditions of 5e7 to 1e11 by units: the first was answered with a gap of 5e-7, the second refused, the third 4e-9."""
+    one = next(islice(drawn(seed), case, None))
+    assert one is not None
+    assert minimax(one.a, one.v, one.limit).gap <= 1e-12
+
+
+@pytest.mark.parametrize(("seed", "case"), [(918098262, 129), (918098262, 120), (918098261, 246)])
+def test_nearly_dependent_planes_are_solved_to_the_end(seed: int, case: int) -> None:
+    """Conditions of 3e6 to 7e7, gaps of 1e-9 to 3e-8 once.
+
+    The first held both planes at limits of which one holds; the bound of the others was rounded with its forces.
+    """
+    one = next(islice(drawn(seed), case, None))
+    assert one is not None
+    assert minimax(one.a, one.v, one.limit).gap <= 1e-12
+
+
+@pytest.mark.parametrize("above", [0, 1e-15, 1e-12, 1e-10, 1e-9, 3e-9])
+def test_the_smallest_limit_leaves_the_minimax_corrections(above: float) -> None:
+    """Goodman's data: 0.4 can be met by 1 and 1.8 alone. The squares once had any gap there."""
+    fix = least_squares([[3, -2], [5, -2], [5, -3]], [1, -1, 0], max_residual=0.4 * (1 + above))
+    assert fix.corrections == pytest.approx([1, 1.8], rel=1e-14)
+    assert fix.of_largest
+    assert fix.gap <= 1e-12
+    assert fix.bound is not None
+    assert fix.bound * 0.4 * (1 + above) == pytest.approx(0.4, rel=1e-12)
 
 
 def test_a_doubled_sensor_has_digits() -> None:
@@ -272,7 +300,7 @@ def drawn(seed: int) -> Iterator[Drawn | None]:
 
 
 def holds(one: Drawn) -> bool:
-    """Whether the answer within a ceiling is proven to nine digits; every other one is, or is refused for its condition."""
+    """Whether there is an answer within a ceiling; every answer is proven, or is refused for its condition."""
     a, v, limit = one[:3]
     for solve in (minimax, lambda a, v, m: least_squares(a, v, max_mass=m)):
         try:
@@ -300,19 +328,19 @@ def holds(one: Drawn) -> bool:
     with pytest.raises(Infeasible) as caught:
         least_squares(a, v, max_mass=limit, max_residual=least * one.below)
     assert caught.value.smallest == pytest.approx(least, rel=1e-9)
-    return within.gap <= 1e-9
+    assert within.gap <= 1e-9
+    return True
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::balancing.Doubtful")
 def test_campaign(first_seed: int) -> None:
     """Proven, or refused where rounding decides."""
-    doubtful = 0
+    refused = 0
     for case, one in enumerate(islice(drawn(first_seed), 400)):
         print(f"case {case}")
-        doubtful += one is not None and not holds(one)
-    # next to what cannot be met, in units far apart: a warning says so, and it is rare
-    assert doubtful <= 4
+        refused += one is not None and not holds(one)
+    # next to what cannot be met, in units far apart: it is rare
+    assert refused <= 4
 
 
 def test_a_ceiling_next_to_the_smallest_in_units_far_apart() -> None:
@@ -329,7 +357,6 @@ def test_a_ceiling_next_to_the_smallest_in_units_far_apart() -> None:
     assert fix.residual_max <= top
 
 
-@pytest.mark.filterwarnings("ignore::balancing.Doubtful")
 def test_large_masses_that_leave_little() -> None:
     """Case 84 of seed 100019: masses of 3e6 leave 0.009, one 3e-10 below its limit: once refused with a gap of 1e-3."""
     one = next(islice(drawn(100019), 84, None))

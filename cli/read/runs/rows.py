@@ -28,7 +28,7 @@ NO = ("no", "n", "false", "0", "", "removed", "off", "nein")
 
 
 class Masses(NamedTuple):
-    """What the rows of a table put on, an entry for each mass."""
+    """The masses that the rows of a table put on, an entry for each."""
 
     planes: list[str]
     row: Rows
@@ -89,7 +89,7 @@ class LogRows:
     """The rows of a table of runs, as arrays."""
 
     of: Runs
-    """What the rows are of."""
+    """The runs that the rows are about."""
     rotor: Rows
     vibration: Complex
     masses: Masses

@@ -109,11 +109,11 @@ class Group:
     readings: Complex
     """(g, r, s), in the table's amplitude unit; NaN where a row lacks a channel."""
     masses: Complex
-    """What was on the rotor, (g, r, p), SI."""
+    """The masses on the rotor, (g, r, p), SI."""
     standing: Complex
-    """What is on the rotor in its last run, whether it is meant to stay or not, (g, p), SI."""
+    """The masses on the rotor in its last run, meant to stay or not, (g, p), SI."""
     last: list[str]
-    """What that run is called, (g,)."""
+    """The name of that run, (g,)."""
     weights: Real | None
     """Those of the channels, (g, s)."""
     exact: Callable[[], Exact]
@@ -181,7 +181,7 @@ class Group:
 
     @property
     def on(self) -> Complex:
-        """What was on the rotor in each run, (g, runs, p)."""
+        """The masses on the rotor in each run, (g, runs, p)."""
         return self.masses[:, [rows[0] for rows in self.lines.rows]]
 
     @property
