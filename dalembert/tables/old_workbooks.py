@@ -1,4 +1,4 @@
-"""Hidden rows, hidden columns and percentages of an .xls workbook, which calamine reads without them.
+"""Hidden rows, hidden columns, percentages and bounds of an .xls workbook, which calamine reads without them.
 
 The file is a compound document ([MS-CFB] §2: header, sectors, directory) whose stream "Workbook" is a row of records
 ([MS-XLS] §2.4: BoundSheet8, Row, ColInfo, XF, Format, Number, RK, MulRk, Formula).
@@ -12,6 +12,9 @@ from struct import error, unpack_from
 MAGIC = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 ROW, COLUMN, SHEET, STYLE, FORMAT, END = 0x208, 0x7D, 0x85, 0xE0, 0x41E, 0x0A
 NUMBER, SHORT, SHORTS, FORMULA = 0x203, 0x27E, 0xBD, 0x06
+TEXTS, SPAN = (0xFD, 0x204, 0x205), 0x200
+# how far a sheet can reach
+ROWS, COLUMNS = 0x10000, 0x100
 # number formats that every workbook has
 PERCENT = (9, 10)
 # a chain of sectors ends with a number from here on
@@ -28,9 +31,30 @@ def looks(data: bytes, name: str) -> Looks:
         return frozenset(), frozenset(), frozenset()
 
 
+def is_within_bounds(data: bytes) -> bool:
+    """Whether no sheet says that it reaches farther than a sheet can: calamine reserves memory for as much as it says."""
+    try:
+        for kind, body in _records(_stream(data), 0, every_part=True):
+            if kind == SPAN and len(body) == 14:
+                top, rows, left, columns = unpack_from("<IIHH", body)
+                if not (top <= rows <= ROWS and left <= columns <= COLUMNS):
+                    return False
+            elif (
+                kind in (NUMBER, SHORT, SHORTS, FORMULA, *TEXTS) and unpack_from("<H", body, 2)[0] >= COLUMNS
+            ):
+                return False
+    except (error, IndexError, UnicodeDecodeError):
+        # calamine says itself what is wrong
+        return True
+    return True
+
+
 def _stream(data: bytes) -> bytes:
     """The stream of the workbook, in which its records stand."""
     shift, small = unpack_from("<HH", data, 30)
+    if shift not in (9, 12):
+        # no such document
+        return b""
     directory, _, limit, first_small, _, further, _ = unpack_from("<7I", data, 48)
     size = 1 << shift
 
@@ -72,11 +96,11 @@ def _stream(data: bytes) -> bytes:
     return b""
 
 
-def _records(stream: bytes, at: int) -> Iterator[tuple[int, bytes]]:
-    """The records from a place on up to the end of their part: kind and contents."""
+def _records(stream: bytes, at: int, every_part: bool = False) -> Iterator[tuple[int, bytes]]:
+    """The records from a place on, up to the end of their part or through every part: kind and contents."""
     while at + 4 <= len(stream):
         kind, length = unpack_from("<HH", stream, at)
-        if kind == END:
+        if kind == END and not every_part:
             return
         yield kind, stream[at + 4 : at + 4 + length]
         at += 4 + length

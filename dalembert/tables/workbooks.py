@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import io
+import os
 import re
+import sys
 import zipfile
+import zlib
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import date, time, timedelta
 from pathlib import PurePosixPath
@@ -14,15 +17,22 @@ from typing import Any
 from xml.etree import ElementTree
 
 from dalembert.errors import DataError, quote
+from dalembert.tables import old_workbooks
 from dalembert.tables.files import ZIP
 
 Place = tuple[int, int]
 """Row and column, from 0."""
+Faults = dict[Place, tuple[str, str]]
+"""Cells that have no value of their own: what was found, and what was expected."""
 MAIN = "{http://schemas.openxmlformats.org/spreadsheetml/2006/main}"
 LINK = "{http://schemas.openxmlformats.org/officeDocument/2006/relationships}id"
 TABLE = "{urn:oasis:names:tc:opendocument:xmlns:table:1.0}"
 OFFICE = "{urn:oasis:names:tc:opendocument:xmlns:office:1.0}"
 PERCENT = ("9", "10")  # number formats that every workbook has
+# of a sheet, blank ones too: calamine reserves memory for all
+MOST_CELLS = 50_000_000
+# what reading a part of a damaged archive raises
+DAMAGED = (EOFError, KeyError, OSError, RuntimeError, ValueError, zipfile.BadZipFile, zlib.error)
 
 
 @dataclass(frozen=True)
@@ -73,8 +83,7 @@ class Sheet:
     others: list[str]
     rows: list[list[str]]
     """All as wide as the widest."""
-    faults: dict[Place, tuple[str, str]] = field(default_factory=dict)
-    """Cells that have no value of their own: what was found, and what was expected."""
+    faults: Faults = field(default_factory=dict)
     unseen: Unseen = field(default_factory=Unseen)
 
     def error(self, place: Place, value: str, expected: str) -> DataError:
@@ -101,43 +110,63 @@ def read_sheet(file: str, data: bytes, wanted: str) -> Sheet:
     locked = DataError(f"{file}: the workbook is encrypted: expected one without a password")
     if "EncryptedPackage".encode("utf-16-le") in data:
         raise locked
+    if data[:4] != ZIP and not old_workbooks.is_within_bounds(data):
+        raise DataError(f"{file}: broken workbook (its cells lie beyond its bounds): expected .xls")
     try:
-        book = calamine.CalamineWorkbook.from_filelike(io.BytesIO(data))
-        names = [
-            sheet.name for sheet in book.sheets_metadata if sheet.typ == calamine.SheetTypeEnum.WorkSheet
-        ]
-        shown = [
-            sheet.name
-            for sheet in book.sheets_metadata
-            if sheet.name in names and sheet.visible == calamine.SheetVisibleEnum.Visible
-        ]
-        first = next(iter(shown or names), None)
-        if first is None:
-            raise DataError(f"{file}: no sheet in the workbook: expected a table")
-        name = next((each for each in names if each.lower() == wanted.lower()), None) if wanted else first
-        if name is None:
-            raise DataError(
-                f"{file}: no sheet {quote(wanted)}: expected one of {', '.join(map(quote, names))}"
-            )
-        sheet = book.get_sheet_by_name(name)
-        cells = sheet.to_python(skip_empty_area=False)
-        merged = sheet.merged_cell_ranges or []
+        with _panics():
+            book = calamine.CalamineWorkbook.from_filelike(io.BytesIO(data))
+            names = [
+                sheet.name for sheet in book.sheets_metadata if sheet.typ == calamine.SheetTypeEnum.WorkSheet
+            ]
+            shown = [
+                sheet.name
+                for sheet in book.sheets_metadata
+                if sheet.name in names and sheet.visible == calamine.SheetVisibleEnum.Visible
+            ]
+            first = next(iter(shown or names), None)
+            if first is None:
+                raise DataError(f"{file}: no sheet in the workbook: expected a table")
+            name = next((each for each in names if each.lower() == wanted.lower()), None) if wanted else first
+            if name is None:
+                raise DataError(
+                    f"{file}: no sheet {quote(wanted)}: expected one of {', '.join(map(quote, names))}"
+                )
+            _check_reach(file, data, name)
+            sheet = book.get_sheet_by_name(name)
+            cells = sheet.to_python(skip_empty_area=False)
+            merged = sheet.merged_cell_ranges or []
     except calamine.PasswordError:
         raise locked from None
     except (calamine.CalamineError, OSError, ValueError) as error:
         if _is_locked(data):
             raise locked from None
         raise DataError(f"{file}: broken workbook ({error}): expected .xlsx, .xls or .ods") from None
-    faults: dict[Place, tuple[str, str]] = {}
-    if data[:4] == ZIP:
-        faults = dict(_faults(data, name))
+    faults, unseen = _looks(data, name)
     for (top, left), (bottom, right) in merged:
         span = f"{address((top, left))}:{address((bottom, right))}"
         for row in range(top, bottom + 1):
             for column in range(left, right + 1):
                 faults[row, column] = (f"merged cells {span}", "a value in each cell")
-    hidden = unseen(data, name)
-    return Sheet(file, name, [each for each in names if each != name], _texts(cells), faults, hidden)
+    return Sheet(file, name, [each for each in names if each != name], _texts(cells), faults, unseen)
+
+
+@contextmanager
+def _panics() -> Iterator[None]:
+    """Raise ValueError where calamine panics over a damaged file, and discard the trace that it prints itself."""
+    sys.stderr.flush()
+    kept, nothing = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nothing, 2)
+    try:
+        yield
+    except BaseException as error:
+        # pyo3 derives it from BaseException and has no name to import it by
+        if type(error).__name__ == "PanicException":
+            raise ValueError(error) from None
+        raise
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nothing)
 
 
 def _texts(cells: list[list[Any]]) -> list[list[str]]:
@@ -159,27 +188,15 @@ def _text(cell: str | float | date | time | timedelta, comma: bool) -> str:
     return str(cell).lower() if isinstance(cell, bool) else str(cell)
 
 
-# -- what calamine does not tell: encrypted OpenDocument, formulas without a stored value, errors in cells ----------
+# -- what calamine does not read: encryption, formulas without a stored value, errors, what is hidden, percentages -----
 
 
 def _is_locked(data: bytes) -> bool:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             return b"encryption-data" in archive.read("META-INF/manifest.xml")
-    except (KeyError, OSError, RuntimeError, zipfile.BadZipFile):
+    except DAMAGED:
         return False
-
-
-def _faults(data: bytes, name: str) -> Iterator[tuple[Place, tuple[str, str]]]:
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        try:
-            if "content.xml" in archive.namelist():
-                yield from _faults_in_open_document(archive.read("content.xml"), name)
-            else:
-                yield from _faults_in_office_open(archive, name)
-        except (KeyError, ElementTree.ParseError):
-            # calamine has read the cells: no more is known
-            return
 
 
 def _fault(formula: str, error: str) -> tuple[str, str]:
@@ -191,46 +208,40 @@ def _fault(formula: str, error: str) -> tuple[str, str]:
     )
 
 
-def _faults_in_office_open(archive: zipfile.ZipFile, name: str) -> Iterator[tuple[Place, tuple[str, str]]]:
-    text = part_of(archive, name)
-    if b"<f" not in text and b't="e"' not in text:
+def _check_reach(file: str, data: bytes, name: str) -> None:
+    """Refuse an Office Open sheet that reaches so far that the cells in between do not fit into memory."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            text = _part_of(archive, name)
+    except (*DAMAGED, StopIteration, ElementTree.ParseError):
         return
-    for _, cell in ElementTree.iterparse(io.BytesIO(text)):
-        if cell.tag != f"{MAIN}c":
-            continue
-        formula, value = cell.find(f"{MAIN}f"), cell.find(f"{MAIN}v")
-        place = place_of(cell.get("r", ""))
-        if place is not None and cell.get("t") == "e":
-            yield place, _fault("", (value.text if value is not None else "") or "an error")
-        elif place is not None and formula is not None and (value is None or value.text is None):
-            yield place, _fault(formula.text or "", "")
-        cell.clear()
+    last = max(set(re.findall(rb'\br="([A-Z]{1,3})\d', text)), key=lambda one: (len(one), one), default=b"A")
+    row = re.match(rb'<row [^>]*\br="(\d{1,7})"', text[max(text.rfind(b"<row "), 0) :])
+    corner = f"{last.decode()}{'1' if row is None else row[1].decode()}"
+    rows, columns = (k + 1 for k in place_of(corner) or (0, 0))
+    if rows * columns > MOST_CELLS:
+        raise DataError(
+            f"{file}: sheet {quote(name)}: its cells reach to {corner}: expected at most {MOST_CELLS} cells: delete the stray ones"
+        )
 
 
-def _faults_in_open_document(text: bytes, name: str) -> Iterator[tuple[Place, tuple[str, str]]]:
-    if b"formula" not in text and b"spanned" not in text:
-        return
-    tables = ElementTree.fromstring(text).iter(f"{TABLE}table")
-    sheet = next(each for each in tables if each.get(f"{TABLE}name") == name)
-    row = 0
-    for line in sheet.iter(f"{TABLE}table-row"):
-        column = 0
-        for cell in line:
-            formula = cell.get(f"{TABLE}formula")
-            wide, high = (int(cell.get(f"{TABLE}number-{k}-spanned", "1")) for k in ("columns", "rows"))
-            if wide * high > 1:
-                span = f"{address((row, column))}:{address((row + high - 1, column + wide - 1))}"
-                yield (row, column), (f"merged cells {span}", "a value in each cell")
-            elif formula is not None and cell.get(f"{OFFICE}value-type") is None:
-                yield (row, column), _fault(formula.partition("=")[2], "")
-            column += int(cell.get(f"{TABLE}number-columns-repeated", "1"))
-        row += int(line.get(f"{TABLE}number-rows-repeated", "1"))
+def _looks(data: bytes, name: str) -> tuple[Faults, Unseen]:
+    """Find the cells of a sheet without a value of their own, hidden rows and columns, percentages.
+
+    Nothing in a file that holds them otherwise: calamine has read the cells.
+    """
+    if data[:4] != ZIP:
+        return {}, Unseen(*old_workbooks.looks(data, name))
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            if "content.xml" in archive.namelist():
+                return _in_open_document(archive.read("content.xml"), name)
+            return _in_office_open(archive, name)
+    except (*DAMAGED, StopIteration, ElementTree.ParseError):
+        return {}, Unseen()
 
 
-# -- where in the file a sheet stands; hidden rows and columns, percentages --------------------------------
-
-
-def part_of(archive: zipfile.ZipFile, name: str) -> bytes:
+def _part_of(archive: zipfile.ZipFile, name: str) -> bytes:
     """Return the part of an Office Open workbook that holds the sheet of this name."""
     book = ElementTree.fromstring(archive.read("xl/workbook.xml"))
     link = next(each.get(LINK) for each in book.iter(f"{MAIN}sheet") if each.get("name") == name)
@@ -239,40 +250,29 @@ def part_of(archive: zipfile.ZipFile, name: str) -> bytes:
     return archive.read(target.lstrip("/") if target.startswith("/") else str(PurePosixPath("xl") / target))
 
 
-def unseen(data: bytes, name: str) -> Unseen:
-    """Find hidden rows and columns and percentages in a sheet; nothing in a file that holds them otherwise."""
-    if data[:4] != ZIP:
-        from dalembert.tables.old_workbooks import looks
-
-        return Unseen(*looks(data, name))
-    with (
-        zipfile.ZipFile(io.BytesIO(data)) as archive,
-        suppress(KeyError, StopIteration, ElementTree.ParseError),
-    ):
-        if "content.xml" in archive.namelist():
-            return _looks_in_open_document(archive.read("content.xml"), name)
-        return _looks_in_office_open(archive, name)
-    return Unseen()
-
-
-def _looks_in_office_open(archive: zipfile.ZipFile, name: str) -> Unseen:
-    text = part_of(archive, name)
+def _in_office_open(archive: zipfile.ZipFile, name: str) -> tuple[Faults, Unseen]:
+    text = _part_of(archive, name)
     styles = _percent_styles(archive) if b' s="' in text else frozenset()
-    if b"hidden" not in text and not styles:
-        return Unseen()
+    faults: Faults = {}
     rows, columns, percent = set(), set(), set()
+    if not styles and not any(mark in text for mark in (b"<f", b't="e"', b"hidden")):
+        return faults, Unseen()
     for _, each in ElementTree.iterparse(io.BytesIO(text)):
         if each.tag == f"{MAIN}col" and each.get("hidden") in ("1", "true"):
             columns |= set(range(int(each.get("min", "1")) - 1, min(int(each.get("max", "1")), 16384)))
-        elif each.tag == f"{MAIN}c" and each.get("s") in styles and each.get("t", "n") == "n":
-            place = place_of(each.get("r", ""))
-            if place is not None and each.find(f"{MAIN}v") is not None:
+        elif each.tag == f"{MAIN}c" and (place := place_of(each.get("r", ""))) is not None:
+            formula, value = (each.findtext(f"{MAIN}{tag}") for tag in "fv")
+            if each.get("t") == "e":
+                faults[place] = _fault("", value or "an error")
+            elif formula is not None and not value:
+                faults[place] = _fault(formula, "")
+            elif value is not None and each.get("t", "n") == "n" and each.get("s") in styles:
                 percent.add(place)
         elif each.tag == f"{MAIN}row":
             if each.get("hidden") in ("1", "true"):
                 rows.add(int(each.get("r", "1")) - 1)
             each.clear()
-    return Unseen(frozenset(rows), frozenset(columns), frozenset(percent))
+    return faults, Unseen(frozenset(rows), frozenset(columns), frozenset(percent))
 
 
 def _percent_styles(archive: zipfile.ZipFile) -> frozenset[str]:
@@ -286,9 +286,10 @@ def _percent_styles(archive: zipfile.ZipFile) -> frozenset[str]:
     return frozenset(str(k) for k, one in enumerate(every) if one.get("numFmtId") in {*PERCENT, *formats})
 
 
-def _looks_in_open_document(text: bytes, name: str) -> Unseen:
-    if b"visibility" not in text and b"percentage" not in text:
-        return Unseen()
+def _in_open_document(text: bytes, name: str) -> tuple[Faults, Unseen]:
+    faults: Faults = {}
+    if not any(mark in text for mark in (b"formula", b"spanned", b"visibility", b"percentage")):
+        return faults, Unseen()
     tables = ElementTree.fromstring(text).iter(f"{TABLE}table")
     sheet = next(each for each in tables if each.get(f"{TABLE}name") == name)
     columns = {k for k, one in _repeated(sheet.iter(f"{TABLE}table-column"), "columns") if _hidden(one)}
@@ -297,9 +298,16 @@ def _looks_in_open_document(text: bytes, name: str) -> Unseen:
         if _hidden(line):
             rows.add(row)
         for column, cell in _repeated(line, "columns"):
-            if cell.get(f"{OFFICE}value-type") == "percentage":
+            formula, kind = cell.get(f"{TABLE}formula"), cell.get(f"{OFFICE}value-type")
+            wide, high = (int(cell.get(f"{TABLE}number-{k}-spanned", "1")) for k in ("columns", "rows"))
+            if wide * high > 1:
+                span = f"{address((row, column))}:{address((row + high - 1, column + wide - 1))}"
+                faults[row, column] = (f"merged cells {span}", "a value in each cell")
+            elif formula is not None and kind is None:
+                faults[row, column] = _fault(formula.partition("=")[2], "")
+            elif kind == "percentage":
                 percent.add((row, column))
-    return Unseen(frozenset(rows), frozenset(columns), frozenset(percent))
+    return faults, Unseen(frozenset(rows), frozenset(columns), frozenset(percent))
 
 
 def _hidden(element: ElementTree.Element) -> bool:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from struct import pack
 
 import openpyxl
 import pytest
 
+from dalembert.errors import DataError
 from dalembert.tables.old_workbooks import looks
+from dalembert.tables.workbooks import read_sheet
 from tests.conftest import Dalembert
 
 HERE = Path(__file__).parent / "workbooks"
@@ -279,3 +282,39 @@ def test_digits_of_further_sheets_are_cut(dalembert: Dalembert, tmp_path: Path) 
     whole, cut = sheets
     assert cut == pytest.approx(whole, rel=1e-9)
     assert len(repr(cut["peak_power_W"])) < len(repr(whole["peak_power_W"]))
+
+
+@pytest.mark.parametrize("name", ["masses.xls", "masses.ods"])
+def test_a_workbook_cut_off_or_changed_anywhere_is_read_or_refused_in_one_line(name: str) -> None:
+    """calamine panics over some, and of others reads what zipfile refuses."""
+    data = (HERE / name).read_bytes()
+    for place in range(8, len(data), 41):
+        for damaged in (data[:place], data[:place] + bytes([data[place] ^ 0x55]) + data[place + 1 :]):
+            with suppress(DataError):
+                read_sheet("file", damaged, "")
+
+
+def test_a_panic_is_one_line(dalembert: Dalembert, tmp_path: Path) -> None:
+    (tmp_path / "cut.xls").write_bytes((HERE / "masses.xls").read_bytes()[:4400])
+    done = dalembert("balance", str(tmp_path / "cut.xls"), *PLANE)
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert "broken workbook" in done.stderr
+
+
+def test_an_old_workbook_that_reserves_too_many_rows_is_refused() -> None:
+    """[MS-XLS] 2.4.90, Dimensions: first row, last row, first column, last column. calamine would end the process."""
+    data = (HERE / "masses.xls").read_bytes()
+    at = data.index(pack("<HHIIHH", 0x200, 14, 0, 3, 0, 3))
+    for rows in (pack("<II", 0, 0x55000003), pack("<II", 85, 3)):
+        with pytest.raises(DataError, match="its cells lie beyond its bounds"):
+            read_sheet("file", data[: at + 4] + rows + data[at + 12 :], "")
+
+
+def test_a_stray_cell_in_the_last_corner_is_named(dalembert: Dalembert, tmp_path: Path) -> None:
+    book(tmp_path / "far.xlsx", {"Masses": ROWS})
+    made = openpyxl.load_workbook(tmp_path / "far.xlsx")
+    made["Masses"]["XFD1048576"] = 1
+    made.save(tmp_path / "far.xlsx")
+    done = dalembert("balance", str(tmp_path / "far.xlsx"), *PLANE)
+    assert done.returncode == 1
+    assert "sheet 'Masses': its cells reach to XFD1048576: expected at most" in done.stderr
