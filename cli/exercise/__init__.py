@@ -76,6 +76,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     warnings: list[str] = []
     people = _students(options.students, exercise)
     with workshop(exercise) as shop:
+        exercise = shop.exercise
         drawn = variants(shop, len(people), options.seed, warnings)
         filled(shop, drawn[0].drawn)
         # students may share a variant

@@ -7,7 +7,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cache, cached_property
 from importlib import import_module
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cli.exercise.data import DataTable, cell_of, converted
-from cli.exercise.description import Draw, Exercise, Solved, Value, value_of
+from cli.exercise.description import Ask, Draw, Exercise, Solved, Value, value_of
 from cli.read.options import components
 from cli.show.output import result_of
 from dalembert.errors import DataError, quote
@@ -89,6 +89,19 @@ class Workshop:
         from virtualwork.describe.dimensions import dimensions
 
         return {} if self.mechanism is None else dimensions(self.described.mechanism)
+
+    def by_column(self, ask: Ask) -> Ask:
+        """Return a question with its quantity's column, where it names the quantity as --only does: H.x is H_x."""
+        if "." not in ask.quantity or self.mechanism is None:
+            return ask
+        from virtualwork.describe import DescriptionError
+        from virtualwork.quantities import named
+
+        try:
+            columns = named(self.described.mechanism, ask.quantity)
+        except DescriptionError:
+            return ask
+        return replace(ask, quantity=columns[0].header) if len(columns) == 1 else ask
 
     def check(self) -> None:
         """Refuse names of [draw] that the exercise's files do not have, before anything is drawn."""
@@ -224,6 +237,7 @@ def workshop(exercise: Exercise) -> Iterator[Workshop]:
     folder = Path(tempfile.mkdtemp(prefix="dalembert-"))
     try:
         made = Workshop(exercise, folder)
+        made.exercise = replace(exercise, asks=tuple(map(made.by_column, exercise.asks)))
         made.check()
         yield made
     finally:

@@ -38,9 +38,9 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     from cli.grade.marks import METHOD, mark_all, tables
     from cli.show.result import Result
 
-    exercise = read_exercise(options.file)
-    students = read_students(exercise, options.answers, options.key)
-    with workshop(exercise) as shop:
+    with workshop(read_exercise(options.file)) as shop:
+        exercise = shop.exercise
+        students = read_students(exercise, options.answers, options.key)
         marks = mark_all(exercise, shop, students)
     points = sum(mark.points for mark in marks)
     of = float(exercise.points) * len(students)
