@@ -60,8 +60,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     from cli.exercise.drawings import figure, moving
     from cli.exercise.recomputed import candidates
     from cli.exercise.sheets import answers_csv, filled, key_csv, put, sheet_page, solutions, tables
-    from cli.exercise.solving import workshop
-    from cli.exercise.variants import several, variants
+    from cli.exercise.variants import several, variants, workshop
     from cli.show.output import options_of
     from cli.show.result import Result
 

@@ -32,8 +32,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     whole turns. The status is 0 however wrong the answers are.
     """
     from cli.exercise.description import read_exercise
-    from cli.exercise.solving import workshop
-    from cli.exercise.variants import several
+    from cli.exercise.variants import several, workshop
     from cli.grade.answers import read_students
     from cli.grade.marks import METHOD, mark_all, tables
     from cli.show.result import Result

@@ -17,8 +17,7 @@ from cli.examples import names
 from cli.exercise.description import Answer, Ask, read_exercise
 from cli.exercise.recomputed import candidates
 from cli.exercise.slips import Candidates, Slip
-from cli.exercise.solving import workshop
-from cli.exercise.variants import variants
+from cli.exercise.variants import variants, workshop
 from dalembert.figures import Right, typed, written
 from tests.cli.test_exercise import EXERCISE, ROTOR
 from tests.cli.test_grade import STATES, WORK
