@@ -14,7 +14,7 @@ from cli.body.tables import axis_words, numbers_of
 from cli.read import root_search
 from cli.read.options import bad
 from cli.read.parts import SEVERAL, bodies_of
-from dalembert.results.columns import Column, Table, names, number, vector
+from dalembert.results.columns import Column, Table, listed, names, number, vector
 from dalembert.results.way import Topic, figures
 from dalembert.tables.table import Table as ReadTable
 from rigidbody3d.inertia import free_axes, own_axes
@@ -49,10 +49,6 @@ def _of_body(b: MovingBody) -> list[Topic]:
     if b.request.shaft is not None:
         result.append(_bearings(b))
     return result
-
-
-def _list(values: Any) -> list[float]:
-    return [float(v) + 0.0 for v in np.ravel(values)]
 
 
 def _tensor(name: str, tensor: Array) -> Table:
@@ -93,7 +89,7 @@ def _inertia(b: MovingBody) -> Topic:
         "inertia",
         [*text, Table(columns, ("part",), "parts[]"), _tensor("I", body.inertia)],
         "Mass, centre and tensor",
-        {"inertia_kg_m2": [_list(row) for row in body.inertia]},
+        {"inertia_kg_m2": listed(body.inertia)},
     )
 
 
@@ -110,9 +106,9 @@ def _momentum(b: MovingBody) -> Topic:
     text = ["H = I·ω about G (Riul, eqs. 31 to 35):"]
     text += [f"  H_{a} = {_product(inertia[k], w)}{figures(float(h[k]))} kg·m²/s" for k, a in enumerate(AXES)]
     head: dict[str, Any] = {
-        "omega_rad_s": _list(w),
-        "inertia_kg_m2": [_list(row) for row in inertia],
-        "momentum_kg_m2_s": _list(h),
+        "omega_rad_s": listed(w),
+        "inertia_kg_m2": listed(inertia),
+        "momentum_kg_m2_s": listed(h),
     }
     return Topic("momentum", text, "Angular momentum", head)
 
@@ -136,17 +132,17 @@ def _rate(b: MovingBody) -> Topic:
         f"  Ḣ_{a} = {figures(float(relative[k]))} + ({figures(float(cross[k]))}) = {figures(float(rate[k]))} N·m"
         for k, a in enumerate(AXES)
     ]
-    force, moment = _list(m.inertia_force), _list(m.inertia_wrench.moment)
+    force, moment = listed(m.inertia_force), listed(m.inertia_wrench.moment)
     text.append(
         f"ΣM_G = Ḣ, ΣF = m·a_G; d'Alembert's inertia force −m·a_G = ({', '.join(map(figures, force))}) N, "
         f"moment −Ḣ = ({', '.join(map(figures, moment))}) N·m (Riul, eqs. 22, 23)"
     )
     head: dict[str, Any] = {
-        "frame_omega_rad_s": _list(frame),
-        "momentum_kg_m2_s": _list(h),
-        "relative_N_m": _list(relative),
-        "transport_N_m": _list(cross),
-        "rate_N_m": _list(rate),
+        "frame_omega_rad_s": listed(frame),
+        "momentum_kg_m2_s": listed(h),
+        "relative_N_m": listed(relative),
+        "transport_N_m": listed(cross),
+        "rate_N_m": listed(rate),
     }
     return Topic("rate of momentum", text, "Rate of the angular momentum", head)
 
@@ -155,10 +151,10 @@ def _principal(b: MovingBody) -> Topic:
     principal = b.parts.whole.principal
     free = bool(free_axes(principal.moments))
     axes = own_axes(principal)
-    moments = _list(principal.moments)
+    moments = listed(principal.moments)
     head: dict[str, Any] = {
         "principal_kg_m2": moments,
-        "principal_axes": [_list(axis) for axis in axes],
+        "principal_axes": listed(axes),
         "free": free,
     }
     text = [
@@ -175,7 +171,7 @@ def _principal(b: MovingBody) -> Topic:
     columns += [number(f"n_{a}", "number", axes[:, k], place=None) for k, a in enumerate(AXES)]
     if b.moving:
         w, h = axes @ b.motion.omega, axes @ b.motion.momentum
-        head |= {"omega_rad_s": _list(w), "momentum_kg_m2_s": _list(h)}
+        head |= {"omega_rad_s": listed(w), "momentum_kg_m2_s": listed(h)}
         columns += [
             number("omega", "speed", w, place=None),
             number("momentum", "angular momentum", h, place=None),

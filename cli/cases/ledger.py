@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dalembert.results.columns import Column, Table, names
+from dalembert.results.columns import Column, Table, listed, names
 from dalembert.results.way import Topic, figures, vector_text
 
 if TYPE_CHECKING:
-    from dalembert.results.columns import Cell
     from virtualwork.motion import Motion
     from virtualwork.study.ledger import Item
 
@@ -187,10 +186,5 @@ def components(letter: str, unit: str, values: Sequence[complex | None]) -> list
 
 def _vectors(place: str, values: Sequence[complex | None]) -> Column:
     """Return vectors for JSON; null where there is none."""
-    stored: list[Any] = [None if v is None else [_plain(v.real), _plain(v.imag)] for v in values]
+    stored = [None if v is None else listed(complex(v)) for v in values]
     return Column(place, "", [None] * len(stored), place=place, stored=stored)
-
-
-def _plain(value: float) -> Cell:
-    """Return a number that JSON can have; no −0."""
-    return float(value) + 0.0 if value - value == 0 else None

@@ -60,8 +60,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     from cli.exercise.drawings import figure, moving
     from cli.exercise.recomputed import candidates
     from cli.exercise.sheets import answers_csv, filled, key_csv, put, sheet_page, solutions, tables
-    from cli.exercise.solving import workshop
-    from cli.exercise.variants import several, variants
+    from cli.exercise.variants import several, variants, workshop
     from cli.show.output import options_of
     from cli.show.result import Result
 
@@ -76,6 +75,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     warnings: list[str] = []
     people = _students(options.students, exercise)
     with workshop(exercise) as shop:
+        exercise = shop.exercise
         drawn = variants(shop, len(people), options.seed, warnings)
         filled(shop, drawn[0].drawn)
         # students may share a variant

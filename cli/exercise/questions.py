@@ -97,7 +97,7 @@ def accepted(candidates: Candidates) -> list[tuple[Decimal, Decimal]]:
 
 
 def expected_mistakes(candidates: Candidates) -> Iterator[tuple[Decimal, Decimal, str]]:
-    """Yield value, tolerance and text of the likely mistakes, none of which a right answer meets."""
+    """Yield value, tolerance and text of the likely mistakes, none of which a right answer or another mistake meets."""
     right = candidates.right
     taken = [(right.answer, right.unit / 2)]
     for slip in candidates.wrong:
@@ -107,6 +107,8 @@ def expected_mistakes(candidates: Candidates) -> Iterator[tuple[Decimal, Decimal
         figures = max(candidates.answer.ask.figures, 3)
         half = Decimal((0, (5,), value.adjusted() - figures))
         if any(abs(value - other) <= half + own for other, own in taken):
+            continue
+        if len(candidates.met(float(value), float(half))) > 1:
             continue
         taken.append((value, half))
         yield value, half, slip.text

@@ -12,12 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cli.exercise.data import DataTable
 from cli.exercise.description import Solved, Value
 from cli.exercise.slips import Candidates, Pairs, Slip, changes_of, finals, joined, other_gravities
-from cli.exercise.slips_of_rotors import of_rotor
-from cli.exercise.slips_of_sums import Load, is_sum, loads, of_ledger, of_loads, of_motion
-from cli.exercise.solving import Problem
+from cli.exercise.slips_of_sums import Load, is_sum, loads, of_ledger, of_loads, of_motion, of_rotor
+from cli.exercise.solving import DataTable, Problem
 from cli.exercise.variants import Variant
 from dalembert.errors import DataError
 from dalembert.units import G0, unit_name

@@ -13,9 +13,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from cli.exercise.data import DataTable, cell_of
 from cli.exercise.description import Answer, Ask, Exercise, Value, unit_text
-from cli.exercise.solving import Workshop
+from cli.exercise.solving import DataTable, Workshop, cell_of
 from cli.exercise.variants import Variant
 from cli.show.commands import ShowOptions
 from cli.show.report import html_part, report

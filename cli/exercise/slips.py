@@ -1,7 +1,8 @@
 """The likely mistake behind a wrong answer: what one slip of a list, or two, make of the right answer.
 
-A slip is named where it reproduces the answer to its digits. Two slips are named only where the answer has four digits or
-more, and where there are so few pairs about the answer that a random number would hardly meet one.
+A slip is named where it alone reproduces the answer to its digits: where two make numbers that round to the answer, none is.
+An answer of two digits has a name only where a random number would hardly meet a slip; two slips are named only where the
+answer has four digits or more, and a random number would hardly meet a pair.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import cached_property
-from math import isfinite, pi
+from math import isfinite, log, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +23,19 @@ from dalembert.units import unit_name
 Real = NDArray[np.float64]
 
 FEWEST = 2
-"""From so many digits on a slip is named: of random numbers of one digit it would be every sixth."""
+"""An answer of fewer digits, if more are asked, is what a slip makes exactly."""
+SURE = 3
+"""From so many digits on random numbers hardly meet a slip."""
 DIGITS = 4
 """From so many digits on two slips may be named."""
-CHANCE = 0.012
-"""Two slips are named where less than this share of random numbers about the answer would meet a pair."""
+CHANCE = 0.015
+"""Two slips, or one behind an answer of two digits, are named where less than this share of random numbers would meet any."""
+SIZES = 10.0
+"""Random numbers beside an answer of two digits: from its tenth to so many times it, evenly on a logarithmic scale."""
 ABOUT = 0.2
-"""What is about the answer: within this share of it."""
+"""Random numbers beside a pair: within this share of it."""
+EQUAL = 1e-9
+"""Two slips make one number where it differs by less than this share of it."""
 MOST_PAIRED = 400
 """The largest number of changes of which any two are tried together: of more, a random number would meet a pair."""
 GRAVITIES = (9.81, 10.0)
@@ -111,29 +118,45 @@ class Candidates:
         return likely
 
     def name(self, number: Typed, scale: float = 1.0) -> str | None:
-        """Return the likely mistake behind a wrong answer; None where no slip reproduces it.
+        """Return the likely mistake behind a wrong answer; None where no slip reproduces it, or several do.
 
         `scale`: the number's unit in the unit asked for.
         """
         a, size = float(number.value) * scale, abs(scale)
         figures = self.answer.ask.figures
         if not a or number.digits < min(FEWEST, figures):
-            # zero, or a whole number that a slip makes
-            halves = [1e-9 * (abs(a) or abs(self.answer.value))]
-        else:
-            # zeros at the end of a whole number may stand for digits that were rounded
-            own = 10.0 ** (number.value.adjusted() - figures + 1) * size
-            most = max(float(self.right.unit), own) / 2 * (1 + 1e-9)
-            halves = [float(half) * size for half in number.half_units]
-            halves = [half for half in halves if half <= most] or halves[:1]
-        near = [(abs(self.answer.distance(slip.value, a)), k) for k, slip in enumerate(self.wrong)]
-        for half in halves:
-            hits = [k for off, k in near if off <= half * (1 + 1e-9)]
-            if hits:
-                return self.wrong[hits[0]].text
-        if number.digits < DIGITS or self._pairs is None:
+            exact = self.met(a, EQUAL * (abs(a) or abs(self.answer.value)))
+            return exact[0].text if len(exact) == 1 else None
+        own = 10.0 ** (number.value.adjusted() - figures + 1) * size
+        most = max(float(self.right.unit), own) / 2 * (1 + 1e-9)
+        halves = [float(half) * size for half in number.half_units]
+        # zeros at the end of a whole number may stand for digits that were rounded, to the figures asked or to far fewer
+        zeros = len(halves) - 1 if halves[-1] > 10 * own else sum(half <= most for half in halves[1:])
+        digits, half = number.digits - zeros, halves[zeros]
+        met = self.met(a, half)
+        if len(met) == 1 and (digits >= SURE or self._chance(a, half) <= CHANCE):
+            return met[0].text
+        if met or digits < SURE or number.digits < DIGITS or self._pairs is None:
             return None
         return self._of_two(a, halves[0])
+
+    def met(self, a: float, half: float) -> list[Slip]:
+        """Return the slips within half a unit of an answer; of those that make one number the first."""
+        met: list[Slip] = []
+        equal = EQUAL * (abs(a) or abs(self.answer.value))
+        for slip in self.wrong:
+            if abs(self.answer.distance(slip.value, a)) <= half * (1 + 1e-9) and not any(
+                abs(self.answer.distance(slip.value, other.value)) <= equal for other in met
+            ):
+                met.append(slip)
+        return met
+
+    def _chance(self, a: float, half: float) -> float:
+        """The share of random numbers of the size of an answer, and of its sign, that would meet a slip."""
+        if self.answer.is_angle:
+            return len(self.wrong) * 2 * half / self.answer.turn
+        near = sum(1 / SIZES <= slip.value / a <= SIZES for slip in self.wrong)
+        return near * half / (abs(a) * log(SIZES))
 
     def _of_two(self, a: float, half: float) -> str | None:
         pairs = self._pairs

@@ -1,17 +1,23 @@
-"""Slips where an answer is a sum: of the parts of a motion, of the products of a momentum, of the loads, of their powers."""
+"""Slips where an answer is a sum: of the parts of a motion, of the products of a momentum, of loads, powers, unbalances."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from decimal import Decimal
+from functools import cached_property
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing import correct
 from cli.exercise.description import Answer, Value, same
-from cli.exercise.slips import Change, Pairs, Slip, of_sum, other_gravities
+from cli.exercise.slips import GRAVITIES, Candidates, Change, Pairs, Slip, finals, of_sum, other_gravities
 from cli.exercise.solving import Problem
 from cli.exercise.variants import Variant
+from dalembert.angles import degrees
 from dalembert.results.way import figures
 
 AXES = "xyz"
@@ -28,8 +34,17 @@ PARTS = {
 """What the parts of a point's velocity and acceleration are called."""
 
 
+WRONG = {
+    "has the wrong sign": -2.0,
+    "is left out": -1.0,
+    "is ten times too small": -0.9,
+    "is ten times too large": 9.0,
+}
+"""How often a part of an answer is added to it by a slip."""
+
+
 class Part(NamedTuple):
-    """A part of a velocity, an acceleration or a momentum."""
+    """A part of a velocity, an acceleration, a momentum, or of a load in an answer."""
 
     name: str
     value: float
@@ -55,12 +70,10 @@ def of_motion(variant: Variant, number: int) -> tuple[list[Slip], Callable[[], P
 
 def _part_changes(k: int, part: Part) -> Iterator[Change]:
     """What can go wrong with a part."""
-    yield Change(k, f"the {part.name} has the wrong sign", -2 * part.value, is_sign=True)
-    yield Change(k, f"the {part.name} is left out", -part.value)
+    for text, times in WRONG.items():
+        yield Change(k, f"the {part.name} {text}", times * part.value, is_sign=times == -2.0)
     if part.name.startswith("Coriolis"):
         yield Change(k, f"the {part.name} lacks its factor 2", -part.value / 2)
-    yield Change(k, f"the {part.name} is ten times too large", 9 * part.value)
-    yield Change(k, f"the {part.name} is ten times too small", -0.9 * part.value)
 
 
 def _parts(variant: Variant, answer: Answer) -> Sequence[Part]:
@@ -120,13 +133,6 @@ def _of_body(variant: Variant, name: str, k: int) -> Sequence[Part]:
 Values = Sequence[float | None]
 LINEAR = re.compile(r"(_f[xy]|_moment|_contact_force|(^|_)input_(torque|force))$")
 """Of the columns of `dalembert forces`: a sum over the loads."""
-WRONG = {
-    "has the wrong sign": -2.0,
-    "is left out": -1.0,
-    "is ten times too small": -0.9,
-    "is ten times too large": 9.0,
-}
-"""How often a load's part is added to the answer by a slip."""
 LOAD = re.compile(r"(?:forces\.(\d+)\.force|torques\.(\d+)\.torque)(?:\.[xy])?")
 
 
@@ -195,20 +201,14 @@ def of_loads(
     answer: Answer, number: int, every: Sequence[Load]
 ) -> tuple[list[Slip], Callable[[], Pairs | None]]:
     """The slips of an answer that is a sum over the loads, and pairs of them."""
-    changes = [change for k, load in enumerate(every) for change in _load_changes(k, load, number)]
+    parts = [Part(load.name, load.parts[number] or 0.0) for load in every if load.parts]
+    changes = [change for k, part in enumerate(parts) if part.value for change in _part_changes(k, part)]
     return of_sum(answer, changes, complex(answer.value), lambda sums: sums.real)
 
 
 def is_sum(answer: Answer) -> bool:
     """Whether an answer is a sum over the loads."""
     return LINEAR.search(answer.ask.name) is not None
-
-
-def _load_changes(k: int, load: Load, number: int) -> Iterator[Change]:
-    part = load.parts[number] if load.parts else None
-    if part:
-        for text, times in WRONG.items():
-            yield Change(k, f"the {load.name} {text}", times * part, is_sign=times == -2.0)
 
 
 class Term(NamedTuple):
@@ -284,3 +284,163 @@ def _gravity(variant: Variant, terms: Sequence[Term]) -> Iterator[Change]:
         for text, share in other_gravities(g):
             yield Change(len(terms), text, weight * (share - 1))
         yield Change(len(terms), "the mass in place of the weight", weight * (1 / g - 1))
+
+
+# --- a correction is a sum over the masses -------------------------------------------------------------------------
+Complexes = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(eq=False, repr=False)
+class Rotor:
+    """A rotor's unbalances, its planes, and the right corrections; SI."""
+
+    names: Sequence[str]
+    moment: Complexes
+    angle_deg: Real | None
+    """The angles as the table has them; None where they are in radians."""
+    has_radius: bool
+    z: Real
+    planes: Sequence[str]
+    plane_z: Real
+    radius: Real
+    gravity: float
+    weights: bool
+    sign: float
+    """−1 where material is removed."""
+
+    @cached_property
+    def corrections(self) -> Complexes:
+        """The right ones."""
+        return self.corrections_of(self.moment)
+
+    def corrections_of(self, moments: Complexes) -> Complexes:
+        """The corrections of rotors with other unbalances, (n, k) -> (n, p)."""
+        return self.sign * correct(moments, np.broadcast_to(self.z, moments.shape), self.plane_z).unbalance
+
+    @cached_property
+    def in_radians(self) -> Complexes | None:
+        """The unbalances with each angle's degrees taken as radians."""
+        return None if self.angle_deg is None else np.abs(self.moment) * np.exp(1j * self.angle_deg)
+
+    def changes(self) -> Iterator[Change]:
+        """What can go wrong with a mass: what the change adds to its unbalance."""
+        for k, (name, u) in enumerate(zip(self.names, self.moment.tolist(), strict=True)):
+            if not u:
+                continue
+            yield Change(k, f"the term of {name} has the wrong sign", -2 * u, is_sign=True)
+            yield Change(k, f"{name} is left out", -u)
+            yield Change(k, f"the term of {name} is ten times too large", 9 * u)
+            yield Change(k, f"the term of {name} is ten times too small", -0.9 * u)
+            yield Change(k, f"sine in place of cosine at {name}", 1j * np.conj(u) - u)
+            if self.in_radians is not None:
+                turned = complex(self.in_radians[k])
+                yield Change(k, f"the angle of {name}: degrees taken as radians", turned - u)
+            yield Change(k, f"the angle of {name} is counted the other way", np.conj(u) - u)
+            if self.has_radius:
+                yield Change(k, f"the diameter of {name} in place of its radius", u)
+
+    def of_all(self) -> Iterator[tuple[str, Complexes]]:
+        """What can go wrong with all masses alike: the unbalances."""
+        if self.in_radians is not None:
+            yield "the angles of the masses: degrees taken as radians", self.in_radians
+        if self.has_radius:
+            yield "the diameters of the masses in place of their radii", 2 * self.moment
+
+
+def rotor(variant: Variant, answer: Answer) -> Rotor | None:
+    """Return the rotor that a question is about; None with three planes or more, modes, or rounded corrections."""
+    own = variant.problem.parameters
+    if any(own[name] for name in ("round_mass", "round_angle", "modes", "mass")):
+        return None
+    read, planes = variant.problem.known_masses()
+    if not 1 <= len(planes.name) <= 2 or planes.rotor is not None:
+        return None
+    if len(read.names) > 1 and "rotor" not in answer.ask.where:
+        return None
+    which = read.names.index(answer.ask.where["rotor"]) if "rotor" in answer.ask.where else 0
+    rows = np.flatnonzero(read.rotor == which)
+    names = read.table.texts.get("name") or [f"mass {k}" for k in range(1, read.table.rows + 1)]
+    z = read.z if read.z is not None else np.zeros(len(read.moment))
+    plane_z = planes.z if planes.z is not None else np.zeros(len(planes.name))
+    angle = read.table.numbers["angle"]
+    return Rotor(
+        [names[k] for k in rows], read.moment[rows], angle.values[rows] if angle.unit == "deg" else None,
+        read.radius_unit is not None, z[rows], planes.name, np.asarray(plane_z, float), np.asarray(planes.radius, float),
+        variant.problem.gravity, read.weights, -1.0 if own["remove"] else 1.0,
+    )  # fmt: skip
+
+
+KINDS = ("mass", "weight", "unbalance", "angle")
+
+
+def kind_of(answer: Answer) -> str:
+    """What a question asks of a correction: mass, weight, unbalance, angle; empty for anything else."""
+    name = answer.ask.name.lower()
+    return name if name in KINDS else ""
+
+
+def of_rotor(variant: Variant, number: int) -> Candidates | None:
+    """Return the slips of a correction."""
+    answer = variant.answers[number]
+    kind = kind_of(answer)
+    own = rotor(variant, answer) if kind else None
+    if own is None:
+        return None
+    p = list(own.planes).index(answer.ask.where["plane"]) if "plane" in answer.ask.where else 0
+    right = complex(own.corrections[p])
+    if not right or not answer.value:
+        return None
+
+    def value_of(u: Any) -> Real:
+        # in the unit asked for, by the right answer
+        if kind == "angle":
+            return np.asarray(degrees(u) * (answer.turn / 360))
+        return np.asarray(np.abs(u) * (answer.value / abs(right)))
+
+    changes = list(own.changes())
+    by = np.array([change.by for change in changes])
+    changed = np.tile(own.moment, (len(changes), 1))
+    changed[np.arange(len(changes)), [change.term for change in changes]] += by
+    after = own.corrections_of(changed)
+    # a correction is a sum over the masses, as their unbalances are
+    shares = [
+        replace(change, by=complex(u) - right)
+        for change, u in zip(changes, after[:, p].tolist(), strict=True)
+    ]
+    singles, pairs = of_sum(answer, shares, right, value_of)
+    for text, moments in own.of_all():
+        singles.append(Slip(text, float(value_of(own.corrections_of(moments)[p]))))
+    # in the forces alone, with the other plane right; in the moments alone, carried into the forces
+    if len(own.planes) == 2:
+        forces = right - own.sign * by
+        moments = right - (after[:, 1 - p] - own.corrections[1 - p])
+        for where, u in (("forces", forces), ("moments", moments)):
+            singles += [
+                Slip(f"{c.text} in the sum of the {where}", float(v))
+                for c, v in zip(changes, value_of(u), strict=True)
+            ]
+    singles += _final(own, kind, p, answer)
+    return Candidates(answer, singles, pairs)
+
+
+def _final(own: Rotor, kind: str, p: int, answer: Answer) -> Iterator[Slip]:
+    """Slips of the last step: the angle's quadrant and sense, radius, weight."""
+    value, g = answer.value, own.gravity
+    if kind == "angle":
+        yield Slip(
+            "180° off: the angle of the unbalance in place of the correction's, or the wrong quadrant",
+            value + answer.turn / 2,
+        )
+    for other in (g, *(other for other in GRAVITIES if other != g)):
+        if kind == "mass":
+            yield Slip("the weight in place of the mass", value * other)
+        if kind == "weight":
+            yield Slip("the mass in place of the weight", value / other)
+    if kind == "weight" or (own.weights and kind != "angle"):
+        for text, share in other_gravities(g):
+            yield Slip(text, value * share if kind == "weight" else value / share)
+    if kind in ("mass", "weight"):
+        yield Slip("the diameter in place of the radius of the plane", value / 2)
+        yield Slip("the unbalance in place of the mass or weight", value * float(own.radius[p]))
+    yield from finals(answer)

@@ -1,29 +1,30 @@
-"""A student's numbers put into the exercise's files, and the command run on them."""
+"""The exercise's files with a student's numbers in them, and the command run on them."""
 
 from __future__ import annotations
 
+import csv
+import io
 import re
-import shutil
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
+from fractions import Fraction
 from functools import cache, cached_property
 from importlib import import_module
 from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cli.exercise.data import DataTable, cell_of, converted
-from cli.exercise.description import Draw, Exercise, Solved, Value, value_of
+from cli.exercise.description import Ask, Exercise, Solved, Value, value_of
 from cli.read.options import components
 from cli.show.output import result_of
 from dalembert.errors import DataError, quote
-from dalembert.hints import nearest
 from dalembert.quantities import is_number
 from dalembert.tables.files import SUFFIXES, read_bytes, split_sheet
+from dalembert.tables.headers import heading
 from dalembert.tables.sources import open_source
+from dalembert.units import composed, parted
 
 if TYPE_CHECKING:
     from cli.balance.rotors import Rotors
@@ -33,6 +34,118 @@ MECHANISM = ("mechanism", "forces", "inspect", "equilibrium", "simulate", "toler
 """Commands on a mechanism's file: they take --set."""
 _TABLES = (".csv", ".tsv", ".txt", *SUFFIXES)
 _FILES = (".toml", *_TABLES)
+
+
+NAMES = ("name", "link", "part", "rotor", "cylinder", "run")
+"""Columns that may name the rows of a table."""
+COMMA = re.compile(r"\s*[-+]?\d*,\d+(?:[eE][-+]?\d+)?\s*")
+
+
+def cell_of(name: str) -> tuple[str, str, str] | None:
+    """Take the name of a table's cell apart.
+
+    >>> cell_of("rotor.csv:W1.mass_kg"), cell_of("links.crank.B.x")
+    (('rotor.csv', 'W1', 'mass_kg'), None)
+    """
+    file, colon, rest = name.partition(":")
+    row, dot, column = rest.rpartition(".")
+    return (file, row, column) if colon and dot and row else None
+
+
+@dataclass(eq=False, repr=False)
+class DataTable:
+    """A table of the exercise as its file has it: header and cells."""
+
+    header: list[str]
+    rows: list[list[str]] = field(default_factory=list)
+
+    def row(self, name: str) -> int | None:
+        """Return the row of a name: of a column that names rows, else the row's number."""
+        for title in (*NAMES, "plane", "step"):
+            column = self.column(title)
+            if column is not None:
+                cells = [row[column] for row in self.rows]
+                if cells.count(name) == 1:
+                    return cells.index(name)
+        if name.isdecimal() and 1 <= int(name) <= len(self.rows):
+            return int(name) - 1
+        return None
+
+    def column(self, title: str) -> int | None:
+        """Return the place of a column by its header, or by quantity and unit: `mass_kg` for `mass [kg]`."""
+        for k, each in enumerate(self.header):
+            if title.lower() in (each.strip().lower(), heading(each).name.lower()):
+                return k
+        return None
+
+    def quantity(self, column: int) -> tuple[str, str]:
+        """Return the quantity of a column and its unit, which is empty where there is none."""
+        return parted(heading(self.header[column]).name, further=("kg_m2", "kg_m2_s"))
+
+    def number(self, row: int, column: int) -> Decimal | None:
+        """Return the number of a cell; None where it holds none."""
+        text = self.rows[row][column].strip().replace(",", ".")
+        return Decimal(text) if is_number(text) else None
+
+    @cached_property
+    def naming(self) -> str | None:
+        """The title of the column that names the rows; None where there is none."""
+        for title in NAMES:
+            column = self.column(title)
+            if column is not None and len({row[column] for row in self.rows}) == len(self.rows):
+                return title
+        return None
+
+    @cached_property
+    def names(self) -> list[str]:
+        """What the rows are called."""
+        column = None if self.naming is None else self.column(self.naming)
+        return [str(k) if column is None else row[column] for k, row in enumerate(self.rows, 1)]
+
+    def called(self, row: int) -> str:
+        """Return what a row is called in a sentence: its name, or row 3, or cylinder 2."""
+        title = "row" if self.naming in (None, "name") else self.naming
+        return f"{title} {self.names[row]}" if self.names[row].isdecimal() else self.names[row]
+
+    @cached_property
+    def has_commas(self) -> bool:
+        """Whether its decimal sign is a comma."""
+        return any(COMMA.fullmatch(cell) for row in self.rows for cell in row)
+
+    def changed(self, cells: dict[tuple[int, int], str], further: dict[str, list[str]]) -> DataTable:
+        """Return the table with other cells and with further columns by their titles; numbers have a decimal point."""
+        rows = [list(row) for row in self.rows]
+        for (row, column), text in cells.items():
+            rows[row][column] = text.replace(".", ",") if self.has_commas else text
+        return DataTable(
+            [*self.header, *further],
+            [[*row, *(each[k] for each in further.values())] for k, row in enumerate(rows)],
+        )
+
+    def text(self) -> str:
+        """Return the table as CSV."""
+        stream = io.StringIO()
+        writer = csv.writer(stream, lineterminator="\n", delimiter=";" if self.has_commas else ",")
+        writer.writerow(self.header)
+        writer.writerows(self.rows)
+        return stream.getvalue()
+
+
+def converted(value: Value, unit: str) -> str | None:
+    """Return a drawn value as a cell in a column's unit, exactly; None where the units do not fit."""
+    if not value.unit:
+        return f"{value.number:f}"
+    own, wanted = composed(value.unit), composed(unit) if unit else None
+    if own is None or wanted is None or own[1] != wanted[1]:
+        return None
+    if own[0] == wanted[0]:
+        return f"{value.number:f}"
+    (n, d), (wn, wd) = own[0], wanted[0]
+    if isinstance(n, int) and isinstance(d, int) and isinstance(wn, int) and isinstance(wd, int):
+        number = Fraction(value.number) * Fraction(n, d) / Fraction(wn, wd)
+        exact = Decimal(number.numerator) / Decimal(number.denominator)
+        return f"{exact:f}"
+    return repr(float(value.number) * n / d * wd / wn)
 
 
 @dataclass(eq=False, repr=False)
@@ -90,50 +203,18 @@ class Workshop:
 
         return {} if self.mechanism is None else dimensions(self.described.mechanism)
 
-    def check(self) -> None:
-        """Refuse names of [draw] that the exercise's files do not have, before anything is drawn."""
-        place = self.exercise.file
-        placeholders = {part for word in self.exercise.command for part in _placeholders(word)}
-        for draw in self.exercise.draws:
-            where = f"{place}: [draw], {draw.name}"
-            cell = cell_of(draw.name)
-            if cell is not None:
-                self._check_cell(where, draw, cell)
-                continue
-            if draw.name in placeholders:
-                continue
-            if self.mechanism is None:
-                raise DataError(
-                    f"{where}: no such datum: expected a table's cell such as 'rotor.csv:W1.mass_kg', or a name that stands "
-                    f"in braces in the command, such as {{{draw.name}}}"
-                )
-            if draw.name not in self.dimensions:
-                raise DataError(
-                    f"{where}: the mechanism has no such dimension{nearest(draw.name, self.dimensions)}"
-                )
-            self._check_unit(where, draw.values, self.dimensions[draw.name].kind)
-        for name in sorted(placeholders - {draw.name for draw in self.exercise.draws}):
-            raise DataError(f"{place}: key command: found {{{name}}}, expected a name of [draw]")
+    def by_column(self, ask: Ask) -> Ask:
+        """Return a question with its quantity's column, where it names the quantity as --only does: H.x is H_x."""
+        if "." not in ask.quantity or self.mechanism is None:
+            return ask
+        from virtualwork.describe import DescriptionError
+        from virtualwork.quantities import named
 
-    def _check_cell(self, where: str, draw: Draw, cell: tuple[str, str, str]) -> None:
-        file, row, column = cell
-        if file not in self.tables:
-            raise DataError(
-                f"{where}: found the file {quote(file)}, expected one that the command reads: "
-                f"{', '.join(self.tables) or 'it reads no table'}{nearest(file, self.tables)}"
-            )
-        table = self.table(file)
-        if table.row(row) is None:
-            raise DataError(
-                f"{where}: no row {quote(row)} in {file}: expected one of {', '.join(table.names)}"
-            )
-        if table.column(column) is None:
-            raise DataError(
-                f"{where}: no column {quote(column)} in {file}: expected one of {', '.join(table.header)}"
-                f"{nearest(column, table.header)}"
-            )
-        for value in draw.values:
-            self.entered(draw.name, value)
+        try:
+            columns = named(self.described.mechanism, ask.quantity)
+        except DescriptionError:
+            return ask
+        return replace(ask, quantity=columns[0].header) if len(columns) == 1 else ask
 
     def entered(self, name: str, value: Value) -> tuple[str, int, int, str]:
         """Return file, row and column of a drawn value's cell, and its text.
@@ -153,13 +234,6 @@ class Workshop:
                 f"{self.table(file).header[column]}"
             )
         return file, row, column, text
-
-    def _check_unit(self, where: str, values: Sequence[Value], kind: str) -> None:
-        from dalembert.quantities import expected, number_in_si
-
-        for value in values:
-            if value.unit and number_in_si(str(value), kind) is None:
-                raise DataError(f"{where}: found {quote(str(value))}, expected {expected(kind)}")
 
     def problem(self, drawn: Mapping[str, Value]) -> Problem:
         """Return the exercise with a student's numbers."""
@@ -214,20 +288,8 @@ class Workshop:
         return value_of(here) if isinstance(here, str) and not is_number(here) else None
 
 
-def _placeholders(word: str) -> list[str]:
+def placeholders(word: str) -> list[str]:
     return re.findall(r"\{([A-Za-z_]\w*)\}", word)
-
-
-@contextmanager
-def workshop(exercise: Exercise) -> Iterator[Workshop]:
-    """A folder for the tables of variants, which goes when the work is done."""
-    folder = Path(tempfile.mkdtemp(prefix="dalembert-"))
-    try:
-        made = Workshop(exercise, folder)
-        made.check()
-        yield made
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 @dataclass(eq=False, repr=False)
@@ -281,7 +343,7 @@ class Problem:
         )
         words = []
         for word in filter(None, self.words or self.exercise.command):
-            for name in _placeholders(word):
+            for name in placeholders(word):
                 if name in self.drawn:
                     word = word.replace(f"{{{name}}}", self.drawn[name].option)
             if word in changed:

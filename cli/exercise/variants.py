@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property
 from math import isfinite, prod, tau
+from pathlib import Path
 from random import Random
 from typing import Any
 
-from cli.exercise.description import Answer, Exercise, Solved, Value
-from cli.exercise.solving import Problem, Workshop
+from cli.exercise.description import Answer, Draw, Exercise, Solved, Value
+from cli.exercise.solving import Problem, Workshop, cell_of, placeholders
 from cli.show.output import options_of
-from dalembert.errors import DataError
+from dalembert.errors import DataError, quote
 from dalembert.figures import Right
+from dalembert.hints import nearest
 
 MOST_CONDITION = 25.0
 """Largest condition number of the constraint Jacobian, with lengths divided by the mechanism's size."""
@@ -50,6 +55,72 @@ class Variant:
         if "--steps" not in options_of(self.problem.exercise.command[0]):
             return self.solved
         return self.problem.result("--steps")
+
+
+@contextmanager
+def workshop(exercise: Exercise) -> Iterator[Workshop]:
+    """A folder for the tables of variants, which goes when the work is done."""
+    folder = Path(tempfile.mkdtemp(prefix="dalembert-"))
+    try:
+        shop = Workshop(exercise, folder)
+        shop.exercise = replace(exercise, asks=tuple(map(shop.by_column, exercise.asks)))
+        _check(shop)
+        yield shop
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _check(shop: Workshop) -> None:
+    """Refuse names of [draw] that the exercise's files do not have, before anything is drawn."""
+    place = shop.exercise.file
+    braced = {part for word in shop.exercise.command for part in placeholders(word)}
+    for draw in shop.exercise.draws:
+        where = f"{place}: [draw], {draw.name}"
+        cell = cell_of(draw.name)
+        if cell is not None:
+            _check_cell(shop, where, draw, cell)
+            continue
+        if draw.name in braced:
+            continue
+        if shop.mechanism is None:
+            raise DataError(
+                f"{where}: no such datum: expected a table's cell such as 'rotor.csv:W1.mass_kg', or a name that stands "
+                f"in braces in the command, such as {{{draw.name}}}"
+            )
+        if draw.name not in shop.dimensions:
+            raise DataError(
+                f"{where}: the mechanism has no such dimension{nearest(draw.name, shop.dimensions)}"
+            )
+        _check_unit(where, draw.values, shop.dimensions[draw.name].kind)
+    for name in sorted(braced - {draw.name for draw in shop.exercise.draws}):
+        raise DataError(f"{place}: key command: found {{{name}}}, expected a name of [draw]")
+
+
+def _check_cell(shop: Workshop, where: str, draw: Draw, cell: tuple[str, str, str]) -> None:
+    file, row, column = cell
+    if file not in shop.tables:
+        raise DataError(
+            f"{where}: found the file {quote(file)}, expected one that the command reads: "
+            f"{', '.join(shop.tables) or 'it reads no table'}{nearest(file, shop.tables)}"
+        )
+    table = shop.table(file)
+    if table.row(row) is None:
+        raise DataError(f"{where}: no row {quote(row)} in {file}: expected one of {', '.join(table.names)}")
+    if table.column(column) is None:
+        raise DataError(
+            f"{where}: no column {quote(column)} in {file}: expected one of {', '.join(table.header)}"
+            f"{nearest(column, table.header)}"
+        )
+    for value in draw.values:
+        shop.entered(draw.name, value)
+
+
+def _check_unit(where: str, values: Sequence[Value], kind: str) -> None:
+    from dalembert.quantities import expected, number_in_si
+
+    for value in values:
+        if value.unit and number_in_si(str(value), kind) is None:
+            raise DataError(f"{where}: found {quote(str(value))}, expected {expected(kind)}")
 
 
 def variants(workshop: Workshop, count: int, seed: int, warnings: list[str]) -> list[Variant]:

@@ -16,7 +16,7 @@ from cli.read.rotor_options import Verdict
 from cli.read.runs.runs import Channel, Complex, Group, Real
 from dalembert.angles import degrees
 from dalembert.arithmetic.exact import EPS
-from dalembert.results.columns import Column, Table, finite, names
+from dalembert.results.columns import Column, Table, finite, listed, names
 from dalembert.results.way import Topic, figures
 from dalembert.units import written
 
@@ -425,8 +425,8 @@ class _Way:
             how = "the corrections within the limits that leave the least"
         head: dict[str, Any] = {
             "planes": list(self.planes),
-            "matrix": [[[a.real + 0.0, a.imag + 0.0] for a in row] for row in alpha.tolist()],
-            "right": [[-v.real + 0.0, -v.imag + 0.0] for v in here],
+            "matrix": listed(alpha),
+            "right": listed([-v for v in here]),
             "weights": None if weights is None else [float(v) for v in weights],
         }
         begin = "as it stands" if self.b.request.from_here else "without masses"

@@ -18,7 +18,7 @@ import numpy as np
 from cli.cases.analysis import Analysis
 from cli.cases.ledger import Entry, components, entries_of, ledger
 from cli.cases.poses import bound, bounds_of, cells, cells_of, column, keys_of, over_poses, pose_keys, solved
-from dalembert.results.columns import Column, Table, finite, names
+from dalembert.results.columns import Column, Table, finite, listed, names
 from dalembert.results.way import Topic, figures, vector_text
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.forces import Applied, AppliedMoment
@@ -290,7 +290,7 @@ def _motors(analysis: Analysis) -> list[Topic]:
         link, whole = m.links[motor.carrier], m.rigid[motor.carrier]
         j = next((j for j, e in enumerate(m.inputs) if e.link == motor.drives), None)
         effort = analysis.motions[0].dynamics.effort
-        torque = [] if j is None else [finite(value) for value in effort[:, j].tolist()]
+        torque = [] if j is None else listed(effort[:, j])
         text = [
             f"m′ = {figures(link.mass)} + {figures(motor.mass)} = {figures(whole.mass)} kg",
             f"r_G′ = (m·r_G + m_M·r_M)/m′ = ({figures(link.mass)}·{_vector_of(link.center)} + "
@@ -305,7 +305,7 @@ def _motors(analysis: Analysis) -> list[Topic]:
             "carrier": motor.carrier,
             "drives": motor.drives,
             "mass_kg": whole.mass,
-            "center_m": [whole.center.real + 0.0, whole.center.imag + 0.0],
+            "center_m": listed(whole.center),
             "inertia_kg_m2": whole.inertia,
             "torque_N_m": torque[0] if len(torque) == 1 else torque,
         }
@@ -359,14 +359,11 @@ def _free_bodies(analysis: Analysis) -> list[Topic]:
 
 
 def _body(body: FreeBody, i: int) -> dict[str, Any]:
-    def pair(z: complex) -> list[float | None]:
-        return [finite(z.real + 0.0), finite(z.imag + 0.0)]
-
     return {
         "link": body.link,
-        "center_m": pair(complex(body.center[i])),
+        "center_m": listed(body.center[i]),
         "forces": [
-            {"name": f.name, "kind": f.kind, "at_m": pair(complex(f.at[i])), "force_N": pair(complex(f.force[i]))}
+            {"name": f.name, "kind": f.kind, "at_m": listed(f.at[i]), "force_N": listed(f.force[i])}
             for f in body.forces
         ],
         "torques": [{"name": t.name, "kind": t.kind, "torque_N_m": finite(float(t.torque[i]))} for t in body.torques],

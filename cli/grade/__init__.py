@@ -32,15 +32,14 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     whole turns. The status is 0 however wrong the answers are.
     """
     from cli.exercise.description import read_exercise
-    from cli.exercise.solving import workshop
-    from cli.exercise.variants import several
+    from cli.exercise.variants import several, workshop
     from cli.grade.answers import read_students
     from cli.grade.marks import METHOD, mark_all, tables
     from cli.show.result import Result
 
-    exercise = read_exercise(options.file)
-    students = read_students(exercise, options.answers, options.key)
-    with workshop(exercise) as shop:
+    with workshop(read_exercise(options.file)) as shop:
+        exercise = shop.exercise
+        students = read_students(exercise, options.answers, options.key)
         marks = mark_all(exercise, shop, students)
     points = sum(mark.points for mark in marks)
     of = float(exercise.points) * len(students)

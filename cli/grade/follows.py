@@ -10,11 +10,13 @@ from itertools import product
 
 import numpy as np
 
+from cli.exercise.description import Answer
 from cli.exercise.recomputed import Recomputed
-from cli.exercise.slips_of_rotors import Range, carried, polar_range
-from cli.exercise.slips_of_sums import WRONG, is_sum, way_of
+from cli.exercise.slips_of_sums import WRONG, Complexes, is_sum, kind_of, rotor, way_of
 from cli.exercise.variants import Variant
+from dalembert.angles import degrees
 
+Range = tuple[float, float]
 Typed = Mapping[int, tuple[float, float]]
 """Of earlier questions by their number: the value typed, in the unit asked for, and half a unit of its last digit."""
 ENOUGH = 3
@@ -35,7 +37,7 @@ class Follows:
         """Yield the ranges of an answer that would follow from earlier ones; `wrong`: those that are not right."""
         command = self.variant.problem.exercise.command[0]
         if command == "balance":
-            after = carried(self.variant, k, typed)
+            after = _balance(self.variant, k, typed)
             if after is not None:
                 yield after
             return
@@ -178,6 +180,57 @@ def _body(variant: Variant, k: int, typed: Typed, wrong: frozenset[int]) -> Rang
     return _linear(variant, k, typed, wrong, shares)
 
 
+def _balance(variant: Variant, number: int, typed: Typed) -> Range | None:
+    """Plane A from plane B; mass, weight and unbalance of one plane from each other."""
+    answer = variant.answers[number]
+    kind = kind_of(answer)
+    own = rotor(variant, answer) if kind else None
+    if own is None:
+        return None
+    here = answer.ask.where.get("plane", own.planes[0])
+    p = list(own.planes).index(here)
+    same: dict[str, tuple[Answer, tuple[float, float]]] = {}
+    other: dict[str, tuple[Answer, tuple[float, float]]] = {}
+    for k, pair in typed.items():
+        its = variant.answers[k]
+        if kind_of(its) and its.ask.where.get("rotor") == answer.ask.where.get("rotor"):
+            there = same if its.ask.where.get("plane", own.planes[0]) == here else other
+            there[kind_of(its)] = its, pair
+    right = own.corrections[p]
+    if kind != "angle":
+        # mass, weight and unbalance of one plane are in proportion
+        for earlier in ("unbalance", "mass", "weight"):
+            if earlier != kind and earlier in same and same[earlier][0].value:
+                its, (value, half) = same[earlier]
+                share = answer.value / its.value
+                return (value - half) * share, (value + half) * share
+    if len(own.planes) != 2 or not other:
+        return None
+    q = 1 - p
+    sizes, angles = [abs(own.corrections[q])], [float(np.angle(own.corrections[q]))]
+    for earlier, (its, (value, half)) in other.items():
+        if earlier == "angle":
+            angles = [(value + share * half) * 2 * np.pi / its.turn for share in (-1.0, 0.0, 1.0)]
+        elif its.value:
+            scale = abs(own.corrections[q]) / its.value
+            sizes = [(value + share * half) * scale for share in (-1.0, 0.0, 1.0)]
+    u = np.array([size * np.exp(1j * angle) for size in sizes for angle in angles])
+    # what the other plane leaves of the forces
+    made = right - (u - own.corrections[q])
+    if kind == "angle":
+        return _polar_range(made, answer)
+    values = np.abs(made) * (answer.value / abs(right))
+    return float(values.min()), float(values.max())
+
+
+def _polar_range(made: Complexes, answer: Answer) -> Range:
+    """Return the range of the angles of vectors, about that in the middle, in the unit of the answer."""
+    middle = degrees(made[len(made) // 2 : len(made) // 2 + 1])
+    off = np.remainder(degrees(made) - middle + 180.0, 360.0) - 180.0
+    unit = answer.turn / 360
+    return float(middle[0] + off.min()) * unit, float(middle[0] + off.max()) * unit
+
+
 def _trim(variant: Variant, k: int, typed: Typed, wrong: frozenset[int]) -> Range | None:
     """The trim follows from the correction: it is the correction less the masses on the rotor."""
     answer = variant.answers[k]
@@ -202,7 +255,7 @@ def _trim(variant: Variant, k: int, typed: Typed, wrong: frozenset[int]) -> Rang
         return None
     made = np.array([right - correction + s * np.exp(1j * t) for s, t in product(sizes, turns)])
     if match[1] == "angle":
-        return polar_range(made, answer)
+        return _polar_range(made, answer)
     return _range((np.abs(made) * (answer.value / abs(right))).tolist())
 
 

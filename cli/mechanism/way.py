@@ -9,7 +9,7 @@ import numpy as np
 
 from cli.cases.poses import column, over_poses, pose_head
 from dalembert.angles import in_turn, read_degrees
-from dalembert.results.columns import Column, Table, finite, names
+from dalembert.results.columns import Column, Table, finite, listed, names
 from dalembert.results.way import Topic, figures, vector_text
 
 if TYPE_CHECKING:
@@ -118,10 +118,6 @@ def _groups(analysis: Analysis, motion: Motion) -> list[Topic]:
     return groups
 
 
-def _pair(z: complex) -> list[float]:
-    return [z.real + 0.0, z.imag + 0.0]
-
-
 def _unknowns(m: Any, group: Group, root: Root) -> Document:
     return {
         **{
@@ -136,7 +132,7 @@ def _root_entry(m: Any, group: Group, name: str, at: GroupAt | None) -> Document
     if at is None:
         return {"roots": [], "taken": None}
     return {
-        "vectors_m": {"W": _pair(at.offset), "V": _pair(at.vectors[0]), "U": _pair(at.vectors[1])},
+        "vectors_m": dict(zip("WVU", listed((at.offset, *at.vectors)), strict=True)),
         "roots": [
             {
                 "point": name,
@@ -233,9 +229,9 @@ def _newton(analysis: Analysis, motion: Motion) -> Topic:
                 {
                     "k": it.k,
                     "unknowns": unknowns,
-                    "residual": _finite(it.residual.tolist()),
-                    "jacobian": [_finite(line) for line in it.jacobian.tolist()],
-                    "step": _finite(it.step.tolist()),
+                    "residual": listed(it.residual),
+                    "jacobian": listed(it.jacobian),
+                    "step": listed(it.step),
                 }
             )
             rows.append(
@@ -260,10 +256,6 @@ def _newton(analysis: Analysis, motion: Motion) -> Topic:
             f"Largest difference to the assembly solved group by group: {figures(max(differences))} rad"
         )
     return Topic("newton", text, "Newton-Raphson (Nicoletti, lecture 7)", {"poses": entries})
-
-
-def _finite(values: list[float]) -> list[float | None]:
-    return [v + 0.0 if np.isfinite(v) else None for v in values]
 
 
 def _first_step(keys: list[str], entry: Document) -> list[str | Table]:
@@ -301,7 +293,7 @@ def _parts(analysis: Analysis, motion: Motion) -> Topic:
                 "point": each.point,
                 "on": each.on,
                 "from": each.base,
-                **{k.key: _finite(_pair(complex(getattr(each, k.of)[i]))) for k in PARTS if k.key},
+                **{k.key: listed(getattr(each, k.of)[i]) for k in PARTS if k.key},
             }
             for each in every
         ]

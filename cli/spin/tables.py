@@ -15,7 +15,7 @@ from cli.read import root_search
 from cli.read.options import bad
 from cli.show.picture import blank
 from cli.spin.rotation import Rotation, TurningBody
-from dalembert.results.columns import Column, Table, names, number, vector
+from dalembert.results.columns import Column, Table, listed, names, number, vector
 from dalembert.results.way import Topic, figures
 from rigidbody3d import check
 from rigidbody3d.attitude import rotate
@@ -176,8 +176,8 @@ def way(r: Rotation) -> list[Topic]:
         f"T = ω·H/2 = {figures(energy)} J",
     ]
     head = {
-        "momentum_body_kg_m2_s": [float(v) + 0.0 for v in h],
-        "momentum_kg_m2_s": [float(v) + 0.0 for v in space],
+        "momentum_body_kg_m2_s": listed(h),
+        "momentum_kg_m2_s": listed(space),
         "kinetic_energy_J": energy,
     }
     result = [Topic("start", start, "At time zero", head)]

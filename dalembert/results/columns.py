@@ -42,6 +42,20 @@ def finite(value: float) -> float | None:
     return float(value) if isfinite(value) else None
 
 
+def listed(values: Any) -> Any:
+    """Return numbers as JSON has them: arrays as lists, a complex number as its two parts; None for what is not finite.
+
+    >>> listed(complex(-0.0, 2)), listed([1.0, float("inf")])
+    ([0.0, 2.0], [1.0, None])
+    """
+    if hasattr(values, "tolist"):
+        values = values.tolist()
+    if isinstance(values, complex):
+        values = (values.real, values.imag)
+    # the sum has no −0
+    return [listed(each) for each in values] if isinstance(values, (list, tuple)) else finite(values + 0.0)
+
+
 @dataclass(eq=False, repr=False)
 class Column:
     """A quantity of a table: texts are names, None and NaN are empty cells."""

@@ -48,6 +48,10 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+def rows_of(text: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(text.splitlines()))
+
+
 def rows(path: Path) -> list[dict[str, str]]:
     with path.open(encoding="utf-8", newline="") as stream:
         return list(csv.DictReader(stream))
@@ -99,6 +103,42 @@ def test_the_key_is_what_the_command_says_of_each_students_numbers(
             assert float(row["value"]) == pytest.approx(
                 float(found[row["plane"]][row["quantity"]]), rel=1e-14
             )
+
+
+def test_a_question_names_its_quantity_as_only_does(dalembert: Dalembert, tmp_path: Path) -> None:
+    """The coordinate of a point, a motor's torque and the force of a pin: the columns that `--only` gives these names."""
+    assert dalembert("examples", "exercise-robot-arm").returncode == 0
+    for command, only in (
+        ("mechanism arm.toml --at upper=20deg,fore=75deg", ("T.x", "fore.angle")),
+        ("forces arm.toml --at upper=20deg,fore=75deg", ("upper.torque", "E.fore.fy")),
+    ):
+        table = dalembert(*command.split(), "--only", ",".join(only)).stdout
+        (row,) = csv.DictReader(table.splitlines())
+        columns = list(row)[-len(only) :]
+        asks = "".join(f'[[ask]]\nquantity = "{name}"\n' for name in only)
+        (tmp_path / "e.toml").write_text(f'command = "{command}"\n{asks}')
+        out = command.split()[0]
+        assert dalembert("exercise", "e.toml", "-o", out).returncode == 0
+        key = rows(tmp_path / out / "key.csv")
+        assert [each["quantity"] for each in key] == columns
+        assert [float(each["value"]) for each in key] == [float(row[column]) for column in columns]
+        answers = (tmp_path / out / "answers.csv").read_text().splitlines()
+        filled = [
+            answers[0],
+            *(line + each["answer"] for line, each in zip(answers[1:], key, strict=True)),
+        ]
+        (tmp_path / out / "answers.csv").write_text("\n".join(filled) + "\n")
+        marks = rows_of(dalembert("grade", "e.toml", f"{out}/answers.csv").stdout)
+        assert [mark["verdict"] for mark in marks] == ["right", "right"]
+
+
+def test_a_name_that_is_no_quantity_is_refused(dalembert: Dalembert, tmp_path: Path) -> None:
+    assert dalembert("examples", "exercise-robot-arm").returncode == 0
+    for name in ("T", "T.q", "Q.x"):
+        (tmp_path / "e.toml").write_text(f'command = "mechanism arm.toml"\n[[ask]]\nquantity = "{name}"\n')
+        done = dalembert("exercise", "e.toml", "-o", "out")
+        assert done.returncode == 1
+        assert f"[[ask]] 1, key quantity: found '{name}', expected a column of the result: " in done.stderr
 
 
 def test_the_same_seed_is_the_same_folder_and_another_is_not(dalembert: Dalembert, folder: Path) -> None:

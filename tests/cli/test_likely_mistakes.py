@@ -6,6 +6,7 @@ import csv
 import json
 import random
 import re
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +14,10 @@ import pytest
 
 from balancing import correct
 from cli.examples import names
-from cli.exercise.description import read_exercise
+from cli.exercise.description import Answer, Ask, read_exercise
 from cli.exercise.recomputed import candidates
-from cli.exercise.slips import Candidates
-from cli.exercise.solving import workshop
-from cli.exercise.variants import variants
+from cli.exercise.slips import Candidates, Slip
+from cli.exercise.variants import variants, workshop
 from dalembert.figures import Right, typed, written
 from tests.cli.test_exercise import EXERCISE, ROTOR
 from tests.cli.test_grade import STATES, WORK
@@ -81,8 +81,8 @@ OTHERS = {
 """Of further commands: a file, its text, the command, questions."""
 
 
-def every_question(name: str, folder: Path, count: int) -> list[Candidates]:
-    """The questions of a worked exercise, or of a further command, with four figures."""
+def every_question(name: str, folder: Path, count: int, figures: int) -> list[Candidates]:
+    """The questions of a worked exercise, or of a further command, with so many figures."""
     if name in OTHERS:
         file, text, command, asks = OTHERS[name]
         (folder / file).write_text(text)
@@ -95,12 +95,12 @@ def every_question(name: str, folder: Path, count: int) -> list[Candidates]:
                 f"quantity = {quantity}",
                 *([f'where = {{ {key} = "{row}" }}'] if where else []),
             ]
-            lines.append("figures = 4")
+            lines.append(f"figures = {figures}")
         exercise = "\n".join(lines) + "\n"
     else:
-        exercise = re.sub(r"figures = \d", "figures = 4", (folder / f"{name}.toml").read_text())
-    (folder / "four.toml").write_text(exercise)
-    with workshop(read_exercise(str(folder / "four.toml"))) as shop:
+        exercise = re.sub(r"figures = \d", f"figures = {figures}", (folder / f"{name}.toml").read_text())
+    (folder / "e.toml").write_text(exercise)
+    with workshop(read_exercise(str(folder / "e.toml"))) as shop:
         every = [own for variant in variants(shop, count, 3, []) for own in candidates(variant)]
         for own in every:
             # pairs are formed while the tables are there
@@ -113,13 +113,15 @@ def every_question(name: str, folder: Path, count: int) -> list[Candidates]:
 def test_a_slip_is_named_in_every_command(
     name: str, dalembert: Dalembert, tmp_path: Path, first_seed: int
 ) -> None:
-    """Of 1000 answers with one slip at least 99 % are named, of 1000 random numbers at most 2 %; sixteen exercises."""
+    """Of 1000 answers with one slip nearly all have its name and none another's, of 1000 random numbers at most 2 %."""
     if name not in OTHERS:
         assert dalembert("examples", name).returncode == 0
-    slipped, met = share_named(every_question(name, tmp_path, 2), 1000, first_seed)
-    print(f"{name}: named {slipped:.1%}, random {met:.1%}")
-    assert slipped >= 0.99
-    assert met <= 0.02
+    for figures, least, most in ((2, 0.0, 0.015), (3, 0.75, 0.07), (4, 0.8, 0.02)):
+        named, other, met = share_named(every_question(name, tmp_path, 2, figures), 1000, first_seed, figures)
+        print(f"{name}, {figures} figures: named {named:.1%}, random {met:.1%}")
+        assert named >= least
+        assert other == 0
+        assert met <= most
 
 
 @pytest.fixture
@@ -138,15 +140,17 @@ def questions(tmp_path: Path) -> list[Candidates]:
     return found
 
 
-def share_named(questions: list[Candidates], count: int, seed: int) -> tuple[float, float]:
-    """Of wrong answers with one slip the share that is named; of random wrong numbers the share that is."""
+def share_named(
+    questions: list[Candidates], count: int, seed: int, figures: int = FIGURES
+) -> tuple[float, float, float]:
+    """Of answers with one slip the share with its name, and with another's; of random wrong numbers the share with a name."""
     draw = random.Random(seed)
-    slipped = named = 0
+    slipped = named = other = 0
     while slipped < count:
         own = draw.choice(questions)
         slip = draw.choice(own.singles)
         (answer, *_) = (
-            typed(written(slip.value, FIGURES)) if np.isfinite(slip.value) and slip.value else (None,)
+            typed(written(slip.value, figures)) if np.isfinite(slip.value) and slip.value else (None,)
         )
         if (
             answer is None
@@ -155,7 +159,12 @@ def share_named(questions: list[Candidates], count: int, seed: int) -> tuple[flo
         ):
             continue
         slipped += 1
-        named += own.name(answer) is not None
+        name = own.name(answer)
+        # several slips may make one number
+        made = [each.value for each in own.singles if each.text == name]
+        is_own = any(abs(own.answer.distance(value, slip.value)) <= 1e-8 * abs(slip.value) for value in made)
+        named += is_own
+        other += name is not None and not is_own
     wrong = met = 0
     while wrong < count:
         own = draw.choice(questions)
@@ -164,24 +173,70 @@ def share_named(questions: list[Candidates], count: int, seed: int) -> tuple[flo
             if own.answer.is_angle
             else own.answer.value * 10 ** draw.uniform(-1, 1) * draw.choice([-1, 1, 1, 1])
         )
-        (answer, *_) = typed(written(value, FIGURES))
+        (answer, *_) = typed(written(value, figures))
         if own.right.verdict(answer) != "wrong":
             continue
         wrong += 1
         met += own.name(answer) is not None
-    return named / count, met / count
+    return named / count, other / count, met / count
 
 
 def test_one_slip_is_named_and_a_random_number_is_not(questions: list[Candidates]) -> None:
-    named, met = share_named(questions, 600, 1)
-    assert named >= 0.99
+    named, other, met = share_named(questions, 600, 1)
+    assert named >= 0.93
+    assert other == 0
     assert met <= 0.02
+
+
+@pytest.mark.parametrize(("figures", "least", "most"), [(2, 0.0, 0.01), (3, 0.85, 0.05)])
+def test_of_two_and_three_figures(
+    dalembert: Dalembert, tmp_path: Path, figures: int, least: float, most: float
+) -> None:
+    """A random number of two figures gets a name in less than one of a hundred cases; no slip gets the name of another."""
+    assert dalembert("examples", "exercise-static").returncode == 0
+    named, other, met = share_named(every_question("exercise-static", tmp_path, 2, figures), 600, 1, figures)
+    assert named >= least
+    assert other == 0
+    assert met <= most
+
+
+def test_a_slip_is_named_where_it_alone_makes_the_answer() -> None:
+    made = {
+        "one": 12.32,
+        "two": 12.38,
+        "three": -98.6,
+        "four": 52.01,
+        "five": 51.98,
+        "six": 77.7,
+        "seven": 12345.0,
+    }
+    made["of the same value"] = 77.7 * (1 + 1e-13)
+    slips = [Slip(text, value) for text, value in made.items()]
+    for figures, answer, name in (
+        (4, "12.32", "one"),
+        (4, "12.38", "two"),
+        # 12.32 rounds to 12.3, 12.38 does not
+        (3, "12.3", "one"),
+        (3, "52.0", None),
+        (3, "77.7", "six"),
+        (3, "-98.6", "three"),
+        # a unit is 1 % of the answer, or 8 %: a random number of two digits would often meet a slip of 12
+        (2, "-99", "three"),
+        (2, "12", None),
+        (4, "12345", "seven"),
+        (4, "12350", "seven"),
+        # zeros that stand for figures
+        (4, "12000", None),
+    ):
+        own = Candidates(Answer(Ask("mass_kg", {}, figures, Fraction(1), ""), 30.0, "kg"), slips)
+        assert own.name(typed(answer)[0]) == name, (figures, answer)
 
 
 @pytest.mark.slow
 def test_ten_thousand_answers(questions: list[Candidates], first_seed: int) -> None:
-    named, met = share_named(questions, 10_000, first_seed)
-    assert named >= 0.99
+    named, other, met = share_named(questions, 10_000, first_seed)
+    assert named >= 0.93
+    assert other == 0
     assert met <= 0.02
 
 
