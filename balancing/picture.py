@@ -1,6 +1,6 @@
 """Polar pictures of balancing: known masses and their correction, vibration before and after, masses on their places.
 
-Angles are counter-clockwise as seen against +z. All takes plain arrays, in the unit that is named; the prefix is chosen here.
+Angles are counter-clockwise as seen against +z. All functions take plain arrays in the named unit; they choose its prefix.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class KnownMasses(NamedTuple):
     shares: Complex
     """The share of each mass in each plane, (k, p)."""
     made: Complex
-    """The correction in each plane, as it is given out, (p,)."""
+    """The printed correction in each plane, (p,)."""
 
 
 class Vibration(NamedTuple):
@@ -70,11 +70,11 @@ class Vibration(NamedTuple):
     """The masses on these places, of each plane."""
     read: Complex = NONE
     fitted: Complex = NONE
-    """Readings of runs, and what was fitted to each, (n,)."""
+    """Readings of runs and their fitted values, (n,)."""
 
 
 class Places(NamedTuple):
-    """Places on a rotor, the masses on them, what these are to be together and what they are."""
+    """Places on a rotor, the masses on them, their required sum and their sum."""
 
     title: str
     angles: Sequence[float]
@@ -125,9 +125,9 @@ def before_and_after(
     history: tuple[Complex, Complex] | None = None,
     figure: FigureBase | None = None,
 ) -> Dials:
-    """Draw what a balance found, in SI: vibrations (..., s) and corrections (..., p); of a batch the first four.
+    """Draw the result of a balance, in SI: vibrations (..., s) and corrections (..., p); of a batch the first four.
 
-    `history` has the readings of one rotor's runs and what was fitted to each.
+    `history` has the readings of one rotor's runs and their fitted values.
     """
     s, p = before.shape[-1], corrections.shape[-1]
     many = corrections.ndim > 1
@@ -201,7 +201,7 @@ def vibration(
             GIVEN,
             "vibration before" + ("; trial masses left on" if any(r.standing.any() for r in rotors) else ""),
         ),
-        handle(FOUND, "predicted vibration (dot: next to none); correction, by its plane"),
+        handle(FOUND, "predicted vibration (dot: almost zero); correction, named by its plane"),
     ]
     if any(len(rotor.read) for rotor in rotors):
         handles.append(_reading())
@@ -219,12 +219,12 @@ def readings(
     *,
     figure: FigureBase | None = None,
 ) -> PolarAxes:
-    """Draw the readings of runs (n,), each joined to what was fitted to it, and the fitted vibration without masses (s,)."""
+    """Draw the readings of runs (n,), each joined to its fitted value, and the fitted vibration without masses (s,)."""
     scale, amplitude = prefixed(_largest(initial, read), amplitude)
     figure = sheet(5.6, 5.6, figure)
     axes: PolarAxes = _dials(figure, 1, 1)[0, 0]
     vectors = [Vector(v, GIVEN, name) for v, name in zip(initial * scale, sensors, strict=True)]
-    title = ", ".join(filter(None, ("readings, and what was fitted", amplitude)))
+    title = ", ".join(filter(None, ("readings and fitted values", amplitude)))
     labels = dial(axes, title, vectors)
     _history(axes, read * scale, fitted * scale)
     axes.set_rlim(0, ROOM * (_largest(initial * scale, read * scale, fitted * scale) or 1.0))
@@ -256,9 +256,9 @@ def indexed(
     labels += [Label(str(k + 1), (float(np.angle(v)), abs(v)), "tab:blue", 8.0) for k, v in enumerate(read)]
     axes.set_rlim(0, ROOM * (_largest(read, circle, rotor * factor) or 1.0))
     handles = [
-        handle(FOUND, "the rotor itself, in its position turned = 0"),
+        handle(FOUND, "the rotor alone, in its position turned = 0"),
         handle(GIVEN, "the mandrel"),
-        _reading("readings, in their order; to what was fitted"),
+        _reading("readings in their order, joined to the fitted ones"),
     ]
     _key(figure, handles, SENSE, 1)
     place([(axes, labels)])
@@ -287,9 +287,9 @@ def places(
     what = "drilled or taken off" if remove else "mass"
     handles = [
         handle(WHOLE, "correction"),
-        handle(TOGETHER, "what the masses are together"),
+        handle(TOGETHER, "sum of the masses"),
         Line2D([], [], color="tab:red", marker="o", ls="", mfc=filled, label=what),
-        Line2D([], [], color="0.6", marker="o", ls="", mfc="white", label="place without"),
+        Line2D([], [], color="0.6", marker="o", ls="", mfc="white", label="empty place"),
     ]
     _key(figure, handles, SENSE, 2)
     place(labels)
@@ -351,7 +351,7 @@ def _history(axes: PolarAxes, read: Complex, fitted: Complex) -> None:
         axes.plot(np.angle([v, w]), np.abs([v, w]), **DOT, markevery=[0])
 
 
-def _reading(label: str = "reading of a run; to what was fitted to it") -> Line2D:
+def _reading(label: str = "reading of a run, joined to its fitted value") -> Line2D:
     from matplotlib.lines import Line2D
 
     return Line2D([], [], **DOT, label=label)

@@ -139,7 +139,7 @@ class JointFit:
     def plot(
         self, sensors: Sequence[str] = (), amplitude: str = "", figure: FigureBase | None = None
     ) -> PolarAxes:
-        """Draw one machine's readings, each joined to what was fitted to it, and the vibration without masses.
+        """Draw one machine's readings, each joined to its fitted value, and the vibration without masses.
 
         Returns matplotlib's polar axes. Without a figure it is a new one of pyplot's; without matplotlib (the extra
         `plot`) an ImportError.

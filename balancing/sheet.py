@@ -59,13 +59,13 @@ def machine_sheet(
     weights, ridge, errors, covariance, runout
         See `tapes.measured`.
     against : bool
-        Whether phases are typed against the sense of the mass angles.
+        Whether typed phases are counted against the sense of the mass angles.
     first : str
-        What the initial run is called.
+        The name of the initial run.
     mass : (kind, unit)
         "mass" or "unbalance", and the unit it is shown in.
     channels : sequence of (sensor, speed)
-        How the rows call the sensors; default: as `sensors`, without a speed.
+        The sensors' names in the rows; default: as `sensors`, without a speed.
     places : sequence of (name, angle)
         Where masses go, rad.
     spread : (along, across), arrays (s, p), optional
@@ -79,7 +79,7 @@ def machine_sheet(
     unbalance : complex array (s, p), optional
         The unbalance that explains a vibration of 1 at each sensor (`initial_unbalance`), NaN where readings do not determine it.
     facts : sequence of (name, text)
-        What is to be known of the machine.
+        Facts of the machine, shown below the answers.
     """
     seen, shares = None, None
     if permissible is not None and unbalance is not None:
@@ -100,7 +100,7 @@ def machine_sheet(
             plane,
             float(abs(influence[s, p])),
             float(degrees(influence[s, p])),
-            # where they are known: the standard deviations of size and angle
+            # the standard deviations of size and angle, if there are any
             *(
                 []
                 if spread is None

@@ -1,4 +1,4 @@
-"""A mechanism as a page that computes: its formulas on tapes with every dimension as an input, and what the page needs beside them.
+"""A mechanism as a page that computes: its formulas on tapes with every dimension as an input, and the page's further data.
 
 The page holds no mechanics of its own. It chooses each loop's assembly at the guess by the tape of the choice, looks along the
 input for places where a radicand touches or crosses zero, and runs the tape of the poses with the signs that follow.
@@ -150,7 +150,7 @@ class Formulas:
             return "the joint forces are statically redundant, and there is friction"
         if forces:
             if any(load.axis == "time" for load in self.written.recording.tables) and self.poses.time is None:
-                return "a torque is given over the time, which the poses have not"
+                return "a torque depends on the time, which the poses do not have"
             if m.torsion_springs and len(m.inputs) > 1:
                 return "a torsion spring counts its turns along several inputs"
         return ""
@@ -182,7 +182,7 @@ class Formulas:
 
     # --- tapes ----------------------------------------------------------------------------------------------------
     def tapes(self, drawn: Mapping[str, Number]) -> dict[str, Tape]:
-        """The tapes of the page, once all rows are given out."""
+        """The tapes of the page, after all rows are numbered."""
         written = self.written
         groups = written.plan.groups
         closed = [g.name for g in written.closed]

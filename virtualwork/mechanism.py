@@ -109,7 +109,7 @@ class Mechanism(Numbered):
         Raises
         ------
         DescriptionError
-            A part has no text: a table beside the file, an end of a spring at a point without a name.
+            A part has no text: rows without the name of a table, an end of a spring at a point without a name.
 
         Examples
         --------

@@ -13,7 +13,7 @@ DOMAINS = {
         "benchmarks.speed.variants",
         "families of mechanisms, beside a loop and beside poses of one",
     ),
-    "skipping": ("benchmarks.speed.skipping", "what is saved where less is asked for"),
+    "skipping": ("benchmarks.speed.skipping", "what smaller requests save"),
     "rotors": ("benchmarks.speed.rotors", "corrections of rotors with known masses"),
     "field": ("benchmarks.speed.field", "corrections from measured vibration"),
     "bodies": ("benchmarks.speed.bodies", "angular momentum, its rate and inertia forces of rigid bodies"),

@@ -85,7 +85,7 @@ def falling_work() -> Work:
 
 
 def accuracies(quick: bool) -> tuple[float, ...]:
-    """What the double pendulum is asked for."""
+    """The requests of the double pendulum."""
     return (1e-6, 1e-9) if quick else (1e-4, 1e-6, 1e-8, 1e-10)
 
 

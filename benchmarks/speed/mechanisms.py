@@ -35,7 +35,7 @@ PINS = (("A", "crank"), ("B", "coupler"), ("C", "rocker"), ("D", "rocker"))
 
 def measure(quick: bool) -> Iterator[Measurement]:
     """Yield time and error of sweeps, single poses, Newton's steps, long sweeps and long chains."""
-    # one engine in every table: left to itself, what is asked for often goes over to compiled code
+    # one engine in every table: left to itself, what is requested often goes over to compiled code
     with engine("numpy"):
         poses = 10_000 if quick else 100_000
         yield from _four_bar(poses)
@@ -130,7 +130,7 @@ def _four_bar(poses: int) -> Iterator[Measurement]:
     work = "four-bar: torque and all reactions"
     for method, forces, aim in (
         ("all in one pass", together, 100.0),
-        ("asked for one by one", one_by_one, None),
+        ("requested one by one", one_by_one, None),
         ("the torque alone, by virtual work", alone, None),
     ):
         # on one engine: left to itself, the torque alone goes over to compiled code and the others do not
@@ -258,7 +258,7 @@ def _sizes(sizes: tuple[int, ...], long: bool) -> Iterator[Measurement]:
     for poses in sizes:
         angles = np.linspace(0.0, 2 * np.pi, poses)
         once = partial(_positions, mechanism, angles)
-        # on one engine, or the sizes asked for last would be those of compiled code
+        # on one engine, or the sizes requested last would be those of compiled code
         with engine("numpy"):
             timed = measured(DOMAIN, work, "one call", once, size=poses, bytes=float(peak(once)))
         yield timed

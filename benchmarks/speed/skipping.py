@@ -1,4 +1,4 @@
-"""What skipping saves: one scene, and less and less of it asked for; time, and the operations that are left on the tape."""
+"""What skipping saves: one scene, and smaller and smaller requests of it; time, and the operations that are left on the tape."""
 
 from __future__ import annotations
 
@@ -49,18 +49,18 @@ def ask(mechanism: Mechanism, angles: Real, speed: float, names: tuple[str, ...]
 
 
 def measure(quick: bool) -> Iterator[Measurement]:
-    """Yield times and operations of the Klann leg with masses, gravity and a force at its foot, asked for ever less."""
+    """Yield times and operations of the Klann leg with masses, gravity and a force at its foot, for ever smaller requests."""
     # on one engine throughout: left to itself, each request goes over to compiled code when that pays
     with engine("numpy"):
-        yield from _asked(quick)
+        yield from _requests(quick)
 
 
-def _asked(quick: bool) -> Iterator[Measurement]:
+def _requests(quick: bool) -> Iterator[Measurement]:
     angles = np.linspace(0.0, 2 * np.pi, 4096 if quick else 40_960)
     heavy, light = loaded_klann(), loaded_klann(masses=False, gravity=False)
     no_weights = loaded_klann(gravity=False)
     effort, turning = ("effort",), 10.0
-    asked: tuple[tuple[str, Mechanism, float, tuple[str, ...]], ...] = (
+    requests: tuple[tuple[str, Mechanism, float, tuple[str, ...]], ...] = (
         (
             "everything: foot, angles and rates, torque, joint forces",
             heavy,
@@ -77,11 +77,11 @@ def _asked(quick: bool) -> Iterator[Measurement]:
         ("one pin's position: arm and leg are never solved", heavy, 0.0, ("points.C",)),
     )
     whole = 0.0
-    for method, mechanism, speed, names in asked:
+    for method, mechanism, speed, names in requests:
         call = partial(ask, mechanism, angles, speed, names)
         found = measured(
             DOMAIN,
-            "Klann leg, loaded: what is asked for",
+            "Klann leg, loaded: requested quantities",
             method,
             call,
             size=len(angles),

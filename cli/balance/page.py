@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def draw(balancing: Balancing, *, polygons: bool = False) -> Figure:
-    """Draw the first rotors below each other, their planes beside each other; with --steps the closed polygons too."""
+    """Draw the first rotors, one below the other, with their planes in a row; with --steps the closed polygons too."""
     figure = blank()
     if polygons:
         _polygons_below(balancing, figure)
@@ -162,7 +162,7 @@ def sheet(b: Balancing) -> Page:
             "name": rotor,
             "planes": [b.planes.name[p] for p in at],
             "tapes": tapes[text],
-            # a mass and a radius that are both given leave something
+            # with both mass and radius fixed there is a residual
             "made": bool(steps or (~np.isnan(b.given_mass[here]) & ~b.sought[here]).any()),
             "fixed": (~np.isnan(b.given_mass[here])).tolist(),
         }

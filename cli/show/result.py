@@ -315,7 +315,7 @@ def way_sheets(result: Result) -> list[Sheet]:
 
     def close() -> None:
         if open_topics:
-            title = "" if sheets else "The way"
+            title = "" if sheets else "Worked solution"
             sections = [Section(topic.heading, with_sentences(topic.parts)) for topic in open_topics]
             sheets.append(Sheet(title, sections, open_topics[-1].figure))
             open_topics.clear()

@@ -16,6 +16,7 @@ from cli.cases.study import METHOD
 from cli.read.options import processes
 from cli.tolerance.way import way
 from dalembert.dataclass import dataclass
+from dalembert.drawing.amounts import NOISE
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table, names
 from dalembert.results.way import Topic
@@ -359,14 +360,12 @@ def _paths(axes: Axes, tolerances: Tolerances, points: list[Point]) -> None:
     bands = {}
     for key, z in paths.items():
         slopes = np.array(tolerances.slopes[key]) * scale
-        along = np.gradient(z) if len(z) > 1 else np.ones(1, complex)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            normal = 1j * along / np.abs(along)
-        normal = np.where(np.isfinite(normal), normal, 1j)
+        normal = 1j * _directions(z)
         bands[key] = normal, (np.abs((slopes * normal.conj()).real) * sizes[:, None]).sum(axis=0)
     widest = max((np.nanmax(band, initial=0.0) for _, band in bands.values()), default=0.0)
     enlarged = 1.0
-    if 0 < widest < SEEN * width:
+    # a path across which nothing moves has a band of rounding
+    if NOISE * width < widest < SEEN * width:
         enlarged = 10.0 ** np.ceil(np.log10(SEEN * width / widest))
     for i, (key, z) in enumerate(paths.items()):
         normal, band = bands[key]
@@ -380,13 +379,24 @@ def _paths(axes: Axes, tolerances: Tolerances, points: list[Point]) -> None:
         axes.add_collection(quads)
         axes.plot(z.real, z.imag, color=f"C{i}", lw=1.2, label=key.node)
     much = "" if enlarged == 1 else f", drawn {enlarged:g} times as wide"
-    axes.set_title(f"paths, and their worst case across{much}", fontsize=9)
+    axes.set_title(f"paths with their worst case across{much}", fontsize=9)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel(f"x, {unit}")
     axes.set_ylabel(f"y, {unit}")
     axes.grid(color="0.9", lw=0.6)
     axes.set_axisbelow(True)
     axes.legend(fontsize=8)
+
+
+def _directions(path: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Return the direction of a path at each pose; where it turns back, or has no pose, that of the poses before."""
+    along = np.gradient(path) if len(path) > 1 else np.ones(1, complex)
+    size = np.nan_to_num(np.abs(along))
+    clear = size > NOISE * size.max(initial=0.0)
+    if not clear.any():
+        return np.ones(len(path), complex)
+    before = np.maximum.accumulate(np.where(clear, np.arange(len(path)), np.argmax(clear)))
+    return np.asarray(along[before] / size[before])
 
 
 def _over_input(axes: Axes, tolerances: Tolerances, header: str) -> None:
@@ -420,4 +430,4 @@ def _shares(axes: Axes, tolerances: Tolerances, keys: Sequence[Quantity], of: st
     axes.set_xlim(0, 118)
     axes.set_xticks(range(0, 101, 20))
     axes.set_xlabel(f"share of the {of}, %")
-    axes.set_title("which dimension matters", fontsize=9)
+    axes.set_title("shares of the dimensions", fontsize=9)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Real = NDArray[np.float64]
 COLORS = ("#000000", "#e69f00", "#0072b2", "#56b4e9", "#d55e00", "#cc79a7")
-"""Dark and light by turns, so that neighbours differ in grey too (Okabe and Ito's colours)."""
+"""Dark and light by turns: neighbours differ in grey too (Okabe and Ito's colours)."""
 DASHES: tuple[tuple[float, ...], ...] = (
     (),
     (6, 2),
@@ -27,9 +27,9 @@ DASHES: tuple[tuple[float, ...], ...] = (
     (8, 1.5, 1.3, 1.5, 1.3, 1.5),
 )
 LONGEST = 28
-"""So many characters the names of three and more equal curves may have."""
+"""Most characters of the names of three and more equal curves."""
 MOST = 41
-"""Characters of a name beside a picture."""
+"""Most characters of a name at the side of a picture."""
 EQUAL = 1e-9
 """Curves that differ nowhere by more, of the largest value of all, are one."""
 

@@ -1,4 +1,4 @@
-"""Labels beside what they name: clear of each other, of other words and as far as may be of lines."""
+"""Labels next to what they name: clear of each other, of other words and, as far as possible, of lines."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Label(NamedTuple):
     color: str = "black"
     size: float = 9.0
     toward: float | None = None
-    """The direction in which it had best stand, degrees on the sheet."""
+    """Its preferred direction from the point, degrees on the sheet."""
 
 
 class _Taken:

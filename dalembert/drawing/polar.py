@@ -44,7 +44,7 @@ class Vector(NamedTuple):
 
 
 def dial(axes: PolarAxes, title: str, vectors: Sequence[Vector], room: float = ROOM) -> list[Label]:
-    """Draw vectors on polar axes, in the order given, and return the labels of their tips, to be placed."""
+    """Draw vectors on polar axes, in their order, and return the labels of their tips, to be placed."""
     from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
     scale = max((abs(v.value) for v in vectors if np.isfinite(v.value)), default=0.0) or 1.0
@@ -74,11 +74,11 @@ def dial(axes: PolarAxes, title: str, vectors: Sequence[Vector], room: float = R
 
 
 def arrow(axes: PolarAxes, value: complex, scale: float, look: Look) -> None:
-    """Draw a vector as an arrow; beside a dial of the size `scale` that is nothing, as nothing."""
+    """Draw a vector as an arrow; one that is nothing against the dial's size `scale` is not drawn."""
     angle, size = float(np.angle(value)), abs(value)
     if not size > 1e-9 * scale:
         return
-    # the shaft ends within the head, so that a dash never blurs the tip
+    # the shaft ends within the head: a dash never blurs the tip
     neck = max(size - 0.03 * scale, 0.5 * size)
     axes.plot([angle, angle], [0, neck], color=look.color, lw=look.width, ls=look.dash, solid_capstyle="butt")
     tip = head(look.color, look.width if look.dash == "-" else 1.2)

@@ -43,7 +43,7 @@ def sheet(width: float, height: float, figure: FigureBase | None = None) -> Figu
 
 
 def plain(axes: Axes, which: str = "both") -> None:
-    """Let axes print their numbers whole: no power of ten and no offset beside them, a faint grid behind."""
+    """Let axes print whole numbers, without a power of ten or an offset, on a faint grid."""
     from matplotlib.ticker import ScalarFormatter
 
     for name, axis in (("x", axes.xaxis), ("y", axes.yaxis)):

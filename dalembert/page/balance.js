@@ -1,4 +1,4 @@
-// Rotors whose masses are known: rows are typed, corrections, states, tolerances and polygons follow.
+// Rotors with known masses: rows are typed, corrections, states, tolerances and polygons follow.
 const tapesOf = sheet.rotors.map((rotor) => Object.fromEntries(Object.entries(tapes[rotor.tapes]).map(([name, tape]) => [name, new Tape(tape)])));
 const namesOf = sheet.rotors.map((rotor) => sheet.outputs[rotor.tapes]);
 const prefix = (rotor) => (sheet.rotors.length > 1 ? `${rotor.name}/` : "");

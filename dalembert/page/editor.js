@@ -142,8 +142,8 @@ function options() {
 function toml() {
   if (!model.toml || wrong.size) return "";
   const lines = model.toml.filter(({ of, needed }) => needed || of.some((piece) => Array.isArray(piece) && numbers[piece[0]] !== machine.own[piece[0]]));
-  const beside = model.files.length ? `# ${TEXTS.beside(model.files.join(", "))}\n` : "";
-  return `${beside}${lines.map(({ of }) => of.map((piece) => (Array.isArray(piece) ? tomlNumber(numbers[piece[0]]) : piece)).join("")).join("\n")}\n`;
+  const note = model.files.length ? `# ${TEXTS.needs(model.files.join(", "))}\n` : "";
+  return `${note}${lines.map(({ of }) => of.map((piece) => (Array.isArray(piece) ? tomlNumber(numbers[piece[0]]) : piece)).join("")).join("\n")}\n`;
 }
 const tomlNumber = (x) => (Number.isInteger(x) ? `${x + 0}.0` : String(x).replace(/^(-?\d+)e/, "$1.0e"));
 
@@ -285,7 +285,7 @@ drawHandles = (stands) => {
   for (const { handle, group, place } of handleParts) {
     const body = bodyIndex(handle[1]);
     let [u, v] = (([x, y]) => [px(x), py(y)])(place());
-    // beside a joint, towards the middle of the link, so that each link's own point can be taken
+    // next to a joint, towards the middle of the link: each link's own point can be taken
     const others = model.handles.filter(([, b]) => b === handle[1]).map((one) => carried(lastStands[body], ...local(...one)));
     const middle = [0, 1].map((axis) => others.reduce((sum, z) => sum + z[axis], 0) / others.length);
     const way = body ? [px(middle[0]) - u, py(middle[1]) - v] : [0, 20];

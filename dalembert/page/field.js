@@ -80,7 +80,7 @@ solveSheet = () => {
         answers.set(`${lead}${plane}.angle_uncertainty`, [out.get(`across ${from}`)[0] / out.get(size)[0], 0]);
       }
     }
-    // the program's reasons for leaving a plane as it is: of the limits that are asked for each is met
+    // as the program decides: a plane needs no trim where every requested limit is met
     const stands = sheet.sensors.map((_, s) => out.get(`${has(reading(last, s, "amplitude")) ? "read" : "expected"} ${last} ${s}`)[0]);
     const limits = [];
     if (sheet.ceiling !== null) limits.push([stands.every((x) => x <= sheet.ceiling * (1 + 1e-9)), TEXTS.vibrationWithin]);

@@ -1,5 +1,5 @@
 // A mechanism that is computed anew: its tapes with the numbers of the moment. No formula of mechanics stands here.
-const SERIES = [0.03, 0.16, 14]; // rad: beside a change point the quantities are interpolated, over so far, from so many poses
+const SERIES = [0.03, 0.16, 14]; // near a change point quantities are interpolated: how near, rad; from poses over how far, rad; how many
 const SLIDES = [1, 2, 4]; // sizes of the mechanism within which the limits of a slide are looked for
 
 class Machine extends Way {
@@ -184,7 +184,7 @@ class Machine extends Way {
     }
   }
 
-  // the whole turns of a group's links a step farther on; says whether they are known there
+  // the whole turns of a group's links a step farther on; returns whether they can be counted there
   #turns(g, here, trial) {
     return g.winds.every((body) => {
       const key = `near ${body}`;
@@ -226,8 +226,8 @@ class Machine extends Way {
     state.chosen = Object.values(numbers).every(Number.isFinite) && this.#choose(fixed, at);
     if (!state.chosen) return state;
     if (this.one) {
-      const known = [...inputs[0].filter(Number.isFinite), ...(this.model.fine?.slice(0, 2) ?? [])];
-      this.look(state, Math.min(at[0], known.reduce((a, b) => Math.min(a, b), Infinity)), Math.max(at[0], known.reduce((a, b) => Math.max(a, b), -Infinity)));
+      const ends = [...inputs[0].filter(Number.isFinite), ...(this.model.fine?.slice(0, 2) ?? [])];
+      this.look(state, Math.min(at[0], ends.reduce((a, b) => Math.min(a, b), Infinity)), Math.max(at[0], ends.reduce((a, b) => Math.max(a, b), -Infinity)));
     }
     state.entering = this.#entering(state, inputs);
     const out = this.tapes.pose.run(state.entering, this.n + 1);
@@ -247,7 +247,7 @@ class Machine extends Way {
     return new Map(this.model.traced.map((name, k) => [name, [out[2 * k], out[2 * k + 1]]]));
   }
 
-  // poses beside a change point: a polynomial through poses on both sides
+  // poses near a change point: a polynomial through poses on both sides
   #through(state, out) {
     const [q] = state.inputs;
     const [reach, span, count] = SERIES;
@@ -288,9 +288,9 @@ class Machine extends Way {
         const x = (exact < 0 ? sum / total : row[exact]) / (q[l] - flip) ** power;
         return turns ? x - TAU * Math.round(x / TAU) : Number.isFinite(x) ? x : NaN;
       };
-      // the rates and the loads of a pose that has its own are kept at all nodes, so that what is interpolated is smooth
+      // the rates and the loads of a pose that has its own are kept at all nodes, and what is interpolated is smooth
       const lanes = this.tapes.over || Object.values(state.fixed).some((x) => typeof x !== "number") ? near.map((l) => [l]) : [near];
-      // beside the change point the closed forms lose digits: the nodes are worked out with 32
+      // near the change point the closed forms lose digits: the nodes are computed with 32
       const precise = (tape, entering) => {
         const each = Array.from(nodes, (_, k) => tape.twice(lane(entering, k)));
         return tape.outputs.map((_, r) => Float64Array.from(each, (row) => row[r][0]));
@@ -335,7 +335,7 @@ class Machine extends Way {
     return around;
   }
 
-  // the first loop of a pose that does not close, and by how much, m; null where that is not known
+  // the first loop of a pose that does not close, and by how much, m; null where no tape has it
   short(state, l) {
     if (!state.chosen) return null;
     const out = this.tapes.short.one(lane(state.entering, l));

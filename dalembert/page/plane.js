@@ -279,7 +279,7 @@ function fit() {
 }
 
 // --- all of a pose ----------------------------------------------------------------------------------------------------
-// beside a point, on the side where none of its links leads away; a link's name in the middle of a plate or beside a bar;
+// at a point, on the side where none of its links leads away; a link's name in the middle of a plate or along a bar;
 // where other names stand there, on another side, and nowhere if there is no room
 const neighbours = whole.points.map((_, k) => [...new Set(whole.bodies.slice(1).filter((b) => b.points.includes(k)).flatMap((b) => b.points))].filter((other) => other !== k));
 function labels(stands, i) {
@@ -302,11 +302,11 @@ function labels(stands, i) {
     const ends = whole.bodies[label.b].points.map((p) => places[p]);
     const along = ends.length > 1 ? [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]] : [0, 50];
     const side = across(direction(along)).map((x) => -x);
-    const beside = [12, 22].flatMap((gap) => [1, -1].flatMap((sign) => [0, 0.2, -0.2].map((share) => {
+    const sides = [12, 22].flatMap((gap) => [1, -1].flatMap((sign) => [0, 0.2, -0.2].map((share) => {
       const [du, dv] = aside(label.t, side.map((x) => sign * x), gap);
       return [u + du + share * along[0], v + dv + share * along[1]];
     })));
-    words.set(label.t, ends.length > 2 ? [[u, v], ...beside] : beside, `body ${classOf(label.b)}`);
+    words.set(label.t, ends.length > 2 ? [[u, v], ...sides] : sides, `body ${classOf(label.b)}`);
   }
 }
 function legend() {

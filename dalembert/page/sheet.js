@@ -107,11 +107,11 @@ function polygon(parent, title, vectors, closing, label) {
   for (const [[x, y], [u, v], , text] of lines) {
     if (Math.hypot(u - x, v - y) < 12) continue;
     const side = direction([v - y, x - u]);
-    const beside = [9, 13, 18].flatMap((gap) => [0.5, 0.3, 0.7, 0.15, 0.85].flatMap((share) => [1, -1].map((sense) => {
+    const places = [9, 13, 18].flatMap((gap) => [0.5, 0.3, 0.7, 0.15, 0.85].flatMap((share) => [1, -1].map((sense) => {
       const [du, dv] = aside(text, [sense * side[0], sense * side[1]], gap);
       return [x + share * (u - x) + du, y + share * (v - y) + dv];
     })));
-    words.set(text, beside, "point");
+    words.set(text, places, "point");
   }
 }
 function start() {

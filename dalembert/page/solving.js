@@ -68,7 +68,7 @@ function determined(a, b, count, none = 1e-9) {
 
 const CLOSE = 8e-14; // relative: what changes by less has settled
 
-// what is known of some lanes alone
+// the numbers of some lanes alone
 const chosen = (entering, lanes) => Object.fromEntries(Object.entries(entering).map(([name, x]) => [name, typeof x === "number" ? x : Float64Array.from(lanes, (l) => x[l])]));
 
 // the x of A·x = b, by elimination with the largest pivot, and the determinant
@@ -189,7 +189,7 @@ function* spread(g, size) {
   }
 }
 
-// the values of a table at places, linear between its rows; NaN beside it
+// the values of a table at places, linear between its rows; NaN outside
 function tabled({ at, periodic, turns }, values, places) {
   const [first, end] = [at[0], at.at(-1)];
   const within = (angle, period) => first + ((angle - first) % period < 0 ? ((angle - first) % period) + period : (angle - first) % period);

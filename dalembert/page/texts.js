@@ -83,7 +83,7 @@ const TEXTS = {
   noLimits: "The input turns without a limit.",
   noLimitsOfSlide: "The input slides without a limit.",
   noFile: "this mechanism has no file: one of its parts cannot be written into TOML",
-  beside: (files) => `needs in its folder: ${files}`,
+  needs: (files) => `needs in its folder: ${files}`,
   digits: "All digits shown are confirmed by a second computation with 32 digits.",
   blank: (name) => `${name}: expected a number, found an empty cell`,
   copyRows: "copy rows",

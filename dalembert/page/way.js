@@ -13,7 +13,7 @@ const lane = (entering, l) => Object.fromEntries(Object.entries(entering).map(([
 // an angle in (−π, π]; what stands at half a turn but for its rounding is at +π
 const principal = (angle) => angle - TAU * Math.ceil((angle - Math.PI - 1e-9) / TAU);
 
-// what is known at nodes, linear between them; before the first and after the last as there
+// values at nodes, linear between them; before the first and after the last as there
 function interpolated(nodes, values, at) {
   let [low, high] = [0, nodes.length - 1];
   while (high - low > 1) {
@@ -36,7 +36,7 @@ class Way {
     this.n = model.n;
     this.sweep = model.inputs.map((input) => unpack(input.sweep, model.n));
     this.one = model.inputs.length === 1;
-    // what changes along the sweep is known at its poses; the free one has the file's own rates, and no time
+    // what changes along the sweep has its values at the poses; the free one has the file's own rates, and no time
     const along = (packed, free = NaN) => Float64Array.of(...unpack(packed, model.n), free);
     this.rates = model.inputs.map(({ rates, rated, paths }) => {
       if (rates.every((rate) => "all" in rate)) return rates.map((rate) => rate.all);
@@ -116,7 +116,7 @@ class Way {
   // the whole turns of the angle in a row of the tape of them, counted from the guess along the input
   follow(state, row, grid) {
     const [start] = state.at;
-    const angle = (q) => this.tapes.winds.run(this.beside(state, q), q.length)[row];
+    const angle = (q) => this.tapes.winds.run(this.entering(state, q), q.length)[row];
     let nodes = Float64Array.from(new Set([...grid, start])).sort();
     let angles = Float64Array.from(angle(nodes));
     for (let round = 0; round < 64; round++) {
@@ -128,10 +128,10 @@ class Way {
       }
       if (!more.length) break;
       const between = Float64Array.from(more);
-      const known = new Map([...nodes].map((q, i) => [q, angles[i]]));
-      for (const [i, x] of angle(between).entries()) known.set(more[i], x);
-      nodes = Float64Array.from(known.keys()).sort();
-      angles = nodes.map((q) => known.get(q));
+      const every = new Map([...nodes].map((q, i) => [q, angles[i]]));
+      for (const [i, x] of angle(between).entries()) every.set(more[i], x);
+      nodes = Float64Array.from(every.keys()).sort();
+      angles = nodes.map((q) => every.get(q));
     }
     const good = nodes.filter((_, i) => Number.isFinite(angles[i]));
     const values = angles.filter(Number.isFinite);
@@ -202,7 +202,7 @@ class Way {
   // where the radicand of a group touches zero; where it crosses, a limit is noted
   touches(state, g, k, grid, m, [low, high]) {
     if (!m.some((x) => x < DIP)) return [];
-    const margin = (q) => this.tapes.margins.run(this.beside(state, q), q.length)[k];
+    const margin = (q) => this.tapes.margins.run(this.entering(state, q), q.length)[k];
     const flips = [];
     const note = (q) => {
       const same = 1e-6 * state.turn;
@@ -259,7 +259,7 @@ class Way {
   }
 
   // what enters at further inputs, as far as groups are looked through
-  beside(state, q) {
+  entering(state, q) {
     const entering = { ...state.fixed, q0: q };
     for (const g of this.closed) entering[`sign ${g.name}`] = this.signs(state, g, q);
     this.turned(state, entering, q);

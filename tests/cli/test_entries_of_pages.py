@@ -45,6 +45,18 @@ def test_a_number_stands_in_its_field_as_in_the_file(
     assert page.faults() == []
 
 
+def test_a_file_with_units_in_full(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """4 inches are 0.1016 m, also typed as a bare number, and a quarter of a turn is 0.25 rev."""
+    text = CRANK.replace('"in"', '"inches"\nangle = "rev"').replace("138.3", "3") + "angle = 0.25\n"
+    (tmp_path / "m.toml").write_text(text)
+    assert dalembert("mechanism", "m.toml", "--page", "m.html").returncode == 0
+    page = Computing(browser, tmp_path / "m.html")
+    assert [shown(page, name) for name in ("links.crank.P.x", "input")] == ["3", "0.25"]
+    page.type("links.crank.P.x", "4")
+    assert page.get("links.crank.P.x") == 0.1016
+    assert page.get("P.y") == pytest.approx(0.1016, rel=1e-15)
+
+
 def test_every_pose_of_a_turn_has_short_degrees(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
     """From 10° on by whole degrees: no 117.99999999999999."""
     (tmp_path / "m.toml").write_text(CRANK)

@@ -8,8 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib
+import numpy as np
 import pytest
 from faults import faults
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 import cli.show.picture
@@ -95,6 +97,17 @@ def test_a_picture_can_be_handed_on(
     assert faults(draw(name, words)) == []
     # matplotlib's own remarks would stand on the user's terminal
     assert [record.message for record in caplog.records] == []
+
+
+def test_a_straight_guide_has_no_band_across_it(draw: Draw) -> None:
+    """The worst case across the path of a point on a straight guide is zero, at the dead centre too, where the path turns back."""
+    axes = draw("tolerances", None).axes[0]
+    (band,) = axes.collections
+    assert isinstance(band, PolyCollection)
+    corners = np.concatenate([path.vertices for path in band.get_paths()])
+    assert np.ptp(corners[:, 0]) == pytest.approx(100, rel=0.01)
+    assert np.abs(corners[:, 1]).max() < 1e-9
+    assert axes.get_title() == "paths with their worst case across"
 
 
 def test_names_with_dollars_are_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

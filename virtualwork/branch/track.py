@@ -138,7 +138,7 @@ class Track:
             high = low + 1e-3 * self.length
         if max(self.high - low, high - self.low) > 20000 * self.length:
             raise MechanismError(
-                f"the input is asked {abs(high - low) / self.length:.3g} turns away from the guess; give `at` nearer"
+                f"the input is {abs(high - low) / self.length:.3g} turns away from the guess: give an `at` nearer to it"
             )
         with np.errstate(all="ignore"):
             while self.high < high:

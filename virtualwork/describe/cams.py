@@ -66,7 +66,7 @@ class Cam(Part):
     )
     history: tuple[tuple[float, float], ...] | None = declared(
         LiftTable(),
-        "a table beside the file: angle_deg and lift_mm (of an arm swing_deg) over one turn",
+        "a table in the file's folder: angle_deg and lift_mm (of an arm swing_deg) over one turn",
         default=None,
         name="table",
         unless="law",

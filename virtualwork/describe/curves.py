@@ -44,12 +44,12 @@ class Rows(tuple[tuple[float, Any], ...]):
 
 @dataclass(eq=False, repr=False)
 class Curve(Form):
-    """A table beside the file, which the file names; rows without a name cannot be written."""
+    """A table in the file's folder, which the file names; rows without a name cannot be written."""
 
     def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
         if isinstance(value, Rows) and value.name:
             return value.name
-        raise DescriptionError("a table beside the file cannot be written into it")
+        raise DescriptionError("rows without the name of their table cannot be written into a file")
 
 
 @dataclass(eq=False, repr=False)
@@ -123,7 +123,7 @@ def _coordinate(slides: bool) -> str:
 def curve(
     entry: Entry, name: Any, where: str, over: Sequence[str], values: Sequence[str]
 ) -> tuple[Rows, str]:
-    """The rows of a table beside the file in SI, and the quantity that they are over.
+    """The rows of a table in the file's folder in SI, and the quantity that they are over.
 
     Parameters
     ----------

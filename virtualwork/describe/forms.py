@@ -71,7 +71,7 @@ class Form:
         return str(value)
 
     def fields(self, name: str, value: Any, where: str, entry: Entry) -> dict[str, Any]:
-        """The fields that a value fills: its own, and those that a table beside the file fills too."""
+        """The fields that a value fills: its own, and those that a table in the file's folder fills too."""
         return {name: self.read(value, where, entry)}
 
     def check(self, value: Any, where: str, part: Any, names: Names) -> None:

@@ -211,7 +211,7 @@ class Input(Part):
         default=None,
     )
     history: tuple[tuple[float, float], ...] | None = declared(
-        Law(), "a table beside the file: time_s and the angle or position", default=None, name="law"
+        Law(), "a table in the file's folder: time_s and the angle or position", default=None, name="law"
     )
 
     @property
@@ -301,7 +301,7 @@ class Force(Part):
     )
     history: tuple[tuple[float, complex], ...] | None = declared(
         ForceTable(),
-        "a table beside the file in place of force: the input, fx_N and fy_N",
+        "a table in the file's folder in place of force: the input, fx_N and fy_N",
         default=None,
         name="table",
     )
@@ -322,7 +322,7 @@ class Torque(Part):
     link: str = declared(Body(ground=False), "the link it acts on")
     torque: float = declared(
         TorqueOrTable(),
-        "counter-clockwise, N m; or a table beside the file: torque_N_m over t_s, angle_deg or speed_rad_s of the link",
+        "counter-clockwise, N m; or a table in the file's folder: torque_N_m over t_s, angle_deg or speed_rad_s of the link",
         default=0.0,
         needed=True,
         unless="history",
@@ -350,7 +350,7 @@ class Spring(Part):
     )
     stiffness: float = declared(Scalar("stiffness"), "N/m", default=0.0)
     free_length: float = declared(Scalar("length"), "the length without force", default=0.0)
-    damping: float = declared(Scalar("damping"), "of a damper beside the spring, N s/m", default=0.0)
+    damping: float = declared(Scalar("damping"), "of a damper, N s/m", default=0.0)
 
 
 @dataclass(frozen=True)
@@ -368,9 +368,7 @@ class TorsionSpring(Part):
     )
     stiffness: float = declared(Scalar("torsional stiffness"), "N m/rad", default=0.0)
     free_angle: float = declared(Scalar("angle"), "the angle without torque", default=0.0)
-    damping: float = declared(
-        Scalar("torsional damping"), "of a damper beside the spring, N m s/rad", default=0.0
-    )
+    damping: float = declared(Scalar("torsional damping"), "of a damper, N m s/rad", default=0.0)
     turns: int = 0
 
 

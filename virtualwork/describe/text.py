@@ -64,7 +64,7 @@ def toml_text(
     Raises
     ------
     DescriptionError
-        Where a part has no text: a table beside the file, an end of a spring at a point without a name.
+        Where a part has no text: rows without the name of a table, an end of a spring at a point without a name.
 
     Examples
     --------
@@ -154,7 +154,7 @@ def table_of(part: Any, units: Units = SI, slides: bool = False) -> Table:
     declared = {key.field for key in keys}
     history = getattr(part, "history", None)
     if isinstance(history, Rows) and history.name:
-        # what is read from a table beside the file, which the file names
+        # what is read from a table in the file's folder, which the file names
         declared |= {"history", "over", "periodic"}
         table |= {key.name: history.name for key in keys if isinstance(key.form, TorqueOrTable)}
     for f in fields(part):

@@ -26,7 +26,7 @@ COLORS = {
 LENGTH = 0.8
 """The longest arrow, as a share of the largest link."""
 MOST = 3
-"""Panels beside each other."""
+"""Panels in a row."""
 
 
 def draw(bodies: Sequence[FreeBody], i: int, figure: FigureBase | None = None) -> None:

@@ -108,7 +108,7 @@ class _Paper:
         return type(poses)(poses.branch, np.linspace(low, high, PATH)) if high > low else poses
 
     def _height(self, width: float) -> float:
-        """Return how high a drawing of this width had best be: as high as what is drawn, within bounds."""
+        """Return the height of a drawing of this width: that of its contents, within bounds."""
         outlines = [self._outline(shape, i) for i in self.shown for shape in self.drawing.shapes]
         every = np.concatenate(outlines) if outlines else np.zeros(1, dtype=complex)
         across = float(np.ptp(every.real))
@@ -172,7 +172,7 @@ class _Paper:
         self.axes.plot(z.real, z.imag, **({"color": color} | LINES[shape.role]), zorder=level)
 
     def _names(self, i: int) -> list[Label]:
-        """Return the names of points and links in a pose; a link of one point is named beside it."""
+        """Return the names of points and links in a pose; a link of one point has its name next to the point."""
         names = []
         for label in self.drawing.labels:
             at, point = complex(self._at(label.body, label.at, i)[0]), label.of == "point"

@@ -36,7 +36,7 @@ def ledger(terms: Sequence[tuple[str, str, float]], figure: FigureBase | None = 
     axes.set_yticks(places, [f"{link}: {kind}" for link, kind, _ in terms])
     axes.invert_yaxis()
     axes.margins(x=0.25)
-    axes.set_xlabel(f"virtual power, {unit} (black: the unknown's; together zero)")
+    axes.set_xlabel(f"virtual power, {unit} (black: the unknown load; the sum is zero)")
     return np.array([axes], dtype=object)
 
 
