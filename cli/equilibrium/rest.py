@@ -116,14 +116,13 @@ class Rest(Case):
         elif not equilibria.found:
             lines.append("no equilibrium: the loads balance at no position of the range")
         m = self.analysis.mechanism
-        if not np.isfinite(m.assembly.reach.range).all():
-            for j, (entry, turns) in enumerate(zip(m.inputs, equilibria.turns, strict=True)):
-                if not (turns or entry.is_slide or j in self.ranged):
-                    low, high = (f"{math.degrees(end):.10g}" for end in equilibria.ranges[j])
-                    lines.append(
-                        f"no number of turns of {entry.name} brings the loads back: searched from {low} to {high} deg; "
-                        "--over sets another range"
-                    )
+        for j, (entry, turns) in enumerate(zip(m.inputs, equilibria.turns, strict=True)):
+            if not (turns or entry.is_slide or j in self.ranged or np.isfinite(m.assembly.reach.range).all()):
+                low, high = (f"{math.degrees(end):.10g}" for end in equilibria.ranges[j])
+                lines.append(
+                    f"no number of turns of {entry.name} brings the loads back: searched from {low} to {high} deg; "
+                    "--over sets another range"
+                )
         if any(e.stable and e.period is None for e in equilibria.found):
             lines.append("no period of oscillation: nothing that moves there has a mass or an inertia")
         if any(e.stable is None for e in equilibria.found):

@@ -90,3 +90,23 @@ def test_a_half_swing_ends_where_rounding_lets_it(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(60))
 def test_far_springs_at_random(seed: int) -> None:
     holds(seed, bool(seed % 2), 10.0 ** np.random.default_rng(seed).uniform(-2, 3))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("short", [0.04, 1.6e-3, 1e-4])
+def test_a_pendulum_that_comes_by_its_upper_rest_again_and_again(short: float, side: int) -> None:
+    """Three periods, six times past the upper rest: sin(θ/2) = k cd(ωt, k²) about the lower one."""
+    m = Mechanism({"O": 0j}, {"bob": Link({"O": 0j}, 2.0, 0.5)}, inputs=Input(link="bob"), gravity=-1j * G)
+    start = -math.pi / 2 + side * (math.pi - short)
+    with mp.workdps(40):
+        lower = mp.pi / 2
+        k, w = mp.sin((start + lower) / 2), mp.sqrt(mp.mpf(G) / mp.mpf("0.5"))
+        end = float(3 * 4 * mp.ellipk(k * k) / w)
+        run = m.simulate(np.linspace(0.0, end, 32), angle=start, speed=0.0)
+        exact = [2 * mp.asin(k * mp.ellipfun("cd", w * mp.mpf(t), m=k * k)) - lower for t in run.t.tolist()]
+        off = np.array(
+            [float(abs(mp.mpf(q) - x)) for q, x in zip(run.angle[:, 0].tolist(), exact, strict=True)]
+        )
+    assert (off <= run.error_estimate[:, 0]).all()
+    # an error of the start grows by 1/short² each time it comes by the rest: they add up, and do not multiply
+    assert run.error_estimate.max() < 2e4 * np.finfo(float).eps / short**2

@@ -5,7 +5,8 @@ along it says, δ̈ = ∂a/∂q δ + ∂a/∂q̇ δ̇: about an upper rest e tim
 rounded, each in its own way, and what they differ by is one sample. So the variance of the state goes along the motion,
 P → Φ P Φᵀ + R in every step, with Φ the flow of the equation and R what rounds (A. H. Jazwinski, Stochastic Processes and
 Filtering Theory, 1970, §4.2). Φ is the exponential of Magnus's exponent of order 4, from Gauss's two nodes of the step
-(S. Blanes et al., Physics Reports 470 (2009) 151, eq. 254).
+(S. Blanes et al., Physics Reports 470 (2009) 151, eq. 254). Where nothing depends on the time, the rates (q̇, q̈) are themselves a
+solution of it, and Φ is made to take them along: else what it is off by grows anew at every upper rest.
 
 Matrices stand with their rows and columns first, (2k, 2k, n, …), so that products are done for all steps at once.
 """
@@ -33,7 +34,14 @@ Rates = Callable[[Reals, Reals, Reals], Reals]
 
 
 def grown(
-    f: Rates, scale: Reals, t: Reals, q: Reals, v: Reals, a: Reals, noise: Reals | float = 0.0
+    f: Rates,
+    scale: Reals,
+    t: Reals,
+    q: Reals,
+    v: Reals,
+    a: Reals,
+    noise: Reals | float = 0.0,
+    steady: bool = True,
 ) -> Reals:
     """The standard deviation of the inputs at the nodes of a way, (k, n, …), as rounding in all steps before leaves it.
 
@@ -49,6 +57,8 @@ def grown(
         The inputs, their speeds and accelerations.
     noise : array (k, n − 1, …), optional
         What rounding of the accelerations makes of the speeds over each step, in addition to that of their arguments.
+    steady : bool
+        Whether the accelerations depend on the inputs and their speeds alone, and not on the time.
 
     Examples
     --------
@@ -71,6 +81,8 @@ def grown(
     flow = _exponential(0.5 * h * (first + last) + turning)
     start = 0.5 * EPS * np.abs(np.concatenate([q[:, 0], v[:, 0]]))
     with np.errstate(all="ignore"):
+        if steady:
+            flow = _along_itself(flow, np.concatenate([v, a]), h, scale)
         variances = _along(flow, np.concatenate([0.0 * rounds, rounds]) ** 2, start**2)
     # beyond it the equation is not linear, and two solutions lie as far apart as they can
     return np.minimum(np.sqrt(variances[:k]), scale[:, None])
@@ -105,6 +117,18 @@ def _linear(f: Rates, scale: Reals, t: Reals, q: Reals, v: Reals) -> tuple[Reals
         if j >= k:
             result[j - k, j] = 1.0
     return result, np.einsum("ij...,j...->i...", np.abs(result[k:]), np.abs(state))
+
+
+def _along_itself(flow: Reals, rates: Reals, h: Reals, scale: Reals) -> Reals:
+    """The flows, changed least so that they take the rates (q̇, q̈) at each node to those at the next, as the true ones do."""
+    unit = np.broadcast_to(scale[:, None], rates[: len(scale), 1:].shape)
+    units = np.concatenate([unit, unit / np.where(h > 0, h, 1.0)])
+    here = rates[:, :-1] / units
+    square = np.square(here).sum(axis=0)
+    off = rates[:, 1:] - np.einsum("ij...,j...->i...", flow, rates[:, :-1])
+    return np.asarray(
+        flow + np.einsum("i...,j...->ij...", off, here / units / np.where(square > 0, square, 1.0))
+    )
 
 
 def _times(a: Reals, b: Reals) -> Reals:

@@ -201,8 +201,8 @@ class Path:
             return self.equations.many(t, q.T, v.T)[:, :k].T
 
         scale = np.array(self.equations.scale)
-        states = (x.T for x in (nodes.q, nodes.v, nodes.rates[:, :k], self.noise_of_speeds))
-        return grown(rates, scale, nodes.t, *states).T
+        q, v, a, noise = (x.T for x in (nodes.q, nodes.v, nodes.rates[:, :k], self.noise_of_speeds))
+        return grown(rates, scale, nodes.t, q, v, a, noise, not self.equations.stops).T
 
     # --- the inputs -----------------------------------------------------------------------------------------------
     @cached_property
