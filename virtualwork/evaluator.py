@@ -75,7 +75,8 @@ class Evaluator:
         dict of name to float or (x, y); to array (n,) or (n, 2)
             NaN where the pose cannot be assembled.
         """
-        if isinstance(angle, float) and isfinite(angle):
+        rates = isinstance(speed, float) and isinstance(acceleration, float) and isinstance(jerk, float)
+        if rates and isinstance(angle, float) and isfinite(angle):
             moves = speed != 0.0, acceleration != 0.0, jerk != 0.0
             if moves not in self._ready:
                 self._ready[moves] = ready(self.assembly, moves, self.keys)

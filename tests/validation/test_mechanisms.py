@@ -366,6 +366,16 @@ def test_000_1_10_block_on_a_turning_bar():
     assert block.velocity == pytest.approx(1 + 1j + 2 * -3j + 1.5)
 
 
+def test_000_1_8_to_1_10_take_lists_of_vectors(recwarn):
+    assert rotation([2, 1j], 3.0).velocity.tolist() == [6j, -3]
+    assert second_point(1, 2.0, 0.0, [1j, 2]).velocity.tolist() == [3j, 2 + 2j]
+    assert block_on_bar([1, 1j], 2.0, 0.0, 3.0).velocity.tolist() == [3 + 2j, -2 + 3j]
+    # along an arm of no length the block has no direction
+    assert np.isnan(block_on_bar(0, 2.0, 0.0, 3.0).velocity)
+    assert block_on_bar(0, 2.0, 0.0, 3.0, along=1j).velocity == 3j
+    assert not recwarn
+
+
 @pytest.mark.parametrize("angle", [np.pi / 2, np.array([np.pi / 2, np.pi / 2]), np.empty(0)])
 def test_000_1_11_a_rod_that_is_too_short_reaches_nowhere(angle, recwarn):
     """A rod of 0.5 on a crank of 1 at 90°: no warning, and no number."""

@@ -85,3 +85,15 @@ def test_both_coordinates_of_a_point_by_an_evaluator() -> None:
     for name, value in many.items():
         assert one[name] == pytest.approx(value[0], rel=1e-13)
     assert one["points.H"] == (one["H.x"], one["H.y"])
+
+
+@pytest.mark.parametrize("speed", [3, np.float32(3.0), np.array(3.0), [3.0], np.array([3.0])])
+def test_an_evaluator_takes_the_speeds_of_a_motion(speed: object) -> None:
+    """In float32 the fast way had eight digits, and of an array none."""
+    at = klann().evaluator("H.vx")
+    assert at(1.0, speed)["H.vx"] == pytest.approx(at(1.0, 3.0)["H.vx"], rel=1e-14)
+
+
+def test_an_evaluator_refuses_what_is_no_speed() -> None:
+    with pytest.raises(ValueError, match="speed: expected real numbers, found 'fast'"):
+        klann().evaluator("H.vx")(1.0, "fast")

@@ -42,6 +42,22 @@ def test_two_links_too_short():
     assert "come no nearer than 0.2 m, 0.05 m needed: 0.15 m too long" in found.text()
 
 
+def test_links_with_braces_in_their_names():
+    """Braces are places of numbers in the sentence; in the name of a link they are what they are."""
+    m = Mechanism(
+        {"A": (0, 0), "D": (9, 0)},
+        {
+            "crank": Link({"A": (0, 0), "B": (1, 0)}),
+            "cou{pler}": Link({"B": (0, 0), "C": (3, 0)}),
+            "{0}": Link({"D": (0, 0), "C": (2, 0)}),
+        },
+        inputs=Input("crank"),
+        guess=Guess(0.0, {"cou{pler}": 0.3, "{0}": 1.2}),
+    )
+    text = m.assembly.reach.shortfall((0.0,)).text(lambda v: f"{v:g} m")
+    assert "cou{pler} and {0} together reach 5 m, 8 m needed: 3 m short" in text
+
+
 def test_a_rod_too_short_for_its_line():
     m = Mechanism(
         {"O": (0, 0)},

@@ -21,51 +21,64 @@ from virtualwork.formulas.numbers import ONE, Kind, Number, cross
 from virtualwork.formulas.positions import State, tied
 from virtualwork.plan.steps import Angle, Group, Term
 
+# in the order of `_spans`: what a closed form that has no root says, with its links or its guide as {0} and {1}
+WORDS = {
+    "RRR": (
+        "{0} and {1} together reach {available}, {needed} needed: {by} short",
+        "{0} and {1} come no nearer than {available}, {needed} needed: {by} too long",
+    ),
+    "RRP": ("{0} reaches {available}, {needed} needed: {by} short",),
+    "RPR": ("the guide at {0} runs past at {available}, {needed} needed: {by} too far",),
+}
+
 
 @dataclass(frozen=True)
 class Gap:
     """By how much a loop does not close: the length that it needs and the available one, m.
 
-    `what` has the places {needed}, {available} and {by}, the difference, for lengths as they are to be shown.
+    `what` has the places {needed}, {available} and {by}, the difference, for lengths as they are to be shown, and {0} … for `names`.
     """
 
     needed: float
     available: float
     what: str
+    names: tuple[str, ...] = ()
 
     def text(self, show: Callable[[float], str]) -> str:
         """The sentence, with lengths as `show` writes them."""
         by = show(abs(self.needed - self.available))
-        return self.what.format(needed=show(self.needed), available=show(self.available), by=by)
+        return self.what.format(*self.names, needed=show(self.needed), available=show(self.available), by=by)
+
+
+def _spans(kind: str, w: Number, v: Number, u: Number) -> list[tuple[Number, Number, Number]]:
+    """The lengths that a closed form needs and those that there are, and by how much they miss: negative where it closes.
+
+    From its W, its (first) arm V, and its second arm or its rail U. Two guides always cut, unless they are parallel.
+    """
+    if kind == "RRR":
+        d, far, near = abs(w), abs(v) + abs(u), abs(abs(v) - abs(u))
+        return [(d, far, d - far), (d, near, near - d)]
+    if kind == "RRP":
+        y, r = abs(cross(u, w)) / abs(u), abs(v)
+        return [(y, r, y - r)]
+    if kind == "RPR":
+        d, q = abs(w), abs(cross(u, v)) / abs(u)
+        return [(d, q, q - d)]
+    return []
 
 
 def gap_of(kind: str, names: tuple[str, ...], w: complex, v: complex, u: complex) -> Gap | None:
-    """Why a closed form has no root, from its W, its (first) arm V, and its second arm or its rail U; None where it has.
+    """Why a closed form has no root, from W, V and U as `_spans` has them; None where it has.
 
     >>> gap_of("RRR", ("coupler", "rocker"), 1264 + 0j, 700 + 0j, 500 + 0j).text("{:g} mm".format)
     'coupler and rocker together reach 1200 mm, 1264 mm needed: 64 mm short'
     """
-    if kind == "RRR":
-        d, r1, r2 = abs(w), abs(v), abs(u)
-        both = f"{names[0]} and {names[1]}"
-        if d > r1 + r2:
-            return Gap(d, r1 + r2, f"{both} together reach {{available}}, {{needed}} needed: {{by}} short")
-        if d < abs(r1 - r2):
-            what = f"{both} come no nearer than {{available}}, {{needed}} needed: {{by}} too long"
-            return Gap(d, abs(r1 - r2), what)
-    elif kind == "RRP":
-        y, r = abs(cross(u, w)) / abs(u), abs(v)
-        if y > r:
-            return Gap(y, r, f"{names[0]} reaches {{available}}, {{needed}} needed: {{by}} short")
-    elif kind == "RPR":
-        d, q = abs(w), abs(cross(u, v)) / abs(u)
-        if d < q:
-            what = f"the guide at {names[0]} runs past at {{available}}, {{needed}} needed: {{by}} too far"
-            return Gap(d, q, what)
-    else:
+    for (needed, available, by), what in zip(_spans(kind, w, v, u), WORDS.get(kind, ()), strict=True):
+        if by > 0:
+            return Gap(needed, available, what, names)
+    if kind == "PRP" and abs(cross(u, v)) <= 1e-12 * abs(u) * abs(v):
         offset = abs(cross(u, w)) / abs(u)
-        if abs(cross(u, v)) <= 1e-12 * abs(u) * abs(v):
-            return Gap(offset, 0.0, "its two guides are parallel, {by} apart, and do not meet")
+        return Gap(offset, 0.0, "its two guides are parallel, {by} apart, and do not meet")
     return None
 
 
@@ -79,16 +92,10 @@ def missing(kind: str, w: Number, v: Number, u: Number) -> Number:
     >>> run(recorder.tape({"short": short}), {"w": 1264.0})["short"]
     64.0
     """
-    if kind == "RRR":
-        d, r1, r2 = abs(w), abs(v), abs(u)
-        far, near = d - (r1 + r2), abs(r1 - r2) - d
-        return RECORDED.select(far - near, far, near)
-    if kind == "RRP":
-        return abs(cross(u, w)) / abs(u) - abs(v)
-    if kind == "RPR":
-        return abs(cross(u, v)) / abs(u) - abs(w)
-    # two guides always cut, unless they are parallel
-    return -1.0
+    worst: Number = -1.0
+    for i, (*_, by) in enumerate(_spans(kind, w, v, u)):
+        worst = RECORDED.select(worst - by, worst, by) if i else by
+    return worst
 
 
 def _root(radicand: Number, sign: Number, kind: Kind) -> Number:

@@ -44,6 +44,11 @@ def sense(vector: Vector) -> Any:
     return np.where(v == 0, np.nan, np.where(angle >= 2 * np.pi, 0.0, angle))[()]
 
 
+def _vector(x: Vector) -> Any:
+    """A vector or several, as numbers of numpy: a list of them is no number of Python's."""
+    return np.asarray(x, dtype=complex)[()]
+
+
 @dataclass(frozen=True)
 class Translation:
     """Position, velocity and acceleration of a body that only translates, x + iy."""
@@ -160,9 +165,9 @@ def rotation(arm: Vector, omega: ArrayLike, alpha: ArrayLike = 0.0) -> Rotation:
     >>> complex(p.velocity), complex(p.tangential), complex(p.normal)
     (6j, 10j, (-18+0j))
     """
-    w, a = np.asarray(omega, dtype=float)[()], np.asarray(alpha, dtype=float)[()]
-    tangential, normal = 1j * a * arm, -(w * w) * arm
-    return Rotation(1j * w * arm, tangential, normal, tangential + normal)
+    r, w, a = _vector(arm), np.asarray(omega, dtype=float)[()], np.asarray(alpha, dtype=float)[()]
+    tangential, normal = 1j * a * r, -(w * w) * r
+    return Rotation(1j * w * r, tangential, normal, tangential + normal)
 
 
 @dataclass(frozen=True)
@@ -202,11 +207,11 @@ def second_point(
     """
     turn = rotation(arm, omega, alpha)
     return TwoPoints(
-        velocity + turn.velocity,
+        _vector(velocity) + turn.velocity,
         turn.velocity,
         turn.tangential,
         turn.normal,
-        acceleration + turn.acceleration,
+        _vector(acceleration) + turn.acceleration,
     )
 
 
@@ -253,7 +258,7 @@ def block_on_bar(
     carrier_velocity, carrier_acceleration : complex
         Of the bar's point A.
     along : complex, optional
-        Unit vector of the guide; by default that of the arm.
+        Unit vector of the guide; by default that of the arm: NaN where the arm has no length.
 
     Returns
     -------
@@ -268,7 +273,8 @@ def block_on_bar(
     >>> complex(block.coriolis), float(np.degrees(sense(block.coriolis))), complex(block.normal)
     (12j, 90.0, (-4+0j))
     """
-    u = np.asarray(arm / np.abs(arm) if along is None else along)[()]
+    with np.errstate(invalid="ignore"):
+        u = _vector(arm) / np.abs(arm) if along is None else _vector(along)
     turn = rotation(arm, omega, alpha)
     relative_v, relative_a = np.multiply(speed, u), np.multiply(acceleration, u)
     coriolis = 2j * np.asarray(omega, dtype=float)[()] * relative_v
@@ -276,13 +282,13 @@ def block_on_bar(
         carrier_velocity,
         turn.velocity,
         relative_v,
-        carrier_velocity + turn.velocity + relative_v,
+        _vector(carrier_velocity) + turn.velocity + relative_v,
         carrier_acceleration,
         turn.tangential,
         turn.normal,
         relative_a,
         coriolis,
-        carrier_acceleration + turn.tangential + turn.normal + relative_a + coriolis,
+        _vector(carrier_acceleration) + turn.tangential + turn.normal + relative_a + coriolis,
     )
 
 
