@@ -227,8 +227,8 @@ class Analysis:
         requested = {each.path[1] for each in self.places if each.path[0] == kind}
         return tuple(name for name in names if name in requested)
 
-    def check_names(self) -> None:
-        """Refuse names that --only cannot find."""
+    def check_names(self, flag: str = "--only") -> None:
+        """Refuse names of an option that are no quantities."""
         only = self.request.only
         if only is None:
             return
@@ -240,7 +240,7 @@ class Analysis:
             return
         if unknown(forces, [word]) is None:
             where = "dalembert forces shows it, dalembert simulate with --forces"
-            raise DataError(f"{self.file}: --only {word}: this is a force: {where}")
+            raise DataError(f"{self.file}: {flag} {word}: this is a force: {where}")
         names = {name for each in components for name in (*each.names, *each.owners)}
         owner = word.rpartition(".")[0]
         parts = [
@@ -251,9 +251,9 @@ class Analysis:
         ]
         if parts:
             choices = ", ".join(dict.fromkeys(parts))
-            raise DataError(f"{self.file}: --only: '{word}': expected {owner}. with one of {choices}")
+            raise DataError(f"{self.file}: {flag}: '{word}': expected {owner}. with one of {choices}")
         raise DataError(
-            f"{self.file}: --only: no link or point is named '{owner or word}'{nearest(word, names)}"
+            f"{self.file}: {flag}: no link or point is named '{owner or word}'{nearest(word, names)}"
         )
 
     # --- inputs ---------------------------------------------------------------------------------------------------

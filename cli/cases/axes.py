@@ -46,14 +46,7 @@ def driven(m: Mechanism, name: str, text: str, flag: str) -> int:
 
 def dimension_named(m: Mechanism, path: str, text: str, flag: str) -> Varied:
     """Return the one dimension that a path names."""
-    from virtualwork.describe.dimensions import named
-
-    try:
-        first, *both = named(m, path)
-    except DescriptionError as error:
-        inputs = [e.name for e in m.inputs]
-        hint = "" if "did you mean" in str(error) else nearest(path, inputs)
-        raise options.bad(flag, f"{error}{hint}") from None
+    first, *both = _named(m, path, flag)
     if both:
         raise options.bad(flag, f"'{text}': two numbers: expected {first.path} or {both[0].path}")
     return Varied(first)
@@ -61,15 +54,26 @@ def dimension_named(m: Mechanism, path: str, text: str, flag: str) -> Varied:
 
 def assigned_paths(m: Mechanism, text: str, flag: str, what: str) -> tuple[tuple[Dimension, ...], str]:
     """Part `NAME=VALUE`, and find the dimensions that it names."""
-    from virtualwork.describe.dimensions import named
-
     path, equals, value = text.rpartition("=")
     if not equals or not path.strip():
         raise options.bad(flag, f"'{text}': expected NAME={what}, such as links.crank.B.x=...")
+    return _named(m, path.strip(), flag), value
+
+
+def _named(m: Mechanism, path: str, flag: str) -> tuple[Dimension, ...]:
+    """Return the dimensions that a path names."""
+    from virtualwork.describe.dimensions import dimensions, named
+
     try:
-        return named(m, path.strip()), value
+        return named(m, path)
     except DescriptionError as error:
-        raise options.bad(flag, error) from None
+        inputs = [str(entry.name) for entry in m.inputs]
+        if path in inputs:
+            place = ("inputs", inputs.index(path), "value")
+            own = next(each.path for each in dimensions(m).values() if each.where == place)
+            raise options.bad(flag, f"'{path}' is an input: expected its place in the file, {own}") from None
+        hint = "" if "did you mean" in str(error) else nearest(path, inputs)
+        raise options.bad(flag, f"{error}{hint}") from None
 
 
 def assigned(m: Mechanism, bare: Mapping[str, str], texts: Sequence[str]) -> Mechanism:
@@ -189,7 +193,6 @@ def cases_axis(m: Mechanism, path: str, elsewhere: set[int], remarks: list[str])
     `elsewhere` are the inputs that other options hold.
     """
     from dalembert.tables.table import read
-    from virtualwork.describe import DescriptionError
     from virtualwork.describe.dimensions import dimensions, named
 
     every = dimensions(m)
@@ -295,8 +298,6 @@ def rates_over_time(
 
 def history_axis(m: Mechanism) -> Axis:
     """Return the axis of the laws of motion that the file has as tables over time."""
-    from virtualwork.describe import DescriptionError
-
     laws = [np.array(e.history) if e.history else None for e in m.inputs]
     first = next(law for law in laws if law is not None)
     time = first[:, 0]

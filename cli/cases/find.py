@@ -68,7 +68,7 @@ def with_root(cases: Cases, find: str | None, so_that: str | None) -> Cases:
 
 def _quantity(nominal: Analysis, word: str) -> Component:
     """Return the one quantity of this name."""
-    nominal.check_names()
+    nominal.check_names("--so-that")
     components = [each for each in nominal.tabled if word in each.names]
     if len(components) != 1:
         names = ", ".join(dict.fromkeys(n for each in nominal.tabled for n in each.names[:1]))

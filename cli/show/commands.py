@@ -323,13 +323,7 @@ class Command(TyperCommand):
 
 
 # the parser's own words for a value that is no number, or out of range
-_TYPES = {
-    "integer": "a whole number",
-    "int range": "a whole number",
-    "float": "a number",
-    "float range": "a number",
-}
-_NO_NUMBER = re.compile(r"('.*') is not a valid (integer|int range|float range|float)\.?", re.DOTALL)
+_NO_NUMBER = re.compile(r"('.*') is not a valid (int|float)\w*(?: range)?\.?", re.DOTALL)
 _RANGE = re.compile(r"(?:(\d+)(?:\.0)?<=)?x([<>]=)(\d+)(?:\.0)?")
 _COUNTS = re.compile(r"  \[x>=[01](?:\.0)?\]|; x>=[01](?:\.0)?(?=\])")
 _OUTSIDE = re.compile(rf"(\S+) is not in the range ({_RANGE.pattern})\.?")
@@ -342,15 +336,15 @@ def _span(match: re.Match[str]) -> str:
 
 
 def in_plain_words(message: str) -> str:
-    """Say what the parser has against a value as all other messages do.
+    """Return the parser's message about a value in the words of all other messages.
 
-    >>> in_plain_words("'abc' is not a valid int range.")
-    "'abc': expected a whole number"
+    >>> in_plain_words("'abc' is not a valid int range."), in_plain_words("'abc' is not a valid float.")
+    ("'abc': expected a whole number", "'abc': expected a number")
     >>> in_plain_words("-1 is not in the range x>=1."), in_plain_words("0 is not in the range 1<=x<=100.")
     ('-1: expected a number, at least 1', '0: expected a number from 1 to 100')
     """
     if match := _NO_NUMBER.fullmatch(message):
-        return f"{match[1]}: expected {_TYPES[match[2]]}"
+        return f"{match[1]}: expected a {'whole ' if match[2] == 'int' else ''}number"
     if match := _OUTSIDE.fullmatch(message):
         return f"{match[1]}: expected a number {_RANGE.sub(_span, match[2])}".replace(
             "number at", "number, at"

@@ -124,11 +124,13 @@ def _with_check(result: Result, checked: Comparison) -> Result:
     from dalembert.results.columns import document as result_document
 
     document = result.documented
-    check = result_document([checked.table])
+    (check,) = result_document([checked.table]).values()
+    # dalembert inspect has a check of its own
+    name = "expected" if "check" in result.tables else "check"
     return replace(
         result,
-        tables={"check": lambda: checked.table, **result.tables},
-        document=lambda: {**document(), **check},
+        tables={name: lambda: checked.table, **result.tables},
+        document=lambda: {**document(), name: check},
     )
 
 

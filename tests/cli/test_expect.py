@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from cli.examples import EXAMPLES
 from tests.conftest import Dalembert
 
 ROTOR = "name,mass_kg,radius_mm,angle_deg,z_mm\nm1,9,30,60,20\nm2,6,50,210,65\n"
@@ -159,3 +160,17 @@ def test_energies_and_torques_have_units_of_their_own(dalembert: Dalembert) -> N
         joules = float(shown[f"work_{energy}"]) * (1000 if energy == "kJ" else 1)
         watts = float(shown[f"mean_power_{power}"]) * (1000 if power == "kW" else 1)
         assert (joules, watts) == pytest.approx((40 * math.pi, 400 * math.pi), rel=1e-15)
+
+
+def test_the_check_of_an_inspection_stands_beside_its_own(dalembert: Dalembert, tmp_path: Path) -> None:
+    klann = EXAMPLES / "klann" / "klann.toml"
+    (tmp_path / "e.csv").write_text("quantity,value\nmobility,1\nmobility_by_rank,2\n")
+    call = ("inspect", klann, "--expect", "e.csv")
+    done = dalembert(*call, "--json")
+    assert done.returncode == 1
+    document = json.loads(done.stdout)
+    assert document["check"]["mobility"] == 1
+    assert [row["verdict"] for row in document["expected"]] == ["ok", "WRONG"]
+    dalembert(*call, "-o", "check.csv")
+    with (tmp_path / "check.csv").open() as stream:
+        assert [row["verdict"] for row in csv.DictReader(stream)] == ["ok", "WRONG"]
