@@ -307,3 +307,15 @@ def test_bounds_are_kept_and_named(dalembert):
     done = dalembert(*FIT, *FREE, "--keep", "transmission>=89deg", "--starts", "4")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
     assert "keeps transmission >= 89 deg (it comes to" in done.stderr
+
+
+def test_a_target_of_two_points_that_differ_in_case_alone(dalembert, tmp_path):
+    (tmp_path / "m.toml").write_text(
+        "[ground]\nO = [0, 0]\n[links.arm]\npoints = { O = [0, 0], H = [1, 0], h = [2, 0] }\n[input]\nlink = 'arm'\nangle = 0\n"
+    )
+    (tmp_path / "t.csv").write_text("input_deg,H_x_m,H_y_m,h_x_m,h_y_m\n0,1.5,0,2.5,0\n90,0,1.5,0,2.5\n")
+    for name, expected in (("H", 1.5), ("h", 2.5)):
+        found = dalembert(
+            "fit", "m.toml", "t.csv", "--want", name, "--free", f"links.arm.{name}.x=1:5", "--starts", "8"
+        )
+        assert float(rows(found.stdout)[0][f"links.arm.{name}.x_m"]) == pytest.approx(expected)

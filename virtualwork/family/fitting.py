@@ -17,7 +17,7 @@ import numpy as np
 from dalembert.arithmetic.parts import in_parts
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.description import Description
-from virtualwork.describe.dimensions import Dimension, by_path, changed, dimensions, named, value
+from virtualwork.describe.dimensions import Dimension, by_path, changed, dimensions, named, number_of
 from virtualwork.family.design import Design
 from virtualwork.family.fitted import FINE, D, Fit
 from virtualwork.family.keep import HELD, JUDGED, Bound, Bounds, Held, Kept
@@ -190,7 +190,7 @@ class _Problem(Generic[D]):
     # --- solution ---------------------------------------------------------------------------------------------------
     def solved(self, starts: int, seed: int, best: int, executor: Executor | None) -> Fit[D]:
         """Refine the best starts; stop when as many as requested meet the target."""
-        own = np.array([float(value(self.m, d.path).real) for d in self.dimensions])
+        own = np.array([float(number_of(self.m, d)) for d in self.dimensions])
         begun = self.begun(shares((own - self.low) / (self.high - self.low), starts, seed))
         evaluations = self.evaluations
         met: list[_Refined] = []
