@@ -183,6 +183,9 @@ def _target(
         if sum(other.kind == each.kind for other in aims) == 1:
             # one alone may go without its name: x_mm, angle_deg, position_mm
             short |= {f"{part}_": f"{each.name}_{part}_" for part in KINDS[each.kind][0]}
+        if each.kind in ("torque", "force"):
+            # as `dalembert forces` writes it
+            short |= {f"input_{each.kind}_": f"{each.name}_{each.kind}_"}
 
     def meant(headers: list[str]) -> list[str]:
         lower = [h.strip().lower() for h in headers]
