@@ -196,8 +196,8 @@ def cases_axis(m: Mechanism, path: str, elsewhere: set[int], remarks: list[str])
     from virtualwork.describe.dimensions import dimensions, named
 
     every = dimensions(m)
-    inputs = {name.label.lower(): name for j in range(len(m.inputs)) for name in Driven.all(m, j)}
-    varied = {path.lower(): Varied(of) for path, of in every.items()}
+    inputs = {name.label: name for j in range(len(m.inputs)) for name in Driven.all(m, j)}
+    varied = {path: Varied(of) for path, of in every.items()}
     names: dict[str, Driven | Varied] = {**varied, **inputs}
     kinds = dict.fromkeys(TIMES, "time") | {name: of.dimension for name, of in names.items()}
     table = read(path, numbers=kinds, texts=("step", "variant"))

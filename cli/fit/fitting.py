@@ -25,7 +25,7 @@ from dalembert.results.columns import ABSENT, Column, Table, names, number
 from dalembert.results.way import Topic, figures
 from dalembert.tables.files import read_bytes
 from virtualwork.describe import DescriptionError
-from virtualwork.describe.dimensions import Dimension, dimensions, value
+from virtualwork.describe.dimensions import Dimension, dimensions, number_of
 from virtualwork.describe.units import Units
 
 if TYPE_CHECKING:
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.cases.analysis import Analysis
-    from dalembert.results.way import Topic
     from virtualwork import Mechanism
     from virtualwork.family.fitted import Fit
     from virtualwork.family.keep import Bound, Kept
@@ -338,22 +337,19 @@ def _text(file: str, fit: Fit[Mechanism], bare: Mapping[str, str]) -> str:
         )
 
     own = read(text)
-    new = {d: si for path, d in dimensions(own).items() if (si := _si(fit.mechanism, path)) != _si(own, path)}
+    new = {
+        d: si for d in dimensions(own).values() if (si := number_of(fit.mechanism, d)) != number_of(own, d)
+    }
     for dimension, si in new.items():
         _write(document, dimension, si, Units(dict(bare)))
     text = tomlkit.dumps(document)
     again = read(text)
     for dimension, si in new.items():
-        if not math.isclose(_si(again, dimension.path), si, rel_tol=WRITTEN, abs_tol=1e-15):
+        if not math.isclose(number_of(again, dimension), si, rel_tol=WRITTEN, abs_tol=1e-15):
             raise DataError(
                 f"{name}: {dimension.path}: it does not stand in the file as a number that could be replaced"
             )
     return text
-
-
-def _si(m: Mechanism, path: str) -> float:
-    """Return a dimension of a mechanism, SI."""
-    return float(value(m, path).real)
 
 
 def _write(document: Any, dimension: Dimension, si: float, units: Units) -> None:

@@ -45,8 +45,8 @@ class Wanted:
 
     @property
     def columns(self) -> dict[str, str]:
-        """Its columns, as a table of poses calls them, with their dimensions; headers are read in any case."""
-        return {f"{self.name}_{part}".lower(): kind for part, kind in KINDS[self.kind][0].items()}
+        """Its columns, as a table of poses calls them, with their dimensions."""
+        return {f"{self.name}_{part}": kind for part, kind in KINDS[self.kind][0].items()}
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -175,15 +175,21 @@ def _target(
     turning = not m.inputs[0].is_slide
     kinds = {"input": "angle" if turning else "length", "weight": "number"}
     short: dict[str, str] = {}
+    named = {each.name.lower() for each in aims}
+    for each in every_wanted(m):
+        # a point H beside a wanted h has columns of its own
+        kinds |= each.columns if each.name.lower() in named else {}
     for each in aims:
-        kinds |= each.columns
         if sum(other.kind == each.kind for other in aims) == 1:
             # one alone may go without its name: x_mm, angle_deg, position_mm
-            short |= {f"{part}_": f"{each.name}_{part}_".lower() for part in KINDS[each.kind][0]}
+            short |= {f"{part}_": f"{each.name}_{part}_" for part in KINDS[each.kind][0]}
+        if each.kind in ("torque", "force"):
+            # as `dalembert forces` writes it
+            short |= {f"input_{each.kind}_": f"{each.name}_{each.kind}_"}
 
     def meant(headers: list[str]) -> list[str]:
         lower = [h.strip().lower() for h in headers]
-        whole = {to for to in short.values() if any(h.startswith(to) for h in lower)}
+        whole = {to for to in short.values() if any(h.startswith(to.lower()) for h in lower)}
         return [
             next((to + h[len(at) :] for at, to in short.items() if l.startswith(at) and to not in whole), h)
             for h, l in zip(headers, lower, strict=True)
@@ -193,7 +199,7 @@ def _target(
     present = [each for each in aims if any(column in table.numbers for column in each.columns)]
     for each in present or aims[:1]:
         for column, kind in each.columns.items():
-            part = column.removeprefix(f"{each.name}_".lower())
+            part = column.removeprefix(f"{each.name}_")
             if column not in table.numbers:
                 table.require(part if f"{part}_" in short else f"{each.name}_{part}", kind)
     if table.rows < 2:

@@ -266,7 +266,7 @@ class Tolerances(Case):
 
     def way(self) -> list[Topic]:
         """Return the terms of every dimension."""
-        return way(self.analysis, self.numbers, self.slopes, self.limits)
+        return way(self.analysis, self.numbers, self.slopes, self.linear, self.limits)
 
     def figure(self) -> Figure:
         """Draw the band of paths, and the share of each dimension."""

@@ -13,6 +13,7 @@ from dalembert.results.way import Topic
 if TYPE_CHECKING:
     from cli.cases.analysis import Analysis
     from virtualwork.describe.dimensions import Dimension
+    from virtualwork.family.tolerance import Spread
     from virtualwork.formulas.quantity import Quantity
     from virtualwork.quantities import Component
 
@@ -21,9 +22,10 @@ def way(
     analysis: Analysis,
     shown: Sequence[Component],
     slopes_of: Mapping[Quantity, Sequence[Any]],
+    linear: Mapping[str, Spread],
     limits: Mapping[Dimension, float],
 ) -> list[Topic]:
-    """Return the one topic: the terms at the first pose that is assembled."""
+    """Return the one topic: the terms at the first pose that is assembled, and their sums (`linear`)."""
     whole = analysis.motions[0].assembled
     if not shown or not whole.any():
         return [
@@ -34,12 +36,12 @@ def way(
     sums: list[tuple[str, float, float]] = []
     for each in shown:
         slopes = [float(np.broadcast_to(each.of(slope), len(whole))[i]) for slope in slopes_of[each.key]]
-        terms = [slope * limit for slope, limit in zip(slopes, limits.values(), strict=True)]
-        variance = sum((term / 3) ** 2 for term in terms)
-        for d, slope, limit, term in zip(limits, slopes, limits.values(), terms, strict=True):
-            share = (term / 3) ** 2 / variance if variance else 0.0
-            rows.append((each.header, d.path, slope, limit, term, share))
-        sums.append((each.header, sum(map(abs, terms)), variance**0.5))
+        effect = linear[each.header]
+        for (d, limit), slope, share in zip(
+            limits.items(), slopes, effect.shares[:, i].tolist(), strict=True
+        ):
+            rows.append((each.header, d.path, slope, limit, slope * limit, share))
+        sums.append((each.header, float(effect.worst[i]), float(effect.sd[i])))
     columns = zip(*((*row[:2], *map(finite, row[2:])) for row in rows), strict=True)
     titles = ("column", "path", "slope", "limit", "term", "share")
     table = Table(

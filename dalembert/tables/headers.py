@@ -34,8 +34,8 @@ class Heading:
         return f"{self.base}_{self.unit}"
 
     def of(self, quantity: str) -> str | None:
-        """Return the suffix behind a quantity's name, if the column is called by it."""
-        name = self.name.lower()
+        """Return the suffix behind a quantity's name, if the column is called by it, in any case."""
+        name, quantity = self.name.lower(), quantity.lower()
         if name == quantity:
             return ""
         return self.name[len(quantity) + 1 :] if name.startswith(f"{quantity}_") else None
@@ -150,14 +150,18 @@ def find_columns(
             raise DataError(f"{file}: the column {name} stands twice: expected it once")
         if places:
             result[name] = (places[0], "")
+    alike: dict[str, list[str]] = {}
+    for name in dimensions:
+        alike.setdefault(name.lower(), []).append(name)
     for name, dimension in dimensions.items():
         good: list[tuple[int, str]] = []
         bad: list[tuple[int, str]] = []
         for index, each in enumerate(headings):
             suffix = each.of(name)
-            if suffix is not None:
-                unit = find_unit(dimension, suffix)
-                (bad if unit is None else good).append((index, unit or suffix))
+            if suffix is None or not _is_of(file, each, name, alike[name.lower()]):
+                continue
+            unit = find_unit(dimension, suffix)
+            (bad if unit is None else good).append((index, unit or suffix))
         if len(good) > 1:
             both = " and ".join(headings[index].written for index, _ in good)
             raise DataError(
@@ -167,7 +171,7 @@ def find_columns(
             result[name] = good[0]
         elif bad:
             # a column that another quantity claims (`z_rotation` beside `z`) is not an unknown unit
-            others = [other for other in (*dimensions, *texts) if other.startswith(name + "_")]
+            others = [o for o in map(str.lower, (*dimensions, *texts)) if o.startswith(f"{name}_".lower())]
             strays = [
                 (i, suffix)
                 for i, suffix in bad
@@ -182,6 +186,16 @@ def find_columns(
                     f"expected {spellings(name, dimension)}{hint}"
                 )
     return result
+
+
+def _is_of(file: str, each: Heading, name: str, alike: Sequence[str]) -> bool:
+    """Return whether a column is that of this name, of names that differ in case alone."""
+    spelt = [other for other in alike if each.name.startswith(other)]
+    if len(alike) > 1 and not spelt:
+        raise DataError(
+            f"{file}: column {each.written}: expected {' or '.join(alike)}, in upper and lower case as here"
+        )
+    return len(alike) == 1 or name in spelt
 
 
 def likeness(headings: Iterable[Heading], dimensions: Mapping[str, str], texts: Sequence[str]) -> int:

@@ -214,3 +214,24 @@ def test_more_than_memory_holds_is_refused_where_it_has_to_be_held(dalembert, fi
     found = dalembert("mechanism", files(), *vary)
     assert found.returncode == 1
     assert "1000000 variants" in found.stderr
+
+
+def test_columns_of_points_that_differ_in_case_alone(dalembert, tmp_path):
+    (tmp_path / "arm.toml").write_text(
+        "[ground]\nO = [0, 0]\n[links.arm]\npoints = { O = [0, 0], B = [1, 0], b = [2, 0] }\n"
+        '[input]\nlink = "arm"\nangle = 0\n'
+    )
+
+    def places(header, *numbers):
+        (tmp_path / "c.csv").write_text(f"{header}\n{','.join(numbers)}\n")
+        found = dalembert("mechanism", "arm.toml", "--cases", "c.csv", "--only", "B,b")
+        return [(row["B_x_m"], row["b_x_m"]) for row in rows(found.stdout)] or found.stderr
+
+    assert places("links.arm.B.x_m", "3") == [("3.0", "2.0")]
+    assert places("links.arm.b.x_m", "3") == [("1.0", "3.0")]
+    assert places("links.arm.b.x_m,links.arm.B.x_m", "3", "4") == [("4.0", "3.0")]
+    # a name that has no twin is read in any case
+    assert places("LINKS.ARM.O.X_m", "0") == [("1.0", "2.0")]
+    assert places("LINKS.ARM.B.X_m", "3") == (
+        "dalembert: c.csv: column LINKS.ARM.B.X_m: expected links.arm.B.x or links.arm.b.x, in upper and lower case as here\n"
+    )

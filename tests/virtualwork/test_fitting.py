@@ -412,3 +412,28 @@ def test_a_picture_has_the_target_and_both_curves():
     assert after.get_xdata()[ends] == pytest.approx(marks.get_xdata()[ends])
     assert np.abs(before.get_xdata() - after.get_xdata()).max() > 1
     assert angle.lines[2].get_ydata() == pytest.approx(np.degrees(motion.link("rocker").angle))
+
+
+@pytest.mark.parametrize(("off", "weight"), [(20.0, 1.0), (1.0, 1e6)])
+def test_a_target_out_of_reach_is_approached_by_mechanisms_that_can_be_assembled(off, weight):
+    """The nearest of four-bars that are drawn within the bounds, each moved alone, is no nearer."""
+    m = Mechanism(
+        {"A": 0j, "D": 0.1},
+        {
+            "crank": Link({"A": 0j, "B": 0.04}),
+            "coupler": Link({"B": 0j, "C": 0.12, "H": 0.08 + 0.04j}),
+            "rocker": Link({"D": 0j, "C": 0.08}),
+        },
+        inputs=Input("crank"),
+        guess=Guess(0.7, {"coupler": 0.4, "rocker": 1.0}),
+    )
+    q = np.linspace(0.0, 6.0, 12)
+    target = m.motion(q).point("H").position + off * m.size
+    free = {"links.crank.B.x": (0.02, 0.2), "links.coupler.C.x": (0.05, 0.3), "links.rocker.C.x": (0.03, 0.2)}
+    found = m.fit([Target({"points.H": target}, q, {"points.H": weight})], free=free, starts=16)
+    assert found.mechanism.motion(q).assembled.all()
+    rng = np.random.default_rng(0)
+    drawn = {path: rng.uniform(low, high, 300) for path, (low, high) in free.items()}
+    motion = m.vary(drawn).motion(q)
+    apart = np.abs((motion.point("H").position - target) @ np.array([1.0, 1j]))
+    assert found.rms <= np.sqrt((apart[motion.assembled.all(axis=1)] ** 2).mean(axis=1)).min() * (1 + 1e-12)

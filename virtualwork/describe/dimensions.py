@@ -201,18 +201,19 @@ def value(m: Description, path: str) -> float | complex:
     >>> value(arm, "links.arm.mass"), value(arm, "links.arm.P"), value(arm, "input.speed")
     (2.0, (3+4j), 0.0)
     """
-    numbers = [_value(m, dimension) for dimension in named(m, path)]
+    numbers = [number_of(m, dimension) for dimension in named(m, path)]
     return numbers[0] if len(numbers) == 1 else joined(*numbers)
 
 
-def _value(m: Description, dimension: Dimension) -> float:
-    number: Any = m
+def number_of(m: Description, dimension: Dimension) -> float:
+    """The number of a dimension."""
+    of: Any = m
     for key in dimension.where:
-        number = _part(number, key)
-    if number is None:
+        of = _part(of, key)
+    if of is None:
         _, j, key = dimension.where
         return m.at[int(j)] if key == "value" else 0.0
-    return number  # type: ignore[no-any-return]
+    return of  # type: ignore[no-any-return]
 
 
 def by_path(dimensions: Iterable[Dimension], numbers: Iterable[float]) -> dict[str, float]:

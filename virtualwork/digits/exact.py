@@ -28,7 +28,7 @@ from dalembert.arithmetic.recorded import Number, Recorder, bare, lifted
 from dalembert.arithmetic.varied import Precise, Varied
 from virtualwork.describe.cams import Cam
 from virtualwork.describe.description import Description
-from virtualwork.describe.dimensions import Dimension, changed, dimensions, value
+from virtualwork.describe.dimensions import Dimension, changed, dimensions, number_of
 from virtualwork.describe.laws import splined
 from virtualwork.formulas.branch import Branch
 from virtualwork.formulas.group_loops import gaps, unknowns
@@ -103,7 +103,7 @@ class Numbers:
             self.mechanism = replace(self.mechanism, cams=cams)
 
     def _number(self, dimension: Dimension) -> Any:
-        x = float(complex(value(self._of, dimension.path)).real)
+        x = float(complex(number_of(self._of, dimension)).real)
         exact = Doubled(x, self.rest(dimension.kind, x))
         if dimension.where[0] == "guides" and dimension.where[-1] == "angle":
             quarters = round(x / (math.pi / 2))

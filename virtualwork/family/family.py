@@ -29,7 +29,7 @@ from dalembert.arithmetic.parts import in_parts
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.description import Description
-from virtualwork.describe.dimensions import Dimension, by_path, changed, dimensions, named, value
+from virtualwork.describe.dimensions import Dimension, by_path, changed, dimensions, named, number_of
 from virtualwork.family.part import ASSEMBLED, LANES, Part, Solver, room
 from virtualwork.formulas.forces import Effort, Reaction
 from virtualwork.formulas.numbers import Number, Reals, real_array, xy
@@ -146,7 +146,7 @@ class Family:
         every = dimensions(self.mechanism)
         places = {d.path: i for i, d in enumerate(self.dimensions)}
         return {
-            (d.where[1], d.where[2]): (places.get(d.path), float(value(self.mechanism, d.path).real))
+            (d.where[1], d.where[2]): (places.get(d.path), float(number_of(self.mechanism, d)))
             for d in every.values()
             if d.where[0] == "inputs"
         }

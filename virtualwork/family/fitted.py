@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 import numpy as np
 
 from virtualwork.describe.description import Description
-from virtualwork.describe.dimensions import Dimension, by_path, value
+from virtualwork.describe.dimensions import Dimension, by_path, number_of
 from virtualwork.family.design import Design, place_key
 from virtualwork.family.keep import Kept
 from virtualwork.family.target import Reached
@@ -113,7 +113,7 @@ class Fit(Generic[D]):
         """
         from virtualwork.picture.fitted import Fitted, fitted
 
-        own = np.array([float(value(self.before, d.path).real) for d in self.dimensions])
+        own = np.array([float(number_of(self.before, d)) for d in self.dimensions])
         turning = not self.before.inputs[0].is_slide
         panels = []
         for each in self.reached:

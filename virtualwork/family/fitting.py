@@ -17,12 +17,12 @@ import numpy as np
 from dalembert.arithmetic.parts import in_parts
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.description import Description
-from virtualwork.describe.dimensions import Dimension, by_path, changed, dimensions, named, value
+from virtualwork.describe.dimensions import Dimension, by_path, changed, dimensions, named, number_of
 from virtualwork.family.design import Design
 from virtualwork.family.fitted import FINE, D, Fit
 from virtualwork.family.keep import HELD, JUDGED, Bound, Bounds, Held, Kept
 from virtualwork.family.part import ASSEMBLED
-from virtualwork.family.search import AWAY, COARSE, Descent, along, in_turn, shares
+from virtualwork.family.search import COARSE, Descent, along, in_turn, shares
 from virtualwork.family.target import Aim, Reached, Target
 from virtualwork.formulas.numbers import Reals
 
@@ -136,8 +136,7 @@ class _Problem(Generic[D]):
         """Return the weighted distance of every row of every target: in sizes of the mechanism, or rad."""
         values = self.values(x)
         parts = zip(self.aims, self.designs, inputs, strict=True)
-        off = np.concatenate([aim.apart(design(values, q)).ravel() for aim, design, q in parts])
-        return np.where(np.isfinite(off), off, AWAY)
+        return np.concatenate([aim.counted(design(values, q)).ravel() for aim, design, q in parts])
 
     def hold(self, x: Reals | None) -> bool:
         """Hold every loop on the branch that it has at some shares; None: let it go."""
@@ -160,12 +159,11 @@ class _Problem(Generic[D]):
         for aim, design in zip(self.aims, self.designs, strict=True):
             if aim.inputs is not None:
                 swept.append(None)
-                off = aim.apart(design.table(values, aim.inputs[None]))
-                cost += _cost((off**2).sum(axis=0)).sum(axis=1)
+                cost += aim.cost(design.table(values, aim.inputs[None])).sum(axis=1)
             else:
                 table = design.table(values, q[None])
                 swept.append(table)
-                away = (_cost(aim.from_each(table[:, i])) for i in range(len(values)))
+                away = (aim.from_each(table[:, i]) for i in range(len(values)))
                 cost += [each.min(axis=0).sum() for each in away]
         order = np.argsort(cost, kind="stable")
         if all(table is None for table in swept):
@@ -176,7 +174,7 @@ class _Problem(Generic[D]):
             ways = [
                 [(0.0, aim.inputs)] * 2
                 if table is None or aim.inputs is not None
-                else along(_cost(aim.from_each(table[:, i])), q, turning)
+                else along(aim.from_each(table[:, i]), q, turning)
                 for aim, table in zip(self.aims, swept, strict=True)
             ]
             # the better way round of each target, then the other
@@ -184,13 +182,13 @@ class _Problem(Generic[D]):
                 result.append((sum(c for c, _ in each), (starts[i], tuple(way for _, way in each))))
         result.sort(key=lambda each: each[0])
         # what cannot be assembled near every row leads nowhere, while anything else does
-        hopeless = AWAY**2
+        hopeless = min(aim.lost.min() for aim in self.aims)
         return [x for c, x in result if c < hopeless or result[0][0] >= hopeless]
 
     # --- solution ---------------------------------------------------------------------------------------------------
     def solved(self, starts: int, seed: int, best: int, executor: Executor | None) -> Fit[D]:
         """Refine the best starts; stop when as many as requested meet the target."""
-        own = np.array([float(value(self.m, d.path).real) for d in self.dimensions])
+        own = np.array([float(number_of(self.m, d)) for d in self.dimensions])
         begun = self.begun(shares((own - self.low) / (self.high - self.low), starts, seed))
         evaluations = self.evaluations
         met: list[_Refined] = []
@@ -254,7 +252,8 @@ class _Problem(Generic[D]):
         as its own guess has it.
         """
         before = self.evaluations
-        begins = np.abs(self.residuals(x, inputs)).max() < AWAY
+        away = np.concatenate([aim.away.ravel() for aim in self.aims])
+        begins = (np.abs(self.residuals(x, inputs)) < away).all()
         held = self.hold(x)
         end, at = self._descended(x, inputs, steps)
         if held:
@@ -366,10 +365,6 @@ class _Problem(Generic[D]):
 
 def _refined(problem: _Problem[Any], x: Reals, inputs: Sequence[Reals], steps: int) -> _Refined:
     return problem.refined(x, inputs, steps)
-
-
-def _cost(squared: Reals) -> Reals:
-    return np.where(np.isfinite(squared), squared, AWAY**2)
 
 
 def _free(

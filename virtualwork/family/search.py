@@ -27,8 +27,6 @@ COARSE = 120
 FIRSTS = 24
 # rad: inputs that are one
 EQUAL = 1e-9
-# of the mechanism's size, or rad: how far a pose that cannot be assembled counts as away
-AWAY = 10.0
 # steps of the inputs at most, the longest of them, and the one that is the last: rad, or of the mechanism's size
 STEPS, LONGEST, SHORTEST = 12, 0.1, 1e-8
 
@@ -171,7 +169,7 @@ class Descent:
             q = self.inputs[i]
             if aim.inputs is None:
                 q = self.inputs[i] = self._followed(aim, design, values, q)
-            apart = aim.apart(design(values, q))
+            apart = aim.counted(design(values, q))
             slope = design.slopes(values, q) * aim.scale[..., None]
             there = slope[..., :d] * self.width
             if aim.inputs is None:
@@ -180,7 +178,7 @@ class Descent:
                     part = (along[..., None] * there).sum(axis=0) / (along**2).sum(axis=0)[:, None]
                 # where the path stands still there is nothing to take away
                 there = there - along[..., None] * np.where(np.isfinite(part), part, 0.0)
-            off.append(np.where(np.isfinite(apart), apart, AWAY).ravel())
+            off.append(apart.ravel())
             slopes.append(np.where(np.isfinite(there), there, 0.0).reshape(-1, d))
             inputs.append(q)
         if self.held is not None:

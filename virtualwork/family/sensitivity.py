@@ -20,7 +20,7 @@ from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.tape import Operation, Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
-from virtualwork.describe.dimensions import Dimension, dimensions, named, value
+from virtualwork.describe.dimensions import Dimension, dimensions, named, number_of
 from virtualwork.digits.second_run import SecondRun, parts
 from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.formulas.lanes import Lanes
@@ -120,9 +120,7 @@ class Sensitivities:
     def _given(self, tape: Tape, dimensions: Sequence[Dimension]) -> dict[str, Any]:
         """Return the inputs of a tape: the dimensions' own numbers, and those of the poses."""
         own = {
-            d.path: float(value(self.assembly.mechanism, d.path).real)
-            for d in dimensions
-            if d.where[0] != "inputs"
+            d.path: float(number_of(self.assembly.mechanism, d)) for d in dimensions if d.where[0] != "inputs"
         }
         return own | self.poses.entering([name for name in tape.inputs if name not in own])
 

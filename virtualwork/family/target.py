@@ -17,6 +17,9 @@ from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.quantity import Quantity
 
+# of the mechanism's size, rad or of the largest effort: how far a pose that cannot be assembled counts as away, at least
+AWAY = 10.0
+
 
 @dataclass(frozen=True, eq=False)
 class Target:
@@ -96,6 +99,8 @@ class Aim:
         Roots of the weights, over the size for lengths.
     angle : array (rows, 1) of bool
     inputs : array (n,) or None
+    away : array (rows, n)
+        The weighted distance that a pose that cannot be assembled counts as.
     """
 
     keys: tuple[Quantity, ...]
@@ -104,6 +109,7 @@ class Aim:
     scale: Reals
     angle: NDArray[np.bool_]
     inputs: Reals | None
+    away: Reals
 
     @classmethod
     def read(cls, m: Description, target: Target) -> Aim:
@@ -119,7 +125,7 @@ class Aim:
         keys = {name: place_key(m, name) for name in target.places}
         if not keys:
             raise ValueError("target: expected a point, a link or a slide")
-        wanted, scale, angle = [], [], []
+        wanted, scale, angle, away = [], [], [], []
         n = None
         for name, key in keys.items():
             rows = _rows(name, key.is_vector, target.places[name], n)
@@ -132,6 +138,9 @@ class Aim:
             if key.is_force:
                 unit = 1.0 / _largest(m, rows, target.inputs)
             scale.append(np.broadcast_to(np.sqrt(weight) * unit, rows.shape))
+            # farther than any pose that can be: a target may lie far from the mechanism
+            far = AWAY if key.dimension != "length" else max(AWAY, 2 * unit * _distance(m, rows))
+            away.append(np.broadcast_to(far * np.sqrt(np.where(weight > 0, weight, 1.0)), rows.shape))
             angle += [key.is_angle] * len(rows)
         strange = [name for name in target.weights if name not in keys]
         if strange:
@@ -140,7 +149,8 @@ class Aim:
         if q is not None and (q.shape != (n,) or not np.isfinite(q).all()):
             raise ValueError(f"inputs: expected {n} finite numbers, one for each row of the target")
         flags = np.array(angle)[:, None]
-        return cls(tuple(keys.values()), tuple(keys), np.vstack(wanted), np.vstack(scale), flags, q)
+        whole, scales, lost = (np.vstack(each) for each in (wanted, scale, away))
+        return cls(tuple(keys.values()), tuple(keys), whole, scales, flags, q, lost)
 
     def __len__(self) -> int:
         return int(self.wanted.shape[1])
@@ -149,10 +159,27 @@ class Aim:
         """Return the weighted distance, (rows, ..., n): lengths in sizes of the mechanism, angles in rad."""
         return self._off(reached, self.wanted, self.scale)
 
+    def counted(self, reached: Reals) -> Reals:
+        """Return the same of (rows, n), with what counts for poses that cannot be assembled."""
+        off = self.apart(reached)
+        return np.where(np.isfinite(off), off, self.away)
+
+    def cost(self, reached: Reals) -> Reals:
+        """Σ (weighted distance)² of each pose of (rows, ..., n), (..., n)."""
+        return self._cost(self.apart(reached))
+
     def from_each(self, reached: Reals) -> Reals:
         """Σ (weighted distance)² of every pose of (rows, ..., poses) from every row of the target, (..., poses, n)."""
-        off = self._off(reached[..., None], self.wanted[:, None, :], self.scale[:, None, :])
-        return np.asarray((off**2).sum(axis=0))
+        return self._cost(self._off(reached[..., None], self.wanted[:, None, :], self.scale[:, None, :]))
+
+    @property
+    def lost(self) -> Reals:
+        """What each row costs whose pose cannot be assembled, (n,)."""
+        return np.asarray((self.away**2).max(axis=0))
+
+    def _cost(self, off: Reals) -> Reals:
+        squared = (off**2).sum(axis=0)
+        return np.where(np.isfinite(squared), squared, self.lost)
 
     def _off(self, values: Reals, wanted: Reals, scale: Reals) -> Reals:
         def beside(each: NDArray[Any]) -> NDArray[Any]:
@@ -174,6 +201,13 @@ class Aim:
             out.append(Reached(name, key.kind, inputs, values, target))
             row += 2 if key.is_vector else 1
         return tuple(out)
+
+
+def _distance(m: Description, wanted: Reals) -> float:
+    """How far a target of lengths goes from the middle of the ground's points, or from the beginning of a guide, m."""
+    points = np.array(list(m.ground.values()) or [0j]).mean()
+    middle = np.array([[points.real], [points.imag]]) if len(wanted) == 2 else 0.0
+    return float(np.abs(wanted - middle).max())
 
 
 def _largest(m: Description, wanted: Reals, inputs: ArrayLike | None) -> float:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from virtualwork.describe.description import Description
-from virtualwork.describe.dimensions import Dimension, dimensions, named, value
+from virtualwork.describe.dimensions import Dimension, dimensions, named, number_of
 from virtualwork.family.family import Family
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.formulas.quantity import Quantity
@@ -126,8 +126,7 @@ def drawn_numbers(
         parts.append(rng.normal(size=shape) / 3 if distribution == "normal" else rng.uniform(-1, 1, shape))
     unit = np.concatenate(parts)[:draws]
     return {
-        d.path: float(value(m, d.path).real) + limit * unit[:, i]
-        for i, (d, limit) in enumerate(limits.items())
+        d.path: float(number_of(m, d)) + limit * unit[:, i] for i, (d, limit) in enumerate(limits.items())
     }
 
 

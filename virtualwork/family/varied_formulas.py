@@ -17,7 +17,7 @@ from virtualwork.branch.guess import distance, sign_of_angles
 from virtualwork.branch.phases import Phases, with_constants
 from virtualwork.branch.solutions import guessed_slide
 from virtualwork.describe.description import Description, joints_apart, known_by_guess
-from virtualwork.describe.dimensions import Dimension, changed, value
+from virtualwork.describe.dimensions import Dimension, changed, number_of
 from virtualwork.describe.keys import keys_of
 from virtualwork.describe.parts import Link
 from virtualwork.formulas.closed_forms import Case, missing
@@ -440,5 +440,5 @@ def _again(tape: Tape, recorder: Recorder, values: Mapping[str, Number]) -> dict
 
 def varied(m: Description, dimensions: Sequence[Dimension], recorder: Recorder) -> Description:
     """The description with recorded numbers at some dimensions, called by their paths; decisions see its own numbers."""
-    numbers = {d.path: Varied(float(value(m, d.path).real), recorder.input(d.path)) for d in dimensions}
+    numbers = {d.path: Varied(float(number_of(m, d)), recorder.input(d.path)) for d in dimensions}
     return changed(m, numbers)
