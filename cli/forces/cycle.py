@@ -187,7 +187,7 @@ def cycle_of(analysis: Analysis, coefficient: float | None) -> tuple[Table, str]
         f"rms_{effort}": (effort, "rms", lambda: c.rms),
         "peak_power": ("power", "peak_power", lambda: c.peak_power),
         "work": ("energy", "work", lambda: c.work),
-        "energy_closure": ("energy", "", lambda: c.closure),
+        "energy_closure": ("energy", "work", lambda: c.closure),
     }
 
     @cache

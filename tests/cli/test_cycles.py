@@ -191,3 +191,18 @@ def test_rates_without_a_speed_have_one_warning(dalembert: Dalembert) -> None:
         done = dalembert("mechanism", "-", "--order", "velocity", "--only", "C", *speed, stdin=BARE)
         assert "C_vx_m_s" in done.stdout
         assert done.stderr == ""
+
+
+def test_the_closure_of_energy_has_no_digit_that_rounding_leaves(
+    dalembert: Dalembert, tmp_path: Path
+) -> None:
+    """Of 427 J of work 8e-15 J are rounding: once printed as six digits that hold."""
+    assert dalembert("examples", "engine").returncode == 0
+    done = dalembert("forces", "engine.toml", "--over", "0deg:720deg:5deg", "--digits", "-o", "cycle.md")
+    assert done.returncode == 0, done.stderr
+    lines = (tmp_path / "cycle.md").read_text().splitlines()
+    at = next(i for i, line in enumerate(lines) if "energy_closure_J" in line)
+    heads, cells = ([cell.strip() for cell in lines[k].strip("|").split("|")] for k in (at, at + 2))
+    row = dict(zip(heads, cells, strict=True))
+    assert row["work_J"] == "-426.84"
+    assert row["energy_closure_J"] in ("", "0")
