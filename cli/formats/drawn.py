@@ -102,7 +102,7 @@ def place(x: float, y: float) -> Exact:
 def finite(file: str, where: str, word: object) -> float:
     """Return the finite number that a word is; DataError names the place where it is none."""
     try:
-        value = float(str(word))
+        value = float(str(word).replace("_", " "))
         exact(value)
     except ValueError:
         raise damaged(file, where, word, "a finite number") from None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -14,9 +13,9 @@ from xml.parsers.expat.errors import codes
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.errors import DataError, quote
+from cli.formats.drawn import damaged, finite
+from dalembert.errors import DataError
 from dalembert.tables.files import load
-from dalembert.units import LARGEST
 
 LARGEST_FILE = 10_000_000  # bytes
 DEEPEST = 100
@@ -146,17 +145,11 @@ class At(NamedTuple):
 
     def error(self, of: str, value: object, expected: object) -> DataError:
         """Return the error: the value there, and the expected value."""
-        return DataError(f"{self.file}: {self.inside(of).where}: found {value}, expected {expected}")
+        return damaged(self.file, self.inside(of).where, value, str(expected))
 
     def number(self, of: str, text: str | None) -> float:
         """Return a finite number."""
-        try:
-            value = float(text or "")
-        except ValueError:
-            value = math.nan
-        if not abs(value) <= LARGEST or "_" in (text or ""):
-            raise self.error(of, quote(str(text)), "a finite number")
-        return value
+        return finite(self.file, self.inside(of).where, text)
 
     def numbers(
         self, of: str, text: str | None, n: int | None = None, default: Sequence[float] | None = None
@@ -166,7 +159,7 @@ class At(NamedTuple):
             return list(default)
         numbers = [self.number(of, word) for word in (text or "").split()]
         if n is not None and len(numbers) != n:
-            raise self.error(of, quote(text or ""), f"{n} number{'s' * (n != 1)}")
+            raise self.error(of, text or "", f"{n} number{'s' * (n != 1)}")
         return numbers
 
     def direction(self, of: str, vector: ArrayLike) -> NDArray[np.float64]:

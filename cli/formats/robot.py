@@ -108,7 +108,6 @@ class Robot:
     """A robot of a file; `couplings` are sums of joint coordinates that stay as they are."""
 
     file: str
-    format: str
     name: str
     links: dict[str, RobotLink] = field(default_factory=dict)
     joints: dict[str, RobotJoint] = field(default_factory=dict)

@@ -64,7 +64,7 @@ def read(file: str, root: Element) -> Robot:
     if not models:
         raise DataError(f"{file}: <sdf>: no <model>")
     model = next((e for e in models if xml.child(e, "joint") is not None), models[0])
-    robot = Robot(file, "SDF", model.get("name", ""), notes=xml.passed_over(root, READ))
+    robot = Robot(file, model.get("name", ""), notes=xml.passed_over(root, READ))
     if len(models) > 1:
         others = ", ".join(e.get("name", "without a name") for e in models if e is not model)
         robot.notes.append(f"models left out: {others}")

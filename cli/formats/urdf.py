@@ -57,7 +57,7 @@ class _Joint(NamedTuple):
 
 def read(file: str, root: Element) -> Robot:
     """Read a `<robot>`."""
-    robot = Robot(file, "URDF", root.get("name", ""), notes=xml.passed_over(root, READ))
+    robot = Robot(file, root.get("name", ""), notes=xml.passed_over(root, READ))
     joints = list(xml.children(root, "joint"))
     for e in xml.children(root, "link"):
         name, at = xml.placed(file, e)
