@@ -33,6 +33,7 @@ def parse(file: str, data: bytes) -> Element:
 
     if len(data) > LARGEST_FILE:
         raise DataError(f"{file}: {len(data)} bytes: expected at most {LARGEST_FILE} (10 MB)")
+    data = _in_utf_8(data)
     try:
         try:
             root: Element = fromstring(data, forbid_dtd=True, forbid_entities=True, forbid_external=True)
@@ -51,7 +52,7 @@ def parse(file: str, data: bytes) -> Element:
         ) from None
     except (ValueError, LookupError) as error:
         raise DataError(f"{file}: no valid XML: {error}") from None
-    _shallow(file, root)
+    _plain(file, root)
     return root
 
 
@@ -72,22 +73,31 @@ def _with_prefixes(data: bytes) -> bytes:
     return data if root is None else data[: root.end()] + declared + data[root.end() :]
 
 
-def _shallow(file: str, root: Element) -> None:
+def _plain(file: str, root: Element) -> None:
+    """Take the name spaces off the tags; refuse elements that are nested too deeply."""
     level = [root]
     for _ in range(DEEPEST):
+        for element in level:
+            element.tag = element.tag.rpartition("}")[2]
         level = [inner for outer in level for inner in outer]
     if level:
         raise DataError(f"{file}: elements nested more than {DEEPEST} deep")
 
 
-def plain(element: Element) -> str:
-    """Return a tag without its name space."""
-    return element.tag.rpartition("}")[2]
+def _in_utf_8(data: bytes) -> bytes:
+    """Return a file without a declared encoding that is no UTF-8 as Windows-1252 reads it."""
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff") or b"encoding" in data[:200].partition(b"?>")[0]:
+        return data
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace").encode()
+    return data
 
 
 def children(element: Element, *tags: str) -> Iterator[Element]:
     """Yield the elements of some tags directly inside."""
-    return (e for e in element if isinstance(e.tag, str) and plain(e) in tags)
+    return (e for e in element if e.tag in tags)
 
 
 def child(element: Element | None, *path: str) -> Element | None:
@@ -125,10 +135,9 @@ def passed_over(root: Element, known: Mapping[str, str]) -> list[str]:
     """
     lost = []
     for inner in root:
-        tag = plain(inner)
-        if tag not in known[plain(root)].split():
-            lost.append(f"<{tag}> in <{plain(root)}>: left out: it is not read")
-        elif tag in known:
+        if inner.tag not in known[root.tag].split():
+            lost.append(f"<{inner.tag}> in <{root.tag}>: left out: it is not read")
+        elif inner.tag in known:
             lost += passed_over(inner, known)
     return list(dict.fromkeys(lost))
 
@@ -175,14 +184,14 @@ def named(file: str, element: Element, attribute: str = "name") -> str:
     """Return an attribute that must be there."""
     value = element.get(attribute)
     if not value:
-        raise DataError(f"{file}: a <{plain(element)}> has no '{attribute}'")
+        raise DataError(f"{file}: a <{element.tag}> has no '{attribute}'")
     return value
 
 
 def placed(file: str, element: Element) -> tuple[str, At]:
     """Return an element's name, which must be there, and its place."""
     name = named(file, element)
-    return name, At(file, f"{plain(element)} '{name}'")
+    return name, At(file, f"{element.tag} '{name}'")
 
 
 def include(file: str, element: Element, folder: Path | None, seen: list[int]) -> None:

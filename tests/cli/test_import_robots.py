@@ -381,6 +381,25 @@ def test_an_equality_that_its_default_switches_off_is_left_out() -> None:
     assert any("left out: it is not active" in note for note in taken(off)[1])
 
 
+@pytest.mark.parametrize("text", [SDF, URDF.format(loop=LOOPS["gazebo"]), MJCF], ids=["sdf", "urdf", "mjcf"])
+def test_name_spaces_and_encodings_change_nothing(text: str) -> None:
+    ours = text.replace("crank", "Kürbel").replace("AB", "Kürbel")
+    root = re.search("<(robot|sdf|mujoco) ", ours)
+    assert root is not None
+    spaced = ours.replace(root[0], f'{root[0]}xmlns="http://example.org" ')
+    expected = taken(ours)
+    for data in (
+        spaced.encode(),
+        ours.encode("cp1252"),
+        ours.encode("utf-16"),
+        ours.encode("utf-8-sig"),
+        ours.replace(root[0], f"<!-- {root[0]}> -->\n{root[0]}").encode(),
+    ):
+        _, (drawing,) = read("file", data, None)
+        (part,) = settle(drawing)
+        assert (Mechanism.from_toml_text(described(part, "test")), drawing.notes + part.notes) == expected
+
+
 def test_default_sections_of_mjcf_add_up() -> None:
     """Files that are included bring sections of their own."""
     split = '<default><geom size=".1"/></default><worldbody>'
