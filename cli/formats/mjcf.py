@@ -202,11 +202,8 @@ class _Reader:
         texts = dict.fromkeys(DIAGONAL_FIRST, "0")
         for key, names in (("diaginertia", DIAGONAL_FIRST[:3]), ("fullinertia", DIAGONAL_FIRST)):
             if e.get(key) is not None:
-                numbers = e.get(key, "").split()
-                at.numbers(key, e.get(key))
-                if len(numbers) != len(names):
-                    raise at.error(key, f"{len(numbers)} numbers", len(names))
-                texts |= dict(zip(names, numbers, strict=True))
+                at.numbers(key, e.get(key), len(names))
+                texts |= dict(zip(names, e.get(key, "").split(), strict=True))
         return Inertial(mass, place, *printed(texts))
 
     def _every(self, section: str) -> Iterator[tuple[int, Element]]:
