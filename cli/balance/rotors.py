@@ -78,7 +78,7 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
     if not amounts:
         raise DataError(
             f"{table.file}: no column mass_kg (or mass_g, weight_N, unbalance_g_mm …): expected a mass or weight with "
-            f"a radius, or an unbalance {table.told}"
+            f"a radius, or an unbalance {table.hint}"
         )
     (amount,) = amounts
     column = table.numbers[amount]

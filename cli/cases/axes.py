@@ -214,13 +214,13 @@ def cases_axis(m: Mechanism, path: str, elsewhere: set[int], remarks: list[str])
         wanted = [_headers(Driven.of(m, j)) for j in range(len(m.inputs))]
         raise DataError(
             f"{table.file}: no column names an input or a dimension, such as {', '.join(wanted)} or "
-            f"{next(iter(every.values())).header} {table.told}"
+            f"{next(iter(every.values())).header} {table.hint}"
         )
     driven_here = {name.j for name in columns if isinstance(name, Driven)}
     for j in range(len(m.inputs)):
         if driven_here and j not in driven_here | elsewhere:
             raise DataError(
-                f"{table.file}: no column {_headers(Driven.of(m, j))} for the input '{m.inputs[j].name}' {table.told}"
+                f"{table.file}: no column {_headers(Driven.of(m, j))} for the input '{m.inputs[j].name}' {table.hint}"
             )
     remarks += table.warnings
     shown, si = [], []

@@ -122,6 +122,8 @@ def read(file: str, data: bytes, kind: str | None, folder: Path | None = None) -
     if kind == "freecad" or (kind is None and freecad.is_document(data)):
         return "freecad", freecad.read(file, data)
     text = decoded(file, data)
+    if not text.strip():
+        raise DataError(f"{file}: the file is empty: expected a mechanism of another program")
     kind = kind or kind_of(file, text)
     if kind in ROOTS.values():
         from cli.formats import plane
@@ -140,13 +142,13 @@ def read(file: str, data: bytes, kind: str | None, folder: Path | None = None) -
 def read_robot(file: str, data: bytes, folder: Path | None) -> Robot:
     """Read a robot file; files that it includes must lie in `folder`."""
     from cli.formats import mjcf, sdf, urdf
-    from cli.formats.markup import parse, plain
+    from cli.formats.markup import parse
 
     root = parse(file, data)
-    kind = ROOTS.get(plain(root))
+    kind = ROOTS.get(root.tag)
     if kind is None:
         expected = ", ".join(f"<{tag}> ({name.upper()})" for tag, name in ROOTS.items())
-        raise DataError(f"{file}: found <{plain(root)}>, expected {expected}")
+        raise DataError(f"{file}: found <{root.tag}>, expected {expected}")
     if kind == "urdf":
         return urdf.read(file, root)
     return sdf.read(file, root) if kind == "sdf" else mjcf.read(file, root, folder)

@@ -12,7 +12,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from dalembert.errors import DataError, quote
 from dalembert.units import LARGEST, to_si
@@ -102,10 +102,20 @@ def place(x: float, y: float) -> Exact:
 def finite(file: str, where: str, word: object) -> float:
     """Return the finite number that a word is; DataError names the place where it is none."""
     try:
-        value = float(str(word))
+        value = float(str(word).replace("_", " "))
         exact(value)
     except ValueError:
         raise damaged(file, where, word, "a finite number") from None
+    return value
+
+
+def objects(file: str, where: str, value: Any) -> list[dict[str, Any]]:
+    """Return the objects of a JSON list, or of an object by their ids; none where there is no value."""
+    if isinstance(value, dict):
+        value = [{"id": k} | v if isinstance(v, dict) else v for k, v in value.items()]
+    value = [] if value is None else value
+    if not isinstance(value, list) or not all(isinstance(e, dict) for e in value):
+        raise damaged(file, where, value, "a list of objects")
     return value
 
 

@@ -19,6 +19,7 @@ from cli.formats.drawn import (
     coordinates,
     damaged,
     exact,
+    objects,
     pins_of,
     place,
     together,
@@ -89,13 +90,6 @@ class _Reader:
             raise damaged(self.file, f"{where}{key}", value, "an object by names")
         return value
 
-    def listed(self, entry: dict[str, Any], key: str, where: str = "") -> list[dict[str, Any]]:
-        """Return a list of objects; empty where there is none."""
-        value = [] if entry.get(key) is None else entry[key]
-        if not isinstance(value, list) or not all(isinstance(e, dict) for e in value):
-            raise damaged(self.file, f"{where}{key}", value, "a list of objects")
-        return value
-
     def pair(self, where: str, value: Any) -> Exact:
         """Return two coordinates."""
         try:
@@ -140,7 +134,7 @@ class _Reader:
                 d.leave(f"joint {name}", f"a joint of type {e.get('type')} has no equivalent")
         self._drives(joints)
         self._traced()
-        for e in self.listed(data, "forces"):
+        for e in objects(self.file, "forces", data.get("forces")):
             self._force(e)
         if d.bodies[GROUND].mass > 0:
             d.bodies[GROUND] = Body(d.bodies[GROUND].points)
@@ -167,7 +161,7 @@ class _Reader:
         if mass < 0 or inertia < 0:
             raise damaged(self.file, where, f"{mass:g}, {inertia:g}", "a mass and an inertia of zero or more")
         loose = [(mass, center, inertia)]
-        for extra in self.listed(e, "point_masses", f"{where}, "):
+        for extra in objects(self.file, f"{where}, point_masses", e.get("point_masses")):
             m = self.real(f"{where}, point_masses", self.get(where, extra, "mass"))
             loose.append((m, self.pair(f"{where}, point_masses", self.get(where, extra, "local_pos")), 0.0))
         body = self.d.body(name)
@@ -284,7 +278,7 @@ class _Reader:
                 why = "the file does not store it" if marker else "expressions are not evaluated"
                 d.leave(f"law of motion of {where}", why)
                 d.drives.append(Drive(link, on, at=0.0 if d.posed else sign * offset))
-        for e in self.listed(self.data, "linear_drivers"):
+        for e in objects(self.file, "linear_drivers", self.data.get("linear_drivers")):
             self._linear(e)
 
     def _linear(self, e: dict[str, Any]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -14,9 +13,9 @@ from xml.parsers.expat.errors import codes
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.errors import DataError, quote
+from cli.formats.drawn import damaged, finite
+from dalembert.errors import DataError
 from dalembert.tables.files import load
-from dalembert.units import LARGEST
 
 LARGEST_FILE = 10_000_000  # bytes
 DEEPEST = 100
@@ -34,6 +33,7 @@ def parse(file: str, data: bytes) -> Element:
 
     if len(data) > LARGEST_FILE:
         raise DataError(f"{file}: {len(data)} bytes: expected at most {LARGEST_FILE} (10 MB)")
+    data = _in_utf_8(data)
     try:
         try:
             root: Element = fromstring(data, forbid_dtd=True, forbid_entities=True, forbid_external=True)
@@ -52,7 +52,7 @@ def parse(file: str, data: bytes) -> Element:
         ) from None
     except (ValueError, LookupError) as error:
         raise DataError(f"{file}: no valid XML: {error}") from None
-    _shallow(file, root)
+    _plain(file, root)
     return root
 
 
@@ -73,22 +73,31 @@ def _with_prefixes(data: bytes) -> bytes:
     return data if root is None else data[: root.end()] + declared + data[root.end() :]
 
 
-def _shallow(file: str, root: Element) -> None:
+def _plain(file: str, root: Element) -> None:
+    """Take the name spaces off the tags; refuse elements that are nested too deeply."""
     level = [root]
     for _ in range(DEEPEST):
+        for element in level:
+            element.tag = element.tag.rpartition("}")[2]
         level = [inner for outer in level for inner in outer]
     if level:
         raise DataError(f"{file}: elements nested more than {DEEPEST} deep")
 
 
-def plain(element: Element) -> str:
-    """Return a tag without its name space."""
-    return element.tag.rpartition("}")[2]
+def _in_utf_8(data: bytes) -> bytes:
+    """Return a file without a declared encoding that is no UTF-8 as Windows-1252 reads it."""
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff") or b"encoding" in data[:200].partition(b"?>")[0]:
+        return data
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace").encode()
+    return data
 
 
 def children(element: Element, *tags: str) -> Iterator[Element]:
     """Yield the elements of some tags directly inside."""
-    return (e for e in element if isinstance(e.tag, str) and plain(e) in tags)
+    return (e for e in element if e.tag in tags)
 
 
 def child(element: Element | None, *path: str) -> Element | None:
@@ -126,10 +135,9 @@ def passed_over(root: Element, known: Mapping[str, str]) -> list[str]:
     """
     lost = []
     for inner in root:
-        tag = plain(inner)
-        if tag not in known[plain(root)].split():
-            lost.append(f"<{tag}> in <{plain(root)}>: left out: it is not read")
-        elif tag in known:
+        if inner.tag not in known[root.tag].split():
+            lost.append(f"<{inner.tag}> in <{root.tag}>: left out: it is not read")
+        elif inner.tag in known:
             lost += passed_over(inner, known)
     return list(dict.fromkeys(lost))
 
@@ -146,17 +154,11 @@ class At(NamedTuple):
 
     def error(self, of: str, value: object, expected: object) -> DataError:
         """Return the error: the value there, and the expected value."""
-        return DataError(f"{self.file}: {self.inside(of).where}: found {value}, expected {expected}")
+        return damaged(self.file, self.inside(of).where, value, str(expected))
 
     def number(self, of: str, text: str | None) -> float:
         """Return a finite number."""
-        try:
-            value = float(text or "")
-        except ValueError:
-            value = math.nan
-        if not abs(value) <= LARGEST or "_" in (text or ""):
-            raise self.error(of, quote(str(text)), "a finite number")
-        return value
+        return finite(self.file, self.inside(of).where, text)
 
     def numbers(
         self, of: str, text: str | None, n: int | None = None, default: Sequence[float] | None = None
@@ -166,7 +168,7 @@ class At(NamedTuple):
             return list(default)
         numbers = [self.number(of, word) for word in (text or "").split()]
         if n is not None and len(numbers) != n:
-            raise self.error(of, quote(text or ""), f"{n} number{'s' * (n != 1)}")
+            raise self.error(of, text or "", f"{n} number{'s' * (n != 1)}")
         return numbers
 
     def direction(self, of: str, vector: ArrayLike) -> NDArray[np.float64]:
@@ -182,14 +184,14 @@ def named(file: str, element: Element, attribute: str = "name") -> str:
     """Return an attribute that must be there."""
     value = element.get(attribute)
     if not value:
-        raise DataError(f"{file}: a <{plain(element)}> has no '{attribute}'")
+        raise DataError(f"{file}: a <{element.tag}> has no '{attribute}'")
     return value
 
 
 def placed(file: str, element: Element) -> tuple[str, At]:
     """Return an element's name, which must be there, and its place."""
     name = named(file, element)
-    return name, At(file, f"{plain(element)} '{name}'")
+    return name, At(file, f"{element.tag} '{name}'")
 
 
 def include(file: str, element: Element, folder: Path | None, seen: list[int]) -> None:

@@ -28,7 +28,7 @@ from cli.formats.robot import (
     pose,
     printed,
 )
-from dalembert.errors import DataError, quote
+from dalembert.errors import DataError
 
 if TYPE_CHECKING:
     from cli.formats.skeleton import Branching, Joint, Skeleton
@@ -55,7 +55,7 @@ KINDS: dict[str, Kind] = {"hinge": "turn", "slide": "slide", "ball": "ball"}
 def read(file: str, root: Element, folder: Path | None) -> Robot:
     """Read a `<mujoco>`; files that it includes are followed inside its folder alone."""
     xml.include(file, root, folder, [0])
-    robot = Robot(file, "MJCF", root.get("model", ""), notes=xml.passed_over(root, READ))
+    robot = Robot(file, root.get("model", ""), notes=xml.passed_over(root, READ))
     _Reader(robot, root).read()
     return robot
 
@@ -202,11 +202,8 @@ class _Reader:
         texts = dict.fromkeys(DIAGONAL_FIRST, "0")
         for key, names in (("diaginertia", DIAGONAL_FIRST[:3]), ("fullinertia", DIAGONAL_FIRST)):
             if e.get(key) is not None:
-                numbers = e.get(key, "").split()
-                at.numbers(key, e.get(key))
-                if len(numbers) != len(names):
-                    raise at.error(key, f"{len(numbers)} numbers", len(names))
-                texts |= dict(zip(names, numbers, strict=True))
+                at.numbers(key, e.get(key), len(names))
+                texts |= dict(zip(names, e.get(key, "").split(), strict=True))
         return Inertial(mass, place, *printed(texts))
 
     def _every(self, section: str) -> Iterator[tuple[int, Element]]:
@@ -286,7 +283,7 @@ class _Reader:
         text = values.get("springlength", "-1")
         rest = at.numbers("springlength", text)
         if not 1 <= len(rest) <= 2:
-            raise at.error("springlength", quote(text), "1 or 2 numbers")
+            raise at.error("springlength", text, "1 or 2 numbers")
         ends, terms = [], []
         if e.tag == "fixed":
             terms = self._fixed(xml.named(self.file, e), at)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from cli.formats.drawn import GROUND, Drawing, Drive, Exact, Slide, damaged, direction, exact, place
+from cli.formats.drawn import GROUND, Drawing, Drive, Exact, Slide, damaged, direction, exact, objects, place
 from dalembert.errors import DataError
 
 LENGTHS = ("mm", "cm", "m", "in", "ft")
@@ -43,12 +43,7 @@ class _Reader:
 
     def entries(self, key: str) -> list[dict[str, Any]]:
         """Return the objects of a list, or of an object by their ids."""
-        value = self.data.get(key) or []
-        if isinstance(value, dict):
-            value = [{"id": k} | v if isinstance(v, dict) else v for k, v in value.items()]
-        if not isinstance(value, list) or not all(isinstance(e, dict) for e in value):
-            raise damaged(self.file, key, type(value).__name__, "a list of objects")
-        return value
+        return objects(self.file, key, self.data.get(key))
 
     def joint_ids(self, where: str, ids: list[Any]) -> list[str]:
         """Return ids of joints, each of which must be in the file."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cli.formats.markup import At
+from cli.read.turning import along, turned
 from dalembert.errors import DataError
 
 if TYPE_CHECKING:
@@ -108,7 +109,6 @@ class Robot:
     """A robot of a file; `couplings` are sums of joint coordinates that stay as they are."""
 
     file: str
-    format: str
     name: str
     links: dict[str, RobotLink] = field(default_factory=dict)
     joints: dict[str, RobotJoint] = field(default_factory=dict)
@@ -168,23 +168,13 @@ def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), rotation: Array | None = None) -> Arr
     return made
 
 
-def about(axis: int, angle: float) -> Array:
-    """Return the rotation about one of the axes x, y, z (0, 1, 2), rad.
+def rpy(*angles: float) -> Array:
+    """Return the rotation by fixed axes x, y, z in that order (URDF, SDF).
 
-    >>> about(2, np.pi / 2).round(9)[0]
+    >>> rpy(0, 0, np.pi / 2).round(9)[0]
     array([ 0., -1.,  0.])
     """
-    c, s = np.cos(angle), np.sin(angle)
-    made = np.eye(3)
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    made[i, i] = made[j, j] = c
-    made[i, j], made[j, i] = -s, s
-    return made
-
-
-def rpy(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the rotation by fixed axes x, y, z in that order (URDF, SDF)."""
-    return np.asarray(about(2, yaw) @ about(1, pitch) @ about(0, roll))
+    return turned(((axis, np.cos(angle), np.sin(angle)) for axis, angle in enumerate(angles)), np.eye(3))
 
 
 def rotation(at: At, wxyz: Sequence[float]) -> Array:
@@ -194,13 +184,6 @@ def rotation(at: At, wxyz: Sequence[float]) -> Array:
     from rigidbody3d.attitude import to_matrix
 
     return np.asarray(to_matrix(wxyz) / np.dot(wxyz, wxyz))
-
-
-def _about(direction: Array, angle: float) -> Array:
-    """Return the rotation about a direction of length 1, rad."""
-    from rigidbody3d.attitude import from_vector, to_matrix
-
-    return to_matrix(from_vector(angle * direction))
 
 
 def half_unit(word: str) -> float:
@@ -255,7 +238,7 @@ class Frames:
     def __post_init__(self) -> None:
         """Check the axes."""
         if len(self.sequence) != 3 or not set(self.sequence.lower()) <= set("xyz"):
-            raise At(self.file, "compiler").error("", f"eulerseq '{self.sequence}'", "three of x, y, z")
+            raise At(self.file, "compiler").error("eulerseq", self.sequence, "three of x, y, z")
 
     def angle(self, value: float) -> float:
         """Return an angle of the file in rad."""
@@ -265,33 +248,27 @@ class Frames:
         """Return the pose that pos and one of quat, euler, axisangle, xyaxes, zaxis give."""
         at = At(self.file, where)
         place = at.numbers("pos", e.get("pos"), 3, (0.0, 0.0, 0.0))
-        turned = np.eye(3)
+        turn = np.eye(3)
         if "quat" in e:
-            turned = rotation(at, at.numbers("quat", e["quat"], 4))
+            turn = rotation(at, at.numbers("quat", e["quat"], 4))
         elif "euler" in e:
             for axis, angle in zip(self.sequence, at.numbers("euler", e["euler"], 3), strict=True):
-                one = about("xyz".index(axis.lower()), self.angle(angle))
-                turned = turned @ one if axis.islower() else one @ turned
+                value = self.angle(angle)
+                one = [("xyz".index(axis.lower()), np.cos(value), np.sin(value))]
+                turn = turn @ turned(one, np.eye(3)) if axis.islower() else turned(one, turn)
         elif "axisangle" in e:
+            from rigidbody3d.attitude import from_vector
+
             *v, angle = at.numbers("axisangle", e["axisangle"], 4)
-            turned = _about(at.direction("axisangle", v), self.angle(angle))
+            turn = rotation(at, from_vector(self.angle(angle) * at.direction("axisangle", v)).tolist())
         elif "xyaxes" in e:
             v = at.numbers("xyaxes", e["xyaxes"], 6)
             x = at.direction("xyaxes", v[:3])
             y = at.direction("xyaxes", np.array(v[3:]) - x * (x @ v[3:]))
-            turned = np.column_stack([x, y, np.cross(x, y)])
+            turn = np.column_stack([x, y, np.cross(x, y)])
         elif "zaxis" in e:
-            turned = _onto(at.direction("zaxis", at.numbers("zaxis", e["zaxis"], 3)))
-        return pose(place, turned)
-
-
-def _onto(z: Array) -> Array:
-    """Return the least rotation that turns the z-axis onto a direction."""
-    axis = np.cross([0.0, 0.0, 1.0], z)
-    s, c = float(np.linalg.norm(axis)), float(z[2])
-    if s < 1e-15:
-        return np.eye(3) if c > 0 else about(0, np.pi)
-    return _about(axis / s, np.arctan2(s, c))
+            turn = along(at.direction("zaxis", at.numbers("zaxis", e["zaxis"], 3))[None])[0]
+        return pose(place, turn)
 
 
 # of a shape with neither mass nor density, kg/m³
@@ -346,11 +323,11 @@ def mass_of_shapes(
         if "fromto" in values:
             ends = np.array(at.numbers("geom fromto", values["fromto"], 6)).reshape(2, 3)
             way = ends[1] - ends[0]
-            here = pose(ends.mean(axis=0), _onto(at.direction("geom fromto", way)))
+            here = pose(ends.mean(axis=0), along(at.direction("geom fromto", way)[None])[0])
             # across it has one size, whatever its shape
             size = size[:1] * (SIZES[shape] - 1) + [float(np.linalg.norm(way)) / 2]
         if len(size) < SIZES[shape] or min(size[: SIZES[shape]]) <= 0:
-            raise at.error("geom size", len(size), f"{SIZES[shape]} above zero")
+            raise at.error("geom size", values.get("size", ""), f"{SIZES[shape]} above zero")
         whole = solid(shape, size[: SIZES[shape]])
         density = at.number("geom density", values.get("density", str(DENSITY)))
         mass = at.number("geom mass", values.get("mass", repr(density * float(whole.mass))))

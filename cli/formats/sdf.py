@@ -64,7 +64,7 @@ def read(file: str, root: Element) -> Robot:
     if not models:
         raise DataError(f"{file}: <sdf>: no <model>")
     model = next((e for e in models if xml.child(e, "joint") is not None), models[0])
-    robot = Robot(file, "SDF", model.get("name", ""), notes=xml.passed_over(root, READ))
+    robot = Robot(file, model.get("name", ""), notes=xml.passed_over(root, READ))
     if len(models) > 1:
         others = ", ".join(e.get("name", "without a name") for e in models if e is not model)
         robot.notes.append(f"models left out: {others}")
@@ -118,7 +118,7 @@ class _Model:
         self.at[MODEL] = read_pose(xml.At(file, "model"), xml.child(self.element, "pose"))
         for e in xml.children(self.element, "model", "include"):
             robot.notes.append(
-                f"<{xml.plain(e)}> in the model: left out: nested models and included files are not read"
+                f"<{e.tag}> in the model: left out: nested models and included files are not read"
             )
         static = xml.text(self.element, "static") in ("true", "1")
         if static:
@@ -154,9 +154,9 @@ class _Model:
         base = "" if pose is None else pose.get("relative_to", "")
         if not base:
             base = MODEL
-            if xml.plain(e) == "joint":
+            if e.tag == "joint":
                 base = _named_text(xml.At(self.file, f"joint '{name}'"), e, "child")
-            elif xml.plain(e) == "frame":
+            elif e.tag == "frame":
                 base = e.get("attached_to") or MODEL
         self.at[name] = self.frame(base, at) @ read_pose(at, pose)
         return self.at[name]
@@ -164,12 +164,12 @@ class _Model:
     def holder(self, name: str, at: xml.At) -> str:
         """Return the link that holds a frame: a frame that is attached to none is the model's, and so its first link's."""
         passed: set[str] = set()
-        while name in self.frames and xml.plain(self.frames[name]) != "link":
+        while name in self.frames and self.frames[name].tag != "link":
             if name in passed:
                 raise DataError(f"{self.file}: {at.where}: the frame '{name}' is attached to itself")
             passed.add(name)
             e = self.frames[name]
-            name = (xml.text(e, "child") if xml.plain(e) == "joint" else e.get("attached_to")) or MODEL
+            name = (xml.text(e, "child") if e.tag == "joint" else e.get("attached_to")) or MODEL
         first = self.element.get("canonical_link") or next(
             iter(n for n in self.robot.links if n != WORLD), ""
         )
@@ -257,7 +257,7 @@ def read_joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
     )
     mimic = xml.child(axis, "mimic")
     if mimic is not None:
-        words = {xml.plain(inner): inner.text or "" for inner in mimic}
+        words = {inner.tag: inner.text or "" for inner in mimic}
         robot.mimic(name, xml.named(robot.file, mimic, "joint"), words)
 
 

@@ -57,7 +57,7 @@ class _Joint(NamedTuple):
 
 def read(file: str, root: Element) -> Robot:
     """Read a `<robot>`."""
-    robot = Robot(file, "URDF", root.get("name", ""), notes=xml.passed_over(root, READ))
+    robot = Robot(file, root.get("name", ""), notes=xml.passed_over(root, READ))
     joints = list(xml.children(root, "joint"))
     for e in xml.children(root, "link"):
         name, at = xml.placed(file, e)
@@ -121,7 +121,7 @@ def _shapes(at: xml.At, link: Element) -> list[tuple[Array, float]]:
                 if shape.get(key) is not None
             ]
             size = [x for key, n in sizes for x in at.numbers(key, shape.get(key), n)]
-            radius = sphere_around(xml.plain(shape), size)
+            radius = sphere_around(shape.tag, size)
             if radius is None:
                 return []
             shapes.append((origin(at, xml.child(e, "origin"))[:3, 3], radius))

@@ -90,7 +90,7 @@ def read_positions(path: str, phase_lag: bool) -> Positions:
     if quantity not in table.numbers:
         raise DataError(
             f"{table.file}: no column unbalance_g_mm (or amplitude_um …): expected unbalance_* with angle_*, or "
-            f"amplitude_* with phase_deg {table.told}"
+            f"amplitude_* with phase_deg {table.hint}"
         )
     size, angle = (
         table.numbers[quantity],

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from struct import error, unpack_from
 
-MAGIC = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 ROW, COLUMN, SHEET, STYLE, FORMAT, END = 0x208, 0x7D, 0x85, 0xE0, 0x41E, 0x0A
 NUMBER, SHORT, SHORTS, FORMULA = 0x203, 0x27E, 0xBD, 0x06
 TEXTS, SPAN = (0xFD, 0x204, 0x205), 0x200

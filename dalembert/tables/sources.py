@@ -121,13 +121,13 @@ class Source:
             return
         used = set(columns)
         top = next(islice(self.everything(), self.above, None))[0] - 1
-        self._tell_unseen(used, top)
+        self._warn_of_unseen(used, top)
         for (row, column), (value, expected) in sorted(self.sheet.faults.items()):
             if row >= top and column in used:
                 raise self.sheet.error((row, column), value, expected)
 
-    def _tell_unseen(self, used: set[int], top: int) -> None:
-        """Remark hidden rows, hidden columns and percentages that take part."""
+    def _warn_of_unseen(self, used: set[int], top: int) -> None:
+        """Warn of hidden rows, hidden columns and percentages that take part."""
         assert self.sheet is not None
         from dalembert.tables.workbooks import address, letters
 
@@ -149,7 +149,7 @@ class Source:
                 f"{'s' * many}, and read as the number{'s' * many} behind: 50 % is 0.5"
             )
 
-    def told(self, unread: Sequence[Heading], missed: Mapping[str, str], texts: Sequence[str]) -> str:
+    def hint(self, unread: Sequence[Heading], missed: Mapping[str, str], texts: Sequence[str]) -> str:
         """Return the hint for a missing column: the header, columns of a similar meaning, and the other sheets."""
         parts = [f"the header is: {', '.join(self.header)}"]
         if offered := offers(unread, missed, texts):

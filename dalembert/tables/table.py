@@ -104,7 +104,7 @@ class Table:
     cells: dict[str, Cells] = field(default_factory=dict)
     marks: dict[tuple[int, str], str] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
-    told: str = ""
+    hint: str = ""
     """Description of the file where a column is missing: its header, and which columns may be meant."""
     _source: Source | None = None
     _numbered: dict[str, tuple[list[str], NDArray[np.intp]]] = field(default_factory=dict)
@@ -160,7 +160,7 @@ class Table:
     def needed(self, name: str) -> list[str]:
         """Return a column of texts, or say that the table lacks it."""
         if name not in self.texts:
-            raise DataError(f"{self.file}: no column {name} {self.told}")
+            raise DataError(f"{self.file}: no column {name} {self.hint}")
         return self.texts[name]
 
     def named(self, name: str, otherwise: str = "1") -> list[str]:
@@ -170,7 +170,7 @@ class Table:
     def require(self, quantity: str, dimension: str) -> Numbers:
         """Return a column of numbers, or say that the table lacks it."""
         if quantity not in self.numbers:
-            raise DataError(f"{self.file}: no column {spellings(quantity, dimension)} {self.told}")
+            raise DataError(f"{self.file}: no column {spellings(quantity, dimension)} {self.hint}")
         return self.numbers[quantity]
 
 
@@ -265,10 +265,10 @@ def read(
             + (f"; to read: {' '.join(offered)}" if offered else "")
         )
     source.check_cells(used)
-    note = source.told(extra, missed, missed_texts)
+    hint = source.hint(extra, missed, missed_texts)
 
     def begun() -> Table:
-        return Table(source.file, source.header, 0, warnings=source.warnings, told=note, _source=source)
+        return Table(source.file, source.header, 0, warnings=source.warnings, hint=hint, _source=source)
 
     table = begun()
     if not (source.large and _read_large(source, table, columns, marker)):

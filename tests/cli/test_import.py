@@ -381,7 +381,7 @@ def test_limits_of_strokes_and_turns_are_named() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "of no known kind: expected pmks-text"),
+        ("", "the file is empty: expected a mechanism of another program"),
         ("hello world", "of no known kind"),
         ("<html/>", "of no known kind"),
         ("\0\1\2", "of no known kind"),

@@ -381,6 +381,25 @@ def test_an_equality_that_its_default_switches_off_is_left_out() -> None:
     assert any("left out: it is not active" in note for note in taken(off)[1])
 
 
+@pytest.mark.parametrize("text", [SDF, URDF.format(loop=LOOPS["gazebo"]), MJCF], ids=["sdf", "urdf", "mjcf"])
+def test_name_spaces_and_encodings_change_nothing(text: str) -> None:
+    ours = text.replace("crank", "Kürbel").replace("AB", "Kürbel")
+    root = re.search("<(robot|sdf|mujoco) ", ours)
+    assert root is not None
+    spaced = ours.replace(root[0], f'{root[0]}xmlns="http://example.org" ')
+    expected = taken(ours)
+    for data in (
+        spaced.encode(),
+        ours.encode("cp1252"),
+        ours.encode("utf-16"),
+        ours.encode("utf-8-sig"),
+        ours.replace(root[0], f"<!-- {root[0]}> -->\n{root[0]}").encode(),
+    ):
+        _, (drawing,) = read("file", data, None)
+        (part,) = settle(drawing)
+        assert (Mechanism.from_toml_text(described(part, "test")), drawing.notes + part.notes) == expected
+
+
 def test_default_sections_of_mjcf_add_up() -> None:
     """Files that are included bring sections of their own."""
     split = '<default><geom size=".1"/></default><worldbody>'
@@ -435,7 +454,7 @@ def test_bombs_and_entities_are_refused(text: str, root: str) -> None:
         (URDF.format(loop="").replace('xyz="0 0 0.2"', 'xyz="0 0 ${2*0.1}"'), "joint 'B', origin xyz: found '${2*0.1}', expected a finite number"),
         (URDF.format(loop="").replace('xyz="0 0 0.2"', 'xyz="0 0 nan"'), "joint 'B', origin xyz: found 'nan', expected a finite number"),
         (URDF.format(loop="").replace('xyz="0 0 0.2"', 'xyz="0 0.2"'), "joint 'B', origin xyz: found '0 0.2', expected 3 numbers"),
-        (URDF.format(loop="").replace('xyz="0 -1 0"', 'xyz="0 0 0"'), "joint 'A', axis: found 0 0 0, expected a direction"),
+        (URDF.format(loop="").replace('xyz="0 -1 0"', 'xyz="0 0 0"'), "joint 'A', axis: found '0 0 0', expected a direction"),
         (URDF.format(loop='<joint name="X" type="fixed"><parent link="rocker"/><child link="base"/></joint>'), "every link is the child of a joint"),
         ("<sdf version='1.9'/>", "<sdf>: no <model>"),
         (SDF.replace("<parent>AB</parent>", ""), "joint 'B': <parent> is missing"),
@@ -444,13 +463,13 @@ def test_bombs_and_entities_are_refused(text: str, root: str) -> None:
         (MJCF.replace('class="rail"/></body>', 'class="none"/></body>'), "no default class is called 'none'"),
         (MJCF.replace('body2="piston"', 'body2="none"'), "no link is called 'none'"),
         (MJCF.replace('joint="hip"', 'joint="none"'), "no joint is called 'none'"),
-        (MJCF.replace('euler="0 20 0"', 'quat="0 0 0 0"'), "body 'rod': found 0 0 0 0, expected a quaternion"),
+        (MJCF.replace('euler="0 20 0"', 'quat="0 0 0 0"'), "body 'rod': found '0 0 0 0', expected a quaternion"),
         ("<mujoco>" + "<frame>" * 200 + "</frame>" * 200 + "</mujoco>", "nested more than 100 deep"),
         (MJCF.replace("<actuator>", '<tendon><fixed name="t" stiffness="3" springlength=""/></tendon><actuator>', 1), "tendon 't', springlength: found '', expected 1 or 2 numbers"),
         ("<robot name='r'><link name='a'><visual><geometry><cylinder radius='1 2' length='1'/></geometry></visual></link></robot>", "link 'a', radius: found '1 2', expected 1 number"),
         (MJCF.replace("<actuator>", '<tendon><spatial class="none" stiffness="3"/></tendon><actuator>', 1), "<spatial>: no default class is called 'none'"),
         (MJCF.replace("<actuator>", '<tendon><fixed class="none"/></tendon><actuator>', 1), "<fixed>: no default class is called 'none'"),
-        ('<mujoco><worldbody><body name="a"><joint name="j"/><geom size=".1" mass="-2"/></body></worldbody></mujoco>', "body 'a', geom mass: found -2, expected one of zero or more"),
+        ('<mujoco><worldbody><body name="a"><joint name="j"/><geom size=".1" mass="-2"/></body></worldbody></mujoco>', "body 'a', geom mass: found '-2', expected one of zero or more"),
         ("<html/>", "of no known kind: expected pmks-text"),
     ],
 )  # fmt: skip

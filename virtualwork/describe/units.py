@@ -15,10 +15,10 @@ LONGEST = 60
 
 
 def wrong(where: str, value: Any, expected: str) -> DescriptionError:
-    """The complaint that something else was expected."""
-    found = repr(value)
-    found = found if len(found) <= LONGEST else f"{found[: LONGEST - 3]}..."
-    return DescriptionError(f"{where}: found {found}, expected {expected}")
+    """The error of a value: its place, the value, and the expected one."""
+    shown = repr(value)
+    shown = shown if len(shown) <= LONGEST else f"{shown[: LONGEST - 3]}..."
+    return DescriptionError(f"{where}: found {shown}, expected {expected}")
 
 
 # the dimension of a table's column, the factor of its unit, what is written in its cells, and their numbers in SI

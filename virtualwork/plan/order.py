@@ -87,7 +87,6 @@ class _Planner:
         self.nodes: set[str] = set()
         self.slides_known: set[int] = set()
         self.directions: dict[int, Any] = {i: Vector.of((i, "direction")) for i in range(len(m.guides))}
-        self.guide_nodes: dict[int, str] = {}
         # (joint, body) already spent to place a body or to close a loop
         self.used: set[tuple[str, str]] = set()
         # long chains: what is done is not looked through again for every block
@@ -110,31 +109,24 @@ class _Planner:
         for body, points in self.points.items():
             for name, z in points.items():
                 self._place(name, body, z)
-        for i in range(len(self.m.guides)):
-            self._guide_node(i)
+        for g in self.m.guides:
+            self._place(g.point, g.link, self.points[g.link][g.point])
         return Plan(
             tuple(self.steps),
             self.anchors,
             {body: angle for body, angle in self.angles.items() if isinstance(body, str)},
             self.directions,
             self.blocks,
-            self.guide_nodes,
         )
 
     # --- points -------------------------------------------------------------------------------------------
-    def _place(self, node: str, body: str, z: Any) -> str:
+    def _place(self, node: str, body: str, z: Any) -> None:
+        """Place a point that is not placed yet, where its body is."""
         if node not in self.nodes and body in self.anchors:
             base, terms = self.anchors[body]
             self.steps.append(Place(node, base, longer(terms, Term(z, body))))
             self.nodes.add(node)
             self.used.add((node, body))
-        return node
-
-    def _guide_node(self, i: int) -> str:
-        """The point of guide i's link that runs in it: `link.point`."""
-        g = self.m.guides[i]
-        self.guide_nodes[i] = g.point
-        return self._place(g.point, g.link, self.points[g.link][g.point])
 
     # --- one block ----------------------------------------------------------------------------------------
     def _block(self, block: tuple[Variable, ...]) -> None:

@@ -243,7 +243,6 @@ class Plan:
     angles: Mapping[str, Angle]
     directions: Mapping[int, complex]
     blocks: Blocks
-    guide_nodes: Mapping[int, str] = field(default_factory=dict)
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:

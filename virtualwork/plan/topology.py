@@ -1,7 +1,7 @@
 """The topology of a mechanism: what its order of solution depends on, the plan kept for it, and which equations go together.
 
 Which links meet, which points of a link lie at the same place, how angles are tied: no length is in it. A plan is made
-once for a topology, with its vectors written down in the names of the points (`order.Vector`); a mechanism puts its numbers in.
+once for a topology, with its vectors written down in the names of the points (`sums.Vector`); a mechanism puts its numbers in.
 
 The equations of the joints and the coordinates they hold form a bipartite graph; its Dulmage-Mendelsohn decomposition
 (A. L. Dulmage, N. S. Mendelsohn, Can. J. Math. 10 (1958) 517) is unique, and says what is solved together.

@@ -100,7 +100,7 @@ class _Reading:
         if not sizes and not files:
             raise DataError(
                 f"{table.file}: no column trial_mass_kg (or trial_mass_g, trial_unbalance_g_mm …): expected trial masses, "
-                f"or stored coefficients by --influence {table.told}"
+                f"or stored coefficients by --influence {table.hint}"
             )
         size = sizes[0] if sizes else Cells("", files[0].unit, [""] * table.rows)
         names, rotor = table.numbered("rotor", "1")
@@ -132,7 +132,7 @@ class _Reading:
                 f"{table.file}: the column use is the keeper's own mark: every row takes part in the fit"
             )
         if "run" not in table.texts and not (of_log or self.files):
-            raise DataError(f"{table.file}: no column run {table.told}")
+            raise DataError(f"{table.file}: no column run {table.hint}")
         run_names, run = table.numbered("run", "initial")
         if "run" in table.texts or not of_log:
             self.masses.check_runs(run_names, run)
