@@ -130,16 +130,16 @@ def read_exercise(path: str) -> Exercise:
     place = _Place(file)
     place.known(table, KEYS, "")
     words = _command(place, place.text(table, "command", 'such as "balance rotor.csv --plane A:20mm"'))
-    title = place.text(table, "title", "the exercise's name", otherwise=Path(path).stem)
+    title = place.text(table, "title", "the exercise's name", otherwise="") or Path(path).stem
     text = place.text(table, "text", "what the student reads", otherwise="")
     figure = place.text(table, "figure", "the name of a picture", otherwise="") or None
     source = place.text(table, "source", "where the exercise comes from", otherwise="")
     folder = Path() if path == "-" else Path(path).parent
     if figure is not None:
         if Path(figure).suffix.lower() not in (".svg", ".png"):
-            raise place.error("figure", figure, "a picture, .svg or .png")
+            raise place.error("key figure", figure, "a picture, .svg or .png")
         if not folder.joinpath(figure).is_file():
-            raise place.error("figure", figure, f"a file in the folder of {file}")
+            raise place.error("key figure", figure, f"a file in the folder of {file}")
     draws = tuple(_draws(place, table.get("draw", {})))
     asks = tuple(_asks(place, table.get("ask")))
     return Exercise(file, folder, words, title, text, figure, source, draws, asks)
@@ -274,7 +274,7 @@ def _asks(place: _Place, entries: object) -> Iterator[Ask]:
     for k, table in enumerate(entries, 1):
         where = f"[[ask]] {k}"
         place.known(table, ASK, where)
-        quantity = table.get("quantity")
+        quantity = table.get("quantity", "")
         if not isinstance(quantity, str) or not quantity.strip():
             raise place.error(
                 f"{where}, key quantity", quantity, 'a column of the command\'s table, such as "mass_kg"'
@@ -371,27 +371,30 @@ class Solved:
 
     def _column(self, place: str, ask: Ask) -> tuple[Table, Column, tuple[str, Fraction] | None]:
         """Return the table and column asked for, and what turns its numbers into the unit asked for."""
+        by_unit = f"{place}, key unit: found {quote(ask.unit)}"
         for table in self.tables:
             for column in table.columns:
                 if ask.quantity.lower() in (column.header.lower(), column.name.lower()):
-                    return table, column, self._scale(place, ask, column, ask.unit)
+                    return table, column, self._scale(by_unit, column, ask.unit)
         base, unit = parted(ask.quantity)
         for table in self.tables:
             for column in table.columns:
                 if unit and column.unit and column.name.lower() == base.lower():
-                    return table, column, self._scale(place, ask, column, ask.unit or unit)
+                    own = self._scale(f"{place}, key quantity: found {quote(ask.quantity)}", column, unit)
+                    return table, column, self._scale(by_unit, column, ask.unit) if ask.unit else own
         every = [column.header for table in self.tables for column in table.columns if column.unit]
         raise DataError(
             f"{place}, key quantity: found {quote(ask.quantity)}, expected a column of the result: "
             f"{', '.join(dict.fromkeys(every))}{nearest(ask.quantity, every)}"
         )
 
-    def _scale(self, place: str, ask: Ask, column: Column, unit: str) -> tuple[str, Fraction] | None:
+    @staticmethod
+    def _scale(found: str, column: Column, unit: str) -> tuple[str, Fraction] | None:
         if not unit or unit_name(unit) == column.unit:
             return None
         own, wanted = composed(column.unit), composed(unit)
         if own is None or wanted is None or own[1] != wanted[1]:
-            raise DataError(f"{place}, key unit: found {quote(unit)}, expected a unit of {column.header}")
+            raise DataError(f"{found}, expected a unit of {column.header}")
         (n, d), (wn, wd) = own[0], wanted[0]
         return unit, Fraction(n) / Fraction(d) * Fraction(wd) / Fraction(wn)
 

@@ -31,17 +31,16 @@ def moodle(
     for student, variant in zip(students, variants, strict=True):
         first.setdefault(variant, student)
     for k, ask in enumerate(exercise.asks):
-        lines += _category(f"{exercise.title}/{k + 1} {label(ask)}", exercise)
+        lines += _category(f"{k + 1} {label(ask)}", exercise)
         for variant, student in first.items():
             name = f"{exercise.title}: {label(ask)}" + (f" ({student.name})" if exercise.draws else "")
             lines += _moodle_question(name, variant, slips[variant][k], drawings[variant])
     return "\n".join([*lines, "</quiz>", ""]).encode()
 
 
-def _category(path: str, exercise: Exercise) -> list[str]:
+def _category(name: str, exercise: Exercise) -> list[str]:
     # a slash parts categories, two are one
-    parts = path.split("/", 1)
-    safe = "/".join(part.replace("/", "//") for part in parts)
+    safe = "/".join(part.replace("/", "//") for part in (exercise.title, name))
     return [
         '<question type="category">',
         f"  <category><text>{_text(f'$course$/top/{safe}')}</text></category>",

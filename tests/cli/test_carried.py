@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from tests.cli.test_exercise import PENDULUM
 from tests.cli.test_grade_measured import BAR, RUNS
 
 
@@ -174,21 +175,7 @@ def test_the_same_slip_twice_is_one(dalembert: Any, tmp_path: Path) -> None:
     assert grade(dalembert, tmp_path, speaking, questions[1:3], answers[1:3]) == ["wrong", "wrong"]
 
 
-BEAM = """
-gravity = [0, -10]
-[ground]
-O = [0, 0]
-[links.arm]
-points = { O = [0, 0] }
-mass = 2
-center = [0.5, 0]
-inertia = 0.3
-[input]
-link = "arm"
-angle = "30 deg"
-speed = "4 rad/s"
-acceleration = "6 rad/s2"
-"""
+BEAM = PENDULUM.replace('"-90 deg"', '"30 deg"\nspeed = "4 rad/s"\nacceleration = "6 rad/s2"')
 BEAM_ASKS = ("input_torque_N_m", "O_ground_on_arm_fx_N", "O_ground_on_arm_fy_N")
 
 

@@ -141,6 +141,16 @@ def test_a_name_that_is_no_quantity_is_refused(dalembert: Dalembert, tmp_path: P
         assert f"[[ask]] 1, key quantity: found '{name}', expected a column of the result: " in done.stderr
 
 
+def test_a_column_in_another_dimension_is_refused(dalembert: Dalembert, folder: Path) -> None:
+    """The key `unit` does not make metres of a mass right."""
+    for unit in ("", 'unit = "kg"\n'):
+        (folder / "e.toml").write_text(EXERCISE.replace('"mass_kg"\n', f'"mass_m"\n{unit}', 1))
+        done = dalembert("exercise", "e.toml", "-o", "out")
+        assert done.returncode == 1
+        assert "key quantity: found 'mass_m', expected a unit of mass_kg" in done.stderr
+        assert not (folder / "out").exists()
+
+
 def test_the_same_seed_is_the_same_folder_and_another_is_not(dalembert: Dalembert, folder: Path) -> None:
     for name, seed in (("one", 5), ("two", 5), ("three", 6)):
         assert dalembert("exercise", "e.toml", "--students", 3, "--seed", seed, "-o", name).returncode == 0
@@ -199,6 +209,16 @@ def moodle_takes(question: ET.Element, value: float) -> tuple[float, str]:
         if nominal - tolerance - slack <= value <= nominal + tolerance + slack:
             return float(answer.get("fraction", "")), answer.findtext("feedback/text") or ""
     return 0.0, ""
+
+
+def test_a_slash_of_a_title_parts_no_category_of_moodle(dalembert: Dalembert, folder: Path) -> None:
+    """Of the bank's path each part is a category, and two slashes are one of its name; an empty title is the file's name."""
+    for title, name in (("Balance 1/2", "Balance 1//2"), ("", "e")):
+        (folder / "e.toml").write_text(EXERCISE.replace('title = "A rotor"', f'title = "{title}"'))
+        assert dalembert("exercise", "e.toml", "-o", "out").returncode == 0
+        quiz = ET.parse(folder / "out" / "moodle.xml").getroot()
+        path = quiz.findtext("question[@type='category']/category/text")
+        assert path == f"$course$/top/{name}/1 mass (plane B)"
 
 
 def test_moodles_questions(dalembert: Dalembert, folder: Path) -> None:
@@ -341,16 +361,16 @@ def test_a_radius_that_is_sought(dalembert: Dalembert, folder: Path) -> None:
 
 
 PENDULUM = """
-gravity = [0, -9.81]
+gravity = [0, -10]
 [ground]
 O = [0, 0]
-[links.rod]
+[links.arm]
 points = { O = [0, 0] }
 mass = 2
 center = [0.5, 0]
-inertia = 0.1
+inertia = 0.3
 [input]
-link = "rod"
+link = "arm"
 angle = "-90 deg"
 """
 
@@ -358,7 +378,7 @@ angle = "-90 deg"
 def test_rows_without_a_key_and_a_key_that_is_called_quantity(dalembert: Dalembert, tmp_path: Path) -> None:
     """A compound pendulum: T = 2π √((I + m·r²)/(m·g·r)); its mobility is a row of a table that has a column quantity."""
     (tmp_path / "p.toml").write_text(PENDULUM)
-    period = f"{2 * math.pi * math.sqrt(0.6 / 9.81):.3g}"
+    period = f"{2 * math.pi * math.sqrt(0.8 / 10):.3g}"
     for command, quantity, where, answer in (
         ("equilibrium", "period_s", 'stable = "true"', period),
         ("inspect", "value", 'quantity = "mobility"', "1.00"),
