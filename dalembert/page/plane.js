@@ -186,15 +186,10 @@ function centreTable(on) {
   $("centres")?.remove();
   centreCells = undefined;
   if (!on) return;
-  const scroll = put($("values"), "div", { class: "scroll", id: "centres" });
-  const element = put(scroll, "table");
-  put(element, "caption", {}, TEXTS.instantCentres);
-  const head = put(put(element, "thead"), "tr");
-  for (const text of ["", ...pointHeads]) put(head, "th", {}, text);
-  const body = put(element, "tbody");
+  const rows = grid($("values"), TEXTS.instantCentres, ["", ...pointHeads]);
+  rows.box.id = "centres";
   centreCells = pairs.map(([a, b]) => {
-    const row = put(body, "tr");
-    put(row, "th", {}, `${whole.bodies[a].name} / ${whole.bodies[b].name}`);
+    const row = rows.row(`${whole.bodies[a].name} / ${whole.bodies[b].name}`);
     return [put(row, "td"), put(row, "td")];
   });
 }
