@@ -214,7 +214,7 @@ def solve_columns(cols: list[list[Number]], right: list[Number]) -> list[Number]
 
 
 def solve_determined(cols: list[list[Number]], right: list[Number]) -> list[Number]:
-    """The same where J is singular in every pose: what a null vector of J moves is not determined, and NaN."""
+    """Solve as `solve_columns` where J is singular in every pose: what a null vector of J moves is not determined, and NaN."""
     shape = np.broadcast_shapes(*(np.shape(c) for row in cols for c in row), *(np.shape(w) for w in right))
     n = int(np.prod(shape))
     jacobian, w = stack(cols, n), stack_rows(right, n)
