@@ -177,7 +177,7 @@ def quick(a: Any, b: Any, *low: Any) -> Doubled:
 
 
 def settled(high: Any, low: Any) -> Doubled:
-    """The same number with low below half a unit in the last place of high: a cancellation leaves it above."""
+    """This number with low below half a unit in the last place of high: a cancellation leaves it above."""
     return quick(high, low)
 
 

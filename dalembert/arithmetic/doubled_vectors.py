@@ -142,7 +142,7 @@ class Vectors:
         return Vectors(total(self.x, axis), total(self.y, axis))
 
     def swapped(self) -> Vectors:
-        """The same with its last two axes exchanged."""
+        """The vectors with their last two axes exchanged."""
         parts = ((x.high, x.low + 0.0 * x.high) for x in (self.x, self.y))
         return Vectors(*(Doubled(*(np.swapaxes(each, -1, -2) for each in pair)) for pair in parts))
 

@@ -52,11 +52,11 @@ class Recorder:
         return number
 
     def pair(self, kind: str, a: int, b: int) -> int:
-        """The same of a sum or product, whose arguments may change places."""
+        """The node of a sum or product, whose arguments may change places."""
         return self.node(kind, a, b) if a <= b else self.node(kind, b, a)
 
     def difference(self, a: int, b: int) -> Real:
-        """a − b; b − a, where that is known, with the other sign."""
+        """a − b; or b − a with the other sign, if that is recorded."""
         turned = self._known.get(("sub", b, a))
         return Real(self, self.node("sub", a, b)) if turned is None else Real(self, turned, True)
 

@@ -203,7 +203,7 @@ def performed(name: str, values: list[Any], kind: Kind) -> Any:
 def reached(
     operations: Sequence[Operation], outputs: Iterable[int], inputs: Container[int] = frozenset()
 ) -> list[int]:
-    """The operations that some depend on, in order, they too; what is known depends on nothing."""
+    """The operations that `outputs` depend on, in order, themselves included; `inputs` depend on nothing."""
     wanted = set(outputs)
     last = max(wanted, default=-1)
     marks = bytearray(last + 1)

@@ -96,15 +96,10 @@ function build() {
   $("entries").querySelectorAll(".scroll").forEach((one) => one.remove());
   inputs.clear();
   for (const [r, rotor] of sheet.rotors.entries()) {
-    const scroll = put($("entries"), "div", { class: "scroll" });
-    const table = put(scroll, "table", { class: "cells" });
-    put(table, "caption", {}, sheet.rotors.length > 1 ? TEXTS.massesOf(rotor.name) : TEXTS.masses);
-    const head = put(put(table, "thead"), "tr");
-    for (const text of ["", ...sheet.columns.map((c) => `${TEXTS[c.name]}, ${c.unit}`), ""]) put(head, "th", { scope: "col" }, text);
-    const body = put(table, "tbody");
+    const caption = sheet.rotors.length > 1 ? TEXTS.massesOf(rotor.name) : TEXTS.masses;
+    const table = grid($("entries"), caption, ["", ...sheet.columns.map((c) => `${TEXTS[c.name]}, ${c.unit}`), ""], { class: "cells" });
     for (const row of sheet.rows[r]) {
-      const line = put(body, "tr");
-      put(line, "th", { scope: "row" }, row);
+      const line = table.row(row);
       for (const { name, kind, unit } of sheet.columns) cell(put(line, "td"), cellName(rotor, row, name), kind, unit, rulesOf(name));
       const away = put(put(line, "td"), "button", { type: "button", "aria-label": TEXTS.removeRow(row), title: TEXTS.removeRow(row) }, "×");
       away.addEventListener("click", () => {
@@ -117,7 +112,7 @@ function build() {
         build();
       });
     }
-    const add = put(scroll, "button", { type: "button", class: "add" }, TEXTS.addRow);
+    const add = put(table.box, "button", { type: "button", class: "add" }, TEXTS.addRow);
     add.addEventListener("click", () => {
       remember();
       let k = sheet.rows[r].length + 1;

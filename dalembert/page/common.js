@@ -16,6 +16,23 @@ function put(parent, ...rest) {
 function svgIn(host) {
   return put(host, "svg", { role: "img" });
 }
+// a table with its heads, in a box of its own that scrolls; `row` of it is a row with its name
+function grid(host, caption, heads, attributes = {}) {
+  const box = put(host, "div", { class: "scroll" });
+  const table = put(box, "table", attributes);
+  if (caption) put(table, "caption", {}, caption);
+  const head = put(put(table, "thead"), "tr");
+  for (const text of heads) put(head, "th", { scope: "col" }, text);
+  const body = put(table, "tbody");
+  return {
+    box,
+    row(name, attributes) {
+      const line = put(body, "tr", attributes);
+      put(line, "th", { scope: "row" }, name);
+      return line;
+    },
+  };
+}
 // one unit of a picture is one pixel of the screen: words keep their size on a phone
 function sized(svg, width, height) {
   for (const [key, value] of Object.entries({ width, height, viewBox: `0 0 ${width} ${height}` })) svg.setAttribute(key, value);

@@ -173,8 +173,11 @@ function drawCentres(i) {
     const fields = [...field(a, i), ...field(b, i)];
     // what is at rest against each other has no centre
     const real = fields.every(Number.isFinite) && fields.some((x) => x !== 0);
-    const far = !(Math.hypot(x, y) < 1e6 * (right - left + high - low));
-    centreCells?.[k].forEach((cell, axis) => (cell.textContent = real ? (far ? "∞" : short([x, y][axis] / lengths)) : "–"));
+    const reach = right - left + high - low;
+    const far = !(Math.hypot(x, y) < 1e6 * reach);
+    // what is smaller is the rounding of zero
+    const shownPart = (part) => short(Math.abs(part) < 1e-12 * reach ? 0 : part / lengths);
+    centreCells?.[k].forEach((cell, axis) => (cell.textContent = real ? (far ? "∞" : shownPart([x, y][axis])) : "–"));
     if (!(u > -20 && u < width + 20 && v > -20 && v < height + 20)) continue;
     d += `M${fixed(u - 5, v - 5)}L${fixed(u + 5, v + 5)}M${fixed(u - 5, v + 5)}L${fixed(u + 5, v - 5)}`;
     const text = `${whole.bodies[a].name} / ${whole.bodies[b].name}`;
@@ -186,15 +189,10 @@ function centreTable(on) {
   $("centres")?.remove();
   centreCells = undefined;
   if (!on) return;
-  const scroll = put($("values"), "div", { class: "scroll", id: "centres" });
-  const element = put(scroll, "table");
-  put(element, "caption", {}, TEXTS.instantCentres);
-  const head = put(put(element, "thead"), "tr");
-  for (const text of ["", ...pointHeads]) put(head, "th", {}, text);
-  const body = put(element, "tbody");
+  const rows = grid($("values"), TEXTS.instantCentres, ["", ...pointHeads]);
+  rows.box.id = "centres";
   centreCells = pairs.map(([a, b]) => {
-    const row = put(body, "tr");
-    put(row, "th", {}, `${whole.bodies[a].name} / ${whole.bodies[b].name}`);
+    const row = rows.row(`${whole.bodies[a].name} / ${whole.bodies[b].name}`);
     return [put(row, "td"), put(row, "td")];
   });
 }

@@ -116,16 +116,10 @@ function toggle(key, words, on, change, possible = true) {
 // --- the table of a pose ----------------------------------------------------------------------------------------------
 // rows: [name, [column or null, ...]]; the columns marked exact show every digit
 function table(caption, heads, rows, exactly, more) {
-  const scroll = put($("values"), "div", { class: "scroll" });
-  const element = put(scroll, "table");
-  put(element, "caption", {}, caption);
-  const head = put(put(element, "thead"), "tr");
-  for (const text of ["", ...heads]) put(head, "th", { scope: "col" }, text);
-  const body = put(element, "tbody");
+  const shownRows = grid($("values"), caption, ["", ...heads]);
   const cells = [];
   for (const [name, columns] of rows) {
-    const row = put(body, "tr", { "data-name": name });
-    put(row, "th", { scope: "row" }, name);
+    const row = shownRows.row(name, { "data-name": name });
     for (const [k, column] of columns.entries()) cells.push([put(row, "td"), column, exactly(k)]);
     if (more) more(row, name);
   }

@@ -120,14 +120,9 @@ function start() {
 }
 // a table of answers
 function answerTable(host, caption, heads, rows) {
-  const table = put(put(host, "div", { class: "scroll" }), "table");
-  put(table, "caption", {}, caption);
-  const head = put(put(table, "thead"), "tr");
-  for (const text of heads) put(head, "th", { scope: "col" }, text);
-  const body = put(table, "tbody");
+  const table = grid(host, caption, heads);
   for (const [name, ...cells] of rows) {
-    const line = put(body, "tr");
-    put(line, "th", { scope: "row" }, name);
+    const line = table.row(name);
     for (const text of cells) put(line, "td", {}, text);
   }
 }

@@ -121,7 +121,7 @@ def number(
     place
         Where it stands in a row of the JSON document, without its unit; by default under its name, None: not in JSON.
     exact
-        The same numbers in 32 digits: the errors are by what those shown differ from them.
+        The numbers in 32 digits: the error of a shown number is its difference from them.
 
     Examples
     --------

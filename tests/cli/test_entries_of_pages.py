@@ -143,6 +143,8 @@ def test_zero_of_exact_numbers_is_shown_as_zero(dalembert: Dalembert, tmp_path: 
     page = Computing(browser, tmp_path / "e.html")
     assert page.table("Links")["rod"][1] == "0"
     assert page.table("Joint forces")["B: ground on piston"][1] == "0"
+    page.press("i")
+    assert page.table("Instant centres")["crank / piston"] == ["0.045", "0"]
     page.set(1)
     assert float(page.table("Links")["rod"][1]) == pytest.approx(page.get("rod.omega"), rel=1e-5)
     assert page.faults() == []

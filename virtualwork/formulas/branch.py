@@ -72,7 +72,7 @@ class Branch(Protocol):
 
     @property
     def may_open(self) -> bool:
-        """Whether it cannot be assembled somewhere in what was covered, as far as is known."""
+        """Whether it may not be assembled somewhere in the covered range."""
 
     @property
     def signs(self) -> Mapping[str, int]:

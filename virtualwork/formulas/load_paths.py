@@ -264,7 +264,7 @@ class LoadPaths:
         return next(iter(self._known[key]))  # type: ignore[return-value]
 
     def side(self, side: Side) -> Combination:
-        """The force of a joint on a body: the reaction of one that is known, or a row of its own."""
+        """The force of a joint on a body: the reaction of a joint that is solved, or a row of its own."""
         if side not in self._sides:
             self._sides[side] = self._side(side)
         return self._sides[side]

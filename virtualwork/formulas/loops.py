@@ -45,7 +45,7 @@ class Margin(Everywhere, kind="margin"):
 
     def write(self, recording: Recording) -> Number:
         of = recording.solved(self.group)
-        # of a group that enters nothing else is known
+        # a group that enters the tape has no margin on it
         return 0.0 if recording.enters(of) else recording.st.margin[of.name]
 
 

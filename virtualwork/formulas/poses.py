@@ -136,7 +136,7 @@ class Poses:
         return [v[:, j] for j in range(k)]
 
     def again(self, inputs: Reals, rates: list[list[Number]] | None = None) -> Self:
-        """The same assembly at other inputs (n, k), at rest or with other rates of them."""
+        """The assembly at other inputs (n, k), at rest or with other rates of them."""
         other = type(self)(self.branch, inputs if inputs.shape[1] > 1 else inputs[:, 0], 0.0, 0.0, 0.0)
         if rates is not None:
             other.rates = rates
@@ -157,7 +157,7 @@ class Poses:
     def assembled(self) -> NDArray[np.bool_]:
         """(n,) bool: which poses can be assembled."""
         finite: NDArray[np.bool_] = np.asarray(np.isfinite(self.inputs).all(axis=1))
-        # what opens is known once the inputs are looked over
+        # only the inputs show which loops open
         self.cover()
         if not self.branch.may_open:
             return finite

@@ -150,7 +150,7 @@ class Quantity(tuple[Any, ...]):
         return _names(self)
 
     def of_order(self, order: int) -> Self:
-        """The same differentiated so often; the order is its last field."""
+        """This quantity differentiated `order` times; the order is its last field."""
         return type(self)(*self[1:-1], order)
 
     @property

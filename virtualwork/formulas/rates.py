@@ -105,7 +105,7 @@ class Rates:
         return v
 
     def advance(self, steps: Iterable[Step], k: int) -> None:
-        """Carry steps on to derivatives of order k; the lower orders are known."""
+        """Carry steps on to derivatives of order k, from those of the lower orders."""
         for step in steps:
             if isinstance(step, Place):
                 _put(self.point, step.node, k, self.vector((step.base, step.terms), k))

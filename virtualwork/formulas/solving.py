@@ -241,8 +241,8 @@ class Solving(Poses):
         return Statics(forces.joints, entries, self.n, self.lock)
 
     def _doubts(self, keys: tuple[Quantity, ...]) -> tuple[Quantity, ...]:
-        """What tells where quantities cannot be had, or not from the tape."""
-        # what opens is known once the inputs are looked over
+        """The quantities that show where others have no value, or none from the tape."""
+        # only the inputs show which loops open
         enters, recording = self.enters, self.recording
         name = keys, self.branch.may_open
         if name not in recording.doubts:

@@ -45,7 +45,7 @@ def recorded(branch: Branch, moves: tuple[bool, ...]) -> Recording:
 
 
 def entered(branch: Branch, moves: tuple[bool, ...]) -> Entering:
-    """The same where groups enter that have no closed form, are singular in every pose or have a change point."""
+    """The recording that groups enter: those without a closed form, singular in every pose, or with a change point."""
     changes = () if branch.passage is None else branch.passage.changes
     names = frozenset(g.name for g in branch.plan.groups if g.kind == "Newton").union(branch.folded, changes)
     key = "entering", names, moves, branch.turning_over

@@ -267,7 +267,7 @@ def anew() -> None:
 
 
 def compiled_code() -> bool:
-    """Whether LLVM's code may run here, as far as is known without loading it."""
+    """Whether LLVM's code may run here, as far as one can say without loading it."""
     from importlib.util import find_spec
 
     return find_spec("llvmlite") is not None

@@ -171,7 +171,7 @@ def _rows(names: tuple[str, ...], of: Mapping[str, Any], n: int) -> Reals:
 
 
 def _on_blocks(loop: Loop, constants: Reals, state: Reals, fed: Reals) -> tuple[Reals, Reals]:
-    """The same by numpy, on the lanes that still go on."""
+    """Run the rounds by numpy, on the lanes that still go on."""
     tape, state = loop.whole, state.copy()
     places = {name: i for i, name in enumerate(loop.states)}
     every = (*loop.states, *loop.constants, *loop.fed)

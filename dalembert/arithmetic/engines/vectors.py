@@ -50,11 +50,11 @@ class Vectors:
         self._made: dict[str, Any] = {}
 
     def constant(self, value: float) -> ir.Constant:
-        """The same double in every lane."""
+        """One double in every lane."""
         return ir.Constant(self.vector, [value] * self.width)
 
     def integer(self, value: int) -> ir.Constant:
-        """The same whole number in every lane."""
+        """One whole number in every lane."""
         return ir.Constant(self.longs, [value] * self.width)
 
     def intrinsic(self, b: ir.IRBuilder, name: str, *arguments: ir.Value) -> ir.Value:
