@@ -95,11 +95,8 @@ def followed(
     sizes = {group.name: len(group.angles) + len(group.slides) for group in written.iterated}
     signs_of = {group.name: np.ones(n) for group in written.closed}
     unknowns = {name: np.full((n, k, u), np.nan) for name, u in sizes.items()}
-    decided, m, nodes = (
-        np.zeros(n, dtype=bool),
-        own.mechanism,
-        nodes_of(own, float(low.min()), float(high.max())),
-    )
+    decided, m = np.zeros(n, dtype=bool), own.mechanism
+    nodes = nodes_of(own, float(low.min()), float(high.max()))
     if not nodes:
         return signs_of, unknowns, decided
     each = max(1, LANES // max(k, *(len(q) for q, _ in nodes.values())))
