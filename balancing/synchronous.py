@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from balancing.marks import Marks, floats, marks
 from dalembert.arithmetic.records import record
-from dalembert.arithmetic.shapes import as_array, filled, in_32_digits, is_doubled
+from dalembert.arithmetic.shapes import filled, in_32_digits, is_doubled
 from dalembert.dataclass import dataclass, field, replace
 
 Real = NDArray[np.float64]
@@ -22,8 +23,6 @@ BLOCK = 8192
 """Samples that are worked on together."""
 SUDDEN = 1.5
 """No speed changes by this factor from one pulse of a mark to the next."""
-FEWEST, MOST = 7, 255
-"""Marks in a row that one cubic is fitted to."""
 
 
 @record
@@ -73,186 +72,6 @@ class OncePerTurn:
             t, signal, mark = map(in_32_digits, (t, signal, mark))
             exact = t, signal, mark, pulses, None if tacho is None else in_32_digits(tacho)
         return _averaged(*exact)
-
-
-class Marks(NamedTuple):
-    """When a mark rises."""
-
-    at: Any
-    """(n,), s."""
-    low: Any
-    """When it rises at the earliest, (n,), s: the last low sample."""
-    high: Any
-    """When it rises at the latest, (n,), s: the first high sample."""
-    even: bool = False
-    """Whether the distances from each to the next are alike."""
-
-    def slack(self, place: float) -> Any:
-        """Return by how much they may all be shifted at a place among them, to either side, s; the first one is at 0."""
-        if not len(self.at):
-            return 0.0
-        if not self.even:
-            apart = self.high - self.low
-            return apart[apart.argmax()] / 2
-        # other even marks lie elsewhere there
-        last, k = len(self.at) - 1, np.arange(len(self.at)) - place
-        line = self.at[0] + (self.at[-1] - self.at[0]) * (place / last)
-        return max(line - _envelope(k, self.low), -_envelope(k, -self.high) - line, key=float)
-
-    def resolution(self, middle: float, pulses: int) -> Any:
-        """Return by how much they may shift the vectors of turns of so many marks, to either side, s; `middle`: that of all turns.
-
-        The vector of a turn is shifted as its middle is. A distance that is wrong by δ shifts it by pulses/(4π) δ more, as the mean
-        of (θ − π) sin²(θ + φ) over a turn is −sin(2φ)/4.
-        """
-        beside = pulses / (4 * np.pi)
-        return max(self.slack(middle - beside), self.slack(middle + beside), key=float)
-
-
-def marks(t: ArrayLike, mark: ArrayLike) -> Marks:
-    """Find the times at which a mark rises through half its height.
-
-    A mark of two levels, noise aside, rises somewhere between its last low sample and its first high one: in the middle, half
-    an interval either way. Where the marks are even within the samples they are taken as even, in the middle of what all of
-    them allow; where they lie on cubics within the samples, on these. Any other mark rises between two samples by linear
-    interpolation, which a bend of the mark puts in doubt.
-
-    >>> one, other = marks([0, 1, 2, 3], [0, 0, 1, 0]), marks([0, 1, 2, 3], [0, 0, 3, 4])
-    >>> one.at, float(one.slack(0)), other.at.round(9), float(other.slack(0))
-    (array([1.5]), 0.5, array([1.66666667]), 0.125)
-    """
-    time, level = as_array(t), as_array(mark)
-    nearest = _floats(level)
-    low, high = level[nearest.argmin()], level[nearest.argmax()]
-    half = (low + high) / 2
-    # decisions are those of floats
-    rises = np.flatnonzero((nearest[:-1] < float(half)) & (nearest[1:] >= float(half)))
-    share = (nearest - float(low)) / (float(high - low) or 1.0)
-    if ((share > 0.1) & (share < 0.9)).sum() <= 0.2 * len(rises):
-        rises = rises + 1
-        falls = np.flatnonzero((nearest[:-1] >= float(half)) & (nearest[1:] < float(half))) + 1
-        whole = rises[rises < falls[-1:].max(initial=0)]
-        lengths = falls[np.searchsorted(falls, whole, side="right")] - whole
-        first = 1.0
-        if nearest[0] >= float(half) and len(lengths) and falls[0] >= lengths.min():
-            # the recording begins with a whole pulse; as short as any other, it may lack its first sample
-            rises = np.concatenate([[0], rises])
-            first += float(falls[0] == lengths.min())
-        before = np.concatenate([time[:1] - (time[1:2] - time[:1]) * first, time[:-1]])
-        return _even(before[rises], time[rises])
-    # a line errs by up to an eighth of the second differences beside it
-    last = len(level) - 1
-    rise, long = level[rises + 1] - level[rises], time[rises + 1] - time[rises]
-    before, after = level[np.maximum(rises - 1, 0)], level[np.minimum(rises + 2, last)]
-    bend = np.maximum(abs(rise - level[rises] + before), abs(after - level[rises + 1] - rise))
-    at, off = time[rises] + (half - level[rises]) / rise * long, np.minimum(bend / rise / 8, 0.5) * long
-    return Marks(at, at - off, at + off)
-
-
-def _floats(x: Any) -> Any:
-    """The floats nearest to numbers: what decides is taken from them in the second run too."""
-    return x.value if is_doubled(x) else x
-
-
-def _even(low: Any, high: Any) -> Marks:
-    """Return marks that each lie in an interval as even ones, where they can be."""
-    middle = (low + high) / 2
-    each = Marks(middle, low, high)
-    if len(middle) < 3:
-        return each
-    k = np.arange(len(middle)) - (len(middle) - 1) / 2
-    start, wide = float(k @ _floats(middle) / (k @ k)), 4 * float(each.slack(0)) / len(k)
-    slope = _roomiest(k, low, high, start - wide, start + wide)
-    below, above = low - slope * k, high - slope * k
-    first, last = below[below.argmax()], above[above.argmin()]
-    if not first < last:
-        return _on_cubics(each, slope * k)
-    return Marks((first + last) / 2 + slope * k, low, high, even=True)
-
-
-def _on_cubics(marks: Marks, line: Any) -> Marks:
-    """Return marks where cubics through the middles of their intervals pass, if all pass these, rounding of samples aside.
-
-    Each mark has a cubic of its own, through the most marks around it (A. Savitzky, M. J. E. Golay, Anal. Chem. 36 (1964)
-    1627-1639). The cubics are fitted to the distances from a `line`.
-    """
-    n = len(line)
-    wide, off = min(n, MOST), marks.at - line
-    room = _floats(marks.high - marks.low) / 2
-    while wide >= FEWEST:
-        q = np.linalg.qr(np.vander(np.linspace(-1, 1, wide), 4))[0]
-        begin = np.clip(np.arange(n) - wide // 2, 0, n - wide)
-        weights = (q @ q.T)[np.arange(n) - begin]
-        fitted = (off[begin[:, None] + np.arange(wide)] * weights).sum(axis=-1)
-        if (np.abs(_floats(fitted - off)) <= 1.5 * room).all():
-            return marks._replace(at=np.minimum(np.maximum(fitted + line, marks.low), marks.high))
-        wide //= 2
-    return marks
-
-
-def _envelope(k: Any, y: Any) -> Any:
-    """Return the height over k = 0 of the upper hull of points (k, y): no line above all of them passes lower."""
-    height = _floats(y)
-    left, right = 0, len(k) - 1
-    for _ in k:
-        slope = (height[right] - height[left]) / (k[right] - k[left])
-        top = int((height - slope * k).argmax())
-        # a point above the line through two of them takes the place of the one on its side
-        if top in (left, right) or not height[top] - slope * k[top] > height[left] - slope * k[left]:
-            break
-        left, right = (top, right) if k[top] <= 0 else (left, top)
-    return (y[left] * k[right] - y[right] * k[left]) / (k[right] - k[left])
-
-
-def _roomiest(k: Any, low: Any, high: Any, least: float, most: float) -> Any:
-    """Return the distance from mark to mark, between two, that leaves most room: min (high − slope·k) − max (low − slope·k).
-
-    It is concave, and linear between bends: the lines of both sides meet above it, and closer with each line there (J. E.
-    Kelley, J. SIAM 8 (1960) 703-712).
-    """
-
-    def edges(slope: Any) -> tuple[int, int]:
-        return int((low - slope * k).argmax()), int((high - slope * k).argmin())
-
-    def room(ends: tuple[int, int], slope: Any) -> Any:
-        i, j = ends
-        return (high[j] - low[i]) - slope * (k[j] - k[i])
-
-    def fall(ends: tuple[int, int]) -> float:
-        return float(k[ends[1]] - k[ends[0]])
-
-    zero = 0.0 * low[0]
-
-    def meeting(a: tuple[int, int], b: tuple[int, int]) -> Any:
-        return (room(a, zero) - room(b, zero)) / (fall(a) - fall(b))
-
-    def bend(side: tuple[int, int], top: tuple[int, int]) -> Any:
-        """Where the room stops to be that of a level line, on one side."""
-        slope = meeting(side, top)
-        for _ in k:
-            here = edges(slope)
-            if not room(side, slope) - room(here, slope) > 0 or not fall(here):
-                break
-            side, slope = here, meeting(here, top)
-        return slope
-
-    left, right = edges(least + zero), edges(most + zero)
-    if fall(left) >= 0 or fall(right) <= 0:
-        return (least if fall(left) >= 0 else most) + zero
-    slope = zero
-    for _ in range(4 * len(k)):
-        slope = meeting(left, right)
-        here = edges(slope)
-        if not room(left, slope) - room(here, slope) > 0:
-            break
-        if not fall(here):
-            # one interval bounds the room alone: the middle of where it does
-            return (bend(left, here) + bend(right, here)) / 2
-        if fall(here) < 0:
-            left = here
-        else:
-            right = here
-    return slope
 
 
 def once_per_turn(
@@ -330,7 +149,7 @@ def _averaged(time: Any, x: Any, level: Any, pulses: int, tacho: Any) -> OncePer
         knots, at, pulses, resolution = _counted(time, tacho, rises)
     else:
         knots, at = rises.at, rises.at[::pulses]
-        _require_each(_floats(knots))
+        _require_each(floats(knots))
         resolution = rises.resolution((len(at) - 1) * pulses / 2, pulses)
     each = at[1:] - at[:-1]
     vectors = _turns(time, x, at, knots, pulses)
@@ -360,33 +179,33 @@ def _require_each(knots: Real) -> None:
     if len(odd):
         k = int(odd[0])
         raise ValueError(
-            f"from the pulse at {knots[k + 1]:g} s to the next it takes {1 / faster[k]:.3g} times as long as to it: one was missed "
-            "between two samples, or noise was taken for one: expected a mark of two levels, each longer than a sample"
+            f"the interval after the pulse at {knots[k + 1]:g} s is {1 / faster[k]:.3g} times the one before it: a pulse was missed "
+            "between two samples, or noise was counted as one: expected even pulses longer than a sample, at a speed that changes slowly"
         )
 
 
 def _counted(time: Any, tacho: Any, rises: Marks) -> tuple[Any, Any, int, Any]:
     """Return the times of a tacho's pulses, the marks between them, how many pulses a turn has, and the resolution, s."""
-    if tacho.shape != time.shape or not np.isfinite(_floats(tacho)).all():
+    if tacho.shape != time.shape or not np.isfinite(floats(tacho)).all():
         raise ValueError("the tacho must be finite, a value for each time")
     pulse = marks(time, tacho)
     knots = pulse.at
     if len(knots) < 2:
         raise ValueError(f"the tacho rises {len(knots)} times: expected several pulses in each turn")
-    places = _floats(knots)
-    within = np.flatnonzero((_floats(rises.at) >= places[0]) & (_floats(rises.at) <= places[-1]))
+    places = floats(knots)
+    within = np.flatnonzero((floats(rises.at) >= places[0]) & (floats(rises.at) <= places[-1]))
     at = rises.at[within]
     if len(at) < 2:
         raise ValueError("the tacho has no whole turn from mark to mark")
     # pulses and marks may coincide: their whole number between marks is the rounded mean
-    passed = np.interp(_floats(at), places, np.arange(len(places)))
+    passed = np.interp(floats(at), places, np.arange(len(places)))
     pulses = round(float(passed[-1] - passed[0]) / (len(at) - 1))
     odd = np.flatnonzero(np.abs(np.diff(passed) - pulses) > 0.5)
     if pulses < 1 or len(odd):
         k = int(odd[0]) if len(odd) else 0
         period = float(passed[k + 1] - passed[k])
         raise ValueError(
-            f"the turn at {_floats(at)[k]:g} s has {period:.3g} pulses of the tacho: expected {max(pulses, 1)}, as others"
+            f"the turn at {floats(at)[k]:g} s has {period:.3g} pulses of the tacho: expected {max(pulses, 1)}, as others"
         )
     # turns begin at marks; from there on the pulses give the angle
     begin = float(passed[:-1].mean())
@@ -396,7 +215,7 @@ def _counted(time: Any, tacho: Any, rises: Marks) -> tuple[Any, Any, int, Any]:
 
 def _turns(t: Any, x: Any, at: Any, knots: Any, pulses: int) -> Any:
     """Return the first order of every turn between marks, (turns, s); the angle grows evenly from pulse to pulse."""
-    places, starts = _floats(t), _floats(at)
+    places, starts = floats(t), floats(at)
     first = np.searchsorted(places, starts)
     samples = np.diff(first)
     short = np.flatnonzero(samples < 4)
@@ -426,7 +245,7 @@ def _interpolated(t: Any, knots: Any) -> Any:
 
     Each is the mean of the two parabolas through three pulses that share its part, the nearer one with more weight.
     """
-    i = np.clip(np.searchsorted(_floats(knots), _floats(t), side="right") - 1, 0, len(knots) - 2)
+    i = np.clip(np.searchsorted(floats(knots), floats(t), side="right") - 1, 0, len(knots) - 2)
     h = knots[1:] - knots[:-1]
     share = (t - knots[i]) / h[i]
     if len(h) == 1:
@@ -448,8 +267,8 @@ def _first_order(angle: Any, x: Any, there: Any, orders: int) -> Any:
         sines.append(sines[-1] * c + cosines[-2] * s)
     columns = [np.where(there, each, 0.0) for each in (filled(angle.shape, 1.0, angle), *cosines, *sines)]
     rows = np.stack(columns, axis=-1)
-    q, r = np.linalg.qr(_floats(rows))
-    coefficients = np.linalg.solve(r, np.swapaxes(q, -1, -2) @ _floats(x))
+    q, r = np.linalg.qr(floats(rows))
+    coefficients = np.linalg.solve(r, np.swapaxes(q, -1, -2) @ floats(x))
     if is_doubled(rows):
         # the gradient of what is left, in 32 digits, says by how much they are off
         coefficients = in_32_digits(coefficients)

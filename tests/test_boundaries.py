@@ -62,7 +62,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "rotor",
             "synchronous",
         ),
-        ("triangle",),
+        ("marks", "triangle"),
     ),
     "virtualwork": (
         ("__init__",),

@@ -136,7 +136,7 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
 
     return Result(
         tables=tables(balancing),
-        requested=("bearings", "tolerance"),
+        requested=("bearings",) if request.tolerance is None else ("tolerance",),
         beside={} if options.page is None else {options.page: sheet},
         head={"correction": "remove" if options.remove else "add"},
         figure=figure,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from balancing import once_per_turn
-from balancing.synchronous import marks
+from balancing.marks import marks
 
 
 def test_other_orders_and_an_offset_do_not_leak_into_the_first() -> None:
@@ -218,5 +218,5 @@ def test_a_short_pulse_in_few_samples_is_in_doubt() -> None:
 def test_a_pulse_between_two_samples_is_missed_and_named() -> None:
     """A turn that lasts as long as two was taken for one, and half the amplitude was lost."""
     t, angle, x = recording(0.01, 20, 21.3, 0.4)
-    with pytest.raises(ValueError, match=r"takes (2|0\.5)\S* times as long"):
+    with pytest.raises(ValueError, match=r"is (2|0\.5)\S* times the one before it: a pulse was missed"):
         once_per_turn(t, x, angle % (2 * np.pi) < 0.2)
