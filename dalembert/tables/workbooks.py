@@ -5,11 +5,10 @@ from __future__ import annotations
 import io
 import os
 import re
-import sys
 import zipfile
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import date, time, timedelta
 from pathlib import PurePosixPath
@@ -153,20 +152,21 @@ def read_sheet(file: str, data: bytes, wanted: str) -> Sheet:
 @contextmanager
 def _panics() -> Iterator[None]:
     """Raise ValueError where calamine panics over a damaged file, and discard the trace that it prints itself."""
-    sys.stderr.flush()
-    kept, nothing = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nothing, 2)
-    try:
-        yield
-    except BaseException as error:
-        # pyo3 derives it from BaseException and has no name to import it by
-        if type(error).__name__ == "PanicException":
-            raise ValueError(error) from None
-        raise
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nothing)
+    with ExitStack() as stack:
+        # a process may have no standard error
+        with suppress(OSError):
+            kept, nothing = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+            stack.callback(os.close, nothing)
+            stack.callback(os.close, kept)
+            stack.callback(os.dup2, kept, 2)
+            os.dup2(nothing, 2)
+        try:
+            yield
+        except BaseException as error:
+            # pyo3 derives it from BaseException and has no name to import it by
+            if type(error).__name__ == "PanicException":
+                raise ValueError(error) from None
+            raise
 
 
 def _texts(cells: list[list[Any]]) -> list[list[str]]:

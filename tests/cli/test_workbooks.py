@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import subprocess
+import sys
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -318,3 +320,14 @@ def test_a_stray_cell_in_the_last_corner_is_named(dalembert: Dalembert, tmp_path
     done = dalembert("balance", str(tmp_path / "far.xlsx"), *PLANE)
     assert done.returncode == 1
     assert "sheet 'Masses': its cells reach to XFD1048576: expected at most" in done.stderr
+
+
+def test_a_workbook_is_read_where_there_is_no_standard_error(plain: str) -> None:
+    code = "import os; os.close(2); from cli.app import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "balance", str(HERE / "masses.xls"), *PLANE],
+        stdout=subprocess.PIPE,
+        check=True,
+        text=True,
+    )
+    assert done.stdout == plain
