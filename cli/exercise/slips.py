@@ -1,6 +1,7 @@
 """The likely mistake behind a wrong answer: what one slip of a list, or two, make of the right answer.
 
 A slip is named where it alone reproduces the answer to its digits: where two make numbers that round to the answer, none is.
+A whole number with zeros at its end is what a slip makes exactly, if there is one, before it is what others round to.
 An answer of two digits has a name only where a random number would hardly meet a slip; two slips are named only where the
 answer has four digits or more, and a random number would hardly meet a pair.
 """
@@ -132,12 +133,14 @@ class Candidates:
         halves = [float(half) * size for half in number.half_units]
         # zeros at the end of a whole number may stand for digits that were rounded, to the figures asked or to far fewer
         zeros = len(halves) - 1 if halves[-1] > 10 * own else sum(half <= most for half in halves[1:])
-        digits, half = number.digits - zeros, halves[zeros]
-        met = self.met(a, half)
-        if len(met) == 1 and (digits >= SURE or self._chance(a, half) <= CHANCE):
-            return met[0].text
-        if met or digits < SURE or number.digits < DIGITS or self._pairs is None:
-            return None
+        digits = number.digits - zeros
+        if digits < SURE:
+            met = self.met(a, halves[zeros])
+            return met[0].text if len(met) == 1 and self._chance(a, halves[zeros]) <= CHANCE else None
+        # a slip that makes all digits as they were typed goes before those that round to them
+        met = next(filter(None, (self.met(a, half) for half in halves[: zeros + 1])), [])
+        if met or number.digits < DIGITS or self._pairs is None:
+            return met[0].text if len(met) == 1 else None
         return self._of_two(a, halves[0])
 
     def met(self, a: float, half: float) -> list[Slip]:

@@ -137,7 +137,7 @@ LOAD = re.compile(r"(?:forces\.(\d+)\.force|torques\.(\d+)\.torque)(?:\.[xy])?")
 
 
 class Load(NamedTuple):
-    """A load, and its part in every answer; None where it has none that can be told."""
+    """A load, and its part in every answer; None where it has none."""
 
     name: str
     parts: Values

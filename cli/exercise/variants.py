@@ -1,4 +1,4 @@
-"""Variants of an exercise: drawn from steps, only such as assemble, lie away from limits and are well conditioned."""
+"""Variants of an exercise: they can be assembled, lie away from limits and are well conditioned."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def _check_unit(where: str, values: Sequence[Value], kind: str) -> None:
 
 
 def variants(workshop: Workshop, count: int, seed: int, warnings: list[str]) -> list[Variant]:
-    """Draw so many variants; each once, as long as there are enough.
+    """Draw variants, each once as long as there are enough; then they repeat.
 
     Raises
     ------

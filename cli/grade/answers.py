@@ -170,7 +170,7 @@ INVERSE = re.compile(r"1/s(?:\^?2)?|s\^?-[12]")
 
 
 def spelled(unit: str, unit_of_question: str) -> str:
-    """Return a unit as people spell it in the spelling that is read."""
+    """Return a unit in the spelling that is read: `Nm` is `N*m`."""
     unit = unit.translate(SUPERSCRIPTS).replace("²", "2")
     for pattern, plain in SPELLED:
         unit = re.sub(pattern, plain, unit)
