@@ -74,15 +74,13 @@ class _Reader:
         )
         self.shapes = compiler.get("inertiafromgeom", "auto")
         self.total = xml.At(self.file, "compiler").number("settotalmass", compiler.get("settotalmass", "-1"))
-        robot.gravity = np.array([0.0, 0.0, -9.81])
-        for e in xml.children(root, "option"):
-            if e.get("gravity") is not None:
-                robot.gravity = np.array(xml.At(self.file, "option").numbers("gravity", e.get("gravity"), 3))
-        if any(
-            flag.get("gravity") == "disable"
-            for e in xml.children(root, "option")
-            for flag in xml.children(e, "flag")
-        ):
+        options = list(xml.children(root, "option"))
+        flags = [flag for e in options for flag in xml.children(e, "flag")]
+        gravity = next(
+            (text for e in reversed(options) if (text := e.get("gravity")) is not None), "0 0 -9.81"
+        )
+        robot.gravity = np.array(xml.At(self.file, "option").numbers("gravity", gravity, 3))
+        if any(flag.get("gravity") == "disable" for flag in flags):
             robot.gravity = None
         for e in xml.children(root, "default"):
             self._defaults(e, "main", self.classes["main"])
