@@ -168,7 +168,7 @@ def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> 
 
 
 def _in_words(name: str, table: Table) -> list[str]:
-    """Write the rows of a table as sentences, of many the first ones, and what stands below it."""
+    """Write the rows of a table as sentences, of many the first ones, and the sentence below it."""
     from dalembert.results.text import heading, printed
 
     lead = f"{heading(name)}{': ' * bool(table.above)}{table.above}"

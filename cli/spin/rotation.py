@@ -42,7 +42,7 @@ DIMENSIONS = {
 
 
 class Written(NamedTuple):
-    """Numbers of the file, in SI, and what stands there."""
+    """Numbers of the file, in SI, and as the file writes them."""
 
     numbers: Array
     texts: list[Any]
