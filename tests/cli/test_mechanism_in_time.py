@@ -157,6 +157,7 @@ def test_variants_with_an_end_and_points_in_json(dalembert: Dalembert, pendulum:
     assert "variant 1: no mass moves with input 'bob'" in done.stderr
 
 
+@pytest.mark.slow
 def test_variants_by_several_processes_give_the_same_bytes(
     dalembert: Dalembert, pendulum: Path, tmp_path: Path
 ) -> None:

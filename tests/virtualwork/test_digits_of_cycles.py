@@ -78,7 +78,7 @@ def truth(cycle: Cycle, size: tuple[float, ...], turn: bool) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.parametrize("turn", [True, False])
+@pytest.mark.parametrize("turn", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_a_slider_crank(turn: bool) -> None:
     rng = np.random.default_rng(5 + turn)
     pairs: dict[str, list[tuple[float, float]]] = {}

@@ -200,6 +200,7 @@ def test_with_friction_it_ends_close_to_the_flat_pose_with_its_time(lengths: tup
     assert np.abs(run.energy_drift).max() < 1e-7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["numpy", "llvm"])
 def test_too_far_from_the_guess_it_ends_with_its_time(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A block on a rail draws a slotted arm without mass: steadily to 20 000 sizes of the mechanism, and no farther."""

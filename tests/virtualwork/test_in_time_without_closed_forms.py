@@ -85,6 +85,7 @@ def test_a_frame_with_friction_in_every_pin() -> None:
     assert apart(m, 0.6, 6.0, 1e-8, 1e-10) < 5e-8
 
 
+@pytest.mark.slow
 def test_a_chain_that_turns_back_as_a_whole_with_friction() -> None:
     """All joints of the second loop come to rest at one pose: each of them rubs the other way from there on."""
     m = watt(friction=[Friction(name, 0.3, 0.02) for name in "ABCDEFG"])
@@ -101,6 +102,7 @@ def test_a_frame_comes_to_rest_by_friction_and_stays() -> None:
     assert np.abs(run.energy_drift).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_a_torsion_spring_between_links_that_no_input_turns_alone() -> None:
     m = watt(torsion_springs=[TorsionSpring(("coupler", "rocker"), 30.0, 0.5, 0.0)])
     run = m.simulate(np.linspace(0, 1, 21), speed=15.0)
@@ -111,6 +113,7 @@ def test_a_torsion_spring_between_links_that_no_input_turns_alone() -> None:
     assert abs(run.angle[-1, 0] - free.angle[-1, 0]) > 0.01
 
 
+@pytest.mark.slow
 def test_a_gear_of_fractional_ratio_on_a_loop_with_friction() -> None:
     """A wheel that the rocker turns 1.3 times over: its energy is followed, and its friction's work."""
     m = watt()

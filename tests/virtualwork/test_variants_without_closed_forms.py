@@ -126,6 +126,7 @@ def test_no_number_depends_on_how_many_variants_there_are(count):
         assert (np.abs(motion.effort[i] - own) <= known * alone.condition**2 * np.abs(own).max()).all()
 
 
+@pytest.mark.slow
 def test_a_group_that_another_group_drives_and_one_in_closed_form_behind_it():
     # two triads one after the other, and a dyad on the last: the signs behind depend on the unknowns before
     rng = np.random.default_rng(5)
