@@ -71,9 +71,12 @@ def test_ill_conditioned_planes(kappa: float) -> None:
     alpha = q * np.geomspace(1, 1 / kappa, 8) @ np.linalg.qr(noise(rng, 8, 8))[0]
     v = noise(rng, 24)
     if kappa > 1e7:
-        # where masses of 5e7 leave a residual of 1, rounding of the masses alone is more than 1e-9 of it
-        with pytest.raises(NotConverged, match=r"\(condition number 1e\+08\)"):
-            minimax(alpha, v)
+        # where masses of 5e7 leave a residual of 1, rounding of the masses alone is about 1e-9 of it
+        try:
+            reached, is_returned = gap(minimax(alpha, v)), True
+        except NotConverged as error:
+            reached, is_returned = error.gap, False
+        assert is_returned == (reached <= 1e-9)
     else:
         assert gap(minimax(alpha, v)) < 1e-15 * kappa + 1e-12
 

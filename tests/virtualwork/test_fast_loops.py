@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from fractions import Fraction
 
 import mpmath as mp
 import numpy as np
@@ -224,9 +225,10 @@ def pendulum(ratio: float) -> Mechanism:
 
 @pytest.mark.parametrize("ratio", [1.0, 50.0, -720.0, 1000.0, 1440.0, 17.3])
 def test_every_equilibrium_behind_a_gear(ratio: float) -> None:
-    """A pendulum rests upright or hanging: twice a turn of its own."""
+    """A pendulum rests upright or hanging: twice a turn of its own, over the turns of the input that bring it back."""
     found = pendulum(ratio).equilibria().found
-    ends = sorted(1 + ratio * (q - AT) for q in (0.0, 2 * np.pi))
+    turns = Fraction(str(ratio)).denominator
+    ends = sorted(1 + ratio * (q - AT) for q in (0.0, 2 * np.pi * turns))
     n = np.arange(math.ceil(ends[0] / np.pi - 0.5), math.floor(ends[1] / np.pi - 0.5) + 1)
     angles = np.sort([1 + ratio * (e.inputs[0] - AT) for e in found])
     assert angles == pytest.approx(np.pi * (n + 0.5), abs=1e-14 * max(10.0, 8 * abs(ratio)))
