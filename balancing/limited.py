@@ -75,11 +75,11 @@ class NotConverged(ArithmeticError):
 
     def __init__(self, gap: float, condition: float) -> None:
         self.gap, self.condition = gap, condition
-        text = f"no corrections are given out: the best ones that were reached may leave {gap:.2g} of the optimum too much"
+        text = f"the corrections cannot be proven to be the best: the residual may exceed the least one by a share of {gap:.2g}"
         if condition > 1e5:
             text += (
                 f": the planes are nearly dependent (condition number {condition:.2g}), and the rounding of the masses alone "
-                "changes the residuals by as much: leave a plane out, or limit the masses further"
+                "changes the residual by as much: leave a plane out, or limit the masses further"
             )
         super().__init__(text)
 

@@ -386,8 +386,8 @@ class Mechanism(Numbered):
         Parameters
         ----------
         spans : array (k, 2), optional
-            The range of each input, rad or m. Default, also of an input whose row is NaN: the turns after which the
-            loads come back; where none bring them back, a turn either way of the guess, or between the limits; for a slide,
+            The range of each input, rad or m. Default, also of an input whose row is NaN: from 0 on as many turns as the
+            loads need to repeat; where they never repeat, a turn either way of the guess, or between the limits; for a slide,
             two sizes of the mechanism either way.
         samples : int
             The number of samples of a turn of one input, or of a shorter range.

@@ -21,9 +21,9 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Find the positions in which a mechanism rests under its loads without effort, and their stability.
 
     A stable position has its period of small oscillations, without dampers and friction. --over or --cases of an
-    input set the range of the search (default: the turns after which the loads come back, of most mechanisms one; where
-    none bring them back, as where a torsion spring is wound up, one either way of the guess, or the range between the
-    limits; of a slide two sizes of the mechanism either way).
+    input set the range of the search. The default is one turn, or as many turns as the loads need to repeat. Where
+    they never repeat (turns wind up a torsion spring), it is one turn either way of the guess, or the range between
+    the limits; for a slide, two sizes of the mechanism either way.
     """
     from cli.cases.cases import Cases
     from cli.cases.loop import result

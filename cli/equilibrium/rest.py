@@ -56,7 +56,7 @@ class Rest(Case):
 
     @cached_property
     def shown(self) -> list[list[float]]:
-        """Each input at the positions: m, or deg within the turns after which the loads come back, deg as counted where they do not."""
+        """Each input at the positions: m, or deg within the turns after which the loads repeat; deg as counted where they never do."""
         columns = []
         for j, (entry, turns) in enumerate(
             zip(self.analysis.mechanism.inputs, self.equilibria.turns, strict=True)
@@ -120,7 +120,7 @@ class Rest(Case):
             if not (turns or entry.is_slide or j in self.ranged or np.isfinite(m.assembly.reach.range).all()):
                 low, high = (f"{math.degrees(end):.10g}" for end in equilibria.ranges[j])
                 lines.append(
-                    f"no number of turns of {entry.name} brings the loads back: searched from {low} to {high} deg; "
+                    f"the loads do not repeat after whole turns of {entry.name}: searched from {low} to {high} deg; "
                     "--over sets another range"
                 )
         if any(e.stable and e.period is None for e in equilibria.found):

@@ -1,11 +1,11 @@
-"""The motion of a mechanism in time under its loads: its tables, JSON, picture and worked solution; of variants one by one or together."""
+"""The motion of a mechanism in time under its loads, with its table, JSON, picture and page; of variants one by one or together."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -13,43 +13,39 @@ import numpy as np
 from cli.cases.analysis import Analysis
 from cli.cases.axes import input_values
 from cli.cases.case import Case, Study
-from cli.cases.poses import bounds_of, cells, column, in_rows, keys_of, nested
+from cli.cases.poses import bounds_of, keys_of
 from cli.cases.remarks import idle_friction
 from cli.read import options
 from cli.show.commands import ShowOptions
 from cli.show.picture import shown as on_page
 from cli.show.terminal import progress_in_time
-from dalembert.angles import read_degrees
+from cli.simulate.tables import ENERGY, columns_of, documents, drift, inputs_of, trusted, way
 from dalembert.arithmetic.engines import anew
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
-from dalembert.results.columns import Column, Table, document, names, number
-from dalembert.results.way import Topic, figures
+from dalembert.results.columns import Column, Table, names
 from dalembert.tables.files import name_of
 from virtualwork import MechanismError, quantities
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.forces import Shaking
-from virtualwork.quantities import SLIDE, Component
+from virtualwork.quantities import Component
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from cli.cases.cases import Rows
+    from cli.simulate.tables import Values
     from dalembert.results.columns import Document
+    from dalembert.results.way import Topic
     from virtualwork import Mechanism
     from virtualwork.animation import Series
-    from virtualwork.describe.parts import Input
     from virtualwork.intime.run import Run
     from virtualwork.intime.travel import Moved, Travel
 
     Reals = NDArray[np.float64]
-    Values = dict[Component, Reals]
 
 
-# an input's angle and its rates
-INPUT = ("angle_deg", "speed_rad_s", "acceleration_rad_s2")
-ENERGY = Component(("energy_J",), "energy_J")
 METHOD = (
     "Motion under forces: the effort at the inputs by virtual work with d'Alembert's forces is M·q̈ + h; of released inputs "
     "it is zero, and q̈ is integrated in the inputs. Loops are closed at every evaluation. The error is estimated from a "
@@ -260,7 +256,7 @@ class Simulation(Study):
         return self.show.digits or not self.cases.names
 
     def warnings(self) -> list[str]:
-        """Return the names of --only that no released input has."""
+        """Return a warning for each effort among --only: a released input has none."""
         nominal = self.cases.nominal
         efforts = {name for each in nominal.forces if each.path[:1] == ("effort",) for name in each.names}
         names = [name for name in nominal.request.only or () if name in efforts]
@@ -363,93 +359,3 @@ def _lanes(study: Simulation, rows: Rows) -> Iterator[tuple[Case | None, list[st
             ),
             remarks,
         )
-
-
-# --- numbers over time ------------------------------------------------------------------------------------------------
-def inputs_of(m: Mechanism, q: Reals, v: Reals, a: Reals, error: Reals) -> Values:
-    """Return the inputs, their rates and errors (n, k), as they are shown."""
-    result: Values = {}
-    for j, entry in enumerate(m.inputs):
-        lead = f"{entry.name}_input_" if len(m.inputs) > 1 else "input_"
-        values = (q[:, j], v[:, j], a[:, j], error[:, j])
-        if not entry.is_slide:
-            values = (_degrees(q[:, j]), *values[1:3], np.degrees(error[:, j]))
-        unit = "m" if entry.is_slide else "deg"
-        names = *(SLIDE if entry.is_slide else INPUT)[:3], f"error_estimate_{unit}"
-        for name, numbers in zip(names, values, strict=True):
-            header = f"{lead}{unit if name in (SLIDE[0], INPUT[0]) else name}"
-            result[Component(("inputs", entry.name, name), header)] = numbers
-    return result
-
-
-def _degrees(q: Reals) -> Reals:
-    """Return an input in degrees; its first and last value as they are written."""
-    angle = np.degrees(q)
-    for i in {0, len(q) - 1}:
-        angle[i] = read_degrees(float(q[i]))
-    return np.asarray(angle)
-
-
-def _is_error(each: Component) -> bool:
-    return str(each.path[-1]).startswith("error")
-
-
-def trusted(values: Values, unknown: NDArray[np.bool_]) -> Values:
-    """Return the values with NaN where no digit holds; the errors stay, and the energy, which has its own error."""
-    if not unknown.any():
-        return values
-    return {
-        each: of if each == ENERGY or _is_error(each) else np.where(unknown, np.nan, of)
-        for each, of in values.items()
-    }
-
-
-def columns_of(
-    t: Reals, values: Mapping[Component, Reals], error: Callable[[Component], list[float]] | None = None
-) -> list[Column]:
-    """Return the numbers at each time as columns."""
-    columns = [column("t_s", t.tolist())]
-    for each, of in values.items():
-        bounds = None if error is None or _is_error(each) else partial(error, each)
-        columns.append(column(each.header, cells(of), bounds))
-    return columns
-
-
-def documents(t: Reals, values: Values, further: Table) -> Document:
-    """Return the numbers at each time and the integration, for JSON."""
-    numbers = {each: cells(of) for each, of in values.items()}
-    rows = list(in_rows({"t_s": t.tolist(), **nested(numbers, len(t))}, len(t)))
-    return {"time": rows, **document([further])}
-
-
-def drift(change: Reals) -> Column:
-    """Return the largest change of energy that the work of the loads does not explain, with its sign."""
-    finite = change[np.isfinite(change)]
-    return number("energy_drift", "energy", [finite[np.argmax(np.abs(finite))] if len(finite) else np.nan])
-
-
-# --- the worked solution ----------------------------------------------------------------------------------------------
-def way(run: Run, inputs: Sequence[Input]) -> list[Topic]:
-    """Return the equation of motion at the start, and the balance of energy."""
-    q, v, a = (np.asarray(each, dtype=float) for each in (run.angle[0], run.speed[0], run.acceleration[0]))
-    law = [
-        "The inputs are free: by d'Alembert's principle M(q)·q̈ + h(q, q̇, t) = 0, the effort at every input being nothing "
-        "(Riul, unit II, eq. 5, solved for the accelerations).",
-    ]
-    for entry, place, speed, rate in zip(inputs, q.tolist(), v.tolist(), a.tolist(), strict=True):
-        unit = "m" if entry.is_slide else "rad"
-        law.append(
-            f"  at t = {figures(float(run.t[0]))} s: {entry.name} = {figures(place)} {unit}, speed {figures(speed)} {unit}/s, "
-            f"acceleration {figures(rate)} {unit}/s²"
-        )
-    energy = np.asarray(run.energy, dtype=float)
-    first, last = float(energy[0]), float(energy[-1])
-    drift = float(np.abs(run.energy_drift).max())
-    balance = [
-        f"E = T + V (gravity, springs): {figures(first)} J at t = {figures(float(run.t[0]))} s, "
-        f"{figures(last)} J at t = {figures(float(run.t[-1]))} s",
-        f"  E_end − E_start = {figures(last - first)} J is the work of applied loads, dampers and friction; unexplained {figures(drift)} J",
-    ]
-    start = {"angle": q.tolist(), "speed": v.tolist(), "acceleration": a.tolist()}
-    head = {"start_J": first, "end_J": last, "energy_drift_J": drift}
-    return [Topic("start", law, "Equation of motion", start), Topic("energy", balance, "Energy", head)]

@@ -67,7 +67,7 @@ def test_what_is_not_proven_is_refused(dalembert: Dalembert, tmp_path: Path) -> 
             refused += [done.stderr] * done.returncode
     assert proven
     assert refused
-    assert all("no corrections are given out" in text for text in refused)
+    assert all("the corrections cannot be proven" in text for text in refused)
 
 
 def test_the_limit_that_is_named_can_be_met(dalembert: Dalembert, tmp_path: Path) -> None:

@@ -260,7 +260,7 @@ def test_equilibrium_of_gears(dalembert: Dalembert, ratio: str, searched: str | 
     """
     found = run_json(dalembert, "equilibrium", "-", stdin=text)
     at = [e["input_deg"] for e in found["equilibria"]]
-    text_of = "no number of turns of crank brings the loads back: searched {}; --over sets another range"
+    text_of = "the loads do not repeat after whole turns of crank: searched {}; --over sets another range"
     assert found["warnings"] == ([text_of.format(searched)] if searched else [])
     r = float(ratio)
     for x in map(math.radians, at):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib.resources import files
 
 import numpy as np
@@ -124,6 +125,29 @@ def test_no_number_depends_on_how_many_variants_there_are(count):
             assert (apart <= known * alone.condition**order * m.size * scale).all()
         own = alone.effort
         assert (np.abs(motion.effort[i] - own) <= known * alone.condition**2 * np.abs(own).max()).all()
+
+
+def test_mirrored_variants_are_the_mirror_image():
+    m, q = stephenson(), np.arange(0.5, 6.5)
+    sides = {
+        p: -float(m.value(p)) for p, d in m.dimensions.items() if p.endswith(".y") and d.kind == "length"
+    }
+    guess = Guess(
+        tuple(-at for at in m.guess.at),
+        {name: -angle for name, angle in m.guess.angles.items()},
+        {p: np.conj(z) for p, z in m.guess.points.items()},
+    )
+    other = replace(m, guess=guess).changed(sides)
+    lengths = np.linspace(0.0175, 0.0185, 5)
+    own, mirrored = (
+        each.vary({"links.crank.F.x": lengths}).motion(side * q, side * 5.0, side * 2.0)
+        for each, side in ((m, 1), (other, -1))
+    )
+    for order in range(3):
+        right = own.point("E").complex(order)
+        np.testing.assert_allclose(
+            mirrored.point("E").complex(order), right.conj(), rtol=0, atol=1e-13 * np.abs(right).max()
+        )
 
 
 @pytest.mark.slow

@@ -239,8 +239,8 @@ class _Chooser:
             else:
                 continue
             text = (
-                f"[guess] {point or body}: {shown[0]} contradicts the rest of the guess, which takes the assembly of "
-                f"{group.name} with {shown[1]}; the other one has {shown[2]}: correct one of them"
+                f"[guess] {point or body}: {shown[0]} contradicts the other guesses: they select the assembly of "
+                f"{group.name} with {shown[1]}; the other assembly has {shown[2]}: correct one of the guesses"
             )
             # a point of two links once
             self.warnings += [text] if text not in self.warnings else []
@@ -284,7 +284,7 @@ class _Chooser:
             if len(solutions) < 2:
                 continue
             if here is None or not group.members:
-                distances = [self._distance(group, trial) for _, trial in solutions]
+                distances = [sum(self._distances(group, trial).values()) for _, trial in solutions]
             else:
                 turned = complex(np.exp(1j * side * step))
                 distances = [
@@ -330,9 +330,6 @@ class _Chooser:
     def _distances(self, group: Group, st: State) -> dict[tuple[str, str], float]:
         return distances(group, st, self.plan, self.m, self.angles, self.points)
 
-    def _distance(self, group: Group, st: State) -> float:
-        return float(sum(self._distances(group, st).values()))
-
     # --- groups with no closed form -------------------------------------------------------------------------------
     def _newton(self, group: Group, st: State) -> Any:
         # a mechanism whose groups all have a closed form does not load this
@@ -365,21 +362,9 @@ class _Chooser:
             states.append(trial)
         if len(result) > 1 and not informed(self.m, group):
             raise AssemblyError(self._choices(group, states))
-        best = int(np.argmin([self._distance(group, trial) for trial in states]))
+        best = int(np.argmin([sum(self._distances(group, trial).values()) for trial in states]))
         write_unknowns(group, st, result[best][None])
         return result[best]
-
-
-def distance(
-    group: Group,
-    st: State,
-    done: Plan,
-    m: Description,
-    angles: Mapping[str, Number],
-    points: Mapping[str, Number],
-) -> Number:
-    """How far an assembly is from the guess: the sum of the squared distances."""
-    return sum(distances(group, st, done, m, angles, points).values())
 
 
 def distances(

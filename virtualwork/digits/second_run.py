@@ -166,9 +166,9 @@ class SecondRun:
                 keys: list[Quantity] = [Gap(group.name, i) for i in range(len(group.closures))]
                 gap = length([part.value for parts in self.doubled(keys).values() for part in parts])
                 turn = np.sqrt(2 * gap / _shortest(group, self.poses.mechanism.size))
-                for i in range(len(group.angles) + len(group.slides)):
+                for i, name in enumerate(group.unknowns):
                     off = turn if i < len(group.angles) else turn * self.poses.mechanism.size
-                    moved[f"x {group.name} {i}"] = self._unknown(group.name, str(i)) + off
+                    moved[name] = self._unknown(group.name, str(i)) + off
         return moved
 
     # --- what enters ------------------------------------------------------------------------------------------------
@@ -231,7 +231,7 @@ class SecondRun:
         inputs = [f"x {key.group} {key.number}" for key in keys]
         if any(g.name == group for g in self.branch.plan.groups if g.name in self.exact.folded):
             of = next(g for g in self.branch.plan.groups if g.name == group)
-            inputs, keys = [f"x {group} {i}" for i in range(len(of.angles) + len(of.slides))], []
+            inputs, keys = list(of.unknowns), []
         first = self.poses.entering(inputs)
         self._solutions |= {name: Doubled(x) for name, x in first.items()}
         for _ in range(STEPS if keys else 0):

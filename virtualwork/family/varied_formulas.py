@@ -13,7 +13,7 @@ from dalembert.arithmetic.recorded import RECORDED, Recorder, bare
 from dalembert.arithmetic.tape import Tape
 from dalembert.arithmetic.varied import Varied
 from virtualwork.branch.assembly import Assembly
-from virtualwork.branch.guess import distance, sign_of_angles
+from virtualwork.branch.guess import distances, sign_of_angles
 from virtualwork.branch.phases import Phases, with_constants
 from virtualwork.branch.solutions import guessed_slide
 from virtualwork.describe.description import Description, joints_apart, known_by_guess
@@ -344,7 +344,7 @@ class VariedFormulas:
             for sign in (1.0, -1.0):
                 trial = st.copy()
                 case.solve(trial, sign, size)
-                apart.append(distance(group, trial, self.plan, m, angles, points))
+                apart.append(sum(distances(group, trial, self.plan, m, angles, points).values()))
             guessed = sign_of_angles(group, case, st, angles)
             guessed = 1.0 if guessed is None else guessed
             margin = bare(trial.margin[name])
@@ -398,7 +398,7 @@ class VariedFormulas:
                     outputs[f"gap {name} {row}"] = of(bare(gap))
                     outputs.update({f"column {name} {row} {i}": of(bare(along[loop][i])) for i in free})
             put_unknowns(group, st, self.recording.unknowns(group))
-            outputs[f"far {name}"] = distance(group, st, self.plan, m, angles, points)
+            outputs[f"far {name}"] = sum(distances(group, st, self.plan, m, angles, points).values())
 
         run(self.plan.steps, st, close)
         return recorder.tape(outputs)

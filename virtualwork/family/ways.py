@@ -91,11 +91,7 @@ class Ways:
         """Close every group at the guess, as `guess.choose` does, from the unknowns that the guess says."""
         written, m = self.written, self.own.mechanism
         given = {**self.given, "q0": m.at[0]}
-        x = {
-            name: [f"x {name} {i}" for i in range(len(group.angles) + len(group.slides))]
-            for name, group in ((group.name, group) for group in written.iterated)
-        }
-        self.starts = {each: np.full(self.n, np.nan) for names in x.values() for each in names}
+        self.starts = {name: np.full(self.n, np.nan) for group in written.iterated for name in group.unknowns}
         for group in written.iterated:
             choice = run(written.choice, given | self.starts)
             self.given |= {f"sign {g.name}": choice[f"sign {g.name}"] + 0.0 for g in written.closed}
@@ -104,7 +100,7 @@ class Ways:
             fixed, size = self._fixed(group, np.full((1, 1), m.at[0]), there)
             solution, closed = newton(self._loops[group.name], fixed, start, size)
             self.followed &= closed
-            self.starts |= zip(x[group.name], solution.T, strict=True)
+            self.starts |= zip(group.unknowns, solution.T, strict=True)
 
     def _guessed(self, group: Group, guess: Any) -> Reals:
         """The unknowns that the guess says, (n, u); slides of which it says nothing close the loops as nearly as they can."""
@@ -133,13 +129,11 @@ class Ways:
         loops, (fixed, size) = self._loops[name], self._fixed(group, q[None])
         start = np.broadcast_to(nominal, (self.n, m, u)).reshape(-1, u)
         solution, closed = newton(loops, fixed, start, size, limit=8)
-        det, size = (
-            np.sign(np.linalg.det(loops.over(fixed)(solution)[1])).reshape(self.n, m),
-            size.reshape(self.n, m, 1),
-        )
+        det = np.sign(np.linalg.det(loops.over(fixed)(solution)[1])).reshape(self.n, m)
+        size = size.reshape(self.n, m, 1)
         x, here = solution.reshape(self.n, m, u), int(np.searchsorted(q, at))
-        x[:, here] = np.stack([self.starts[f"x {name} {i}"] for i in range(u)], axis=-1)
-        entering = {f"x {name} {i}": x[..., i] for i in range(u)}
+        x[:, here] = np.stack([self.starts[each] for each in group.unknowns], axis=-1)
+        entering = {each: x[..., i] for i, each in enumerate(group.unknowns)}
         tape = self.written.rates(name)
         *rates, regular = run_grid(tape, self._entering(tape.inputs, q[None], entering), (self.n, m))
         rate = np.stack(rates, axis=-1)
@@ -183,9 +177,8 @@ class Ways:
         """The unknowns among what enters a tape, (n, k), at inputs (n or 1, k)."""
         names, result = set(names), dict[str, Reals]()
         for group in self.written.iterated:
-            its = [f"x {group.name} {i}" for i in range(len(group.angles) + len(group.slides))]
-            if not names.isdisjoint(its):
-                result |= zip(its, np.moveaxis(self.unknowns(group, q), 2, 0), strict=True)
+            if not names.isdisjoint(group.unknowns):
+                result |= zip(group.unknowns, np.moveaxis(self.unknowns(group, q), 2, 0), strict=True)
         return result
 
     def _entering(self, names: Iterable[str], q: Reals, unknowns: Mapping[str, Reals]) -> dict[str, Any]:

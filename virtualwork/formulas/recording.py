@@ -134,9 +134,7 @@ class Recording:
 
     def unknowns(self, group: Group) -> list[Number]:
         """The unknowns of a group, angles and then slides, as they enter."""
-        return [
-            self.recorder.input(f"x {group.name} {i}") for i in range(len(group.angles) + len(group.slides))
-        ]
+        return [self.recorder.input(name) for name in group.unknowns]
 
     def step(self, group: Group, st: State) -> list[Number] | None:
         """By how much a group's unknowns that enter are off, to first order; None where they are exact."""

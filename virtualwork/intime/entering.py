@@ -54,9 +54,7 @@ class Placed:
         size = assembly.mechanism.size
         self.larger = [g for g in assembly.plan.groups if g.kind == "Newton"]
         self.scale = {
-            f"x {g.name} {i}": 1.0 if i < len(g.angles) else size
-            for g in self.larger
-            for i in range(len(g.angles) + len(g.slides))
+            name: 1.0 if i < len(g.angles) else size for g in self.larger for i, name in enumerate(g.unknowns)
         }
         self._at: Floats = []
         self._x: dict[str, float] = {}
@@ -88,7 +86,11 @@ class Placed:
         result = self._followed(q) if self._x and not self.crosses() else None
         if result is None:
             st = self.state(q)
-            result = {f"x {g.name} {i}": _one(x) for g in self.larger for i, x in enumerate(unknowns(g, st))}
+            result = {
+                name: _one(x)
+                for g in self.larger
+                for name, x in zip(g.unknowns, unknowns(g, st), strict=True)
+            }
         return result
 
     def _followed(self, q: Floats) -> dict[str, float] | None:

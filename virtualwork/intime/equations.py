@@ -324,7 +324,7 @@ class Equations:
         recording = self.recording(False, False, False, settled=False)
         recording.solve([key for g in larger for key in self.assembly.plan.writes(g)], 0)
         st = recording.st
-        after = {f"x {g.name} {i}": x for g in larger for i, x in enumerate(unknowns(g, st))}
+        after = {name: x for g in larger for name, x in zip(g.unknowns, unknowns(g, st), strict=True)}
         tape = recording.recorder.tape(after)
         known = {name: self._filler(name) for name in tape.inputs if not name.startswith("x ")}
         return Placed(self.assembly, tape, known, lambda: self.crosses)

@@ -186,6 +186,11 @@ class Group:
         return (*self.angles, *(t.body for t in self.ties if isinstance(t.body, str)))
 
     @cached_property
+    def unknowns(self) -> tuple[str, ...]:
+        """The names of its unknowns as inputs of a tape, angles and then slides."""
+        return tuple(f"x {self.name} {i}" for i in range(len(self.angles) + len(self.slides)))
+
+    @cached_property
     def tied_slides(self) -> tuple[int, ...]:
         """The guides whose slide is tied to the unknowns."""
         return tuple(t.body for t in self.ties if isinstance(t.body, int))

@@ -148,7 +148,7 @@ class Equilibria:
     Attributes
     ----------
     turns : tuple of int or None
-        After how many turns of each input the loads come back; None where they do not, and of a slide.
+        After how many turns of each input the loads repeat; None where they never do, and of a slide.
     ranges : tuple of (float, float)
         What was searched of each input, rad or m.
     """
@@ -175,10 +175,10 @@ def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int 
     assembly : Description
         With its gravity, constant and follower forces, torques, springs. Dampers and friction do not act at rest.
     spans : array (k, 2), optional
-        The range of each input, rad or m; it may be one position. Default, also of an input whose row is NaN: the turns,
-        from 0 on, after which the loads come back; a turn either way of the guess where none bring them back, as where a
-        torsion spring is wound up; of a slide two sizes of the mechanism either way, where its loops are no farther from
-        their ends. With torsion springs, and where turns count, it is the range of the one input between its limits.
+        The range of each input, rad or m; it may be one position. Default, also of an input whose row is NaN: from 0 on
+        as many turns as the loads need to repeat. Where they never repeat (turns wind up a torsion spring), a turn either
+        way of the guess; of a slide two sizes of the mechanism either way, where its loops are no farther from their
+        ends. With torsion springs, and where the loads never repeat, one input with limits is searched between them.
     samples : int
         How finely a turn of one input, or a shorter range, is looked through for sign changes, more finely where a body turns
         faster; every root is then exact to rounding.
@@ -212,7 +212,7 @@ def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int 
 
 
 def _searched(assembly: Assembly) -> tuple[tuple[int | None, ...], Reals]:
-    """After how many turns of each input the loads come back, and the range that is searched of each, (k, 2)."""
+    """After how many turns of each input the loads repeat, and the range that is searched of each, (k, 2)."""
     m, at, turn = assembly.mechanism, np.asarray(assembly.mechanism.at, dtype=float), 2 * np.pi
     one = len(at) == 1
     turns = [None if entry.is_slide else turns_of_loads(assembly, j) for j, entry in enumerate(m.inputs)]

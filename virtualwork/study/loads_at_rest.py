@@ -133,7 +133,7 @@ class Rest:
 
 
 def turns_of_loads(assembly: Assembly, j: int) -> int | None:
-    """After how many turns of an input the loads come back, whatever the others are; None where not within the `TURNED`."""
+    """After how many turns of an input the loads repeat, whatever the others are; None where they do not within the `TURNED`."""
     at = np.asarray(assembly.mechanism.at, dtype=float)
     shares = np.multiply.outer(np.arange(1.0, COMPARED + 1), np.sqrt(np.arange(2.0, 2 + len(at)))) % 1.0
     rest = Rest(assembly, at + 2 * np.pi * shares)

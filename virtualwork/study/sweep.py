@@ -248,7 +248,7 @@ class Sweep:
         return f"{q:.6g} m" if slide else f"{np.degrees(q):.6g} deg"
 
     def _turns_needed(self) -> str:
-        """Why a sweep of angles is no whole cycle: it is a part of one, or not one turn brings the loads back."""
+        """Why a sweep of angles is no whole cycle: it is a part of one, or the loads do not repeat after a turn."""
         name = self.poses.mechanism.inputs[0].name
         sense = -1 if self.input[-1] < self.input[0] else 1
         covered = self._shown(abs(float(self.input[-1] - self.input[0])))
