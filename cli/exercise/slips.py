@@ -1,7 +1,7 @@
 """The likely mistake behind a wrong answer: what one slip of a list, or two, make of the right answer.
 
 A slip is named where it alone reproduces the answer to its digits: where two make numbers that round to the answer, none is.
-A whole number with zeros at its end is what a slip makes exactly, if there is one, before it is what others round to.
+A whole number with zeros at its end has the name of a slip that makes it exactly; where none does, of one that rounds to it.
 An answer of two digits has a name only where a random number would hardly meet a slip; two slips are named only where the
 answer has four digits or more, and a random number would hardly meet a pair.
 """
@@ -24,7 +24,7 @@ from dalembert.units import unit_name
 Real = NDArray[np.float64]
 
 FEWEST = 2
-"""An answer of fewer digits, if more are asked, is what a slip makes exactly."""
+"""An answer of fewer digits, where more are asked, is named only where a slip makes it exactly."""
 SURE = 3
 """From so many digits on random numbers hardly meet a slip."""
 DIGITS = 4

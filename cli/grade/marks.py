@@ -198,7 +198,7 @@ METHOD = (
     "Right is what rounds to the right value at the figures asked, and the right value rounded to more figures; the printed "
     "data count as exact. rounding: one unit of the last figure off; figures: rightly rounded to fewer figures (half the "
     "points each). carried: follows from an earlier wrong answer (all points). A likely mistake is named where one slip alone, "
-    "or two where the answer has at least four digits, reproduces the answer to its digits, and a random number would hardly do."
+    "or two where the answer has at least four digits, reproduces the answer to its digits, and a random number would hardly do so."
 )
 
 

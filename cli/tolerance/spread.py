@@ -355,6 +355,23 @@ def _paths(axes: Axes, tolerances: Tolerances, points: list[Point]) -> None:
     scale, unit = (1e3, "mm") if analysis.mechanism.size < 2 else (1.0, "m")
     sizes = np.array(list(tolerances.limits.values()))
     paths = {key: analysis.motions[0].point(str(key.node)).complex(0) * scale for key in points}
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel(f"x, {unit}")
+    axes.set_ylabel(f"y, {unit}")
+    axes.grid(color="0.9", lw=0.6)
+    axes.set_axisbelow(True)
+    if analysis.inputs.n == 1:
+        worst = {}
+        for key in points:
+            slopes = np.array(tolerances.slopes[key]) * scale
+            worst[key] = [sizes @ np.abs(part) for part in (slopes.real, slopes.imag)]
+        enlarged, much = _enlarged(np.nan_to_num(list(worst.values())).max(), analysis.mechanism.size * scale)
+        for key, z in paths.items():
+            x, y = (enlarged * part for part in worst[key])
+            axes.errorbar(z.real, z.imag, y, x, fmt="o", ms=3, capsize=4, label=key.node)
+        axes.set_title(f"points with their worst case in x and y{much}", fontsize=9)
+        axes.legend(fontsize=8)
+        return
     parts = [z[np.isfinite(z)] for z in paths.values()]
     width = max((abs(z - z.mean()).max() for z in parts if len(z)), default=1.0) or 1.0
     bands = {}
@@ -363,10 +380,7 @@ def _paths(axes: Axes, tolerances: Tolerances, points: list[Point]) -> None:
         normal = 1j * _directions(z)
         bands[key] = normal, (np.abs((slopes * normal.conj()).real) * sizes[:, None]).sum(axis=0)
     widest = max((np.nanmax(band, initial=0.0) for _, band in bands.values()), default=0.0)
-    enlarged = 1.0
-    # a path across which nothing moves has a band of rounding
-    if NOISE * width < widest < SEEN * width:
-        enlarged = 10.0 ** np.ceil(np.log10(SEEN * width / widest))
+    enlarged, much = _enlarged(widest, width)
     for i, (key, z) in enumerate(paths.items()):
         normal, band = bands[key]
         good = np.isfinite(z) & np.isfinite(band)
@@ -378,19 +392,22 @@ def _paths(axes: Axes, tolerances: Tolerances, points: list[Point]) -> None:
         )
         axes.add_collection(quads)
         axes.plot(z.real, z.imag, color=f"C{i}", lw=1.2, label=key.node)
-    much = "" if enlarged == 1 else f", drawn {enlarged:g} times as wide"
     axes.set_title(f"paths with their worst case across{much}", fontsize=9)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel(f"x, {unit}")
-    axes.set_ylabel(f"y, {unit}")
-    axes.grid(color="0.9", lw=0.6)
-    axes.set_axisbelow(True)
     axes.legend(fontsize=8)
+
+
+def _enlarged(widest: float, width: float) -> tuple[float, str]:
+    """Return how many times as wide a worst case is drawn to be seen in a picture so wide, and what its title says of it."""
+    # a path across which nothing moves has a band of rounding
+    if not NOISE * width < widest < SEEN * width:
+        return 1.0, ""
+    times = 10.0 ** np.ceil(np.log10(SEEN * width / widest))
+    return times, f", drawn {times:g} times as wide"
 
 
 def _directions(path: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Return the direction of a path at each pose; where it turns back, or has no pose, that of the poses before."""
-    along = np.gradient(path) if len(path) > 1 else np.ones(1, complex)
+    along = np.gradient(path)
     size = np.nan_to_num(np.abs(along))
     clear = size > NOISE * size.max(initial=0.0)
     if not clear.any():
@@ -405,6 +422,8 @@ def _over_input(axes: Axes, tolerances: Tolerances, header: str) -> None:
     q = tolerances.analysis.inputs.whole.shown[:, 0]
     values = np.array([np.nan if v is None else float(v) for v in base.values])
     worst = tolerances.linear[header].worst
+    if len(q) == 1:
+        axes.errorbar(q, values, worst, fmt="o", ms=3, capsize=4)
     axes.fill_between(q, values - worst, values + worst, color="C0", alpha=0.3, lw=0)
     axes.plot(q, values, color="C0", lw=1.2)
     axes.set_xlabel(tolerances.analysis.input_columns[0])

@@ -110,6 +110,20 @@ def test_a_straight_guide_has_no_band_across_it(draw: Draw) -> None:
     assert axes.get_title() == "paths with their worst case across"
 
 
+@pytest.mark.parametrize("side", [1, -1])
+def test_one_pose_has_points_with_the_worst_case_of_each_coordinate(draw: Draw, side: int) -> None:
+    """The pin B of a crank of 50 mm, 0.05 mm long or short, errs by 0.05 cos 40° and 0.05 sin 40°: drawn 100 times as wide."""
+    axes = draw("tolerances", f"--at {40 * side}deg").axes[0]
+    assert axes.get_title() == "points with their worst case in x and y, drawn 100 times as wide"
+    bars = {bars.get_label(): bars for bars in axes.containers}
+    (_, caps, (across, up)) = bars["B"]
+    assert len(caps) == 4
+    (x,), (y,) = across.get_segments(), up.get_segments()
+    assert np.ptp(x[:, 0]) == pytest.approx(2 * 100 * 0.05 * np.cos(np.radians(40)))
+    assert np.ptp(y[:, 1]) == pytest.approx(2 * 100 * 0.05 * np.sin(np.radians(40)))
+    assert y[:, 1].mean() == pytest.approx(side * 50 * np.sin(np.radians(40)))
+
+
 def test_names_with_dollars_are_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """`$x^{$` is no formula, nor is a plane `A$\\frac$`."""
     monkeypatch.chdir(tmp_path)
