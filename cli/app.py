@@ -119,7 +119,11 @@ def _call_of(example: str) -> str:
 
 
 def build(called: str | None) -> typer.Typer:
-    """Build the command line with only the called command's file loaded."""
+    """Build the command line; of a command that is called, that command alone, and its file alone is loaded.
+
+    Help, completion and a name that is mistyped need the names of all: to build the others takes longer than to read a table.
+    """
+    alone = called in COMMANDS and COMPLETE not in os.environ
     app = typer.Typer(
         cls=Front,
         rich_markup_mode=None,
@@ -130,7 +134,8 @@ def build(called: str | None) -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 10_000},
     )
     app.callback()(_front)
-    for name, (module, line) in COMMANDS.items():
+    for name in [called] if alone else COMMANDS:
+        module, line = COMMANDS[name]
         if name == called:
             # the front door's own help is shown without it
             from cli.show.commands import with_help

@@ -28,11 +28,10 @@ def coefficients(apart: float) -> str:
 
 @pytest.mark.whole
 @pytest.mark.parametrize("objective", ["least-squares", "minimax"])
-def test_planes_too_much_alike_are_refused_in_one_line(
+def test_planes_too_much_alike_are_refused_or_warned_of_in_one_line(
     objective: str, dalembert: Dalembert, tmp_path: Path
 ) -> None:
-    """Where rounding decides, the last bits of a machine's own libraries may prove one answer of several."""
-    refused = 0
+    """Where rounding decides, the last bits of a machine's own libraries prove some answers: these have a warning instead."""
     for apart in (1e-11, 1e-12, 3e-13, 1e-13):
         (tmp_path / "c.csv").write_text(coefficients(apart))
         words = (
@@ -46,13 +45,11 @@ def test_planes_too_much_alike_are_refused_in_one_line(
             f"{1 / apart:g}kg",
         )
         done = dalembert(*words, "--json", stdin=INITIAL)
-        if done.returncode:
-            refused += 1
-            assert done.returncode == 1
-            assert done.stdout == ""
-            (line,) = done.stderr.splitlines()
-            assert "nearly dependent (condition number" in line
-    assert refused
+        (line,) = done.stderr.splitlines()
+        assert "nearly dependent" in line
+        assert "condition number" in line
+        assert done.returncode in (0, 1)
+        assert bool(done.stdout) == (done.returncode == 0)
 
 
 def test_what_is_not_proven_is_refused(dalembert: Dalembert, tmp_path: Path) -> None:

@@ -262,3 +262,16 @@ def test_a_guessed_point_that_contradicts_the_rest_is_named(side):
         guess = Guess(side * math.radians(60), turned, {"C": at})
         warnings = Mechanism(m.ground, m.links, inputs=m.inputs, guess=guess).assembly.warnings
         assert [w.split(" m ")[0] for w in warnings] == [f"[guess] C: (72, {-76 * side})"] * contradicts
+
+
+@pytest.mark.parametrize("unit", [1.0, math.degrees(1.0)], ids=["radians", "degrees read as radians"])
+@pytest.mark.parametrize("mirrored", [1, -1])
+def test_a_guess_in_degrees_that_is_read_in_radians_is_named(mirrored, unit):
+    """Angles of 60, 20 and 65 are some ten turns in radians; two turns, as of a four-stroke engine, are none too many."""
+    m = four_bar(40, 120, 80, 100, *(mirrored * unit * angle for angle in (60, 20, 65)))
+    named = [w.partition(" is ")[0] for w in m.assembly.warnings if "turns" in w]
+    expected = ["at crank: {}60 rad", "coupler: {}20 rad", "rocker: {}65 rad"]
+    sign = "-" if mirrored < 0 else ""
+    assert named == [f"[guess] {text.format(sign)}" for text in expected] * (unit != 1.0)
+    two = Mechanism(m.ground, m.links, inputs=m.inputs, guess=Guess(mirrored * 4 * math.pi, m.guess.angles))
+    assert not any("at crank" in w for w in two.assembly.warnings)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import random
+import re
 import tomllib
 from pathlib import Path
 from typing import ClassVar
@@ -112,6 +113,16 @@ def test_what_no_file_can_say_is_refused() -> None:
         toml_text(Mechanism({"O": 0j}, arm, inputs=Input("arm"), torsion_springs=[wound]))
     with pytest.raises(DescriptionError, match="unknown key 'stifness'; did you mean 'stiffness'"):
         written({"links": {}, "springs": [{"stifness": 3}]})
+
+
+def test_a_point_beside_its_table_is_told_where_it_belongs() -> None:
+    text = "[ground]\nO = [0, 0]\n[links.crank]\n{} = [0, 0]\n"
+    for key, expected in (("O", "expected points = { O = [x, y], … }"), ("centre", "did you mean 'center'?")):
+        with pytest.raises(
+            DescriptionError, match=re.escape(f"[links.crank]: unknown key '{key}'")
+        ) as refused:
+            Mechanism.from_toml_text(text.format(key))
+        assert str(refused.value).endswith(expected)
 
 
 def test_every_key_fills_a_field_of_its_part() -> None:

@@ -27,6 +27,8 @@ C = TypeVar("C", bound=Choice)
 BESIDE = 0.02
 # rad, or of the mechanism's size: how far off a rough guess may be; and how many times nearer is clearly nearer
 ROUGH, CLEARLY = 0.5, 3.0
+# rad: a larger angle of a guess is mostly one in degrees
+LARGE = 4 * np.pi + 1e-9
 
 
 def choose(m: Description, make: Callable[..., C]) -> C:
@@ -61,6 +63,7 @@ class _Chooser:
     def choose(self, make: Callable[..., C]) -> C:
         """The assembly; a mechanism of which a part floats is refused by that part's name."""
         st = State(list(self.m.at))
+        self._warn_of_large_angles()
         try:
             loose = any(2 * len(g.closures) < len(g.angles) + len(g.slides) for g in self.plan.groups)
             if loose or not self.plan.anchors.keys() >= self.m.links.keys():
@@ -220,6 +223,18 @@ class _Chooser:
         for name in ("turn", "point", "slide", "angle", "margin"):
             getattr(st, name).update(getattr(chosen, name))
         return sign
+
+    def _warn_of_large_angles(self) -> None:
+        """Warn of each angle of the guess that is more than two turns: mostly it is in degrees, but was read in radians."""
+        every = [
+            (f"at {e.name}", at) for e, at in zip(self.m.inputs, self.m.at, strict=True) if not e.is_slide
+        ]
+        for name, angle in (*every, *self.m.guess.angles.items()):
+            if abs(angle) > LARGE:
+                self.warnings.append(
+                    f"[guess] {name}: {angle:.4g} rad is {abs(angle) / (2 * np.pi):.3g} turns: an angle without a unit is "
+                    'in radians, unless [units] has angle = "deg"'
+                )
 
     def _warn_of_contradictions(
         self, group: Group, squares: list[dict[tuple[str, str], float]], states: list[State]

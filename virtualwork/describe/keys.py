@@ -10,6 +10,7 @@ from dataclasses import MISSING, field, fields, replace
 from typing import Any, ClassVar
 
 from dalembert.dataclass import dataclass
+from dalembert.hints import nearest
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.file import Entry, missing, require_keys
 from virtualwork.describe.forms import Form, Free, Names, Nested
@@ -199,6 +200,11 @@ def read_fields(entry: Entry, keys: Keys) -> dict[str, Any]:
         An unknown key, a missing one, two of which one is expected, or a value of another form.
     """
     where, table = entry.where, entry.keys
+    for name, value in table.items() if isinstance(table, Mapping) and "points" in keys else ():
+        if name not in keys and isinstance(value, (list, Mapping)) and not nearest(name, keys):
+            raise DescriptionError(
+                f"{where}: unknown key '{name}': expected points = {{ {name} = [x, y], … }}"
+            )
     require_keys(table, keys, where, "key")
     for name, key in keys.items():
         if key.needed and name not in table:
