@@ -123,9 +123,9 @@ def _sense(
             f"deviation), in the other sense {sds[0]:.4g}"
         )
         runs.warnings.append(
-            f"{message}: the phases were turned round"
+            f"{message}: the phases were reversed"
             if lagging is None
-            else f"{message}; the option states otherwise, and counts"
+            else f"{message}; the option states otherwise and has priority"
         )
     if lagging is None and len(against):
         fit = again(np.where((certain < 0)[:, None, None], fit.readings.conj(), fit.readings))
