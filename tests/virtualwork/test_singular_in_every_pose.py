@@ -97,7 +97,7 @@ def test_there_is_no_change_point_and_no_dead_point(tilt, carried):
     assert check.singular == ("bar" if carried else "rod + bar",)
     assert (check.mobility, check.mobility_by_rank) == (1, 2)
     (text,) = m.assembly.track.warnings()
-    assert text.startswith("singular in every pose: the speed of ")
+    assert text.startswith("singular in every pose: the two assemblies of ")
     assert "is not determined" in text
 
 
