@@ -355,7 +355,7 @@ class _Problem(Generic[D]):
             )
         if not self.designs[0].exact:
             lines.append(
-                "fit: derivatives are differences: the phase of a gear depends on links that have to be placed first"
+                "fit: derivatives are computed from differences, because the phase of a gear depends on links that are placed first"
             )
         return lines
 
