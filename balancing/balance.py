@@ -231,7 +231,7 @@ class Balance:
             if not (self.ridge or np.isfinite(condition_number(self.influence, self.weights)).all()):
                 return (
                     None,
-                    "the readings cannot tell the planes apart, so that other corrections leave as much",
+                    "the readings cannot distinguish the planes: other corrections leave the same residual",
                 )
             return least_squares_again(problem, self.ridge if ridge is None else ridge), ""
         from balancing.optimality import optimum_again

@@ -170,7 +170,7 @@ class _Optimum:
         # of least squares the squares' own pull is what the limits hold against
         strength = mu * np.linalg.norm(self.gradient, axis=1)
         if not strength.min() > WEAK * max(float(strength.max()), float(np.linalg.norm(left))):
-            raise _NotBounded("a limit or a reading is only just active: a little more, and it would not be")
+            raise _NotBounded("a limit or a reading is only just active")
         inverse = np.linalg.inv(system)
         inverse[:, :n] /= unit
         inverse[n:, :] *= unit

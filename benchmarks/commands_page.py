@@ -16,7 +16,7 @@ _HEAD = """# Commands and options
 
 Every command with its arguments and options, as `dalembert COMMAND --help` has them. Method and sources: [balancing](balancing.md),
 [balancing in the field](field-balancing.md), [mechanisms](mechanisms.md), [virtual work](virtual-work.md), [rigid bodies](rigid-body.md).
-What tables and quantities may look like, and what is written: [tables](tables.md). This page is written by
+[Tables](tables.md) describes headers, units and output. This page is written by
 `python -m benchmarks.commands_page`.
 """
 

@@ -101,7 +101,7 @@ class Top:
         turning = (I * omega**2).sum(axis=-1)
         if ((mgl != 0) & (turning > LIGHTEST * np.abs(mgl))).any():
             raise ValueError(
-                f"the weight is nothing beside the rotation (I ω² is more than {LIGHTEST:.0e} m g l): expected a slower "
+                f"the weight is negligible against the rotation (I ω² is more than {LIGHTEST:.0e} m g l): expected a slower "
                 "rotation, or a free body"
             )
         unit = np.broadcast_to(quaternion.normalize(q), lead + (4,)).reshape(-1, 4)

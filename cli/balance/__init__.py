@@ -48,7 +48,7 @@ Tolerance:
   permissible UNBALANCE  Permissible residual unbalance, such as 30g_mm.
   bearings Z1:Z2  Bearing planes, where the tolerance holds (default: the correction planes). With --speed: show the bearing forces.
 Output:
-  page FILE(.html)  Write a page that computes: edit the masses.
+  page FILE(.html)  Write a page that computes, with a table of masses to edit.
 Further options (docs/commands.md describes them):
   mode_count N  With --modes: use the first N modes (default: all).
   rigid  With --modes: balance force and couple too, which takes two planes more.

@@ -93,7 +93,7 @@ class Modes:
         ]
         if len(left) == 1:
             return f"the planes do not act on {left[0]}: they lie at its nodes; expected a plane elsewhere"
-        return f"the planes cannot act on {', '.join(left)} apart from one another: expected planes at other places"
+        return f"the planes cannot balance {', '.join(left)} independently: expected planes at other places"
 
 
 def read_modes(path: str, count: int | None, rigid: bool) -> Modes:

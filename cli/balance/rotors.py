@@ -200,8 +200,8 @@ class Balancing:
             planes = plane_z[self.plane_of_row[rows]]
             if planes.shape[-1] < len(conditions):
                 raise DataError(
-                    f"rotor {quote(names[group[0]])}: {', '.join(conditions)} are to vanish, and there {'are' if planes.shape[-1] > 1 else 'is'} "
-                    f"{planes.shape[-1]} plane{'s' * (planes.shape[-1] > 1)}: expected {len(conditions)} at least"
+                    f"rotor {quote(names[group[0]])}: {len(conditions)} conditions ({', '.join(conditions)}) need at least "
+                    f"{len(conditions)} planes, found {planes.shape[-1]}"
                 )
             at = np.where(there, z[masses], modes.z[0])
             try:

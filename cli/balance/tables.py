@@ -261,7 +261,7 @@ def warnings(b: Balancing) -> list[str]:
     if fixed.any():
         named = ", ".join(dict.fromkeys(b.planes.name[p] for p in b.plane_of_row[fixed]))
         lines.append(
-            f"mass and radius are given in plane {named}: the angle alone is found, the residual is what that leaves"
+            f"mass and radius of plane {named} are fixed: only the angle is computed, see the residual"
         )
     if limit is None:
         return lines

@@ -53,7 +53,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
 
     PARTS has a row for each part: part, shape, mass_* (of a hole negative) or density_*, and x_* y_* z_* of its centre of
     mass. The star is a unit. axis_x axis_y axis_z (default z) and rx_* ry_* rz_* (turns about the fixed axes, in this order)
-    place it. A column body tells several bodies apart. Shapes and their dimensions: point; rod length; disk, ring radius;
+    place it. A column body separates several bodies. Shapes and their dimensions: point; rod length; disk, ring radius;
     arc radius, angle; cylinder, cone radius, length; tube radius, inner_radius, length; box width, height, depth; plate
     width, height; sphere radius, inner_radius; tensor ixx iyy izz ixy ixz iyz, products as +∫xy dm; mesh file, file_unit
     (STL, OBJ). A point may have radius and angle for x and y. Thin shapes take linear_density_* or area_density_*.
@@ -84,7 +84,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
             or options.speed_rate
             or options.correct
         ):
-            raise bad("--check-inertias", "goes with no option of a motion or a shaft")
+            raise bad("--check-inertias", "cannot be combined with options of a motion or a shaft")
         return _inertias(options.parts)
     of_center = {"velocity": options.velocity, "acceleration": options.acceleration}
     if options.fixed is not None:

@@ -227,9 +227,9 @@ def warnings(robot: Robot, checks: Sequence[Check]) -> list[str]:
             why = "is negative" if I1 < 0 else f"{I1:.6g} + {I2:.6g} < {I3:.6g}"
             moments = f"principal moments {I1:.6g}, {I2:.6g}, {I3:.6g} kg·m²"
             lines.append(
-                f"link '{c.link.name}': no body has it: {moments}: {'the first ' if I1 < 0 else ''}{why}{hint}"
+                f"link '{c.link.name}': impossible for any body: {moments}: {'the first ' if I1 < 0 else ''}{why}{hint}"
             )
         elif hint:
             off = "smaller than its span suggests" if c.too_small else "larger than the link's reach allows"
-            lines.append(f"link '{c.link.name}': a body can have it, but it is {off}{hint}")
+            lines.append(f"link '{c.link.name}': possible, but {off}{hint}")
     return lines

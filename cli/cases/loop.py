@@ -184,7 +184,7 @@ class Loop:
             except LostPart as lost:
                 first, last = (lost.number - 1) * size + 1, min(lost.number * size, count)
                 raise DataError(
-                    f"variants {first} to {last}: the process that solved them died, and died again when it was done once more"
+                    f"variants {first} to {last}: the process that solved them died twice"
                 ) from None
 
     def _alone(self, form: Form) -> Iterator[Written]:

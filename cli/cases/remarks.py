@@ -118,8 +118,8 @@ def _crossing(analysis: Analysis, assembly: Assembly, change: ChangePoint) -> st
             f"d{n}/dq = {round(float(v), 12) + 0.0:.6g}" for n, v in zip(names, values, strict=True)
         )
 
-    text = f"the branches of {change.group} cross; the motion goes on along its tangent ({rates(change.rates[0])})"
-    return text if change.other is None else f"{text}, the other branch would go with {rates(change.other)}"
+    text = f"the branches of {change.group} cross; the motion continues along its tangent ({rates(change.rates[0])})"
+    return text if change.other is None else f"{text}, the other branch would have {rates(change.other)}"
 
 
 def of_forces(analysis: Analysis) -> list[str]:
@@ -142,14 +142,14 @@ def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
         for number, meet in d.without_length.items():
             note(
                 whole & meet,
-                f"the ends of [[springs]] {number} meet: its pull has no direction there, and the forces that depend "
+                f"the ends of [[springs]] {number} coincide: its force has no direction there, and the forces that depend "
                 "on it have no value",
             )
             whole = whole & ~meet
         for values, what in (
             (
                 d.effort,
-                "the effort by virtual work has no finite value: a dead point, where the input cannot move the rest",
+                "the effort by virtual work has no finite value: a dead point, where the input cannot move the other links",
             ),
             (
                 d.newton_euler if d.statics is None else d.effort,
@@ -178,8 +178,8 @@ def contact_lost(motion: Motion, drive: CamDrive) -> str:
     if off is None or not np.isfinite(off.speed):
         return text
     if off.speed == 0:
-        return f"{text}: it does at rest too"
-    return f"{text}: at constant speed it does from {off.speed:.6g} rad/s on, first at {in_turn(np.degrees(off.at)):.6g} deg"
+        return f"{text}, also at rest"
+    return f"{text}, at constant speed from {off.speed:.6g} rad/s on, first at {in_turn(np.degrees(off.at)):.6g} deg"
 
 
 def statements(analysis: Analysis) -> list[str]:
@@ -198,12 +198,10 @@ def statements(analysis: Analysis) -> list[str]:
                 and not pinned(analysis.mechanism, body, r.center)
             ):
                 result.append(
-                    f"[links.{body}]: an inertia and no mass, though its centre moves: no inertia force from it"
+                    f"[links.{body}]: an inertia and no mass, but its centre moves: its inertia force is missing; add mass"
                 )
     if analysis.mechanism.friction and not any(motion.dynamics.scene.moves for motion in analysis.motions):
-        result.append(
-            "friction: nothing moves (speed zero), so that its direction and size are not determined: left out"
-        )
+        result.append("friction is left out: at speed zero its direction and size are not determined")
     return list(dict.fromkeys([*result, *idle_friction(analysis.mechanism)]))
 
 

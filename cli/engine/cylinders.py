@@ -279,7 +279,7 @@ class Engine:
         named = quote(f"{shaft.order}:{shaft.z:g}m:{'against' if shaft.against else 'with'}")
         if couple:
             return (
-                f"--shaft {named}: order {shaft.order} has a couple and no force that turns so: one shaft cannot balance it; "
+                f"--shaft {named}: order {shaft.order} has a couple but no force in this sense: one shaft cannot balance it; "
                 "add a second one at another place"
             )
-        return f"--shaft {named}: order {shaft.order} has no force that turns so: the shaft has nothing to balance"
+        return f"--shaft {named}: order {shaft.order} has no force in this sense: the shaft has nothing to balance"

@@ -209,7 +209,7 @@ def warnings(e: Engine) -> list[str]:
         if (text := e.idle(shaft, unbalance))
     ]
     if not e.cylinders.reciprocating.any():
-        lines.append("every reciprocating mass is zero, and with it every order")
+        lines.append("every reciprocating mass is zero: all orders are zero")
     weights = e.counterweights
     if weights is not None and not weights.unbalance.any():
         lines.append(

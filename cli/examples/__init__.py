@@ -82,7 +82,9 @@ def _here(name: str) -> dict[Path, tuple[bytes, str]]:
             here = Path(f"{name}-{EXPECTED}")
         ours = _is_an_examples(here) or (here.is_file() and here.read_bytes() == data)
         if here.exists() and not ours:
-            raise DataError(f"{here}: there is another file of this name here: nothing was overwritten")
+            raise DataError(
+                f"{here}: this folder has another file of this name: nothing was written; use another folder"
+            )
         result[here] = data, "" if here.name == file.name else f" ({file.name} is another example's)"
     return result
 

@@ -378,5 +378,5 @@ def _refuse(folder: Path, files: Mapping[str, bytes]) -> None:
             filled = True
         if filled:
             raise DataError(
-                f"{answers}: found answers in it, expected none: they would be lost; give another folder; nothing was written"
+                f"{answers}: its answers would be lost: expected another folder; nothing was written"
             )

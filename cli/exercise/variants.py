@@ -155,7 +155,7 @@ def variants(workshop: Workshop, count: int, seed: int, warnings: list[str]) -> 
             break
     if not result:
         raise DataError(
-            f"{exercise.file}: [draw]: no variant can be used: of {tried} none has answers that can be asked; the last: {reason}"
+            f"{exercise.file}: [draw]: none of {tried} drawn variants can be used; the last: {reason}; expected other values to draw from"
         )
     if len(result) < count:
         warnings.append(
@@ -222,7 +222,7 @@ def _pose_trouble(document: Mapping[str, Any]) -> str:
         if pose.get("assembled") is False:
             return "the mechanism cannot be assembled"
         if pose.get("marks"):
-            return f"the mechanism stands at a {pose['marks'][0]}"
+            return f"the mechanism is at a {pose['marks'][0]}"
         condition = pose.get("condition")
         if isinstance(condition, (int, float)) and not condition <= MOST_CONDITION:
             return f"the mechanism is close to a limit (condition {condition:.3g})"
@@ -237,7 +237,7 @@ def _trouble(answer: Answer) -> str:
         return f"{what} is zero: it has no figures"
     share = (abs(right.value) / right.unit) % 1
     if abs(share - Decimal("0.5")) < NEAR_TIE:
-        return f"{what} = {answer.value:.8g} lies where its rounding turns"
+        return f"{what} = {answer.value:.8g} is at the border between two rounded values"
     return ""
 
 

@@ -48,7 +48,7 @@ Arguments:
 What:
   influence FILE.csv...  Stored influence coefficients, in place of trial runs.
   runout FILE.csv  Run-out vectors to subtract: sensor, amplitude_*, phase_deg.
-  phase_lag  The phase of the instrument lags.
+  phase_lag  The instrument's phase lags: reverse its sign.
 How:
   objective least-squares|minimax=least-squares  Least sum of squares, or least maximum, of the residual vibration.
   max_mass [PLANE=]MASS...  Largest mass of a correction: 5g or A=5g.

@@ -189,7 +189,7 @@ class FieldBalancing:
         start = standing if request.from_here else np.zeros_like(standing)
         if request.from_here and not standing.any():
             self.warnings.append(
-                "--from-here: the last run has no mass on the rotor, so that it stands as in the initial run"
+                "--from-here: the last run has no mass on the rotor: the trim equals the correction"
             )
         initial = group.fit.initial - self.runout(group)
         limits = self._limits(planes), self.ceiling, request.ridge
@@ -405,8 +405,8 @@ def _dependent(planes: list[str], combination: Complex) -> str:
             "respond to it, or the plane left out"
         )
     return (
-        f"the readings cannot tell the planes {' and '.join(unseen)} apart (singular): masses in the ratio "
-        f"{ratio} leave no trace; leave one of these planes out, or damp with --ridge"
+        f"the readings cannot distinguish the planes {' and '.join(unseen)} (singular): masses in the ratio "
+        f"{ratio} have no effect on any reading; leave one of these planes out, or damp with --ridge"
     )
 
 

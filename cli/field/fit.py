@@ -123,9 +123,9 @@ def _sense(
             f"deviation), in the other sense {sds[0]:.4g}"
         )
         runs.warnings.append(
-            f"{message}: the phases were turned round"
+            f"{message}: the phases were reversed"
             if lagging is None
-            else f"{message}; the option states otherwise, and counts"
+            else f"{message}; the option states otherwise and has priority"
         )
     if lagging is None and len(against):
         fit = again(np.where((certain < 0)[:, None, None], fit.readings.conj(), fit.readings))
@@ -249,12 +249,12 @@ class _Groups:
         for own, plane in enumerate(planes):
             if at[own] < 0 and group.masses[..., own].any():
                 raise DataError(
-                    f"{self.runs.table.file}: {of}a mass in plane {plane}, of which no coefficient is stored: expected "
+                    f"{self.runs.table.file}: {of}a mass in plane {plane}, which has no stored coefficient: expected "
                     f"{', '.join(covered)}"
                 )
             if at[own] < 0 and group.standing[:, own].any():
                 self.runs.warnings.append(
-                    f"{of}the last run has a mass in plane {plane}, of which no coefficient is stored: the trim leaves it out"
+                    f"{of}the last run has a mass in plane {plane}, which has no stored coefficient: the trim leaves it out"
                 )
         if self.runs.other_masses:
             at = [-1] * len(at)

@@ -41,8 +41,8 @@ def _not_turned(b: FieldBalancing) -> Iterator[str]:
     if others:
         named = ", ".join(b.runs.rotors[r] for r in others[:SHOWN]) + (" …" if len(others) > SHOWN else "")
         yield (
-            f"the phases of {len(others)} rotor{'s' * (len(others) > 1)} ({named}) were not turned round, for their runs do not show "
-            "the sense: where one instrument read all rotors, state --phase-lag"
+            f"the phases of {len(others)} rotor{'s' * (len(others) > 1)} ({named}) were not reversed: their runs do not "
+            "determine the sense; if one instrument read all rotors, add --phase-lag"
         )
 
 
@@ -140,9 +140,8 @@ class _Group:
         def sentence(i: int) -> str:
             named = [f"{self.planes[p]} ({share[i, p]:.2g})" for p in np.flatnonzero(weak[i])]
             return (
-                "planes nearly dependent: others bring about what these do but for the share in "
-                f"brackets: {', '.join(named)}; condition number {solved.condition[i]:.3g}, errors grow by as much: leave "
-                "one out, or damp with --ridge"
+                f"planes nearly dependent: {', '.join(named)} (in brackets the share of the effect that no other planes "
+                f"produce); errors grow by the condition number, {solved.condition[i]:.3g}: leave one plane out, or damp with --ridge"
             )
 
         yield from self.each(weak.any(axis=1), sentence, "planes nearly dependent")
@@ -156,8 +155,8 @@ class _Group:
                     other = -first / rival
                     yield (
                         f"{b.of(self.group, i)}sensor {self.group.channels[s]}: two corrections fit the amplitudes; the other one is "
-                        f"{b.amount(abs(other)):.6g} {b.unit} at {float(degrees(other)):.2f}°: a further trial run at "
-                        "another angle decides"
+                        f"{b.amount(abs(other)):.6g} {b.unit} at {float(degrees(other)):.2f}°: add a trial run at "
+                        "another angle"
                     )
 
     def _undetermined(self, planes: list[str]) -> str:
@@ -165,7 +164,7 @@ class _Group:
         if len(self.group.channels) < len(self.planes):
             why = f"{len(self.group.channels)} readings for {len(self.planes)} planes"
         else:
-            why = "no reading responds to it" if len(planes) == 1 else "the readings cannot tell them apart"
+            why = "no reading responds to it" if len(planes) == 1 else "the readings cannot distinguish them"
         return (
             f"the initial unbalance is not determined in plane{'s' * (len(planes) > 1)} "
             f"{' and '.join(planes)}: {why}; whether it is within the tolerance is not known"
@@ -210,8 +209,8 @@ class _Group:
         for i, one in islice(outliers, SHOWN):
             yield (
                 f"{b.of(group, i)}run {one.run}, sensor {one.channel}: the reading lies {abs(one.residual):.4g} {self.unit} from the "
-                f"fitted one (standardised {one.standardized:.3g}; by chance in {one.chance:.2g} of logs): an outlier; it "
-                f"takes part, --exclude {one.run} leaves the run out"
+                f"fitted one (standardised {one.standardized:.3g}; by chance in {one.chance:.2g} of logs): an outlier, "
+                f"but used; --exclude {one.run} leaves the run out"
             )
         if next(outliers, None) is not None:
             yield "… and further outliers: they are marked in --json"
@@ -239,8 +238,8 @@ class _Group:
             shown = read.conj() if self.b.against(group)[i] else read
             first, second = (f"{abs(v):.6g} {unit} at {degrees(v):.6g}°" for v in shown)
             yield (
-                f"{self.b.of(group, i)}run{'s' * (len(runs) > 1)} {' and '.join(runs)}, sensor {group.channels[pair.channel]}: with "
-                f"the same masses on it was read {first} and {second}: the readings contradict each other by "
+                f"{self.b.of(group, i)}run{'s' * (len(runs) > 1)} {' and '.join(runs)}, sensor {group.channels[pair.channel]}: "
+                f"{first} and {second} with the same masses: the readings contradict each other by "
                 f"{pair.difference:.4g} {unit}, and their mean has the size {abs(read.mean()):.4g}: read again, or leave out what is "
                 "wrong"
             )

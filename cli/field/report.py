@@ -392,7 +392,7 @@ def machine_page(b: FieldBalancing) -> Page:
     if not (solved.alpha[0].any(axis=0).all() if request.ridge else np.isfinite(solved.condition[0])):
         raise bad(
             "--page",
-            "a sheet computes without limits, and the readings cannot tell the planes apart: leave one out",
+            "a sheet computes without limits, and the readings cannot distinguish the planes: leave one out",
         )
     group = solved.group
     spreads = spread(b, solved)

@@ -347,7 +347,7 @@ def _text(file: str, fit: Fit[Mechanism], bare: Mapping[str, str]) -> str:
     for dimension, si in new.items():
         if not math.isclose(number_of(again, dimension), si, rel_tol=WRITTEN, abs_tol=1e-15):
             raise DataError(
-                f"{name}: {dimension.path}: it does not stand in the file as a number that could be replaced"
+                f"{name}: {dimension.path}: the file does not have it as a number that can be replaced"
             )
     return text
 

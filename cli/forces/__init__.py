@@ -18,7 +18,7 @@ OPTIONS = f"""
 Quantities:
   only NAME,...  Show only these: crank.torque,B.coupler.fx,H.x.
   find NAME  Dimension to find: input.speed, links.crank.B.x.
-  so_that QUANTITY=VALUE  With --find: value that a quantity has then, such as B.vx=3m_s or crank.torque=12.
+  so_that QUANTITY=VALUE  With --find: wanted value of a quantity, such as B.vx=3m_s or crank.torque=12.
 Over a whole cycle:
   flywheel NUMBER  Compute the flywheel for this fluctuation of speed, such as 0.02.
   counterweights LINK,...  Compute counterweights on these links for the least shaking force.

@@ -31,7 +31,7 @@ ROOTS = {"robot": "urdf", "sdf": "sdf", "mujoco": "mjcf"}
 def unknown(file: str) -> DataError:
     """Return the error of a file whose kind is not recognized."""
     programs = "; ".join(f"{name} ({what})" for name, what in KINDS.items())
-    return DataError(f"{file}: of no known kind: expected {programs}; name it with --from")
+    return DataError(f"{file}: unknown format: expected {programs}; name it with --from")
 
 
 def decoded(file: str, data: bytes) -> str:

@@ -192,10 +192,12 @@ def described(d: Drawing, source: str) -> str:
         ways = [m.size * LITTLE if e.slide is not None else LITTLE for e in d.drives]
         if not _motion(m, d, *([side * way for way in ways] for side in (-1, 1))).assembled.any():
             d.notes.append(
-                "its input moves to neither side of the drawn pose: it stands at a limit there, or where assemblies meet"
+                "its input cannot move from the drawn pose: a limit, or a pose where assemblies meet"
             )
         if off > NEAR * m.size:
-            d.notes.append(f"{point} stands {off:.3g} m from where it is drawn: singular there, or nearly")
+            d.notes.append(
+                f"{point} is {off:.3g} m away from its drawn place: the pose is singular, or nearly"
+            )
     except (MechanismError, np.linalg.LinAlgError) as error:
         d.notes.append(f"`dalembert mechanism` will refuse it: {error}")
     return made

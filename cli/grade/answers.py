@@ -84,7 +84,7 @@ def _keyed(exercise: Exercise, answers: str, key: str | None) -> dict[str, Stude
     if path is None:
         if exercise.draws:
             raise DataError(
-                f"{answers}: no key.csv beside it: expected --key key.csv with the numbers of each student, as "
+                f"{answers}: no key.csv in its folder: expected --key key.csv with the numbers of each student, as "
                 "dalembert exercise wrote it"
             )
         return None

@@ -18,7 +18,7 @@ OPTIONS = """
 Arguments:
   readings READINGS  CSV with a row for each position of the rotor on its mandrel; - is standard input.
 What:
-  phase_lag  The phase of the instrument lags.
+  phase_lag  The instrument's phase lags: reverse its sign.
 """
 
 

@@ -32,6 +32,6 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
 
     cases = Cases.of(options, forces=True)
     cases.refuse_inputs(
-        "inspect speaks of the whole range of the input: expected a dimension, links.crank.B.x=..."
+        "inspect covers the whole range of the input: expected a dimension, links.crank.B.x=..."
     )
     return result(Inspection(cases, show), options)

@@ -305,7 +305,7 @@ def working(analysis: Analysis) -> Table:
         works, workless, _ = ledger(motion.dynamics.scene, j)
         rows += [(entry.name, load, "works") for load in works]
         rows += [(entry.name, load, "does no work") for load in workless]
-    below = "joint forces, action and reaction, do no work together: none enters the effort"
+    below = "joint forces (action and reaction) do no work: the effort does not depend on them"
     return replace(listed(("input", "load", "work"), rows), place="", below=below) if rows else Table([])
 
 
@@ -346,7 +346,7 @@ def way(m: Mechanism, check: Check, four_bars: Any) -> list[Topic]:
     if check.mobility != 3 * n - held - len(tied):
         text.append(f"  the program counts {check.mobility}")
     if check.mobility_by_rank != check.mobility:
-        text.append(f"  by the rank of the Jacobian {check.mobility_by_rank}: some constraints repeat others")
+        text.append(f"  by the rank of the Jacobian {check.mobility_by_rank}: some constraints are redundant")
     head: dict[str, Any] = {
         "links": n, "pins_and_slots": held, "sliders_and_gears": len(tied), "mobility": check.mobility,
     }  # fmt: skip

@@ -19,7 +19,7 @@ Quantities:
   only NAME,...  Show only these quantities: H.x,coupler.omega; H is all of H.
   order position|velocity|acceleration|jerk  Highest derivative (default: the highest that the input's rates give).
   find NAME  Dimension to find: input.speed, links.crank.B.x.
-  so_that QUANTITY=VALUE  With --find: value that a quantity has then, such as B.vx=3m_s or crank.torque=12.
+  so_that QUANTITY=VALUE  With --find: wanted value of a quantity, such as B.vx=3m_s or crank.torque=12.
 Output:
   newton  Solve all loops at once by Newton-Raphson too, and show the iterates.
   page FILE(.html)  Write a page that computes: the mechanism moves, and its dimensions can be dragged.

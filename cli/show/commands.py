@@ -28,7 +28,7 @@ Output:
   plot FILE  Draw a picture (.svg .png .pdf).
   expect FILE.csv  Compare the result with the expected values in FILE.csv.
   steps  Show the worked solution: equations with their numbers.
-  digits  Print only the right digits (computed twice).
+  digits  Print only the digits that hold against rounding.
   units UNIT,...  Units of the columns, such as mm,g,deg,N_mm,rpm.
   report FILE  Write a report (.html .md): data, results, method.
 Tables:

@@ -17,7 +17,7 @@ OPTIONS = f"""
 {FILE}{CASES}{BRANCH}{WORKERS}
 Time and accuracy:
   time START:STOP:STEP  Times in seconds: 0:10:0.01 or 0:10/1000; required.
-  accuracy NUMBER  Error of the inputs to aim at (default 1e-9).
+  accuracy NUMBER  Permissible error of the inputs (default 1e-9).
   until INPUT=VALUE...  Stop where an input reaches a value: crank=90deg; repeatable, the first ends the motion.
 Quantities:
   only NAME,...  Show these quantities in addition: H.x,coupler.omega; H is all of H.
@@ -43,7 +43,10 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
         raise bad("--time", "expected the times, such as --time 0:10:0.01")
     until = ",".join(options.until or ()) or None
     if until is not None and options.page is not None and (options.over or options.cases):
-        raise bad("--until", "expected no --page: its variants have one clock; --set shows one of them")
+        raise bad(
+            "--until",
+            "--page shows all variants at the same time: expected no --until, or one mechanism by --set",
+        )
     times, accuracy = times_and_accuracy(options.time, options.accuracy)
     cases = Cases.of(options, 2, forces=options.forces).at_start()
     study = Simulation(cases, show, times=times, accuracy=accuracy, until=until)

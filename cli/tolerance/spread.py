@@ -36,7 +36,9 @@ if TYPE_CHECKING:
 # how far a drawn standard deviation may be from the linear one, in its sampling errors and by its size
 SURE, APART = 5.0, 0.02
 NAMES = ("p0.135", "p99.865")
-FULL = "numbers of drawn mechanisms are printed in full: --digits cuts what rounds, and their errors are those of the sample"
+FULL = (
+    "--digits: numbers of drawn mechanisms are printed in full, because their errors are those of the sample"
+)
 
 
 @dataclass
@@ -151,9 +153,7 @@ class Tolerances(Case):
     def apart(self) -> list[str]:
         """Return the warnings of numbers whose drawn standard deviation differs from that of first order."""
         if not self.numbers:
-            return [
-                "none of the numbers shown varies with [tolerances]: they have none, nor a picture of them"
-            ]
+            return ["none of the numbers shown depends on [tolerances]: no spread and no picture"]
         if not self.draws:
             return []
         samples, whole = self.drawn

@@ -28,7 +28,7 @@ class LostPart(RuntimeError):
     """
 
     def __init__(self, number: int) -> None:
-        super().__init__(f"part {number}: its worker died, and died again when it was done once more")
+        super().__init__(f"part {number}: its worker process died twice")
         self.number = number
 
     def __reduce__(self) -> tuple[type[LostPart], tuple[int]]:

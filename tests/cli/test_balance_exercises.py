@@ -59,7 +59,7 @@ def test_mass_and_radius_given_leave_the_angle(dalembert: Any) -> None:
     (c,) = found["corrections"]
     assert (c["mass_kg"], c["radius_m"], c["angle_deg"]) == (1.0, 0.02, pytest.approx(190.0))
     assert found["residual"]["static_unbalance_kg_m"] == pytest.approx(0.06 - 0.02)
-    assert "the angle alone is found" in warnings[0]
+    assert "only the angle is computed" in warnings[0]
 
 
 @pytest.mark.usefixtures("one")

@@ -80,7 +80,7 @@ def test_force_and_couple_vanish_too(dalembert: Dalembert, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("modes", "options", "status", "says"),
     [
-        (wide(), PLANES[:4], 1, "expected 3 at least"),
+        (wide(), PLANES[:4], 1, "need at least 3 planes, found 2"),
         (wide(2), ("--plane", "A:500mm:9mm", "--plane", "B:1000mm:9mm"), 1, "do not act on mode 2"),
         (wide(), (*PLANES[:4], "--plane", "C:1500mm:9mm"), 1, "a plane stands at 1.5 m"),
         (wide().replace("0.", "x.", 1), PLANES, 1, "found 'x."),

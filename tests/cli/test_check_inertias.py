@@ -141,7 +141,7 @@ def test_every_format_by_the_command(name: str, text: str, tmp_path: Path, dalem
     assert body["principal_kg_m2"] == [0.01, 0.01, 0.2]
     # 0.2 − 0.02 shared by three
     assert np.diag(body["nearest_kg_m2"]) == pytest.approx([0.07, 0.07, 0.14], rel=1e-12)
-    assert "link 'arm': no body has it" in done.stderr
+    assert "link 'arm': impossible for any body" in done.stderr
     (tmp_path / name).write_text(text.replace("0.2", "0.02"))
     done = dalembert("body", name, "--check-inertias")
     assert (done.returncode, done.stderr) == (0, "")
@@ -151,7 +151,12 @@ def test_every_format_by_the_command(name: str, text: str, tmp_path: Path, dalem
 @pytest.mark.parametrize(
     ("text", "arguments", "status", "said"),
     [
-        (link("0.01 0.01 0.02"), ["--omega", "1,2,3"], 2, "goes with no option of a motion or a shaft"),
+        (
+            link("0.01 0.01 0.02"),
+            ["--omega", "1,2,3"],
+            2,
+            "cannot be combined with options of a motion or a shaft",
+        ),
         ("part,shape,mass_kg\na,point,1\n", [], 1, "no valid XML"),
         ('<robot name="r"><link name="a"/></robot>', [], 1, "no link has an inertia"),
         (link("0.01 ten 0.02"), [], 1, "link 'arm', inertia iyy: found 'ten', expected a finite number"),

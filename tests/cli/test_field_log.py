@@ -56,7 +56,7 @@ def test_layout_2_masses_on_top_of_others(dalembert: Dalembert) -> None:
     assert rotor["influence"][0]["magnitude_per_kg"] == pytest.approx(2, abs=1e-6)
     assert rotor["fit"]["residual_sd"] < 1e-6
     assert correction(rotor) == pytest.approx(polar(40, 70), abs=1e-5)
-    assert any("every row takes part" in warning for warning in warnings)
+    assert any("every row is used" in warning for warning in warnings)
     # all on top of the base run: absolute, a header spelt in full
     absolute = rows.replace("ref;use", "reference;useful").replace("10;90;2;1", "14,142135623730951;-45;1;1")
     again, _ = found(dalembert("field", "-", "--json", stdin=absolute))

@@ -66,7 +66,7 @@ def test_a_rotor_without_a_trial_run_that_others_have(dalembert: Dalembert) -> N
         (table("0,1,1,0,,,", "1,2,2,0,A,1,0"), "no reading of sensor 1 in run 1"),
         (table("0,1,1,0,,,", "1,1,2,0,A;B,1,0"), "2 joined by ';'"),
         (table("0,1,1,0,,,", "1,1,2,0,A;B,1;2,0;0"), "2 planes (A, B) and 1 trial run"),
-        (table("0,1,1,0,,,", "1,1,2,0,A,1,0", "2,1,3,0,B,1,0"), "cannot tell the planes A and B apart"),
+        (table("0,1,1,0,,,", "1,1,2,0,A,1,0", "2,1,3,0,B,1,0"), "cannot distinguish the planes A and B"),
         (table("0,1,1,0,,,", "0,2,1,0,,,", "1,1,1,0,A,1,0", "1,2,1,0,A,1,0"), "plane A has no effect"),
         (table("0,1,1,0,,,", "0,2,1,0,,,", "1,1,2,0,A,1,0", "1,2,2,0,B,1,0"), "joined by ';'"),
         (table("0,1,1,x,,,", "1,1,2,0,A,1,0"), "expected a number"),
@@ -93,7 +93,7 @@ def test_dependent_planes_in_the_middle_of_three(dalembert: Dalembert) -> None:
         rows += [f"{r + 1},{s + 1},{cell(v)},{plane},1,0" for s, v in enumerate(v0 + np.array(column))]
     done = dalembert("field", "-", stdin=table(*rows))
     assert done.returncode == 1
-    assert "A and B and C apart" in done.stderr
+    assert "cannot distinguish the planes A and B and C" in done.stderr
     damped = dalembert("field", "-", "--json", "--ridge", "0.1", stdin=table(*rows))
     assert all(c["mass_kg"] < 1 for c in document(damped)["rotors"][0]["corrections"])
 

@@ -99,7 +99,7 @@ def test_kept_trial_masses_are_no_reason_to_stop(dalembert: Dalembert) -> None:
     ("alpha", "known", "why"),
     [
         # B does what A does: only C is determined
-        ([[1, 2, 0], [2, 4, 0], [1j, 2j, 0], [0, 0, 1]], [None, None, 2e-3], "cannot tell them apart"),
+        ([[1, 2, 0], [2, 4, 0], [1j, 2j, 0], [0, 0, 1]], [None, None, 2e-3], "cannot distinguish them"),
         # two sensors for three planes
         ([[1, 2, 1], [2, 1, 1j]], [None, None, None], "2 readings for 3 planes"),
     ],

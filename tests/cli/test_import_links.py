@@ -67,10 +67,10 @@ def test_an_old_link_of_a_slider_crank() -> None:
 @pytest.mark.parametrize(
     ("link", "said"),
     [
-        ("https://app.example.org/?j=A,1,2,AB,R,t,0,t", "the link: of no known kind"),
+        ("https://app.example.org/?j=A,1,2,AB,R,t,0,t", "the link: unknown format"),
         (old().replace("-1.24", "abc", 1), "joint A: found 'abc', expected a finite number"),
         (old().replace("A%7CB", "A%7CX", 1), "link AB: found 'X', expected one of the joints A, B, C, D"),
-        ("https://app.example.org/", "the link: of no known kind"),
+        ("https://app.example.org/", "the link: unknown format"),
     ],
 )
 def test_a_bad_link_is_one_line(dalembert: Dalembert, link: str, said: str) -> None:

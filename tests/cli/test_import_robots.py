@@ -470,7 +470,7 @@ def test_bombs_and_entities_are_refused(text: str, root: str) -> None:
         (MJCF.replace("<actuator>", '<tendon><spatial class="none" stiffness="3"/></tendon><actuator>', 1), "<spatial>: no default class is called 'none'"),
         (MJCF.replace("<actuator>", '<tendon><fixed class="none"/></tendon><actuator>', 1), "<fixed>: no default class is called 'none'"),
         ('<mujoco><worldbody><body name="a"><joint name="j"/><geom size=".1" mass="-2"/></body></worldbody></mujoco>', "body 'a', geom mass: found '-2', expected one of zero or more"),
-        ("<html/>", "of no known kind: expected pmks-text"),
+        ("<html/>", "unknown format: expected pmks-text"),
     ],
 )  # fmt: skip
 def test_damaged_robots_are_refused_with_their_place(text: str, said: str) -> None:

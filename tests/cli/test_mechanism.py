@@ -201,7 +201,7 @@ def test_each_change_point_has_its_own_other_branch(dalembert: Dalembert) -> Non
     for line, at, side in zip(lines, ("0", "180"), (1, -1), strict=True):
         assert line.startswith(f"warning: change point at {at} deg: the branches of coupler + rocker cross")
         coupler, rocker = (
-            float(rate.split(" = ")[1]) for rate in line.rpartition("would go with ")[2].split(", ")
+            float(rate.split(" = ")[1]) for rate in line.rpartition("would have ")[2].split(", ")
         )
         assert side * 40 + 100 * coupler == pytest.approx(side * 40 * rocker, rel=1e-5)
         assert side * 40 + 100 * coupler**2 == pytest.approx(side * 40 * rocker**2, rel=1e-5)

@@ -158,6 +158,6 @@ def test_a_part_whose_worker_is_killed_again_and_again_is_named(begun, tmp_path)
         time.sleep(0.05)
     said = ended(process, terminal)
     assert process.returncode == 1
-    assert "variants 1 to 182: the process that solved them died, and died again" in said
+    assert "variants 1 to 182: the process that solved them died twice" in said
     assert said.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["m.toml"]

@@ -103,7 +103,7 @@ def test_the_command_shows_what_varies_alone(dalembert, tmp_path):
         assert (zero.returncode, json.loads(zero.stdout)["tolerance"]["columns"]) == (0, {})
     none = dalembert("tolerance", "m.toml", "--only", "block", "--plot", "p.svg", "--json")
     assert json.loads(none.stdout)["tolerance"] == {"columns": {}, "shares": []}
-    assert "none of the numbers shown varies with [tolerances]" in none.stderr
+    assert "none of the numbers shown depends on [tolerances]" in none.stderr
     assert not (tmp_path / "p.svg").exists()
 
 

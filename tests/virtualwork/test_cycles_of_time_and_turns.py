@@ -174,7 +174,7 @@ def test_loads_that_come_back_after_more_turns() -> None:
     assert twice.whole
     sprung = arm(torsion_springs=[TorsionSpring(("ground", "arm"), 4.0, 0.3, 0.2)])
     reason = Cycle(sprung.motion(np.linspace(0, 2 * np.pi, 91), 3.0)).reason
-    assert reason == "the loads do not come back to themselves within 32 turns of the input arm"
+    assert reason == "the loads do not repeat within 32 turns of the input arm"
 
 
 @pytest.mark.parametrize("driven", ["four-bar", "slider-crank"])

@@ -75,7 +75,7 @@ def test_a_part_whose_worker_died_is_done_again_once(tmp_path):
 
 @pytest.mark.slow
 def test_a_part_that_kills_its_worker_twice_is_named():
-    with Processes(1) as pool, pytest.raises(LostPart, match="part 2: its worker died"):
+    with Processes(1) as pool, pytest.raises(LostPart, match="part 2: its worker process died"):
         list(in_parts(eval, [("1",), ("__import__('os')._exit(1)",)], pool))
 
 

@@ -97,7 +97,7 @@ def test_there_is_no_change_point_and_no_dead_point(tilt, carried):
     assert check.singular == ("bar" if carried else "rod + bar",)
     assert (check.mobility, check.mobility_by_rank) == (1, 2)
     (text,) = m.assembly.track.warnings()
-    assert text.startswith("singular in every pose: the speed of ")
+    assert text.startswith("singular in every pose: the two assemblies of ")
     assert "is not determined" in text
 
 
@@ -156,7 +156,7 @@ def test_the_command_names_it(dalembert, tmp_path):
     assert run.returncode == 0, run.stderr
     found = json.loads(run.stdout)
     assert any("singular in every pose" in w and "not determined" in w for w in found["warnings"])
-    assert not any("dead or change point" in w or "meet; taken" in w for w in found["warnings"])
+    assert not any("dead or change point" in w or "two assemblies meet" in w for w in found["warnings"])
     check = json.loads(dalembert("inspect", str(file), "--json").stdout)["check"]
     assert check["change_points_deg"] == []
     assert check["singular"] == ["rod + bar"]

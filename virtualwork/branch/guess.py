@@ -67,7 +67,9 @@ class _Chooser:
         try:
             loose = any(2 * len(g.closures) < len(g.angles) + len(g.slides) for g in self.plan.groups)
             if loose or not self.plan.anchors.keys() >= self.m.links.keys():
-                raise MobilityError("[input]: constraints that depend on each other leave a part free")
+                raise MobilityError(
+                    "[input]: a part can still move, because some constraints depend on each other: add a joint or an [[input]]"
+                )
             self._walk(st)
         except ParallelGuidesError:
             raise
@@ -76,7 +78,7 @@ class _Chooser:
             if isinstance(error, MechanismError):
                 raise
             raise AssemblyError(
-                "[guess] at: singular there, so that no direction is determined; give another `at`"
+                "[guess] at: the mechanism is singular there, its motion is not determined: change `at`"
             ) from None
         if self._singular(st):
             self._refuse_floating()
@@ -185,7 +187,7 @@ class _Chooser:
                 case.solve(st, 1, self.m.size)
             except ZeroDivisionError:
                 raise ParallelGuidesError(
-                    f"{group.name}: its two guides are parallel, so that its position is not determined; expected "
+                    f"{group.name}: its two guides are parallel and do not determine its position; expected "
                     "guides of different directions (`angle`)"
                 ) from None
             return 1
@@ -329,8 +331,8 @@ class _Chooser:
 
     def _meeting(self, group: Group) -> str:
         return (
-            f"[guess] at: {group.name} stands at a change point or a limit there, where its two assemblies "
-            "meet; taken is the one whose links stand still or turn with the input; another `at` chooses the other"
+            f"[guess] at: {group.name} is at a change point or a limit there, where its two assemblies meet: "
+            "the one whose links do not turn, or turn with the input, is used; change `at` to choose the other"
         )
 
     def _choices(self, group: Group, states: list[State]) -> str:
@@ -358,7 +360,7 @@ class _Chooser:
                 write_unknowns(group, st, x)
                 return x[0]
             left = float(np.linalg.norm(loops.over(st)(x)[0]))
-            why = f": from the guess on its loops stay {left:.6g} m apart"
+            why = f": from the guess its loops keep a gap of {left:.6g} m"
         result = every_solution(loops, st, self.m.size)
         if len(result) == 0 and len(group.angles) + len(group.slides) < 2 * len(group.closures):
             raise MobilityError(

@@ -281,7 +281,7 @@ class Reach:
         loops = assembly.loops(group)
         x, _ = newton(loops, st, start, assembly.mechanism.size)
         gap = float(np.linalg.norm(loops.over(st)(x)[0]))
-        return Gap(gap, 0.0, "its loops stay {by} apart where they come nearest")
+        return Gap(gap, 0.0, "its loops have a gap of {by} at least")
 
 
 def crossing(margin: Callable[[float], float], a: float, b: float) -> tuple[float, int]:

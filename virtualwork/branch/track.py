@@ -232,8 +232,8 @@ class Track:
                 guides = self.assembly.mechanism.guides
                 what = ", ".join([*g.members, *(f"the slide at {guides[s].point}" for s in g.slides)])
                 result.append(
-                    f"singular in every pose: the speed of {what} is not determined: the assemblies of {g.name} meet "
-                    "all along. Places are those where they meet; rates and forces that depend on them are left out"
+                    f"singular in every pose: the two assemblies of {g.name} coincide, so the speed of {what} is not "
+                    "determined; rates and forces that depend on it are left out"
                 )
         meeting = tuple(f"[guess] at: {name} " for name in self.folded)
         return (*result, *(w for w in self.assembly.warnings if not (meeting and w.startswith(meeting))))

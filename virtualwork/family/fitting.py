@@ -351,11 +351,11 @@ class _Problem(Generic[D]):
             low, high = (self._shown(float(each)) for each in (gaps[0], gaps[-1]))
             lines.append(
                 f"fit: branch defect: between the target points it cannot be assembled from {low} to {high} "
-                f"({len(gaps)} of {FINE} poses): it does not pass there without being taken apart"
+                f"({len(gaps)} of {FINE} poses): the mechanism cannot move through the target"
             )
         if not self.designs[0].exact:
             lines.append(
-                "fit: derivatives are differences: the phase of a gear depends on links that have to be placed first"
+                "fit: derivatives are computed from differences, because the phase of a gear depends on links that are placed first"
             )
         return lines
 

@@ -28,7 +28,7 @@ WORDS = {
         "{0} and {1} come no nearer than {available}, {needed} needed: {by} too long",
     ),
     "RRP": ("{0} reaches {available}, {needed} needed: {by} short",),
-    "RPR": ("the guide at {0} runs past at {available}, {needed} needed: {by} too far",),
+    "RPR": ("the line of the guide at {0} passes at {available}, at most {needed} allowed: {by} too far",),
 }
 
 

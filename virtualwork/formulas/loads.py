@@ -214,7 +214,7 @@ class Tabled(Load):
     def timed(self, time: Number) -> Number:
         """The time; refused where the poses have none."""
         if time is None:
-            what = f"the torque on {self.body} is given over the time: only a motion in time has it"
+            what = f"the torque on {self.body} is a table over time: it acts in a simulation only"
             raise DescriptionError(what)
         return time
 

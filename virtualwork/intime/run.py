@@ -346,8 +346,8 @@ def _refuse_lost_energy(fine: Travel, error: float) -> None:
     lost = np.abs(drift(fine.energy(times), fine.at(times)[3])) > 1e3 * error * moving
     if lost.any():
         raise MechanismError(
-            f"at {times[np.argmax(lost)]:.6g} s it passes a change point too close to which its rates change too fast: "
-            "energy is lost there beyond the error of the motion"
+            f"at {times[np.argmax(lost)]:.6g} s the rates change too fast near a change point: "
+            "more energy is lost than the error of the motion explains"
         )
 
 
@@ -420,22 +420,24 @@ def _warnings(
     if run.fine.ended == "end" and until:
         warnings.append(not_met(until, float(requested[-1])))
     if run.fine.ended == "budget":
-        warnings.append(f"ends at {run.fine.end:.9g} s, after {MOST} steps: a lower accuracy takes fewer")
+        warnings.append(
+            f"ends at {run.fine.end:.9g} s, after {MOST} steps: a larger permissible error (--accuracy) needs fewer"
+        )
     elif run.fine.ended not in ("end", "until"):
         warnings.append(f"ends at {run.fine.end:.9g} s: {run.fine.ended}")
     undecided = run.fine.undecided
     if undecided is not None:
         warnings.append(
-            f"at {undecided:.9g} s it rests at a change point, from where more than one motion leads on: that of the "
-            "guess's branch is followed"
+            f"at {undecided:.9g} s it rests at a change point, where two motions are possible: the one on the guess's "
+            "branch is followed"
         )
     if run.unknown.any():
         warnings.append(
-            f"no digit is known from {run.t[np.argmax(run.unknown)]:.6g} s on: the motion makes any error grow, "
-            "and beyond rounding it grows past the answer"
+            f"no digit holds from {run.t[np.argmax(run.unknown)]:.6g} s on: the motion magnifies rounding errors "
+            "until they exceed the answer"
         )
     elif worst > accuracy:
-        warnings.append(f"accuracy {accuracy:g} is beyond rounding here: {worst:.1e} is reached")
+        warnings.append(f"accuracy {accuracy:g} is beyond rounding here: the estimated error is {worst:.1e}")
     drives = run.assembly.mechanism.cam_drives
     if drives:
         from virtualwork.intime.contacts import contacts_lost

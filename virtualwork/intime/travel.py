@@ -25,10 +25,10 @@ from virtualwork.intime.watch import Floats, noise
 CHANGES = 10_000
 # changes of the mode of friction at one time, for each joint that rubs
 MODES = 3
-CHATTERS = "friction does not settle there which joints stick and which slide"
-GAINS = "friction would drive joint {} there: which way it slides is not settled"
-UNDECIDED = "it comes so near a change point that rounding decides how it goes on"
-NO_FURTHER = "it can go no further: a limit, or a pose where its motion is not determined"
+CHATTERS = "it is not determined which joints stick there and which slide"
+GAINS = "friction would drive joint {} there: its direction of sliding is not determined"
+UNDECIDED = "it is so close to a change point that rounding would decide its further motion"
+NO_FURTHER = "it cannot move further: a limit, or a pose where its motion is not determined"
 
 
 # changes of coordinates and of their speeds, (n, k) each

@@ -266,7 +266,7 @@ class Sweep:
                     f"the sweep covers {covered} of the input {name}, and a whole cycle is {360 * turns} deg: "
                     f"sweep from {start:.10g}deg to {end:.10g}deg"
                 )
-        return f"the loads do not come back to themselves within {TURNS} turns of the input {name}"
+        return f"the loads do not repeat within {TURNS} turns of the input {name}"
 
     def _repeats(self, turns: int) -> bool:
         return self._alike(self._after(turns))

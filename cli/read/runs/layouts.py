@@ -124,7 +124,7 @@ def _states_are_masses(table: Table, states: list[re.Match[str]]) -> None:
     table.cells["trial_angle"] = Cells(header, "deg", [match["angle"] or "0" for match in states])
     if not any(match["angle"] for match in states):
         table.warnings.append(
-            f"{table.file}: the states name no angle of the mass: the correction's counts from where it was"
+            f"{table.file}: the states name no angle of the mass: the angle of the correction counts from that of the mass"
         )
     del table.texts["state"]
 

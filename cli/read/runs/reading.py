@@ -128,9 +128,7 @@ class _Reading:
         table, rotor, of_log = self.table, self.masses.rotor, self.layout.is_log
         vibration, when = self._vibration(), years(table)
         if "use" in table.texts:
-            table.warnings.append(
-                f"{table.file}: the column use is the keeper's own mark: every row takes part in the fit"
-            )
+            table.warnings.append(f"{table.file}: the column use is ignored: every row is used in the fit")
         if "run" not in table.texts and not (of_log or self.files):
             raise DataError(f"{table.file}: no column run {table.hint}")
         run_names, run = table.numbered("run", "initial")
