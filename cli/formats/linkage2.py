@@ -23,6 +23,7 @@ from cli.formats.drawn import (
     finite,
     unused,
 )
+from cli.formats.limits import MOST_PARTS, check_count
 from dalembert.errors import DataError
 from virtualwork.describe.meshes import Gear
 
@@ -54,6 +55,7 @@ def parse(file: str, text: str) -> Element:
     root = Element("", 1)
     open_ = [root]
     line, at = 1, 0
+    check_count(file, text.count("<"), "elements", 2 * MOST_PARTS)
     for match in re.finditer(r"<!--.*?-->|<([^<>]*)>|<", text, re.DOTALL):
         line, at = line + text.count("\n", at, match.start()), match.start()
         where = f"line {line}"

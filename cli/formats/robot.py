@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cli.formats.limits import MOST_LINKS, check_count
 from cli.formats.markup import At
 from cli.read.turning import along, turned
 from dalembert.errors import DataError
@@ -129,6 +130,7 @@ class Robot:
 
     def add(self, link: RobotLink) -> None:
         """Add a link; a name is there once."""
+        check_count(self.file, len(self.links), "links", MOST_LINKS)
         if link.name in self.links:
             raise DataError(f"{self.file}: two links are called '{link.name}'")
         self.links[link.name] = link
@@ -386,7 +388,8 @@ def plane_of(file: str, joints: list[RobotJoint], notes: list[str]) -> Plane:
             )
     turning, sliding = ([j for j in joints if j.kind == kind] for kind in ("turn", "slide"))
     if turning:
-        normal = max((j.axis for j in turning), key=lambda n: sum(_off(n, j.axis) < ROUNDED for j in turning))
+        axes = np.array([j.axis for j in turning])
+        normal = max(axes, key=lambda n: int(np.sum(_off(n, axes) < ROUNDED)))
     else:
         along = sliding[0].axis if sliding else np.zeros(3)
         across = (np.cross(along, j.axis) for j in sliding)
@@ -399,7 +402,7 @@ def plane_of(file: str, joints: list[RobotJoint], notes: list[str]) -> Plane:
     plane = _axes(normal)
     worst = 0.0
     for j in (j for j in joints if j.kind != "ball"):
-        off = abs(_off(plane.normal, j.axis) - (math.pi / 2 if j.kind == "slide" else 0.0))
+        off = abs(float(_off(plane.normal, j.axis)) - (math.pi / 2 if j.kind == "slide" else 0.0))
         if off > ROUNDED:
             by = f"{math.degrees(off):.4g} deg"
             turn = f"axis stands {by} off the normal of the plane of the others"
@@ -411,9 +414,9 @@ def plane_of(file: str, joints: list[RobotJoint], notes: list[str]) -> Plane:
     return plane
 
 
-def _off(a: Array, b: Array) -> float:
-    """Return the angle between two axes without sense, rad."""
-    return math.atan2(float(np.linalg.norm(np.cross(a, b))), abs(float(a @ b)))
+def _off(a: Array, b: Array) -> Array:
+    """Return the angle between an axis and others, without sense, rad."""
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.abs(b @ a)))
 
 
 def _axes(normal: Array) -> Plane:

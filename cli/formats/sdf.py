@@ -106,7 +106,6 @@ class _Model:
         except ValueError:
             self.old = False
         self.at: dict[str, Array] = {WORLD: np.eye(4)}
-        self.entered: set[str] = set()
         self.frames = {
             xml.named(self.file, e): e
             for e in xml.children(element, "link", "joint", "frame")
@@ -142,23 +141,22 @@ class _Model:
 
     def frame(self, name: str, at: xml.At) -> Array:
         """Return the pose of a frame in the world."""
-        if name in self.at:
-            return self.at[name]
-        if name not in self.frames:
-            raise DataError(f"{self.file}: {at.where}: no frame is called '{name}'")
-        if name in self.entered:
-            raise DataError(f"{self.file}: {at.where}: the pose of '{name}' is relative to itself")
-        self.entered.add(name)
-        e = self.frames[name]
-        pose = xml.child(e, "pose")
-        base = "" if pose is None else pose.get("relative_to", "")
-        if not base:
-            base = MODEL
-            if e.tag == "joint":
+        # the frame, that to which it is relative, and so on to one that is known
+        chain: dict[str, Element | None] = {}
+        while name not in self.at:
+            if name not in self.frames:
+                raise DataError(f"{self.file}: {at.where}: no frame is called '{name}'")
+            if name in chain:
+                raise DataError(f"{self.file}: {at.where}: the pose of '{name}' is relative to itself")
+            e = self.frames[name]
+            own = chain[name] = xml.child(e, "pose")
+            base = "" if own is None else own.get("relative_to", "")
+            if not base and e.tag == "joint":
                 base = _named_text(xml.At(self.file, f"joint '{name}'"), e, "child")
-            elif e.tag == "frame":
-                base = e.get("attached_to") or MODEL
-        self.at[name] = self.frame(base, at) @ read_pose(at, pose)
+            name = base or (e.get("attached_to") if e.tag == "frame" else None) or MODEL
+        for inner, own in reversed(chain.items()):
+            self.at[inner] = self.at[name] @ read_pose(at, own)
+            name = inner
         return self.at[name]
 
     def holder(self, name: str, at: xml.At) -> str:

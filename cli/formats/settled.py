@@ -240,7 +240,8 @@ class _Speeds:
 def _fit_inputs(d: Drawing) -> None:
     """Remove inputs that depend on those before them, and add free joints as inputs until all is driven."""
     speeds = _Speeds(d)
-    _, s, vt = np.linalg.svd(speeds.joints())
+    # many joints that say the same become as few rows as there are columns
+    _, s, vt = np.linalg.svd(np.linalg.qr(speeds.joints(), mode="r"))
     free = vt[int(np.sum(s > FOLLOWS * s[0])) :]
     kept: list[Drive] = []
     spare = [e for e in d.spare if all(e.moves != other.moves for other in d.drives)]
