@@ -119,12 +119,21 @@ class _Model:
             robot.notes.append(
                 f"<{e.tag}> in the model: left out: nested models and included files are not read"
             )
+        bases = {name for e in self.element.iter("pose") if (name := e.get("frame"))}
+        if bases:
+            robot.notes.append(
+                f"pose: its attribute frame ({', '.join(sorted(bases))}) is left out: SDF 1.7 and later have relative_to"
+            )
         static = xml.text(self.element, "static") in ("true", "1")
         if static:
             robot.notes.append(f"model '{robot.name}' is static: nothing in it moves")
         for e in xml.children(self.element, "link"):
             name, at = xml.placed(file, e)
-            robot.add(RobotLink(name, self.frame(name, at), _inertial(at, xml.child(e, "inertial"))))
+            inertial = xml.child(e, "inertial")
+            if inertial is not None and inertial.get("auto") in ("true", "1"):
+                robot.notes.append(f"{at.where}: the mass and inertia of its shapes are not imported (auto)")
+                inertial = None
+            robot.add(RobotLink(name, self.frame(name, at), _inertial(at, inertial)))
             if xml.text(e, "gravity") in ("false", "0"):
                 robot.notes.append(f"{at.where}: its <gravity> is left out: its whole weight acts")
         for e in xml.children(self.element, "frame"):
