@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cli.formats.limits import LARGEST_FILE, MOST_LINKS, check_count, values_in
+from cli.formats.values import LARGEST_FILE, MOST_LINKS, check_count, values_in
 from dalembert.errors import DataError
 
 if TYPE_CHECKING:

@@ -14,9 +14,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from cli.formats.drawn import GROUND, Drawing, Drive, Exact, Groups, direction, finite, place
-from cli.formats.limits import LARGEST_FILE
+from cli.formats.drawn import GROUND, Drawing, Drive, Groups
 from cli.formats.markup import parse
+from cli.formats.values import LARGEST_FILE, Exact, direction, finite, place
 from dalembert.errors import DataError
 
 # numbers of Sketcher's constraints (ConstraintType of its source)

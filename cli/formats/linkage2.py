@@ -8,22 +8,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from html import unescape
 
-from cli.formats.drawn import (
-    GROUND,
-    Drawing,
-    Drive,
-    Exact,
-    Groups,
-    Slide,
-    apart,
-    centers,
-    damaged,
-    direction,
-    exact,
-    finite,
-    unused,
-)
-from cli.formats.limits import MOST_PARTS, check_count
+from cli.formats.drawn import GROUND, Drawing, Drive, Groups, Slide, centers, unused
+from cli.formats.values import MOST_PARTS, Exact, apart, check_count, damaged, direction, exact, finite
 from dalembert.errors import DataError
 from virtualwork.describe.meshes import Gear
 

@@ -13,8 +13,7 @@ from xml.parsers.expat.errors import codes
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cli.formats.drawn import damaged, finite
-from cli.formats.limits import LARGEST_FILE, MOST_PARTS, check_count
+from cli.formats.values import LARGEST_FILE, MOST_PARTS, check_count, damaged, finite
 from dalembert.errors import DataError
 from dalembert.tables.files import load
 

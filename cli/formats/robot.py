@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cli.formats.limits import MOST_LINKS, check_count
 from cli.formats.markup import At
+from cli.formats.values import MOST_LINKS, check_count
 from cli.read.turning import turned
 from dalembert.errors import DataError
 

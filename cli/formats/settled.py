@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.formats.drawn import GROUND, SAME, Body, Drawing, Drive, Groups, Slide, apart, together
+from cli.formats.drawn import GROUND, SAME, Body, Drawing, Drive, Groups, Slide, together
+from cli.formats.values import apart
 
 Rows = NDArray[np.float64]
 # below this share a row of speeds follows from others: a file's decimals are fewer than ours
