@@ -91,7 +91,7 @@ class Ties:
 
     def _side(self, site: str | None, at: xml.At) -> tuple[str, Array]:
         """Return the body of a site that closes a loop, and its pose."""
-        if site not in self.sites:
+        if site is None or site not in self.sites:
             raise DataError(f"{at.file}: {at.where}: no site is called '{site}'")
         self.closing.add(site)
         link, inside = self.sites[site]

@@ -15,6 +15,7 @@ from xml.parsers import expat
 
 from dalembert.errors import DataError, quote
 from dalembert.tables import old_workbooks
+from dalembert.tables.files import ZIP
 from dalembert.tables.places import OFFICE, TABLE, address, part_of, place_of
 
 # bytes of a workbook's XML
@@ -64,7 +65,7 @@ def check_file(file: str, data: bytes) -> None:
     zipfile.BadZipFile, expat.ExpatError
         It is damaged.
     """
-    if data[:4] != zipfile.stringFileHeader:
+    if data[:4] != ZIP:
         for held, rows, columns in old_workbooks.reaches(data):
             Reach("", held, rows, columns).check(file)
         return
