@@ -114,7 +114,18 @@ class _Model:
 
     def read(self) -> None:
         robot, file = self.robot, self.file
-        self.at[MODEL] = read_pose(xml.At(file, "model"), xml.child(self.element, "pose"))
+        own = xml.child(self.element, "pose")
+        self.at[MODEL] = read_pose(xml.At(file, "model"), own)
+        base = "" if own is None else own.get("relative_to", "")
+        placed = {
+            "relative_to": base * (base != WORLD),
+            "placement_frame": self.element.get("placement_frame", ""),
+        }
+        for key, name in placed.items():
+            if name:
+                robot.notes.append(
+                    f"model: {key}='{name}' is left out: the model stands elsewhere in the world"
+                )
         for e in xml.children(self.element, "model", "include"):
             robot.notes.append(
                 f"<{e.tag}> in the model: left out: nested models and included files are not read"

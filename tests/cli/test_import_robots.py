@@ -166,6 +166,7 @@ def test_weight_that_does_not_act_in_mjcf_and_positions_that_sdf_starts_from_are
         (SDF, "<mass>2</mass>", "<masss>2</masss>", "<masss> in <inertial>: left out: it is not read"),
         (SDF, "<inertial>", '<inertial auto="true">', "link 'AB': the mass and inertia of its shapes are not imported (auto)"),
         (SDF, "<inertial>", '<inertial><pose frame="A">0 0 0 0 0 0</pose>', "pose: its attribute frame (A) is left out"),
+        (SDF, "<model name=", '<model placement_frame="A" name=', "model: placement_frame='A' is left out: the model stands elsewhere"),
         (SDF, "<link name=", "<include/><link name=", "<include> in the model: left out"),
         (SDF, "</model>", "</model><model_2/>", "<model_2> in <sdf>: left out: it is not read"),
         (SDF, '<link name="AB">', '<link name="AB"><gravity>0</gravity>', "link 'AB': its <gravity> is left out: its whole weight acts"),
