@@ -199,9 +199,7 @@ def write(s: Skeleton, comment: str) -> tuple[bytes, list[str]]:
     """Return the file of a mechanism, and what it leaves out."""
     m = s.m
     root = Element("mujoco", model=m.name or "mechanism")
-    light = max(LIGHT * (max(p.mass for p in s.bodies.values()) or 1.0), LIGHTEST)
-    inertias = [p.inertia for p in s.bodies.values() if p.inertia > 0]
-    least = max(min([light * m.size**2, *inertias]), LIGHTEST)
+    light, least, raised = _bounds(s)
     xml.add(
         root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false", boundmass=light, boundinertia=least
     )  # fmt: skip
@@ -242,7 +240,22 @@ def write(s: Skeleton, comment: str) -> tuple[bytes, list[str]]:
             motor.set("ctrlrange", xml.digits(-s.travel.peak, s.travel.peak))
     root.extend(e for e in (equality, tendon, actuator) if len(e))
     _key(s, xml.add(root, "keyframe"))
-    return xml.document(root, comment), s.left_out(("springs", "torsion springs", "inputs", "gravity"))
+    return xml.document(root, comment), raised + s.left_out(
+        ("springs", "torsion springs", "inputs", "gravity")
+    )
+
+
+def _bounds(s: Skeleton) -> tuple[float, float, list[str]]:
+    """Return the least mass and the least moment of inertia, below all but those of zero; and what MuJoCo raises all the same."""
+    bodies = s.bodies.items()
+    masses, inertias = (
+        [x for x in each if x > 0] for each in zip(*((p.mass, p.inertia) for _, p in bodies), strict=True)
+    )
+    light = max(min([LIGHT * max(masses, default=1.0), *masses]), LIGHTEST)
+    least = max(min([light * s.m.size**2, *inertias]), LIGHTEST)
+    names = [name for name, p in bodies if 0 < p.mass < light or 0 < p.inertia < least]
+    what = f"{', '.join(names)}: MuJoCo raises a mass or a moment of inertia below {LIGHTEST:g}"
+    return light, least, [what] if names else []
 
 
 def _fixed(tendon: Element, name: str, terms: dict[str, float]) -> Element:
