@@ -15,6 +15,8 @@ from cli.formats.values import apart
 Rows = NDArray[np.float64]
 # below this share a row of speeds follows from others: a file's decimals are fewer than ours
 FOLLOWS = 1e-6
+# of two coordinates: how far the difference of their floats may be from their own
+FLOATS = 4e-16
 
 
 def merge(d: Drawing, keep: str, gone: str) -> None:
@@ -43,14 +45,15 @@ def _one_pin_at_a_place(d: Drawing) -> bool:
     """Join two joints of one body at the same place into one pin; return whether there were two."""
     near = SAME * d.size()
     joints = set(d.pins()) | {s.point for s in d.slides}
-    for body in d.bodies.values():
-        held = [p for p in body.points if p in joints]
+    for name, body in d.bodies.items():
+        # two shafts in one place of the ground are not pinned to each other
+        held = [p for p in body.points if p in joints and name != GROUND]
         for i, p in enumerate(held):
             for q in held[:i]:
-                if apart(body.points[p], body.points[q]) <= near:
-                    if body is d.bodies[GROUND]:
-                        # two shafts in one place of the ground are not pinned to each other
-                        continue
+                a, b = body.points[p], body.points[q]
+                # floats show most that are apart; exact differences take twenty times as long
+                close = abs(complex(a) - complex(b)) <= near + FLOATS * (abs(a) + abs(b))
+                if close and apart(a, b) <= near:
                     _rename_point(d, p, q)
                     return True
     return False
