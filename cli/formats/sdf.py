@@ -121,16 +121,16 @@ class _Model:
             "relative_to": base * (base != WORLD),
             "placement_frame": self.element.get("placement_frame", ""),
         }
-        for key, name in placed.items():
-            if name:
+        for key, of in placed.items():
+            if of:
                 robot.notes.append(
-                    f"model: {key}='{name}' is left out: the model stands elsewhere in the world"
+                    f"model: {key}='{of}' is left out: the model stands elsewhere in the world"
                 )
         for e in xml.children(self.element, "model", "include"):
             robot.notes.append(
                 f"<{e.tag}> in the model: left out: nested models and included files are not read"
             )
-        bases = {name for e in self.element.iter("pose") if (name := e.get("frame"))}
+        bases = {frame for e in self.element.iter("pose") if (frame := e.get("frame"))}
         if bases:
             robot.notes.append(
                 f"pose: its attribute frame ({', '.join(sorted(bases))}) is left out: SDF 1.7 and later have relative_to"
