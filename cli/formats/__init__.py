@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cli.formats.values import LARGEST_FILE, MOST_LINKS, check_count, values_in
 from dalembert.errors import DataError
 
 if TYPE_CHECKING:
@@ -36,8 +37,6 @@ def unknown(file: str) -> DataError:
 
 def decoded(file: str, data: bytes) -> str:
     """Return a file's text; DataError where the file is too large or binary."""
-    from cli.formats.markup import LARGEST_FILE
-
     if len(data) > LARGEST_FILE:
         raise DataError(f"{file}: {len(data)} bytes: expected at most {LARGEST_FILE} (10 MB)")
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -60,7 +59,7 @@ def parsed(file: str, text: str) -> Any:
         raise DataError(f"{file}: found {word}, expected finite numbers")
 
     try:
-        return json.loads(text, parse_constant=refuse)
+        result = json.loads(text, parse_constant=refuse)
     except json.JSONDecodeError as error:
         raise DataError(
             f"{file}: line {error.lineno}, column {error.colno}: no valid JSON ({error.msg}); is the file cut off?"
@@ -69,6 +68,8 @@ def parsed(file: str, text: str) -> Any:
         raise DataError(
             f"{file}: no valid JSON: nested too deeply, or a number of thousands of digits"
         ) from None
+    check_count(file, values_in(result), "values")
+    return result
 
 
 def kind_of(file: str, text: str) -> str:
@@ -81,7 +82,7 @@ def kind_of(file: str, text: str) -> str:
     if start.startswith("<"):
         if re.search(r"<\s*linkage2\b", start[:2000], re.IGNORECASE):
             return "linkage"
-        tag = re.search(r"<([A-Za-z_][\w.-]*)", re.sub(r"<!--.*?-->", "", start, flags=re.DOTALL))
+        tag = re.search(r"<([A-Za-z_][\w.-]*)", re.sub(r"<!--.*?(?:-->|\Z)", "", start, flags=re.DOTALL))
         if tag and tag[1] in ROOTS:
             return ROOTS[tag[1]]
         raise unknown(file)
@@ -117,6 +118,13 @@ def kind_of(file: str, text: str) -> str:
 
 def read(file: str, data: bytes, kind: str | None, folder: Path | None = None) -> tuple[str, list[Drawing]]:
     """Return the kind and the drawings of a file; files that it includes must lie in its folder."""
+    kind, drawings = _read(file, data, kind, folder)
+    for d in drawings:
+        check_count(file, len(d.bodies), "links", MOST_LINKS)
+    return kind, drawings
+
+
+def _read(file: str, data: bytes, kind: str | None, folder: Path | None) -> tuple[str, list[Drawing]]:
     from cli.formats import freecad, linkage2, linkage_sim, motiongen, pmks, pmksweb
 
     if kind == "freecad" or (kind is None and freecad.is_document(data)):
@@ -131,6 +139,8 @@ def read(file: str, data: bytes, kind: str | None, folder: Path | None = None) -
         return kind, [plane.drawing(read_robot(file, data, folder))]
     if kind == "linkage":
         return kind, linkage2.read(file, text)
+    if kind in ("pmks-text", "pmks-web"):
+        check_count(file, text.count("\n"), "lines")
     if kind == "pmks-text":
         return kind, pmks.read(file, parsed(file, text) if text.lstrip()[:1] in ("{", "[") else text)
     if kind == "pmks-web":

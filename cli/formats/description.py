@@ -8,17 +8,8 @@ from itertools import chain
 
 import numpy as np
 
-from cli.formats.drawn import (
-    GROUND,
-    ORIGIN,
-    Body,
-    Drawing,
-    Exact,
-    Load,
-    coordinates,
-    exact,
-    unused,
-)
+from cli.formats.drawn import GROUND, Body, Drawing, Load, unused
+from cli.formats.values import ORIGIN, Exact, coordinates, exact
 from virtualwork import Mechanism
 from virtualwork.describe import MechanismError
 from virtualwork.describe.parts import Guess, Guide, Input, Link, Rack

@@ -14,8 +14,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from cli.formats.drawn import GROUND, Drawing, Drive, Exact, Groups, direction, finite, place
-from cli.formats.markup import LARGEST_FILE, parse
+from cli.formats.drawn import GROUND, Drawing, Drive, Groups
+from cli.formats.markup import parse
+from cli.formats.values import LARGEST_FILE, Exact, direction, finite, place
 from dalembert.errors import DataError
 
 # numbers of Sketcher's constraints (ConstraintType of its source)
@@ -27,6 +28,8 @@ H_AXIS, V_AXIS, NONE = -1, -2, -2000
 START, END = 1, 2
 Vertex = tuple[int, int]
 ORIGIN: Vertex = (H_AXIS, START)
+# of a document, which holds parts of every kind beside its sketches
+MOST_ELEMENTS = 500_000
 
 
 @dataclass
@@ -73,7 +76,7 @@ def read(file: str, data: bytes) -> list[Drawing]:
                 raise DataError(
                     f"{file}: Document.xml: {entry.file_size} bytes: expected at most {LARGEST_FILE}"
                 )
-            root = parse(f"{file}, Document.xml", archive.read(entry))
+            root = parse(f"{file}, Document.xml", archive.read(entry), MOST_ELEMENTS)
     except (zipfile.BadZipFile, zipfile.LargeZipFile, NotImplementedError, RuntimeError, EOFError) as error:
         raise DataError(f"{file}: no zip of FreeCAD: {error}") from None
     sketches = list(_sketches(file, root))

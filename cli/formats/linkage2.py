@@ -8,21 +8,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from html import unescape
 
-from cli.formats.drawn import (
-    GROUND,
-    Drawing,
-    Drive,
-    Exact,
-    Groups,
-    Slide,
-    apart,
-    centers,
-    damaged,
-    direction,
-    exact,
-    finite,
-    unused,
-)
+from cli.formats.drawn import GROUND, Drawing, Drive, Groups, Slide, centers, unused
+from cli.formats.values import MOST_PARTS, Exact, apart, check_count, damaged, direction, exact, finite
 from dalembert.errors import DataError
 from virtualwork.describe.meshes import Gear
 
@@ -54,6 +41,7 @@ def parse(file: str, text: str) -> Element:
     root = Element("", 1)
     open_ = [root]
     line, at = 1, 0
+    check_count(file, text.count("<"), "elements", 2 * MOST_PARTS)
     for match in re.finditer(r"<!--.*?-->|<([^<>]*)>|<", text, re.DOTALL):
         line, at = line + text.count("\n", at, match.start()), match.start()
         where = f"line {line}"

@@ -6,24 +6,8 @@ import cmath
 import math
 from typing import Any
 
-from cli.formats.drawn import (
-    GROUND,
-    SAME,
-    Body,
-    Drawing,
-    Drive,
-    Exact,
-    Load,
-    Slide,
-    apart,
-    coordinates,
-    damaged,
-    exact,
-    objects,
-    pins_of,
-    place,
-    together,
-)
+from cli.formats.drawn import GROUND, SAME, Body, Drawing, Drive, Load, Slide, pins_of, together
+from cli.formats.values import Exact, apart, coordinates, damaged, exact, objects, place
 from dalembert.errors import DataError
 
 # type -> the table here, the keys of its bodies and of its points on them, and of its numbers

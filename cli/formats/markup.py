@@ -13,11 +13,10 @@ from xml.parsers.expat.errors import codes
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cli.formats.drawn import damaged, finite
+from cli.formats.values import LARGEST_FILE, MOST_PARTS, check_count, damaged, finite
 from dalembert.errors import DataError
 from dalembert.tables.files import load
 
-LARGEST_FILE = 10_000_000  # bytes
 DEEPEST = 100
 # files that a file may include
 INCLUDES = 20
@@ -26,8 +25,8 @@ FORBIDDEN = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 UNBOUND_PREFIX = codes[errors.XML_ERROR_UNBOUND_PREFIX]
 
 
-def parse(file: str, data: bytes) -> Element:
-    """Return the outermost element of a file; DataError names the line of what is wrong."""
+def parse(file: str, data: bytes, most: int = MOST_PARTS) -> Element:
+    """Return the outermost element of a file of at most so many; DataError names the line of what is wrong."""
     from defusedxml import DefusedXmlException
     from defusedxml.ElementTree import fromstring
 
@@ -53,6 +52,7 @@ def parse(file: str, data: bytes) -> Element:
     except (ValueError, LookupError) as error:
         raise DataError(f"{file}: no valid XML: {error}") from None
     _plain(file, root)
+    check_count(file, sum(1 for _ in root.iter()), "elements", most)
     return root
 
 
@@ -66,11 +66,13 @@ def _with_prefixes(data: bytes) -> bytes:
     """
     used = dict.fromkeys(re.findall(rb"</?([A-Za-z_][\w.-]*):[A-Za-z_]", data))
     used |= dict.fromkeys(re.findall(rb"\s([A-Za-z_][\w.-]*):[A-Za-z_][\w.-]*\s*=", data))
-    new = [p for p in used if p not in (b"xml", b"xmlns") and b"xmlns:" + p not in data]
-    declared = b"".join(b' xmlns:%b="%b"' % (p, p) for p in new)
-    blank = re.sub(rb"<!--.*?-->|<\?.*?\?>", lambda m: b" " * len(m[0]), data, flags=re.DOTALL)
+    declared = {b"xml", b"xmlns", *re.findall(rb"xmlns:([\w.-]+)", data)}
+    new = [p for p in used if p not in declared]
+    more = b"".join(b' xmlns:%b="%b"' % (p, p) for p in new)
+    # what is not closed ends with the file
+    blank = re.sub(rb"<!--.*?(?:-->|\Z)|<\?.*?(?:\?>|\Z)", lambda m: b" " * len(m[0]), data, flags=re.DOTALL)
     root = re.search(rb"<[A-Za-z_][\w.:-]*", blank)
-    return data if root is None else data[: root.end()] + declared + data[root.end() :]
+    return data if root is None else data[: root.end()] + more + data[root.end() :]
 
 
 def _plain(file: str, root: Element) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from cli.formats.drawn import GROUND, Drawing, Drive, Exact, Slide, damaged, direction, exact, objects, place
+from cli.formats.drawn import GROUND, Drawing, Drive, Slide
+from cli.formats.values import Exact, damaged, direction, exact, objects, place
 from dalembert.errors import DataError
 
 LENGTHS = ("mm", "cm", "m", "in", "ft")

@@ -66,7 +66,8 @@ class _Layer:
         # significant digits after the point: the rest is rounding on the way through the tree
         self.digits = 15 - math.ceil(math.log10(self.size))
         self._groups()
-        d.posed = all(self._closed(j) for j in moving)
+        open_ = [j for j in robot.joints.values() if not self._closed(j)]
+        d.posed = not any(j in moving for j in open_)
         self.slides: dict[str, Slide] = {}
         turning = [
             (j.name, {name: self._place(z) for name, z in self._sides(j)})

@@ -11,21 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import unquote
 
-from cli.formats.drawn import (
-    GROUND,
-    Body,
-    Drawing,
-    Drive,
-    Exact,
-    Slide,
-    Toothed,
-    apart,
-    centers,
-    damaged,
-    direction,
-    finite,
-    place,
-)
+from cli.formats.drawn import GROUND, Body, Drawing, Drive, Slide, Toothed, centers
+from cli.formats.values import Exact, apart, damaged, direction, finite, place
 from dalembert.errors import DataError, quote
 from virtualwork.describe.meshes import Gear
 

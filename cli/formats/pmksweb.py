@@ -16,7 +16,8 @@ from dataclasses import dataclass, field
 from itertools import takewhile
 from urllib.parse import unquote
 
-from cli.formats.drawn import GROUND, Drawing, Drive, Exact, Load, Slide, damaged, direction, finite, place
+from cli.formats.drawn import GROUND, Drawing, Drive, Load, Slide
+from cli.formats.values import Exact, damaged, direction, finite, place
 from dalembert.errors import DataError
 
 # a link of before 2022

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cli.formats.markup import At
-from cli.read.turning import along, turned
+from cli.formats.values import MOST_LINKS, check_count
+from cli.read.turning import turned
 from dalembert.errors import DataError
 
 if TYPE_CHECKING:
-    from rigidbody3d.body import Body
     from virtualwork.describe.meshes import Gear
 
 Array = NDArray[np.float64]
@@ -129,6 +129,7 @@ class Robot:
 
     def add(self, link: RobotLink) -> None:
         """Add a link; a name is there once."""
+        check_count(self.file, len(self.links), "links", MOST_LINKS)
         if link.name in self.links:
             raise DataError(f"{self.file}: two links are called '{link.name}'")
         self.links[link.name] = link
@@ -146,6 +147,10 @@ class Robot:
     def couple(self, name: str, joint: str, other: str, factor: float, offset: float, where: str) -> None:
         """Keep a joint's coordinate at a factor times another's, or as it is where there is no other; the offset is the file's."""
         self.couplings.append((name, [(joint, 1.0), *([(other, -factor)] if other else [])]))
+        self.note_offset(where, offset)
+
+    def note_offset(self, where: str, offset: float = 0.0) -> None:
+        """Note what a coupling adds to a coordinate."""
         if offset:
             self.notes.append(f"{where}: its offset {offset:g} is left out: the pose is that of the file")
 
@@ -227,121 +232,6 @@ def sphere_around(shape: str, size: list[float]) -> float | None:
     return max(size) if shape in ("sphere", "ellipsoid") and size else None
 
 
-@dataclass(frozen=True)
-class Frames:
-    """How a file writes orientations: angles in degrees or rad, Euler angles about which axes."""
-
-    file: str
-    degrees: bool
-    sequence: str
-
-    def __post_init__(self) -> None:
-        """Check the axes."""
-        if len(self.sequence) != 3 or not set(self.sequence.lower()) <= set("xyz"):
-            raise At(self.file, "compiler").error("eulerseq", self.sequence, "three of x, y, z")
-
-    def angle(self, value: float) -> float:
-        """Return an angle of the file in rad."""
-        return float(np.radians(value)) if self.degrees else value
-
-    def pose(self, where: str, e: Mapping[str, str]) -> Array:
-        """Return the pose that pos and one of quat, euler, axisangle, xyaxes, zaxis give."""
-        at = At(self.file, where)
-        place = at.numbers("pos", e.get("pos"), 3, (0.0, 0.0, 0.0))
-        turn = np.eye(3)
-        if "quat" in e:
-            turn = rotation(at, at.numbers("quat", e["quat"], 4))
-        elif "euler" in e:
-            for axis, angle in zip(self.sequence, at.numbers("euler", e["euler"], 3), strict=True):
-                value = self.angle(angle)
-                one = [("xyz".index(axis.lower()), np.cos(value), np.sin(value))]
-                turn = turn @ turned(one, np.eye(3)) if axis.islower() else turned(one, turn)
-        elif "axisangle" in e:
-            from rigidbody3d.attitude import from_vector
-
-            *v, angle = at.numbers("axisangle", e["axisangle"], 4)
-            turn = rotation(at, from_vector(self.angle(angle) * at.direction("axisangle", v)).tolist())
-        elif "xyaxes" in e:
-            v = at.numbers("xyaxes", e["xyaxes"], 6)
-            x = at.direction("xyaxes", v[:3])
-            y = at.direction("xyaxes", np.array(v[3:]) - x * (x @ v[3:]))
-            turn = np.column_stack([x, y, np.cross(x, y)])
-        elif "zaxis" in e:
-            turn = along(at.direction("zaxis", at.numbers("zaxis", e["zaxis"], 3))[None])[0]
-        return pose(place, turn)
-
-
-# of a shape with neither mass nor density, kg/m³
-DENSITY = 1000.0
-# how many of a shape's sizes are used, those along its own axes being halves
-SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
-
-
-def solid(shape: str, size: list[float]) -> Body:
-    """Return a shape along its own axes, its density 1 kg/m³.
-
-    >>> float(solid("box", [0.5, 1.0, 1.5]).mass)
-    6.0
-    """
-    from rigidbody3d.body import Body, compose
-    from rigidbody3d.shapes import measure_of
-
-    if shape == "ellipsoid":
-        # a sphere stretched along its axes: its second moments are m a²/5
-        a, b, c = np.square(size)
-        mass = np.asarray(4 / 3 * np.pi * math.prod(size))
-        return Body(mass, np.zeros(3), mass / 5 * np.diag([b + c, a + c, a + b]))
-    r, h = size[0], size[-1]
-    named = {
-        "sphere": {"radius": r},
-        "box": dict(zip(("width", "height", "depth"), (2 * x for x in size), strict=False)),
-    }.get(shape, {"radius": r, "length": 2 * h})
-    kind = "cylinder" if shape == "capsule" else shape
-    whole = Body.of(kind, measure_of(kind, **named)[0], **named)
-    if shape != "capsule":
-        return whole
-    # its two halves of a sphere, each with its centre of mass 3r/8 beyond the cylinder's end
-    end = measure_of("sphere", radius=r)[0] / 2
-    half = Body(end, np.zeros(3), end * r * r * np.diag([83 / 320, 83 / 320, 2 / 5]))
-    return compose([whole, *(half.moved([0.0, 0.0, side * (h + 3 / 8 * r)]) for side in (1, -1))])
-
-
-def mass_of_shapes(
-    frames: Frames, where: str, geoms: Iterable[tuple[Mapping[str, str], Array]], notes: list[str]
-) -> Inertial | None:
-    """Return the inertia of a body's shapes, each by its attributes and the pose in the body in which it is written."""
-    from rigidbody3d.body import Body, compose
-
-    at, parts = At(frames.file, where), []
-    for values, frame in geoms:
-        shape = values.get("type", "sphere")
-        if shape not in SIZES or "mesh" in values:
-            notes.append(f"{where}: the mass of a {values.get('mesh', shape)} is not imported")
-            continue
-        here = frames.pose(f"{where}, geom", values)
-        size = at.numbers("geom size", values.get("size", "0"))
-        if "fromto" in values:
-            ends = np.array(at.numbers("geom fromto", values["fromto"], 6)).reshape(2, 3)
-            way = ends[1] - ends[0]
-            here = pose(ends.mean(axis=0), along(at.direction("geom fromto", way)[None])[0])
-            # across it has one size, whatever its shape
-            size = size[:1] * (SIZES[shape] - 1) + [float(np.linalg.norm(way)) / 2]
-        if len(size) < SIZES[shape] or min(size[: SIZES[shape]]) <= 0:
-            raise at.error("geom size", values.get("size", ""), f"{SIZES[shape]} above zero")
-        whole = solid(shape, size[: SIZES[shape]])
-        density = at.number("geom density", values.get("density", str(DENSITY)))
-        mass = at.number("geom mass", values.get("mass", repr(density * float(whole.mass))))
-        if mass < 0:
-            raise at.error("geom mass", f"{mass:g}", "one of zero or more")
-        held = frame @ here
-        own = Body(np.asarray(mass), np.zeros(3), mass / whole.mass * whole.inertia)
-        parts.append(own.turned(held[:3, :3]).moved(held[:3, 3]))
-    if not sum(part.mass for part in parts) > 0:
-        return None
-    body = compose(parts)
-    return Inertial(float(body.mass), pose(body.center), body.inertia, np.zeros((3, 3)))
-
-
 # rad: what angles such as 1.57 for a right angle are off by
 ROUNDED = 1e-3
 SILENT = 1e-6
@@ -386,7 +276,8 @@ def plane_of(file: str, joints: list[RobotJoint], notes: list[str]) -> Plane:
             )
     turning, sliding = ([j for j in joints if j.kind == kind] for kind in ("turn", "slide"))
     if turning:
-        normal = max((j.axis for j in turning), key=lambda n: sum(_off(n, j.axis) < ROUNDED for j in turning))
+        axes = np.array([j.axis for j in turning])
+        normal = max(axes, key=lambda n: int(np.sum(_off(n, axes) < ROUNDED)))
     else:
         along = sliding[0].axis if sliding else np.zeros(3)
         across = (np.cross(along, j.axis) for j in sliding)
@@ -399,7 +290,7 @@ def plane_of(file: str, joints: list[RobotJoint], notes: list[str]) -> Plane:
     plane = _axes(normal)
     worst = 0.0
     for j in (j for j in joints if j.kind != "ball"):
-        off = abs(_off(plane.normal, j.axis) - (math.pi / 2 if j.kind == "slide" else 0.0))
+        off = abs(float(_off(plane.normal, j.axis)) - (math.pi / 2 if j.kind == "slide" else 0.0))
         if off > ROUNDED:
             by = f"{math.degrees(off):.4g} deg"
             turn = f"axis stands {by} off the normal of the plane of the others"
@@ -411,9 +302,9 @@ def plane_of(file: str, joints: list[RobotJoint], notes: list[str]) -> Plane:
     return plane
 
 
-def _off(a: Array, b: Array) -> float:
-    """Return the angle between two axes without sense, rad."""
-    return math.atan2(float(np.linalg.norm(np.cross(a, b))), abs(float(a @ b)))
+def _off(a: Array, b: Array) -> Array:
+    """Return the angle between an axis and others, without sense, rad."""
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.abs(b @ a)))
 
 
 def _axes(normal: Array) -> Plane:

@@ -106,7 +106,6 @@ class _Model:
         except ValueError:
             self.old = False
         self.at: dict[str, Array] = {WORLD: np.eye(4)}
-        self.entered: set[str] = set()
         self.frames = {
             xml.named(self.file, e): e
             for e in xml.children(element, "link", "joint", "frame")
@@ -115,17 +114,37 @@ class _Model:
 
     def read(self) -> None:
         robot, file = self.robot, self.file
-        self.at[MODEL] = read_pose(xml.At(file, "model"), xml.child(self.element, "pose"))
+        own = xml.child(self.element, "pose")
+        self.at[MODEL] = read_pose(xml.At(file, "model"), own)
+        base = "" if own is None else own.get("relative_to", "")
+        placed = {
+            "relative_to": base * (base != WORLD),
+            "placement_frame": self.element.get("placement_frame", ""),
+        }
+        for key, of in placed.items():
+            if of:
+                robot.notes.append(
+                    f"model: {key}='{of}' is left out: the model stands elsewhere in the world"
+                )
         for e in xml.children(self.element, "model", "include"):
             robot.notes.append(
                 f"<{e.tag}> in the model: left out: nested models and included files are not read"
+            )
+        bases = {frame for e in self.element.iter("pose") if (frame := e.get("frame"))}
+        if bases:
+            robot.notes.append(
+                f"pose: its attribute frame ({', '.join(sorted(bases))}) is left out: SDF 1.7 and later have relative_to"
             )
         static = xml.text(self.element, "static") in ("true", "1")
         if static:
             robot.notes.append(f"model '{robot.name}' is static: nothing in it moves")
         for e in xml.children(self.element, "link"):
             name, at = xml.placed(file, e)
-            robot.add(RobotLink(name, self.frame(name, at), _inertial(at, xml.child(e, "inertial"))))
+            inertial = xml.child(e, "inertial")
+            if inertial is not None and inertial.get("auto") in ("true", "1"):
+                robot.notes.append(f"{at.where}: the mass and inertia of its shapes are not imported (auto)")
+                inertial = None
+            robot.add(RobotLink(name, self.frame(name, at), _inertial(at, inertial)))
             if xml.text(e, "gravity") in ("false", "0"):
                 robot.notes.append(f"{at.where}: its <gravity> is left out: its whole weight acts")
         for e in xml.children(self.element, "frame"):
@@ -142,23 +161,22 @@ class _Model:
 
     def frame(self, name: str, at: xml.At) -> Array:
         """Return the pose of a frame in the world."""
-        if name in self.at:
-            return self.at[name]
-        if name not in self.frames:
-            raise DataError(f"{self.file}: {at.where}: no frame is called '{name}'")
-        if name in self.entered:
-            raise DataError(f"{self.file}: {at.where}: the pose of '{name}' is relative to itself")
-        self.entered.add(name)
-        e = self.frames[name]
-        pose = xml.child(e, "pose")
-        base = "" if pose is None else pose.get("relative_to", "")
-        if not base:
-            base = MODEL
-            if e.tag == "joint":
+        # the frame, that to which it is relative, and so on to one that is known
+        chain: dict[str, Element | None] = {}
+        while name not in self.at:
+            if name not in self.frames:
+                raise DataError(f"{self.file}: {at.where}: no frame is called '{name}'")
+            if name in chain:
+                raise DataError(f"{self.file}: {at.where}: the pose of '{name}' is relative to itself")
+            e = self.frames[name]
+            own = chain[name] = xml.child(e, "pose")
+            base = "" if own is None else own.get("relative_to", "")
+            if not base and e.tag == "joint":
                 base = _named_text(xml.At(self.file, f"joint '{name}'"), e, "child")
-            elif e.tag == "frame":
-                base = e.get("attached_to") or MODEL
-        self.at[name] = self.frame(base, at) @ read_pose(at, pose)
+            name = base or (e.get("attached_to") if e.tag == "frame" else None) or MODEL
+        for inner, own in reversed(chain.items()):
+            self.at[inner] = self.at[name] @ read_pose(at, own)
+            name = inner
         return self.at[name]
 
     def holder(self, name: str, at: xml.At) -> str:

@@ -9,11 +9,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.formats.drawn import GROUND, SAME, Body, Drawing, Drive, Groups, Slide, apart, together
+from cli.formats.drawn import GROUND, SAME, Body, Drawing, Drive, Groups, Slide, together
+from cli.formats.values import apart
 
 Rows = NDArray[np.float64]
 # below this share a row of speeds follows from others: a file's decimals are fewer than ours
 FOLLOWS = 1e-6
+# of two coordinates: how far the difference of their floats may be from their own
+FLOATS = 4e-16
 
 
 def merge(d: Drawing, keep: str, gone: str) -> None:
@@ -42,14 +45,15 @@ def _one_pin_at_a_place(d: Drawing) -> bool:
     """Join two joints of one body at the same place into one pin; return whether there were two."""
     near = SAME * d.size()
     joints = set(d.pins()) | {s.point for s in d.slides}
-    for body in d.bodies.values():
-        held = [p for p in body.points if p in joints]
+    for name, body in d.bodies.items():
+        # two shafts in one place of the ground are not pinned to each other
+        held = [p for p in body.points if p in joints and name != GROUND]
         for i, p in enumerate(held):
             for q in held[:i]:
-                if apart(body.points[p], body.points[q]) <= near:
-                    if body is d.bodies[GROUND]:
-                        # two shafts in one place of the ground are not pinned to each other
-                        continue
+                a, b = body.points[p], body.points[q]
+                # floats show most that are apart; exact differences take twenty times as long
+                close = abs(complex(a) - complex(b)) <= near + FLOATS * (abs(a) + abs(b))
+                if close and apart(a, b) <= near:
                     _rename_point(d, p, q)
                     return True
     return False
@@ -240,7 +244,8 @@ class _Speeds:
 def _fit_inputs(d: Drawing) -> None:
     """Remove inputs that depend on those before them, and add free joints as inputs until all is driven."""
     speeds = _Speeds(d)
-    _, s, vt = np.linalg.svd(speeds.joints())
+    # many joints that say the same become as few rows as there are columns
+    _, s, vt = np.linalg.svd(np.linalg.qr(speeds.joints(), mode="r"))
     free = vt[int(np.sum(s > FOLLOWS * s[0])) :]
     kept: list[Drive] = []
     spare = [e for e in d.spare if all(e.moves != other.moves for other in d.drives)]

@@ -92,9 +92,10 @@ def read_toml(path: str) -> tuple[str, dict[str, Any]]:
         raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
     except RecursionError:
         raise DataError(f"{file}: no valid TOML: nested too deeply") from None
-    except ValueError as error:
-        # a TOMLDecodeError, or a number of thousands of digits
+    except tomllib.TOMLDecodeError as error:
         raise DataError(f"{file}: no valid TOML: {error}") from None
+    except ValueError:
+        raise DataError(f"{file}: no valid TOML: a number of thousands of digits") from None
 
 
 def is_input(path: str | Path) -> bool:

@@ -12,6 +12,7 @@ from struct import error, unpack_from
 ROW, COLUMN, SHEET, STYLE, FORMAT, END = 0x208, 0x7D, 0x85, 0xE0, 0x41E, 0x0A
 NUMBER, SHORT, SHORTS, FORMULA = 0x203, 0x27E, 0xBD, 0x06
 TEXTS, SPAN = (0xFD, 0x204, 0x205), 0x200
+BLANK, BLANKS = 0x201, 0xBE
 # how far a sheet can reach
 ROWS, COLUMNS = 0x10000, 0x100
 # number formats that every workbook has
@@ -46,6 +47,20 @@ def is_within_bounds(data: bytes) -> bool:
         # calamine says itself what is wrong
         return True
     return True
+
+
+def reaches(data: bytes) -> list[tuple[int, int, int]]:
+    """Return of every part of a workbook how many cells it holds, and up to which row and column."""
+    result = [(0, 0, 0)]
+    for kind, body in _records(_stream(data), 0, every_part=True):
+        if kind == END:
+            result.append((0, 0, 0))
+        elif kind in (NUMBER, SHORT, SHORTS, FORMULA, *TEXTS, BLANK, BLANKS):
+            held, rows, columns = result[-1]
+            row, column = unpack_from("<HH", body)
+            last = unpack_from("<H", body, len(body) - 2)[0] if kind in (SHORTS, BLANKS) else column
+            result[-1] = held + last - column + 1, max(rows, row + 1), max(columns, last + 1)
+    return result
 
 
 def _stream(data: bytes) -> bytes:

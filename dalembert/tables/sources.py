@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 # rows in which the delimiter and the header are looked for
 LOOKED_AT = 20
+# as many as a sheet of a workbook has
+MOST_COLUMNS = 16_384
 
 LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
 _CONTROLS = bytes([*range(9), *range(14, 32), 127])
@@ -94,18 +96,23 @@ class Source:
         """Yield (line, cells) of every row of data."""
         return islice(self.everything(), self.above + 1 + self.units_below, None)
 
-    def is_filled(self, column: int) -> bool:
-        """Whether a column has a header, or a cell that is not blank."""
-        return bool(self.headings[column].written) or any(
-            cells[column].strip() for _, cells in self.rows() if column < len(cells)
+    def filled(self, columns: Iterable[int]) -> list[int]:
+        """Return those of some columns that have a header, or a cell that is not blank."""
+        columns = list(columns)
+        bare = [k for k in columns if not self.headings[k].written]
+        used = (
+            {k for _, cells in self.rows() for k in bare if k < len(cells) and cells[k].strip()}
+            if bare
+            else {}
         )
+        return [k for k in columns if self.headings[k].written or k in used]
 
     def error(self, index: int, column: str, value: str, expected: str) -> DataError:
         """Make the one line for a cell of a row of data; `column` as the header spells it."""
         line, _ = next(islice(self.rows(), index, None))
         if self.sheet is None:
             return cell_error(self.file, index + 1, line, column, value, expected)
-        from dalembert.tables.workbooks import address
+        from dalembert.tables.places import address
 
         at = f"row {line}"
         if column in self.header:
@@ -129,7 +136,7 @@ class Source:
     def _warn_of_unseen(self, used: set[int], top: int) -> None:
         """Warn of hidden rows, hidden columns and percentages that take part."""
         assert self.sheet is not None
-        from dalembert.tables.workbooks import address, letters
+        from dalembert.tables.places import address, letters
 
         looks, of = self.sheet.unseen, f"{self.file}: sheet {quote(self.sheet.name)}"
         filled = {line - 1 for line, _ in self.everything()} if looks.rows else set()
@@ -188,6 +195,9 @@ def source_of(
     first = list(islice(source.everything(), LOOKED_AT))
     if not first:
         raise DataError(f"{file}: the file is empty{source.of_sheet}: expected a header and rows")
+    width = max(len(cells) for _, cells in first)
+    if width > MOST_COLUMNS:
+        raise DataError(f"{file}: {width} columns: expected at most {MOST_COLUMNS}")
     _find_header(source, first, dimensions, texts)
     return source
 

@@ -249,9 +249,8 @@ def read(
         for name, (index, unit) in found.items()
     ]
     used = {column.place for column in columns}
-    extra = [
-        each for index, each in enumerate(source.headings) if index not in used and source.is_filled(index)
-    ]
+    others = (index for index in range(len(source.headings)) if index not in used)
+    extra = [source.headings[index] for index in source.filled(others)]
     missed = {name: dimension for name, dimension in dimensions.items() if name not in found}
     missed_texts = [name for name in texts if name not in found]
     if extra:

@@ -5,33 +5,32 @@ from __future__ import annotations
 import io
 import os
 import re
+import struct
 import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import date, time, timedelta
-from pathlib import PurePosixPath
+from itertools import product
 from typing import Any
 from xml.etree import ElementTree
+from xml.parsers.expat import ExpatError
 
 from dalembert.errors import DataError, quote
 from dalembert.tables import old_workbooks
 from dalembert.tables.files import ZIP
+from dalembert.tables.places import MAIN, OFFICE, TABLE, Place, address, part_of, place_of
+from dalembert.tables.reach import check_file, check_sheet
 
-Place = tuple[int, int]
-"""Row and column, from 0."""
 Faults = dict[Place, tuple[str, str]]
 """Cells that have no value of their own: what was found, and what was expected."""
-MAIN = "{http://schemas.openxmlformats.org/spreadsheetml/2006/main}"
-LINK = "{http://schemas.openxmlformats.org/officeDocument/2006/relationships}id"
-TABLE = "{urn:oasis:names:tc:opendocument:xmlns:table:1.0}"
-OFFICE = "{urn:oasis:names:tc:opendocument:xmlns:office:1.0}"
 PERCENT = ("9", "10")  # number formats that every workbook has
-# of a sheet, blank ones too: calamine reserves memory for all
-MOST_CELLS = 50_000_000
 # what reading a part of a damaged archive raises
-DAMAGED = (EOFError, KeyError, OSError, RuntimeError, ValueError, zipfile.BadZipFile, zlib.error)
+DAMAGED = (
+    *(EOFError, LookupError, OSError, RuntimeError, StopIteration, ValueError, struct.error),
+    *(zipfile.BadZipFile, zlib.error, ElementTree.ParseError, ExpatError),
+)
 
 
 @dataclass(frozen=True)
@@ -43,31 +42,6 @@ class Unseen:
     columns: frozenset[int] = frozenset()
     percent: frozenset[Place] = frozenset()
     """Numbers that are shown as percentages: 50 % is 0.5."""
-
-
-def address(place: Place) -> str:
-    """Return a cell's name: `C5`."""
-    return f"{letters(place[1])}{place[0] + 1}"
-
-
-def letters(column: int) -> str:
-    """Return a column's name: `AB` for 27."""
-    name = ""
-    while column >= 0:
-        name = chr(ord("A") + column % 26) + name
-        column = column // 26 - 1
-    return name
-
-
-def place_of(written: str) -> Place | None:
-    """Return the place of a cell by its name; None where it is none."""
-    match = re.fullmatch(r"([A-Z]+)(\d+)", written)
-    if match is None:
-        return None
-    column = 0
-    for letter in match.group(1):
-        column = 26 * column + ord(letter) - ord("A") + 1
-    return int(match.group(2)) - 1, column - 1
 
 
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+\s*")
@@ -111,6 +85,9 @@ def read_sheet(file: str, data: bytes, wanted: str) -> Sheet:
         raise locked
     if data[:4] != ZIP and not old_workbooks.is_within_bounds(data):
         raise DataError(f"{file}: broken workbook (its cells lie beyond its bounds): expected .xls")
+    with suppress(*DAMAGED):
+        # what is damaged calamine names itself
+        check_file(file, data)
     try:
         with _panics():
             book = calamine.CalamineWorkbook.from_filelike(io.BytesIO(data))
@@ -130,7 +107,8 @@ def read_sheet(file: str, data: bytes, wanted: str) -> Sheet:
                 raise DataError(
                     f"{file}: no sheet {quote(wanted)}: expected one of {', '.join(map(quote, names))}"
                 )
-            _check_reach(file, data, name)
+            with suppress(*DAMAGED):
+                check_sheet(file, data, name)
             sheet = book.get_sheet_by_name(name)
             cells = sheet.to_python(skip_empty_area=False)
             merged = sheet.merged_cell_ranges or []
@@ -141,12 +119,14 @@ def read_sheet(file: str, data: bytes, wanted: str) -> Sheet:
             raise locked from None
         raise DataError(f"{file}: broken workbook ({error}): expected .xlsx, .xls or .ods") from None
     faults, unseen = _looks(data, name)
+    rows = _texts(cells)
     for (top, left), (bottom, right) in merged:
         span = f"{address((top, left))}:{address((bottom, right))}"
-        for row in range(top, bottom + 1):
-            for column in range(left, right + 1):
+        # those that reach beyond the cells hide nothing there
+        for row in range(top, min(bottom + 1, len(rows))):
+            for column in range(left, min(right + 1, len(rows[row]))):
                 faults[row, column] = (f"merged cells {span}", "a value in each cell")
-    return Sheet(file, name, [each for each in names if each != name], _texts(cells), faults, unseen)
+    return Sheet(file, name, [each for each in names if each != name], rows, faults, unseen)
 
 
 @contextmanager
@@ -208,23 +188,6 @@ def _fault(formula: str, error: str) -> tuple[str, str]:
     )
 
 
-def _check_reach(file: str, data: bytes, name: str) -> None:
-    """Refuse an Office Open sheet that reaches so far that the cells in between do not fit into memory."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            text = _part_of(archive, name)
-    except (*DAMAGED, StopIteration, ElementTree.ParseError):
-        return
-    last = max(set(re.findall(rb'\br="([A-Z]{1,3})\d', text)), key=lambda one: (len(one), one), default=b"A")
-    row = re.match(rb'<row [^>]*\br="(\d{1,7})"', text[max(text.rfind(b"<row "), 0) :])
-    corner = f"{last.decode()}{'1' if row is None else row[1].decode()}"
-    rows, columns = (k + 1 for k in place_of(corner) or (0, 0))
-    if rows * columns > MOST_CELLS:
-        raise DataError(
-            f"{file}: sheet {quote(name)}: its cells reach to {corner}: expected at most {MOST_CELLS} cells: delete the stray ones"
-        )
-
-
 def _looks(data: bytes, name: str) -> tuple[Faults, Unseen]:
     """Find the cells of a sheet without a value of their own, hidden rows and columns, percentages.
 
@@ -237,21 +200,12 @@ def _looks(data: bytes, name: str) -> tuple[Faults, Unseen]:
             if "content.xml" in archive.namelist():
                 return _in_open_document(archive.read("content.xml"), name)
             return _in_office_open(archive, name)
-    except (*DAMAGED, StopIteration, ElementTree.ParseError):
+    except DAMAGED:
         return {}, Unseen()
 
 
-def _part_of(archive: zipfile.ZipFile, name: str) -> bytes:
-    """Return the part of an Office Open workbook that holds the sheet of this name."""
-    book = ElementTree.fromstring(archive.read("xl/workbook.xml"))
-    link = next(each.get(LINK) for each in book.iter(f"{MAIN}sheet") if each.get("name") == name)
-    targets = ElementTree.fromstring(archive.read("xl/_rels/workbook.xml.rels"))
-    target = next(each.get("Target", "") for each in targets if each.get("Id") == link)
-    return archive.read(target.lstrip("/") if target.startswith("/") else str(PurePosixPath("xl") / target))
-
-
 def _in_office_open(archive: zipfile.ZipFile, name: str) -> tuple[Faults, Unseen]:
-    text = _part_of(archive, name)
+    text = part_of(archive, name)
     styles = _percent_styles(archive) if b' s="' in text else frozenset()
     faults: Faults = {}
     rows, columns, percent = set(), set(), set()
@@ -292,21 +246,27 @@ def _in_open_document(text: bytes, name: str) -> tuple[Faults, Unseen]:
         return faults, Unseen()
     tables = ElementTree.fromstring(text).iter(f"{TABLE}table")
     sheet = next(each for each in tables if each.get(f"{TABLE}name") == name)
-    columns = {k for k, one in _repeated(sheet.iter(f"{TABLE}table-column"), "columns") if _hidden(one)}
+    columns = {
+        k
+        for left, wide, one in _repeated(sheet.iter(f"{TABLE}table-column"), "columns")
+        if _hidden(one)
+        for k in range(left, left + wide)
+    }
     rows, percent = set(), set()
-    for row, line in _repeated(sheet.iter(f"{TABLE}table-row"), "rows"):
+    for top, high, line in _repeated(sheet.iter(f"{TABLE}table-row"), "rows"):
         if _hidden(line):
-            rows.add(row)
-        for column, cell in _repeated(line, "columns"):
+            rows |= set(range(top, top + high))
+        for left, wide, cell in _repeated(line, "columns"):
             formula, kind = cell.get(f"{TABLE}formula"), cell.get(f"{OFFICE}value-type")
-            wide, high = (int(cell.get(f"{TABLE}number-{k}-spanned", "1")) for k in ("columns", "rows"))
-            if wide * high > 1:
-                span = f"{address((row, column))}:{address((row + high - 1, column + wide - 1))}"
-                faults[row, column] = (f"merged cells {span}", "a value in each cell")
+            right, down = (int(cell.get(f"{TABLE}number-{k}-spanned", "1")) for k in ("columns", "rows"))
+            places = product(range(top, top + high), range(left, left + wide))
+            if right * down > 1:
+                span = f"{address((top, left))}:{address((top + down - 1, left + right - 1))}"
+                faults |= dict.fromkeys(places, (f"merged cells {span}", "a value in each cell"))
             elif formula is not None and kind is None:
-                faults[row, column] = _fault(formula.partition("=")[2], "")
+                faults |= dict.fromkeys(places, _fault(formula.partition("=")[2], ""))
             elif kind == "percentage":
-                percent.add((row, column))
+                percent |= set(places)
     return faults, Unseen(frozenset(rows), frozenset(columns), frozenset(percent))
 
 
@@ -316,10 +276,10 @@ def _hidden(element: ElementTree.Element) -> bool:
 
 def _repeated(
     elements: Iterator[ElementTree.Element] | ElementTree.Element, of: str
-) -> Iterator[tuple[int, ElementTree.Element]]:
-    """Yield rows or cells with their numbers; of what stands many times over, as blank space does, the first ones."""
+) -> Iterator[tuple[int, int, ElementTree.Element]]:
+    """Yield rows or cells, each with its first number and how many there are; of many, as of blank space, the first ones."""
     at = 0
     for element in elements:
         times = int(element.get(f"{TABLE}number-{of}-repeated", "1"))
-        yield from ((at + k, element) for k in range(min(times, 1000)))
+        yield at, min(times, 1000), element
         at += times

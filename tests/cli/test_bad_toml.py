@@ -9,7 +9,7 @@ import pytest
 
 FILES = {
     "this is not text: expected TOML in UTF-8": b"\xff\xfe\x00",
-    "no valid TOML: Exceeds the limit": b"title = " + b"9" * 5000,
+    "no valid TOML: a number of thousands of digits": b"title = " + b"9" * 5000,
     "no valid TOML: nested too deeply": b"title = " + b"[" * 3000 + b"]" * 3000,
     "no valid TOML: Expected '='": b"a,b\n",
 }

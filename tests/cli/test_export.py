@@ -158,6 +158,37 @@ def test_a_wheel_with_a_moment_of_inertia_and_no_mass_keeps_it(suffix: str) -> N
     assert back.motion(0.0, 0.0, 8.0).effort[0] == pytest.approx(2.0, rel=1e-15)
 
 
+def test_a_needle_of_a_millionth_keeps_its_mass_in_mjcf() -> None:
+    """The least mass that MuJoCo is told lies below every one that is not zero, but not below its own."""
+    text = """
+[ground]
+O = [0, 0]
+[links.arm]
+points = { O = [0, 0], A = [1, 0] }
+mass = 1
+inertia = 0.1
+[links.needle]
+points = { A = [0, 0], B = [0.1, 0] }
+mass = %s
+inertia = %s
+[[input]]
+link = "arm"
+angle = 0
+[[input]]
+link = "needle"
+angle = 0
+"""
+    m = Mechanism.from_toml_text(text % ("3e-9", "2e-12"))
+    data, notes = file_bytes(m, (0.0, 0.0), ".xml", "f", {})
+    back = taken_back(data).links["needle"]
+    assert (back.mass, back.inertia) == (3e-9, pytest.approx(2e-12, rel=1e-14))
+    assert notes == []
+    m = Mechanism.from_toml_text(text % ("3e-9", "1e-17"))
+    assert file_bytes(m, (0.0, 0.0), ".xml", "f", {})[1] == [
+        "needle: MuJoCo raises a mass or a moment of inertia below 2e-15"
+    ]
+
+
 def test_mjcf_keeps_the_value_of_the_input() -> None:
     m = Mechanism.from_toml(EXAMPLES / "scissors-lift" / "lift.toml")
     back = taken_back(exported(m, ".xml"))

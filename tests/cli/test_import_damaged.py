@@ -83,3 +83,54 @@ def test_a_string_of_pmks_web_that_ends_inside_a_force_is_refused() -> None:
     for end in range(PULLED.rindex("2F1,") + 4, PULLED.rindex(".")):
         with pytest.raises(DataError, match=r"the string ends there: .* is it cut off"):
             taken(PULLED[:end])
+
+
+def test_comments_that_are_not_closed_are_passed_over_once() -> None:
+    """300 000 of them took minutes, once for each to the end of the file."""
+    for text in ("<!--" * 300_000, "<robot><a:b/>" + "<?" * 300_000):
+        with pytest.raises(DataError, match=r"of no known kind|no valid XML"):
+            read("file", text.encode(), None)
+
+
+def test_many_prefixes_are_declared_at_once() -> None:
+    used = " ".join(f'p{k}:a="1"' for k in range(40_000))
+    with pytest.raises(DataError, match="no link: expected one or more"):
+        read("file", f"<robot><x:y {used}/></robot>".encode(), None)
+
+
+def test_frames_of_sdf_may_follow_one_another_without_end() -> None:
+    """Each frame is 1 mm farther than the next one, and a joint stands in the first."""
+    text = '<sdf version="1.9"><model name="m"><link name="crank"/>' + "".join(
+        f'<frame name="f{k}"><pose relative_to="f{k + 1}">0.001 0 0 0 0 0</pose></frame>' for k in range(2000)
+    )
+    text += (
+        '<frame name="f2000"/><joint name="A" type="revolute"><pose relative_to="f0"/><parent>world</parent>'
+    )
+    text += "<child>crank</child><axis><xyz>0 0 1</xyz></axis></joint></model></sdf>"
+    m = only(text)
+    assert m.ground["A"].real == pytest.approx(2.0, rel=1e-12)
+    looped = text.replace('<frame name="f2000"/>', '<frame name="f2000"><pose relative_to="f7"/></frame>')
+    with pytest.raises(DataError, match="the pose of 'f7' is relative to itself"):
+        read("file", looped.encode(), None)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("<robot>" + "<link/>" * 20_000 + "</robot>", "20001 elements: expected at most 20000"),
+        ('{"joints": [' + "0," * 20_000 + "0]}", "20003 values: expected at most 20000"),
+        ("ground, a, R, 0, 0\n" * 20_001, "20001 lines: expected at most 20000"),
+        ("<linkage2>" + "<a/>" * 40_000 + "</linkage2>", "40002 elements: expected at most 40000"),
+        (
+            "<robot>" + "".join(f'<link name="l{k}"/>' for k in range(1002)) + "</robot>",
+            "1001 links: expected at most 1000",
+        ),
+        (
+            "\n".join(f"l{k}, l{k + 1}, R, {k}, 0" for k in range(1100)) + "\nl0, ground, R, 0, 1",
+            "1102 links: expected at most 1000",
+        ),
+    ],
+)
+def test_a_file_that_holds_too_much_is_refused_in_one_line(text: str, message: str) -> None:
+    with pytest.raises(DataError, match=f"^file: {message}$"):
+        read("file", text.encode(), None)

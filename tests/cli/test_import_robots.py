@@ -15,76 +15,9 @@ from cli.formats import read
 from cli.formats.description import described
 from cli.formats.settled import settle
 from dalembert.errors import DataError
+from tests.cli.robots import LOOPS, MJCF, SDF, URDF, refused, taken
 from tests.conftest import Dalembert
 from virtualwork import Mechanism
-
-
-def taken(text: str, folder: Path | None = None) -> tuple[Mechanism, list[str]]:
-    """The only mechanism of a robot file, and everything that is said."""
-    _, (drawing,) = read("file", text.encode(), None, folder)
-    (part,) = settle(drawing)
-    made = described(part, "test")
-    return Mechanism.from_toml_text(made), drawing.notes + part.notes
-
-
-def refused(text: str, folder: Path | None = None) -> str:
-    with pytest.raises(DataError) as error:
-        taken(text, folder)
-    return str(error.value)
-
-
-# the four-bar of Gazebo's own tutorial: links in one plane, joints where they meet
-SDF = """<?xml version="1.0"?>
-<sdf version="1.6"><model name="four bar"><pose>0 0 0.5 0 0 0</pose>
-<link name="AB"><pose>0 0 0 0 0 0</pose><inertial><pose>0 0.1 0 0 0 0</pose><mass>2</mass>
-  <inertia><ixx>0.01</ixx><iyy>0.001</iyy><izz>0.011</izz></inertia></inertial></link>
-<link name="BC"><pose>0 0.2 0 0 0 0</pose></link>
-<link name="CD"><pose>0.3 0.2 0 0 0 0</pose></link>
-<frame name="P" attached_to="BC"><pose>0.1 0.05 0 0 0 0</pose></frame>
-<joint name="A" type="revolute"><parent>world</parent><child>AB</child><axis><xyz>0 0 1</xyz></axis></joint>
-<joint name="B" type="revolute"><parent>AB</parent><child>BC</child><axis><xyz>0 0 1</xyz></axis></joint>
-<joint name="C" type="revolute"><parent>BC</parent><child>CD</child><axis><xyz>0 0 1</xyz></axis></joint>
-<joint name="D" type="revolute"><parent>world</parent><child>CD</child><pose>0.02 -0.2 0 0 0 0</pose>
-  <axis><xyz>0 0 1</xyz></axis></joint>
-</model></sdf>"""
-
-URDF = """<robot name="four bar">
-<link name="base"/><link name="crank"/><link name="coupler"/><link name="rocker"/><link name="tip"/>
-<joint name="A" type="continuous"><parent link="base"/><child link="crank"/><axis xyz="0 -1 0"/>
-  <origin xyz="0 0 0.5"/></joint>
-<joint name="B" type="continuous"><parent link="crank"/><child link="coupler"/><axis xyz="0 1 0"/>
-  <origin xyz="0 0 0.2"/></joint>
-<joint name="D" type="continuous"><parent link="base"/><child link="rocker"/><axis xyz="0 1 0"/>
-  <origin xyz="0.32 0 0.5"/></joint>
-<joint name="P" type="fixed"><parent link="coupler"/><child link="tip"/><origin xyz="0.1 0 0.05"/></joint>
-{loop}
-<transmission name="t"><joint name="A"/></transmission>
-</robot>"""
-LOOPS = {
-    "gazebo": """<gazebo><joint name="C" type="revolute"><parent>coupler</parent><child>rocker</child>
-<pose>-0.02 0 0.2 0 0 0</pose><axis><xyz>0 1 0</xyz></axis></joint></gazebo>""",
-    "loop_joint": """<loop_joint name="C" type="continuous"><link1 link="coupler" xyz="0.3 0 0"/>
-<link2 link="rocker" xyz="-0.02 0 0.2"/><axis xyz="0 1 0"/></loop_joint>""",
-    "second parent": """<link name="end"/>
-<joint name="E" type="fixed"><parent link="rocker"/><child link="end"/><origin xyz="-0.02 0 0.2"/></joint>
-<joint name="C" type="continuous"><parent link="coupler"/><child link="end"/><axis xyz="0 1 0"/>
-  <origin xyz="0.3 0 0"/></joint>""",
-}
-
-PISTON = 0.1 + 0.3 * math.cos(math.radians(20)), 1 - 0.3 * math.sin(math.radians(20))
-MJCF = f"""<mujoco model="slider crank">
-<compiler angle="degree" inertiafromgeom="false"/>
-<default><joint axis="0 1 0"/><default class="rail"><joint type="slide" axis="1 0 0"/></default></default>
-<worldbody>
- <body name="crank" pos="0 0 1"><joint name="hip" damping="1"/>
-  <inertial pos="0.05 0 0" mass="0.2" diaginertia="1e-4 2e-4 3e-4"/>
-  <body name="rod" pos="0.1 0 0" euler="0 20 0"><joint name="knee"/><site name="mid" pos="0.15 0 0"/></body></body>
- <body name="piston" pos="{PISTON[0]!r} 0 {PISTON[1]!r}"><joint name="bore" class="rail"/></body>
-</worldbody>
-<equality><connect body1="rod" body2="piston" anchor="0.3 0 0"/></equality>
-<actuator><position name="m" joint="hip"/></actuator>
-<keyframe><key qpos="0 0 0" qvel="3 0 0"/></keyframe>
-</mujoco>"""
 
 
 def test_an_sdf_model_stands_where_its_poses_say() -> None:
@@ -114,74 +47,6 @@ def test_a_urdf_loop_is_closed_in_each_of_its_notations(loop: str) -> None:
     assert math.dist(turned, (0.32, 0.5)) == pytest.approx(math.hypot(0.02, 0.2), rel=1e-13)
 
 
-def test_an_mjcf_slider_crank_with_classes_and_degrees() -> None:
-    m, notes = taken(MJCF)
-    assert m.guides[0].is_slider
-    assert m.gravity == pytest.approx(-9.81j)
-    assert m.rigid["crank"].inertia == 2e-4
-    # a joint about +y turns clockwise in the plane x-z
-    assert m.inputs[0].speed == pytest.approx(-3.0)
-    motion = m.motion()
-    along = math.cos(math.radians(20))
-    assert motion.point("mid").position[0] == pytest.approx(
-        (0.1 + 0.15 * along, 1 - 0.15 * math.sin(math.radians(20)))
-    )
-    q = 0.4
-    x = 0.1 * math.cos(q) + math.sqrt(0.09 - (0.1 * math.sin(q) + 0.3 * math.sin(math.radians(20))) ** 2)
-    assert m.motion(q).link("rod").angle[0] < 0
-    piston = m.motion(q).point("connect 1").position[0]
-    assert piston == pytest.approx((x, 1 - 0.3 * math.sin(math.radians(20))), rel=1e-12)
-    # the joint's damper, N·m·s/rad, holds against 3 rad/s
-    assert m.torsion_springs[0].damping == 1
-    assert not notes
-
-
-def test_springs_of_mjcf_ask_for_mujocos_effort() -> None:
-    """A joint's spring in degrees, a tendon between two sites, one on a joint: statics against MuJoCo's own forces."""
-    mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads its own format: pip install mujoco")
-    text = """<mujoco><option gravity="0 0 0"/><compiler angle="degree"/><worldbody><site name="s" pos="0.3 0.4 0"/>
-<body name="arm" euler="0 0 30"><joint name="hip" axis="0 0 -1" stiffness="2" springref="20"/><geom size=".1" mass="0"/>
-<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><site name="t" pos="0.2 0 0"/></body></worldbody>
-<tendon><spatial name="a" stiffness="30" springlength="0.1"><site site="s"/><site site="t"/></spatial>
-<fixed name="b" stiffness="3" springlength="0.2"><joint joint="hip" coef="2"/></fixed></tendon></mujoco>"""
-    model = mujoco.MjModel.from_xml_string(text)
-    state = mujoco.MjData(model)
-    m, _ = taken(text)
-    for q in (0.0, 0.4, -0.7):
-        state.qpos[0] = q
-        mujoco.mj_inverse(model, state)
-        assert m.motion(math.radians(30) - q).effort == pytest.approx([-state.qfrc_inverse[0]], rel=1e-12)
-
-
-def test_mujoco_agrees_with_what_is_read_of_poses() -> None:
-    """Every way to write an orientation, nested frames and defaults, against MuJoCo's own reader."""
-    mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads its own format: pip install mujoco")
-    from cli.formats import read_robot
-
-    text = """<mujoco><compiler angle="degree" eulerseq="zyX"/>
-<default><default class="s"><site pos="0 0 0.1"/></default></default><worldbody>
-<body name="a" pos="1 2 3" euler="10 20 30"><joint axis="1 2 3" pos=".1 .2 .3"/><geom size=".1"/>
- <frame pos="0 1 0" axisangle="0 1 1 40"><body name="b" quat="1 2 3 4" childclass="s"><joint type="slide"/><geom size=".1"/>
-  <site name="p"/><frame zaxis="1 1 -1"><site name="q" pos="1 0 0"/></frame>
-  <body name="c" xyaxes="1 1 0 0 1 1"><geom size=".1"/><body name="d" zaxis="0 0 -1"><geom size=".1"/>
-   <frame pos="1 0 2" euler="0 0 30"><joint name="last" axis="1 0 1" pos=".1 0 0"/></frame></body></body></body></frame>
-</body></worldbody></mujoco>"""
-    model = mujoco.MjModel.from_xml_string(text)
-    state = mujoco.MjData(model)
-    mujoco.mj_forward(model, state)
-    robot = read_robot("file", text.encode(), None)
-    for name in "abcd":
-        assert robot.links[name].pose[:3, 3] == pytest.approx(state.body(name).xpos, abs=1e-14)
-        assert robot.links[name].pose[:3, :3] == pytest.approx(state.body(name).xmat.reshape(3, 3), abs=1e-14)
-    for name, link in (("p", "b"), ("q", "b")):
-        at = robot.links[link].pose @ np.append(robot.links[link].points[name], 1)
-        assert at[:3] == pytest.approx(state.site(name).xpos, abs=1e-14)
-    joints = list(robot.joints.values())
-    for k in (0, -1):
-        assert joints[k].axis == pytest.approx(state.xaxis[k], abs=1e-14)
-        assert joints[k].ends[1] == pytest.approx(state.xanchor[k], abs=1e-14)
-
-
 @pytest.mark.parametrize(("axes", "plane"), [(["1 0 0"], "xy"), (["0 0 1"], "xz"), (["0 3 4"], "yz"), (["1 0 2", "2 0 4", "1 0 0"], "xz")])  # fmt: skip
 def test_a_robot_of_slides_alone_lies_in_a_plane_of_the_world_where_it_can(
     axes: list[str], plane: str
@@ -195,50 +60,6 @@ def test_a_robot_of_slides_alone_lies_in_a_plane_of_the_world_where_it_can(
     way = np.array(axes[0].split(), dtype=float)
     along = complex(*(way["xyz".index(axis)] for axis in plane))
     assert np.exp(1j * m.guides[0].angle) == pytest.approx(along / abs(along), abs=1e-15)
-
-
-def test_springs_of_a_chain_count_the_whole_turns_of_both_inputs() -> None:
-    """Two arms about −y, the first turned by more than half a turn: its spring is wound by what MuJoCo has."""
-    mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads its own format: pip install mujoco")
-    text = """<mujoco><compiler angle="degree"/><default><geom contype="0" conaffinity="0"/></default><worldbody>
-<body name="a" euler="0 -160 0"><joint name="one" axis="0 1 0" stiffness="5" springref="40"/><geom size=".1" pos=".3 0 0"/>
-<body name="b" pos="1 0 0" euler="0 -130 0"><joint name="two" axis="0 1 0" ref="-20"/><geom size=".1" pos=".3 0 0"/></body></body>
-</worldbody><actuator><motor joint="one"/><motor joint="two"/></actuator></mujoco>"""
-    model = mujoco.MjModel.from_xml_string(text)
-    state = mujoco.MjData(model)
-    mujoco.mj_inverse(model, state)
-    m, _ = taken(text)
-    effort = m.motion([[e.value for e in m.inputs]], [[0.0, 0.0]], [[0.0, 0.0]]).effort[0]
-    assert np.abs(effort) == pytest.approx(np.abs(state.qfrc_inverse), rel=1e-12)
-
-
-@pytest.mark.parametrize("total", [-1, 14])
-def test_masses_that_follow_from_shapes_are_mujocos(total: int) -> None:
-    mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads its own format: pip install mujoco")
-    from cli.formats import read_robot
-
-    shapes = [
-        '<geom size=".1"/>',
-        '<geom type="capsule" size=".02" fromto="0 0 0 .1 .2 .3"/>',
-        '<geom type="capsule" size=".02 .3" pos="1 0 0" euler="10 20 30"/>',
-        '<geom type="cylinder" size=".05 .2" mass="3"/>',
-        '<geom type="box" size=".1 .2 .3" density="10" quat="1 2 3 4"/>',
-        '<geom type="box" size=".1 .2" fromto="0 0 0 1 1 0"/><geom class="heavy" pos="0 1 0"/>',
-        '<geom type="ellipsoid" size=".1 .2 .3"/>',
-        '<geom type="ellipsoid" size=".1" fromto="0 0 0 0 .1 .4"/>',
-        '<frame pos="1 2 0" euler="0 40 0"><geom type="box" size=".1 .2 .3" pos="0 0 1"/></frame>',
-    ]
-    bodies = "".join(f'<body name="b{k}"><joint/>{s}</body>' for k, s in enumerate(shapes))
-    text = f"""<mujoco><compiler angle="degree" settotalmass="{total}"/><default><default class="heavy"><geom size=".2" density="5000"/></default>
-</default><worldbody>{bodies}</worldbody></mujoco>"""
-    model = mujoco.MjModel.from_xml_string(text)
-    robot = read_robot("file", text.encode(), None)
-    for k in range(len(shapes)):
-        held, theirs = robot.links[f"b{k}"].inertial, model.body(f"b{k}")
-        assert held is not None
-        assert held.mass == pytest.approx(float(theirs.mass[0]), rel=1e-12)
-        assert held.pose[:3, 3] == pytest.approx(theirs.ipos, abs=1e-14)
-        assert np.linalg.eigvalsh(held.tensor) == pytest.approx(np.sort(theirs.inertia), rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -329,19 +150,6 @@ def test_mimicked_joints_are_gears() -> None:
     assert m.motion(0.1, speed=2.0).link("b").omega[0] == pytest.approx(-5.0)
 
 
-@pytest.mark.parametrize("powers", ["0.1 2.5", "0.1 2.5 0 0 0"])
-def test_coupled_joints_of_mjcf_are_gears_and_what_is_no_ratio_is_named(powers: str) -> None:
-    joint = '<joint name="{0}" axis="0 0 1"/><geom size=".1"/>'
-    text = f"""<mujoco><worldbody><body name="a">{joint.format("one")}</body>
-<body name="b" pos="1 0 0">{joint.format("two")}</body></worldbody>
-<equality><joint joint1="two" joint2="one" polycoef="{powers}"/></equality>
-<actuator><velocity joint="one"/></actuator></mujoco>"""
-    m, notes = taken(text)
-    assert m.motion(0.1, speed=2.0).link("b").omega[0] == pytest.approx(5.0)
-    assert "equality 'joint 1': its offset 0.1 is left out: the pose is that of the file" in notes
-    assert "not a straight line" in str(taken(text.replace(powers, "0 1 2"))[1])
-
-
 def test_weight_that_does_not_act_in_mjcf_and_positions_that_sdf_starts_from_are_heard() -> None:
     assert taken(MJCF)[0].gravity == pytest.approx(-9.81j)
     still = MJCF.replace("<worldbody>", '<option><flag gravity="disable"/></option><worldbody>')
@@ -356,6 +164,9 @@ def test_weight_that_does_not_act_in_mjcf_and_positions_that_sdf_starts_from_are
     ("text", "old", "new", "note"),
     [
         (SDF, "<mass>2</mass>", "<masss>2</masss>", "<masss> in <inertial>: left out: it is not read"),
+        (SDF, "<inertial>", '<inertial auto="true">', "link 'AB': the mass and inertia of its shapes are not imported (auto)"),
+        (SDF, "<inertial>", '<inertial><pose frame="A">0 0 0 0 0 0</pose>', "pose: its attribute frame (A) is left out"),
+        (SDF, "<model name=", '<model placement_frame="A" name=', "model: placement_frame='A' is left out: the model stands elsewhere"),
         (SDF, "<link name=", "<include/><link name=", "<include> in the model: left out"),
         (SDF, "</model>", "</model><model_2/>", "<model_2> in <sdf>: left out: it is not read"),
         (SDF, '<link name="AB">', '<link name="AB"><gravity>0</gravity>', "link 'AB': its <gravity> is left out: its whole weight acts"),
@@ -374,11 +185,6 @@ def test_what_is_not_read_is_named(text: str, old: str, new: str, note: str) -> 
         else text.replace(old, new)
     )
     assert any(note in each for each in taken(new)[1])
-
-
-def test_an_equality_that_its_default_switches_off_is_left_out() -> None:
-    off = MJCF.replace("<worldbody>", '<default><equality active="false"/></default><worldbody>', 1)
-    assert any("left out: it is not active" in note for note in taken(off)[1])
 
 
 @pytest.mark.parametrize("text", [SDF, URDF.format(loop=LOOPS["gazebo"]), MJCF], ids=["sdf", "urdf", "mjcf"])
@@ -400,12 +206,6 @@ def test_name_spaces_and_encodings_change_nothing(text: str) -> None:
         assert (Mechanism.from_toml_text(described(part, "test")), drawing.notes + part.notes) == expected
 
 
-def test_default_sections_of_mjcf_add_up() -> None:
-    """Files that are included bring sections of their own."""
-    split = '<default><geom size=".1"/></default><worldbody>'
-    assert taken(MJCF.replace("<worldbody>", split, 1)) == taken(MJCF)
-
-
 def test_axes_rounded_to_a_few_digits_are_planar_and_said() -> None:
     m, notes = taken(URDF.format(loop=LOOPS["gazebo"]).replace(
         '<axis xyz="0 1 0"/>\n  <origin xyz="0 0 0.2"/>', '<axis xyz="0 0 1"/>\n  <origin xyz="0 0 0.2" rpy="-1.5708 0 0"/>'
@@ -415,6 +215,8 @@ def test_axes_rounded_to_a_few_digits_are_planar_and_said() -> None:
 
 
 # --- what is refused -----------------------------------------------------------------------------------------------
+
+
 def test_a_spatial_robot_is_refused_with_its_joint_and_by_how_much() -> None:
     tilted = URDF.format(loop=LOOPS["gazebo"]).replace(
         '<child link="rocker"/><axis xyz="0 1 0"/>', '<child link="rocker"/><axis xyz="0 1 0.1"/>'
@@ -431,6 +233,8 @@ def test_a_spatial_robot_is_refused_with_its_joint_and_by_how_much() -> None:
 BOMB = """<?xml version="1.0"?>
 <!DOCTYPE lolz [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">]>
 <{root} name="&b;"><link name="x"/></{root}>"""
+
+
 OUTSIDE = '<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><{root} name="&x;"/>'
 
 
@@ -481,27 +285,6 @@ def test_damaged_robots_are_refused_with_their_place(text: str, said: str) -> No
 def test_a_robot_cut_off_anywhere_is_refused(text: str) -> None:
     for end in range(20, len(text) - 8, 37):
         assert "file" in refused(text[:end])
-
-
-def test_includes_are_followed_inside_the_folder_alone(tmp_path: Path) -> None:
-    home = tmp_path / "home"
-    home.mkdir()
-    body, rest = MJCF.split("<worldbody>")
-    (home / "world.xml").write_text(
-        "<mujoco><worldbody>" + rest.partition("</worldbody>")[0] + "</worldbody></mujoco>"
-    )
-    (tmp_path / "secret.xml").write_text("<mujoco/>")
-    text = body + '<include file="{}"/>' + rest.partition("</worldbody>")[2]
-    m, _ = taken(text.format("world.xml"), home)
-    assert set(m.links) == {"crank", "rod", "piston"}
-    for path in ("../secret.xml", str(tmp_path / "secret.xml")):
-        assert "lies outside the file's folder: not read" in refused(text.format(path), home)
-    (home / "link.xml").symlink_to(tmp_path / "secret.xml")
-    assert "lies outside" in refused(text.format("link.xml"), home)
-    assert "No such file" in refused(text.format("none.xml"), home)
-    assert "standard input has no folder" in refused(text.format("world.xml"))
-    (home / "loop.xml").write_text('<mujoco><include file="loop.xml"/></mujoco>')
-    assert "more than 20 files are included" in refused(text.format("loop.xml"), home)
 
 
 def test_a_large_robot_is_refused(dalembert: Dalembert, tmp_path: Path) -> None:

@@ -312,16 +312,6 @@ def test_an_old_workbook_that_reserves_too_many_rows_is_refused() -> None:
             read_sheet("file", data[: at + 4] + rows + data[at + 12 :], "")
 
 
-def test_a_stray_cell_in_the_last_corner_is_named(dalembert: Dalembert, tmp_path: Path) -> None:
-    book(tmp_path / "far.xlsx", {"Masses": ROWS})
-    made = openpyxl.load_workbook(tmp_path / "far.xlsx")
-    made["Masses"]["XFD1048576"] = 1
-    made.save(tmp_path / "far.xlsx")
-    done = dalembert("balance", str(tmp_path / "far.xlsx"), *PLANE)
-    assert done.returncode == 1
-    assert "sheet 'Masses': its cells reach to XFD1048576: expected at most" in done.stderr
-
-
 def test_a_workbook_is_read_where_there_is_no_standard_error(plain: str) -> None:
     code = "import os; os.close(2); from cli.app import main; main()"
     done = subprocess.run(

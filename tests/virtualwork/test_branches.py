@@ -275,3 +275,17 @@ def test_a_guess_in_degrees_that_is_read_in_radians_is_named(mirrored, unit):
     assert named == [f"[guess] {text.format(sign)}" for text in expected] * (unit != 1.0)
     two = Mechanism(m.ground, m.links, inputs=m.inputs, guess=Guess(mirrored * 4 * math.pi, m.guess.angles))
     assert not any("at crank" in w for w in two.assembly.warnings)
+
+
+@pytest.mark.parametrize(("coupler", "rocker"), [(0.7, 0.299), (1.9, 0.902)])
+def test_links_that_turn_about_one_place_have_no_dips(coupler, rocker, monkeypatch):
+    """Both ground pins in one place: coupler and rocker turn with the crank, or reach it nowhere; no dip of rounding is searched."""
+    monkeypatch.setattr("virtualwork.branch.sampling.lowest", lambda *_: pytest.fail("a constant has no dip"))
+    m = four_bar(1.0, coupler, rocker, 0.0, 10, 40, 70)
+    motion = m.motion(TWO_TURNS, speed=1.0)
+    if coupler + rocker < 1:
+        assert not motion.assembled.any()
+        return
+    assert np.abs(np.diff(np.unwrap(motion.link("rocker").angle - TWO_TURNS))).max() < 1e-13
+    assert np.abs(motion.link("coupler").omega - 1).max() < 1e-12
+    assert len(Check(m.assembly).change_points) == 0

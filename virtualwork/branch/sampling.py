@@ -295,6 +295,10 @@ def touched(
     (array([1.57079633]), [(-1.1, -1.0)])
     """
     (level, noise), (a, b, edge) = depth, span
+    finite = m[np.isfinite(m)]
+    if not len(finite) or np.ptp(finite) <= noise:
+        # pins that turn about one place: the radicand is constant, and its dips are rounding
+        return np.empty(0), []
     inside = (q >= a) & (q < b)
     changes = ((m[:-1] >= 0) != (m[1:] >= 0)) & np.isfinite(m[:-1] + m[1:]) & (inside[:-1] | inside[1:])
     at = np.flatnonzero(changes)

@@ -42,9 +42,10 @@ def read_text(
         data = tomllib.loads(text)
     except RecursionError:
         raise DescriptionError(f"{file}: no valid TOML: nested too deeply") from None
-    except ValueError as error:
-        # a TOMLDecodeError, or a number of thousands of digits
+    except tomllib.TOMLDecodeError as error:
         raise DescriptionError(f"{file}: no valid TOML: {error}") from None
+    except ValueError:
+        raise DescriptionError(f"{file}: no valid TOML: a number of thousands of digits") from None
     try:
         file_read = File(data, folder or Path(), load)
         parts = _parts(file_read)
