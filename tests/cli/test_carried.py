@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.cli.test_exercise import PENDULUM
+from tests.cli.exercises import PENDULUM
 from tests.cli.test_grade_measured import BAR, RUNS
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from cli.grade.answers import scale_of
-from tests.cli.test_exercise import EXERCISE, ROTOR
+from tests.cli.exercises import EXERCISE, ROTOR
 from tests.conftest import Dalembert
 
 STATES = """link,mass_kg,inertia_kg_m2,vx_m_s,vy_m_s,ax_m_s2,ay_m_s2,omega_rad_s,alpha_rad_s2,fx_N,fy_N,torque_N_m

@@ -19,7 +19,7 @@ from cli.exercise.recomputed import candidates
 from cli.exercise.slips import Candidates, Slip
 from cli.exercise.variants import variants, workshop
 from dalembert.figures import Right, typed, written
-from tests.cli.test_exercise import EXERCISE, ROTOR
+from tests.cli.exercises import EXERCISE, ROTOR
 from tests.cli.test_grade import STATES, WORK
 from tests.conftest import Dalembert
 
