@@ -178,11 +178,11 @@ def sheet_page(
         f'<td class="n">{answer.ask.figures}</td><td class="n">{float(answer.ask.points):g}</td><td class="blank"></td></tr>\n'
         for answer in variant.answers
     )
-    angles = (
-        " Angles count counter-clockwise from x; a whole turn more or less is the same angle."
-        if any(answer.is_angle for answer in variant.answers)
-        else ""
-    )
+    angles = ""
+    if any(answer.is_angle for answer in variant.answers):
+        # in measured vibration they count as the instrument's phases do
+        sense = "" if exercise.command[0] in ("field", "index") else " Angles count counter-clockwise from x."
+        angles = f"{sense} A whole turn more or less is the same angle."
     body = (
         f"<h1>{html.escape(exercise.title)}</h1>\n"
         f'<div class="student"><span>student: <b>{html.escape(student.name)}</b></span>{others}</div>\n'

@@ -166,3 +166,43 @@ def test_a_page_where_the_command_has_none(dalembert: Dalembert, tmp_path: Path)
     assert done.returncode == 2
     assert "which has no page" in " ".join(done.stderr.split())
     assert not (tmp_path / "week").exists()
+
+
+def test_the_names_of_many_masses_keep_clear_of_each_other(dalembert: Dalembert, folder: Path) -> None:
+    """Twelve masses close together, seen along the axis and from the side."""
+    masses = "".join(f"M{k},{50 + k},{40 + k},{37 * k % 360},{20 * k}\n" for k in range(1, 13))
+    (folder / "rotor.csv").write_text("name,weight_N,radius_mm,angle_deg,z_mm\n" + masses)
+    (folder / "e.toml").write_text(
+        'command = "balance rotor.csv --plane A:0mm:20mm --plane B:250mm:20mm"\n'
+        '[[ask]]\nquantity = "mass_kg"\nwhere = { plane = "A" }\n'
+    )
+    assert dalembert("exercise", "e.toml", "-o", "out").returncode == 0
+    sheet = (folder / "out" / "sheet-1.html").read_text()
+    names = re.findall(
+        r'<text x="([\d.]+)" y="([\d.]+)" text-anchor="middle"[^>]*>(M\d+|[xyAB])</text>', sheet
+    )
+    assert len(names) == 2 * 12 + 4
+    places = [(float(x), float(y), 4.3 * len(name)) for x, y, name in names]
+    for k, (x, y, half) in enumerate(places):
+        assert half <= x <= 430 - half
+        assert all(abs(x - a) >= half + other or abs(y - b) >= 15 for a, b, other in places[:k]), names[k]
+
+
+def test_angles_of_measured_vibration_count_as_the_instrument_does(
+    dalembert: Dalembert, folder: Path
+) -> None:
+    """Those of a rotor's masses count counter-clockwise from x."""
+    (folder / "runs.csv").write_text(
+        "run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n0,1,3.4,116,,,\n1,1,1.8,42,A,2,30\n"
+    )
+    for command, has_sense in (
+        ("balance rotor.csv --plane A:0mm:20mm --plane B:90mm:20mm", True),
+        ("field runs.csv", False),
+    ):
+        (folder / "e.toml").write_text(
+            f'command = "{command}"\n[[ask]]\nquantity = "angle_deg"\nwhere = {{ plane = "A" }}\n'
+        )
+        assert dalembert("exercise", "e.toml", "-o", command[:5]).returncode == 0
+        sheet = (folder / command[:5] / "sheet-1.html").read_text()
+        assert "A whole turn more or less is the same angle." in sheet
+        assert ("Angles count counter-clockwise from x." in sheet) is has_sense
