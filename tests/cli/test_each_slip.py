@@ -129,7 +129,7 @@ def of_work(slipped: float, name: str) -> Slip:
 SLIPS = {
     "a sign": of_masses(ONE - TWO + THREE, "the term of Q has the wrong sign"),
     "a sign of a power": of_work(torque(inertia=-1), "the inertia force of link slider has the wrong sign"),
-    "left out": of_masses(ONE + THREE, "Q is left out"),
+    "left out": of_masses(ONE + THREE, "the term of Q is left out"),
     "a power left out": of_work(torque(weight=0), "the weight of link load is left out"),
     "ten times too large": of_masses(10 * ONE + TWO + THREE, "the term of P is ten times too large"),
     "ten times too small": of_masses(ONE + TWO / 10 + THREE, "the term of Q is ten times too small"),
@@ -152,7 +152,7 @@ SLIPS = {
     ),
     "rpm for rad/s": Slip(
         SHAFT, "body parts.csv --shaft=-500mm:500mm --speed 420rpm", "bearing1_dynamic_N", 'axis = "x"', dynamic(420 * pi / 30),
-        dynamic(420), "rpm taken for rad/s", ("kN", 1e-3),
+        dynamic(420), "420rpm: rpm taken for rad/s", ("kN", 1e-3),
     ),
     "the other assembly": Slip(
         FOUR_BAR, "mechanism bar.toml --at 60deg", "rocker_angle_deg", "", rocker(1), rocker(-1), "the other assembly",
