@@ -125,11 +125,13 @@ class Judge:
                 return Mark(student, answer, text, "wrong", trouble), None
             readings.append(_Reading(number, scale, judge(answer, number, scale)))
         best = min(readings, key=lambda reading: RANK.index(reading.verdict))
-        if best.verdict != "wrong":
-            return Mark(student, answer, text, best.verdict), best
+        if best.verdict == "right":
+            return Mark(student, answer, text, "right"), best
         for reading in readings:
             if self._follows(k, reading, earlier):
                 return Mark(student, answer, text, "carried"), reading
+        if best.verdict != "wrong":
+            return Mark(student, answer, text, best.verdict), best
         for reading in readings:
             mistake = self.slips[k].name(reading.number, float(reading.scale))
             if mistake is not None:
