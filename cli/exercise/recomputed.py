@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property, partial
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -204,7 +204,8 @@ class Recomputed:
 
     def _drawn(self) -> Iterator[Edit]:
         """Slips in the dimensions that the text names or the draw changes."""
-        shop = self.variant.problem.workshop
+        problem = self.variant.problem
+        shop = problem.workshop
 
         def drawn(text: str, values: Mapping[str, Value]) -> Edit:
             return Edit(text, next(iter(values)), lambda p: replace(p, drawn={**p.drawn, **values}))
@@ -216,14 +217,22 @@ class Recomputed:
             value = None if ":" in name else shop.datum(name, self.variant.drawn)
             if value is None or not value.number:
                 continue
-            for slip in of_datum(name.rpartition(".")[2], unit_name(value.unit)):
+            for slip in of_datum(_quantity(problem.exercise.command, name), unit_name(value.unit)):
                 yield drawn(f"{name}{slip.text}", {name: Value(slip.change(value.number), value.unit)})
-        g = self.variant.problem.gravity
+        g = problem.gravity
         if g and "gravity.y" in shop.dimensions:
             field = complex(shop.described.mechanism.gravity)
             for text, share in of_gravity(g):
                 x, y = (Value(Decimal(repr(part * share)), "") for part in (field.real, field.imag))
                 yield drawn(text, {"gravity.x": x, "gravity.y": y})
+
+
+def _quantity(words: Sequence[str], name: str) -> str:
+    """Return what a drawn value is: the option whose value it is, or the last part of a dimension's path."""
+    for option, word in pairwise(words):
+        if f"{{{name}}}" in word and option.startswith("--"):
+            return option.removeprefix("--")
+    return name.rpartition(".")[2]
 
 
 def replace_further(problem: Problem, *words: str) -> Problem:

@@ -62,6 +62,10 @@ class Pairs:
     """Where one of the two is a sign."""
 
 
+Slips = tuple[list[Slip], Callable[[], Pairs | None]]
+"""The slips of an answer, and pairs of them, which are formed on request."""
+
+
 def joined(every: Sequence[Callable[[], Pairs | None]]) -> Callable[[], Pairs | None]:
     """Put pairs of several kinds together, the likelier kind first; they are formed on request."""
 
@@ -203,7 +207,7 @@ def of_sum(
     changes: Sequence[Change],
     total: complex,
     value_of: Callable[[NDArray[np.complex128]], Real],
-) -> tuple[list[Slip], Callable[[], Pairs | None]]:
+) -> Slips:
     """Return the slips of an answer that follows from a sum of terms: each change, and pairs of changes of two terms.
 
     `value_of`: the answer that follows from sums, in the unit asked for.
@@ -282,10 +286,10 @@ def of_datum(quantity: str, unit: str) -> Iterator[DatumSlip]:
         return
     if unit == "rpm":
         yield DatumSlip(": rpm taken for rad/s", lambda x: x * RPM, is_unit=True)
-    if quantity in TWICE:
-        other = TWICE[quantity]
-        yield DatumSlip(f": the {other} in place of the {quantity}", lambda x: 2 * x, is_unit=True)
-        yield DatumSlip(f": the {quantity} taken for the {other}", lambda x: x / 2, is_unit=True)
+    length = quantity.rpartition("_")[2]
+    if length in TWICE:
+        yield DatumSlip(f": the {TWICE[length]} in place of the {length}", lambda x: 2 * x, is_unit=True)
+        yield DatumSlip(f": the {length} taken for the {TWICE[length]}", lambda x: x / 2, is_unit=True)
     yield DatumSlip(" has the wrong sign", lambda x: -x)
     if quantity in TERMS:
         yield DatumSlip(" is left out", lambda x: Decimal(0), 2)

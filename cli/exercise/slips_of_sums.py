@@ -18,8 +18,8 @@ from cli.exercise.slips import (
     GRAVITIES,
     Candidates,
     Change,
-    Pairs,
     Slip,
+    Slips,
     finals,
     of_gravity,
     of_sum,
@@ -74,7 +74,7 @@ def changes_of_part(term: int, name: str, value: complex, unit: str = "") -> Ite
 
 def of_parts(
     answer: Answer, parts: Sequence[Part], total: float, unit: str = "", further: Sequence[Change] = ()
-) -> tuple[list[Slip], Callable[[], Pairs | None]]:
+) -> Slips:
     """Return the slips of an answer in proportion to a sum of parts, and pairs of them."""
     changes = [c for k, part in enumerate(parts) if part.value for c in changes_of_part(k, *part, unit)]
     share = answer.value / total if total else 1.0
@@ -87,7 +87,7 @@ def way_of(variant: Variant) -> Sequence[Mapping[str, Any]]:
     return way or ()
 
 
-def of_motion(variant: Variant, number: int) -> tuple[list[Slip], Callable[[], Pairs | None]]:
+def of_motion(variant: Variant, number: int) -> Slips:
     """Return the slips of an answer that is a sum of such parts, and pairs of them; none of any other answer."""
     answer = variant.answers[number]
     parts = [part for part in _parts(variant, answer) if part.value]
@@ -218,9 +218,7 @@ def _less(more: Values | None, less: Values | None) -> list[float | None]:
     return [None if a is None or b is None else a - b for a, b in zip(more, less, strict=True)]
 
 
-def of_loads(
-    answer: Answer, number: int, every: Sequence[Load]
-) -> tuple[list[Slip], Callable[[], Pairs | None]]:
+def of_loads(answer: Answer, number: int, every: Sequence[Load]) -> Slips:
     """The slips of an answer that is a sum over the loads, and pairs of them."""
     parts = [Part(load.name, load.parts[number] or 0.0) for load in every if load.parts]
     return of_parts(answer, parts, answer.value)
@@ -231,7 +229,7 @@ def is_sum(answer: Answer) -> bool:
     return LINEAR.search(answer.ask.name) is not None
 
 
-def of_ledger(variant: Variant, number: int) -> tuple[list[Slip], Callable[[], Pairs | None]]:
+def of_ledger(variant: Variant, number: int) -> Slips:
     """Return the slips of an unknown load or effort, and pairs of them; none of any other answer, nor of several unknowns."""
     answer = variant.answers[number]
     terms = _ledger(variant, answer)

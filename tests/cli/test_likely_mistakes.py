@@ -287,6 +287,19 @@ def test_a_slip_is_what_another_calculation_makes_of_it(tmp_path: Path) -> None:
     assert np.allclose(correct(u, z, np.array([0.0, 0.09])).unbalance[1], right)
 
 
+def test_the_diameter_of_a_drawn_radius(tmp_path: Path) -> None:
+    """A trial mass makes a tenth of the weight: 0.1·m·g/(ω²·r) at 350 mm; twice the radius makes half of it."""
+    (tmp_path / "e.toml").write_text(
+        'command = "trial --rotor-mass 120kg --speed 1480rpm --radius {r}"\n[draw]\nr = ["350mm"]\n[[ask]]\nquantity = "mass_g"\n'
+    )
+    with workshop(read_exercise(str(tmp_path / "e.toml"))) as shop:
+        (variant,) = variants(shop, 1, 1, [])
+        (own,) = candidates(variant)
+    mass = 1000 * 0.1 * 120 * 9.80665 / ((1480 * np.pi / 30) ** 2 * 0.35)
+    assert abs(own.answer.value - mass) < 1e-9 * mass
+    assert own.name(typed(written(mass / 2, 4))[0]) == "r: the diameter in place of the radius"
+
+
 def test_right_answers_have_no_mistake(questions: list[Candidates]) -> None:
     for own in questions:
         for slip in own.wrong:
