@@ -63,7 +63,7 @@ def put(folder: Path, files: Mapping[str, bytes]) -> list[str]:
 def _earlier(folder: Path) -> Iterator[str]:
     """Yield sheets and questions in a folder that this command wrote: they say so themselves, a sheet with its name."""
     for path in sorted(folder.glob("sheet-*.html")):
-        if mark(path.name).encode() in path.read_bytes():
+        if path.is_file() and mark(path.name).encode() in path.read_bytes():
             yield path.name
     exam = folder / NUMBAS
     if exam.is_file() and f'"{TAG}"'.encode() in exam.read_bytes():

@@ -94,6 +94,7 @@ def test_files_of_others_stay(dalembert: Dalembert, folder: Path) -> None:
         "prairielearn/own/server.py": b"def generate(data): pass\n",
     }
     (out / "prairielearn" / "own").mkdir()
+    (out / "sheet-of-all.html").mkdir()
     for name, data in own.items():
         (out / name).write_bytes(data)
     assert dalembert("exercise", "e.toml", "--students", 2, "-o", "new").returncode == 0
