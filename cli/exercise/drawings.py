@@ -25,6 +25,7 @@ STROKES = {
     "wheel": 'stroke="#6a3d9a" stroke-width="1.2" stroke-dasharray="9 3"', "spoke": 'stroke="#6a3d9a" stroke-width="1.2"',
     "slot": 'stroke="#1d4f91" stroke-width="1" fill="#fff"', "block": 'stroke="#1d4f91" stroke-width="1.6" fill="#dfe8f4"',
     "cam": 'stroke="#1d4f91" stroke-width="1.6" fill="#1d4f9118"', "roller": 'stroke="#6a3d9a" stroke-width="1.2"',
+    "belt": 'stroke="#444" stroke-width="1.6"', "rack": 'stroke="#6a3d9a" stroke-width="1.4"',
     "spring": 'stroke="#444" stroke-width="1"', "mass": 'stroke="#666" stroke-width="1"',
     "pin": 'stroke="#000" stroke-width="1.2" fill="#fff"', "tip": 'stroke="#000" stroke-width="1.2" fill="#000"',
 }  # fmt: skip

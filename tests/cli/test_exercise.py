@@ -11,9 +11,11 @@ from typing import Any
 
 import pytest
 
+from cli.exercise.drawings import STROKES
 from tests.cli.exercises import EXERCISE, ROTOR, rotor_exercise, rows
 from tests.cli.pages import Opened
 from tests.conftest import Dalembert
+from virtualwork.drawing import ROLES
 
 
 @pytest.fixture
@@ -206,3 +208,16 @@ def test_angles_of_measured_vibration_count_as_the_instrument_does(
         sheet = (folder / command[:5] / "sheet-1.html").read_text()
         assert "A whole turn more or less is the same angle." in sheet
         assert ("Angles count counter-clockwise from x." in sheet) is has_sense
+
+
+@pytest.mark.parametrize("name", ["rack-lift", "belt-drive"])
+def test_a_mechanism_of_every_kind_has_a_figure(dalembert: Dalembert, tmp_path: Path, name: str) -> None:
+    assert ROLES.keys() <= STROKES.keys()
+    assert dalembert("examples", name).returncode == 0
+    (file,) = tmp_path.glob("*.toml")
+    (tmp_path / "e.toml").write_text(
+        f'command = "inspect {file.name}"\n[[ask]]\nquantity = "value"\nwhere = {{ quantity = "mobility" }}\n'
+    )
+    done = dalembert("exercise", "e.toml", "-o", "out")
+    assert done.returncode == 0, done.stderr
+    assert "<svg" in (tmp_path / "out" / "sheet-1.html").read_text()
