@@ -15,7 +15,7 @@ from dalembert.units import MINUS
 TIE = Decimal("1e-13")
 """Share of a computed number within which it may lie on either side of a tie."""
 _NUMBER = re.compile(
-    r"[\s=≈~]*([+-]?)\s*((?:\d+(?:[ ']\d{3}(?!\d))*)(?:[.,]\d*(?:[ ']\d{3}(?!\d))*)*|[.,]\d+)"
+    r"\s*(?:[^\W\d]\w*\s*(?=[=≈]))?[\s=≈~]*([+-]?)\s*((?:\d+(?:[ ']\d{3}(?!\d))*)(?:[.,]\d*(?:[ ']\d{3}(?!\d))*)*|[.,]\d+)"
     r"(?:\s*(?:[eE]|[·*x×]?\s*10\s*(?:\^|\*\*)\s*\(?|[·*x×]\s*10\s*)\s*([+-]?\d+)\)?)?\s*(.*?)\s*\Z",
     re.DOTALL,
 )
@@ -64,7 +64,7 @@ def typed(text: str) -> list[Typed]:
     Parameters
     ----------
     text : str
-        `1.23`, `1,23`, `1.23e0`, `1,23·10^2`, `82 350`, `18.1 kJ`, `256.8°`.
+        `1.23`, `1,23`, `1.23e0`, `1,23·10^2`, `82 350`, `18.1 kJ`, `256.8°`, `≈ 3`, `T2 = 3 N m`.
 
     Returns
     -------

@@ -58,8 +58,9 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     from cli.exercise import questions
     from cli.exercise.description import read_exercise
     from cli.exercise.drawings import figure, moving
+    from cli.exercise.folder import put
     from cli.exercise.recomputed import candidates
-    from cli.exercise.sheets import answers_csv, filled, key_csv, put, sheet_page, solutions, tables
+    from cli.exercise.sheets import answers_csv, filled, key_csv, sheet_page, solutions, tables
     from cli.exercise.variants import several, variants, workshop
     from cli.show.output import options_of
     from cli.show.result import Result
@@ -83,9 +84,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
         drawings = {variant: figure(variant) for variant in each}
         frames = {variant: moving(variant) for variant in each} if options.page else {}
         files = {
-            f"sheet-{student.file}.html": sheet_page(
-                exercise, student, variant, drawings[variant], frames.get(variant, "")
-            )
+            student.sheet: sheet_page(exercise, student, variant, drawings[variant], frames.get(variant, ""))
             for student, variant in zip(people, drawn, strict=True)
         }
         files["answers.csv"] = answers_csv(exercise, people, drawn)
@@ -95,7 +94,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
         files["moodle.xml"] = questions.moodle(exercise, people, drawn, drawings, slips)
         for name in options.system or ():
             files |= questions.SYSTEMS[name](exercise, drawn, drawings, slips)
-        put(Path(options.folder), files)
+        removed = put(Path(options.folder), files)
     return Result(
         tables=tables(exercise, people, drawn),
         head={
@@ -103,9 +102,11 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
             "folder": options.folder,
             "variants": len(each),
             "files": sorted(files),
+            "removed": removed,
         },
         notes=lambda: (
             f"wrote {len(files)} files to {options.folder}: {several(len(each), 'variant')} for {several(len(people), 'student')}\n"
+            + (f"removed {several(len(removed), 'file')} of an earlier run\n" if removed else "")
         ),
         warnings=warnings,
     )
@@ -153,7 +154,7 @@ def _students(text: str, exercise: Exercise) -> list[Student]:
     ]
     files: dict[str, str] = {}
     for person in people:
-        twin = files.setdefault(person.file.lower(), person.name)
+        twin = files.setdefault(person.sheet.lower(), person.name)
         if twin != person.name:
             raise DataError(
                 f"{text}: column student: found '{twin}' and '{person.name}', expected names that make two file names"

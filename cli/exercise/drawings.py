@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import html
 from collections.abc import Iterator, Sequence
-from math import cos, radians, sin
+from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,7 @@ STROKES = {
     "wheel": 'stroke="#6a3d9a" stroke-width="1.2" stroke-dasharray="9 3"', "spoke": 'stroke="#6a3d9a" stroke-width="1.2"',
     "slot": 'stroke="#1d4f91" stroke-width="1" fill="#fff"', "block": 'stroke="#1d4f91" stroke-width="1.6" fill="#dfe8f4"',
     "cam": 'stroke="#1d4f91" stroke-width="1.6" fill="#1d4f9118"', "roller": 'stroke="#6a3d9a" stroke-width="1.2"',
+    "belt": 'stroke="#444" stroke-width="1.6"', "rack": 'stroke="#6a3d9a" stroke-width="1.4"',
     "spring": 'stroke="#444" stroke-width="1"', "mass": 'stroke="#666" stroke-width="1"',
     "pin": 'stroke="#000" stroke-width="1.2" fill="#fff"', "tip": 'stroke="#000" stroke-width="1.2" fill="#000"',
 }  # fmt: skip
@@ -123,32 +124,39 @@ def mechanism(variant: Variant) -> str:
         points = " ".join(f"{x:.1f},{y:.1f}" for x, y in map(xy, shape.points))
         tag = "polygon" if shape.closed else "polyline"
         parts.append(f'<{tag} points="{points}" {look if shape.closed else look.split(" fill")[0]}/>')
-    parts += _names(drawing.labels, at, xy, set(m.ground))
+    labels = [(each, *xy(at(each.body, each.at))) for each in drawing.labels]
+    pins: list[Box] = [(x, y, 5.0, 5.0) for each, x, y in labels if each.of == "point"]
+    # names of links give way to those of points
+    labels.sort(key=lambda label: label[0].of == "link")
+    italic = 'font-style="italic"'
+    names = [(each.text, x, y, "" if each.of == "point" else italic) for each, x, y in labels]
+    parts += _names(names, pins, height)
     return _svg(height, parts, f"{m.name or 'mechanism'} in the pose of the exercise")
 
 
-def _names(labels: Any, at: Any, xy: Any, ground: set[str]) -> Iterator[str]:
-    """The names of points and links, each where it meets none of the others."""
-    taken: list[tuple[float, float, float, float]] = [
-        (*xy(at(each.body, each.at)), 5.0, 5.0) for each in labels if each.of == "point"
-    ]
-    ways = [(9, -9), (-9, -9), (9, 19), (-9, 19), (14, 5), (-14, 5), (0, -14), (0, 26), (22, -20), (-22, -20)]
-    for each in sorted(labels, key=lambda label: label.of == "link"):
-        x, y = xy(at(each.body, each.at))
-        half = 4.3 * len(each.text)
+WAYS = [(9, -9), (-9, -9), (9, 19), (-9, 19), (14, 5), (-14, 5), (0, -14), (0, 26), (22, -20), (-22, -20)]
+"""Where a name may stand beside its place, the preferred way first."""
+Box = tuple[float, float, float, float]
+"""Middle, half the width, half the height."""
+
+
+def _names(names: Sequence[tuple[str, float, float, str]], taken: list[Box], height: float) -> Iterator[str]:
+    """The names (text, place, look), each where it meets none of the others and nothing that is taken, within the figure."""
+    for text, x, y, look in names:
+        half = 4.3 * len(text)
         best, least = (x, y), float("inf")
-        for dx, dy in ways:
+        for dx, dy in WAYS:
             middle = x + dx + (half if dx > 0 else -half if dx < 0 else 0)
             box = middle, y + dy - 5, half, 8.0
             off = max(0.0, half - middle) + max(0.0, middle + half - WIDTH)
-            hits = (
-                sum(abs(box[0] - t[0]) < box[2] + t[2] and abs(box[1] - t[1]) < box[3] + t[3] for t in taken)
-                + off
+            off += max(0.0, 8.0 - box[1]) + max(0.0, box[1] + 8.0 - height)
+            hits = sum(
+                abs(box[0] - t[0]) < box[2] + t[2] and abs(box[1] - t[1]) < box[3] + t[3] for t in taken
             )
-            if hits < least:
-                best, least = (middle, y + dy), hits
+            if hits + off < least:
+                best, least = (middle, y + dy), hits + off
         taken.append((best[0], best[1] - 5, half, 8.0))
-        yield _text(*best, each.text, more="" if each.of == "point" else 'font-style="italic"')
+        yield _text(*best, text, more=look)
 
 
 def _varied(variant: Variant) -> Mechanism:
@@ -199,25 +207,31 @@ def rotor(variant: Variant) -> str:
         f'<path d="M{cx - r * 1.2} {cy}H{cx + r * 1.2}M{cx} {cy + r * 1.2}V{cy - r * 1.2}" stroke="#bbb" stroke-dasharray="7 3 1 3"/>',
         _text(cx + r * 1.2 + 6, cy + 5, "x"),
         _text(cx + 12, cy - r * 1.2 + 5, "y"),
+        _text(cx, 20, "seen against +z", more='font-size="13"'),
     ]
     far = float(radius.max()) or 1.0
-    taken: list[tuple[float, float]] = []
-    for name, rho, phi in zip(names, radius.tolist(), angle.tolist(), strict=True):
-        x, y = cx + rho / far * r * cos(phi), cy - rho / far * r * sin(phi)
-        parts.append(f'<path d="M{cx} {cy}L{x:.1f} {y:.1f}" stroke="#1d4f91" stroke-width="1.4"/>')
-        parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="8" fill="#1d4f91" stroke="#fff"/>')
-        lx, ly = cx + (rho / far * r + 26) * cos(phi), cy - (rho / far * r + 22) * sin(phi) + 5
-        while any(abs(lx - a) < 34 and abs(ly - b) < 15 for a, b in taken):
-            ly += 15
-        taken.append((lx, ly))
-        parts.append(_text(lx, ly, name))
-    parts.append(_text(cx, 20, "seen against +z", more='font-size="13"'))
+    sizes = radius / far * r
+    axes: list[Box] = [(cx + r * 1.2 + 6, cy, 5.0, 8.0), (cx + 12, cy - r * 1.2, 5.0, 8.0)]
+    x, y = cx + sizes * np.cos(angle), cy - sizes * np.sin(angle)
+    parts += _masses(names, x, y, cx + 0 * sizes, cy, axes, size)
     if z is not None:
-        parts += _side(names, z, radius, angle, chosen, far)
+        parts += _side(names, z, sizes * np.sin(angle), chosen, size)
     return _svg(size, parts, "rotor with its masses")
 
 
-def _side(names: Sequence[str], z: Any, radius: Any, angle: Any, planes: Any, far: float) -> Iterator[str]:
+def _masses(
+    names: Sequence[str], x: Any, y: Any, x0: Any, y0: float, others: Sequence[Box], height: float
+) -> Iterator[str]:
+    """Masses at (x, y) on their arms from (x0, y0), and their names, which keep clear of others."""
+    places = list(zip(names, x.tolist(), y.tolist(), x0.tolist(), strict=True))
+    for _, a, b, a0 in places:
+        yield f'<path d="M{a0:.1f} {y0}L{a:.1f} {b:.1f}" stroke="#1d4f91" stroke-width="1.4"/>'
+        yield f'<circle cx="{a:.1f}" cy="{b:.1f}" r="7" fill="#1d4f91" stroke="#fff"/>'
+    taken: list[Box] = [*others, *((a, b, 7.0, 7.0) for _, a, b, _ in places)]
+    yield from _names([(name, a, b, "") for name, a, b, _ in places], taken, height)
+
+
+def _side(names: Sequence[str], z: Any, up: Any, planes: Any, height: float) -> Iterator[str]:
     """The rotor from the side: masses and correction planes at their axial positions."""
     import numpy as np
 
@@ -225,28 +239,14 @@ def _side(names: Sequence[str], z: Any, radius: Any, angle: Any, planes: Any, fa
     low, high = float(min(z.min(), at.min())), float(max(z.max(), at.max()))
     left, right, cy, r = 285.0, WIDTH - 24, 178.0, 88.0
     scale = (right - left) / ((high - low) or 1.0)
-
-    def x_of(place: float) -> float:
-        return left + (place - low) * scale
-
     yield f'<rect x="{left - 14}" y="{cy - 7}" width="{right - left + 28}" height="14" fill="#ddd" stroke="#888"/>'
     for k, (name, place) in enumerate(zip(planes.name, at.tolist(), strict=True)):
-        x = x_of(place)
+        x = left + (place - low) * scale
         yield f'<path d="M{x:.1f} {cy - 1.22 * r:.1f}V{cy + 1.22 * r:.1f}" stroke="#b35900" stroke-dasharray="6 4" stroke-width="1.5"/>'
         yield _text(
             x, cy - 1.3 * r - (17 if k % 2 and len(planes.name) > 3 else 0), name, more='font-weight="bold"'
         )
-    drawn: dict[float, int] = {}
-    for name, place, rho, phi in sorted(
-        zip(names, z.tolist(), radius.tolist(), angle.tolist(), strict=True), key=lambda m: m[1]
-    ):
-        x, up = x_of(place), rho / far * r * sin(phi)
-        yield f'<path d="M{x:.1f} {cy}V{cy - up:.1f}" stroke="#1d4f91" stroke-width="1.4"/>'
-        yield f'<circle cx="{x:.1f}" cy="{cy - up:.1f}" r="6" fill="#1d4f91" stroke="#fff"/>'
-        same = drawn.setdefault(round(place, 12), 0)
-        drawn[round(place, 12)] += 1
-        yield _text(
-            x + 12, cy - up + (-8 if up >= 0 else 18) + 15 * same * (1 if up < 0 else -1), name, "start"
-        )
+    x = left + (z - low) * scale
+    yield from _masses(names, x, cy - up, x, cy, [], height)
     yield _text((left + right) / 2, cy + 1.22 * r + 24, "z →", more='font-size="13"')
     yield _text((left + right) / 2, 20, "from the side", more='font-size="13"')

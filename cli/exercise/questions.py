@@ -18,6 +18,10 @@ from dalembert.figures import rounded
 
 FEEDBACKS = 30
 """The largest number of likely mistakes of a question with a feedback."""
+PRAIRIELEARN, NUMBAS = "prairielearn", "numbas.exam"
+"""The folder and the file of further systems."""
+TAG = "dalembert"
+"""The tag of their questions."""
 
 
 def moodle(
@@ -191,14 +195,14 @@ def prairielearn(
 ) -> dict[str, bytes]:
     """Return the files of the question by their paths: prairielearn/NAME/…"""
     name = re.sub(r"\W+", "-", exercise.title.lower()).strip("-") or "exercise"
-    folder = f"prairielearn/{name}"
+    folder = f"{PRAIRIELEARN}/{name}"
     every = [_variant(variant, slips[variant], drawings[variant]) for variant in dict.fromkeys(variants)]
     identity = json.dumps([exercise.title, exercise.command, exercise.text], ensure_ascii=False)
     info = {
         "uuid": str(uuid5(NAMESPACE_URL, identity)),
         "title": exercise.title,
         "topic": "Mechanics of machines",
-        "tags": ["dalembert"],
+        "tags": [TAG],
         "type": "v3",
         "singleVariant": not exercise.draws,
     }
@@ -301,7 +305,7 @@ def numbas(
         "custom_part_types": [],
         "resources": [],
     }
-    return {"numbas.exam": f"{VERSION}\n{json.dumps(exam, ensure_ascii=False, indent=1)}\n".encode()}
+    return {NUMBAS: f"{VERSION}\n{json.dumps(exam, ensure_ascii=False, indent=1)}\n".encode()}
 
 
 def _content(text: str) -> str:
@@ -362,7 +366,7 @@ def _numbas_question(
     name: str, variant: Variant, slips: Sequence[Candidates], drawing: str
 ) -> dict[str, object]:
     return {
-        "name": name, "tags": [], "metadata": {"description": "", "licence": "None specified"},
+        "name": name, "tags": [TAG], "metadata": {"description": "", "licence": "None specified"},
         "statement": _content(problem_html(variant, drawing)), "advice": "", "rulesets": {}, "extensions": [],
         "builtin_constants": {"e": True, "pi,π": True, "i": True, "j": False}, "constants": [], "variables": {},
         "variablesTest": {"condition": "", "maxRuns": 100}, "ungrouped_variables": [], "variable_groups": [], "functions": {},

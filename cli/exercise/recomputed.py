@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property, partial
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from cli.exercise.description import Solved, Value
-from cli.exercise.slips import Candidates, Pairs, Slip, changes_of, finals, joined, other_gravities
+from cli.exercise.slips import (
+    Candidates,
+    Pairs,
+    Slip,
+    changes_of,
+    finals,
+    joined,
+    of_datum,
+    of_gravity,
+)
 from cli.exercise.slips_of_sums import Load, is_sum, loads, of_ledger, of_loads, of_motion, of_rotor
 from cli.exercise.solving import DataTable, Problem
 from cli.exercise.variants import Variant
@@ -22,18 +31,13 @@ from dalembert.units import G0, unit_name
 
 MOST = 160
 """The largest number of slips that are tried."""
-TIMES = {"ten times too large": Decimal(10), "ten times too small": Decimal("0.1")}
 LIKELY = 12
 """The number of likeliest slips of which any two are tried together."""
-TWICE = {"radius": "diameter", "throw": "stroke"}
-"""Lengths that are taken for twice as long."""
-TERMS = ("mass", "inertia", "force", "fx", "fy", "torque", "unbalance", "weight", "reciprocating", "rotating")
-"""Quantities of a row that may be left out."""
 RANGES = ("--over", "--time", "--cases")
 """Options that say at how many places a quantity is shown."""
-NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*")
-ANGLE = re.compile(r"(?<![\w.])([-+]?\d+\.?\d*)deg\b")
-SPEED = re.compile(r"(?<![\w.])([-+]?\d+\.?\d*)rpm\b")
+NUMBER = r"(?<![\w.])([-+]?\d+\.?\d*)"
+AMOUNT = re.compile(NUMBER + r"([A-Za-z]\w*)")
+"""A number with its unit in a word of the command."""
 
 
 class Edit(NamedTuple):
@@ -111,8 +115,7 @@ class Recomputed:
         own = [*finals(answer), *self._siblings(k), *self._assemblies(k)]
         if self.variant.problem.exercise.command[0] == "trial":
             # a tenth of the rotor's weight
-            own.append(Slip("the mass in place of the weight", answer.value / G0))
-            own += [Slip(text, answer.value * share) for text, share in other_gravities(G0)]
+            own += [Slip(text, answer.value * share) for text, share in of_gravity(G0)]
         data = [Slip(run.edit.text, value) for run in self.runs if (value := run.values[k]) is not None]
         # of two slips with one result the first is named: a phase counted the other way turns the angle of a correction
         return [*data, *own] if self.variant.problem.exercise.command[0] == "field" else [*own, *data]
@@ -201,7 +204,8 @@ class Recomputed:
 
     def _drawn(self) -> Iterator[Edit]:
         """Slips in the dimensions that the text names or the draw changes."""
-        shop = self.variant.problem.workshop
+        problem = self.variant.problem
+        shop = problem.workshop
 
         def drawn(text: str, values: Mapping[str, Value]) -> Edit:
             return Edit(text, next(iter(values)), lambda p: replace(p, drawn={**p.drawn, **values}))
@@ -213,37 +217,27 @@ class Recomputed:
             value = None if ":" in name else shop.datum(name, self.variant.drawn)
             if value is None or not value.number:
                 continue
-            for text, slipped in _slipped(name, value):
-                yield drawn(text, {name: slipped})
-        g = self.variant.problem.gravity
+            for slip in of_datum(_quantity(problem.exercise.command, name), unit_name(value.unit)):
+                yield drawn(f"{name}{slip.text}", {name: Value(slip.change(value.number), value.unit)})
+        g = problem.gravity
         if g and "gravity.y" in shop.dimensions:
             field = complex(shop.described.mechanism.gravity)
-            for text, share in (("the mass in place of the weight", 1 / g), *other_gravities(g)):
+            for text, share in of_gravity(g):
                 x, y = (Value(Decimal(repr(part * share)), "") for part in (field.real, field.imag))
                 yield drawn(text, {"gravity.x": x, "gravity.y": y})
+
+
+def _quantity(words: Sequence[str], name: str) -> str:
+    """Return what a drawn value is: the option whose value it is, or the last part of a dimension's path."""
+    for option, word in pairwise(words):
+        if f"{{{name}}}" in word and option.startswith("--"):
+            return option.removeprefix("--")
+    return name.rpartition(".")[2]
 
 
 def replace_further(problem: Problem, *words: str) -> Problem:
     """Return a problem with further words behind its command."""
     return replace(problem, further=[*problem.further, *words])
-
-
-def _slipped(name: str, value: Value) -> Iterator[tuple[str, Value]]:
-    """Yield a datum with each slip in it."""
-    unit = unit_name(value.unit)
-    degrees = unit == "deg"
-    if unit == "rpm":
-        yield f"{name}: rpm taken for rad/s", Value(value.number, "rad/s")
-    if degrees:
-        yield f"{name}: degrees taken as radians", Value(value.number, "rad")
-        yield f"{name} is counted the other way", Value(-value.number, value.unit)
-        yield f"{name}: sine in place of cosine", Value(90 - value.number, value.unit)
-        return
-    yield f"{name} has the wrong sign", Value(-value.number, value.unit)
-    for text, times in TIMES.items():
-        yield f"{name} is {text}", Value(value.number * times, value.unit)
-    if "radius" in name:
-        yield f"{name}: the diameter in place of the radius", Value(2 * value.number, value.unit)
 
 
 def _options(problem: Problem) -> Iterator[Edit]:
@@ -260,23 +254,16 @@ def _options(problem: Problem) -> Iterator[Edit]:
     for k, word in enumerate(words):
         option = words[k - 1]
         if option == "--gravity" and (g := problem.gravity):
-            for text, share in (("the mass in place of the weight", 1 / g), *other_gravities(g)):
+            for text, share in of_gravity(g):
                 yield put(text, k, _times(word, share))
-        if option == "--radius":
-            yield put("the diameter in place of the radius", k, _times(word, 2.0))
-            yield put("half the radius, as if it were the diameter", k, _times(word, 0.5))
         if option in RANGES:
             continue
-        for match in SPEED.finditer(word):
-            yield put("rpm taken for rad/s", k, _with(word, match, f"{match[1]}rad_s"))
-        for match in ANGLE.finditer(word):
-            yield put(f"{match[0]}: degrees taken as radians", k, _with(word, match, f"{match[1]}rad"))
-            yield put(
-                f"{match[0]} is counted the other way", k, _with(word, match, f"{-Decimal(match[1])}deg")
-            )
-            yield put(
-                f"{match[0]}: sine in place of cosine", k, _with(word, match, f"{90 - Decimal(match[1])}deg")
-            )
+        for match in AMOUNT.finditer(word):
+            for slip in of_datum(option.removeprefix("--"), match[2]):
+                if slip.is_unit or match[2] == "deg":
+                    number = slip.change(Decimal(match[1]))
+                    changed = f"{word[: match.start()]}{number:f}{match[2]}{word[match.end() :]}"
+                    yield put(f"{match[0]}{slip.text}", k, changed)
     if problem.exercise.command[0] in ("field", "index"):
         lag, text = "--phase-lag", "the phase is counted the other way"
         if lag in words:
@@ -286,11 +273,7 @@ def _options(problem: Problem) -> Iterator[Edit]:
 
 
 def _times(word: str, factor: float) -> str:
-    return NUMBER.sub(lambda match: repr(float(match[0]) * factor), word)
-
-
-def _with(word: str, match: re.Match[str], text: str) -> str:
-    return word[: match.start()] + text + word[match.end() :]
+    return re.sub(NUMBER, lambda match: repr(float(match[0]) * factor), word)
 
 
 def _numbers(table: DataTable) -> Iterator[tuple[int, int, str, str, Decimal]]:
@@ -308,59 +291,31 @@ def _columns(problem: Problem) -> Iterator[Edit]:
     for file, table in problem.tables.items():
         cells: dict[str, dict[tuple[str, int, int], str]] = {}
         for r, c, quantity, unit, number in _numbers(table):
-            for text, value in _of_column(quantity, unit, number):
-                cells.setdefault(text, {})[file, r, c] = f"{value:f}"
+            for slip in of_datum(quantity, unit):
+                if slip.is_unit:
+                    text = f"{quantity.replace('_', ' ')}{slip.text}"
+                    cells.setdefault(text, {})[file, r, c] = f"{slip.change(number):f}"
         for text, changed in cells.items():
             if len(changed) > 1:
                 yield Edit(text, text, _put(changed))
 
 
-def _of_column(quantity: str, unit: str, number: Decimal) -> Iterator[tuple[str, Decimal]]:
-    what = quantity.replace("_", " ")
-    if unit == "deg":
-        yield f"{what}: degrees taken as radians", number * Decimal(180 / np.pi)
-    if unit == "rpm":
-        yield f"{what}: rpm taken for rad/s", number * Decimal(30 / np.pi)
-    if quantity in TWICE:
-        yield f"{what}: the {TWICE[quantity]} in its place", 2 * number
-
-
 def _cells(problem: Problem) -> Iterator[Edit]:
     """Slips in the cells of the tables, the likelier first."""
-    kinds: list[list[Edit]] = [[], [], [], []]
+    edits: list[tuple[int, Edit]] = []
     for file, table in problem.tables.items():
         if problem.exercise.command[0] == "field":
-            kinds[0] += _trials_left_on(problem, file)
+            edits += [(0, edit) for edit in _trials_left_on(problem, file)]
         for r, c, quantity, unit, number in _numbers(table):
             what, place = f"{quantity.replace('_', ' ')} of {table.called(r)}", (file, r, c)
-            for kind, slip, value in _of_cell(quantity, unit, number):
-                kinds[kind].append(Edit(f"{what}: {slip}", place, _put({place: f"{value:f}"})))
-    for edits in kinds:
-        yield from edits
+            for slip in of_datum(quantity, unit):
+                changed = _put({place: f"{slip.change(number):f}"})
+                edits.append((slip.likely, Edit(f"{what}{slip.text}", place, changed)))
+    yield from (edit for _, edit in sorted(edits, key=lambda each: each[0]))
 
 
 def _put(cells: dict[tuple[str, int, int], str]) -> Callable[[Problem], Problem]:
     return lambda p: replace(p, cells={**p.cells, **cells})
-
-
-def _of_cell(quantity: str, unit: str, number: Decimal) -> Iterator[tuple[int, str, Decimal]]:
-    """Yield the slips of a cell: how likely (0 first), what, the number."""
-    if unit == "deg":
-        yield 1, "180° off", number + 180
-        yield 1, "counted the other way", -number
-        yield 2, "degrees taken as radians", number * Decimal(180 / np.pi)
-        yield 2, "sine in place of cosine", 90 - number
-        return
-    yield 1, "wrong sign", -number
-    for text, times in TIMES.items():
-        yield 3, text, number * times
-    if quantity in TWICE:
-        yield 1, f"the {TWICE[quantity]} in its place", 2 * number
-        yield 1, f"half of it, as if it were the {TWICE[quantity]}", number / 2
-    if unit == "rpm":
-        yield 1, "rpm taken for rad/s", number * Decimal(30 / np.pi)
-    if quantity in TERMS:
-        yield 2, "left out", Decimal(0)
 
 
 def _trials_left_on(problem: Problem, file: str) -> list[Edit]:

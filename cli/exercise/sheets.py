@@ -1,17 +1,13 @@
-"""The pages of an exercise: a sheet for each student, solutions, answers and key; the folder is written whole or not at all."""
+"""The pages and tables of an exercise: a sheet for each student, solutions, answers and key."""
 
 from __future__ import annotations
 
 import csv
 import html
 import io
-import os
 import re
-import shutil
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from cli.exercise.description import Answer, Ask, Exercise, Value, unit_text
 from cli.exercise.solving import DataTable, Workshop, cell_of
@@ -21,8 +17,6 @@ from cli.show.report import html_part, report
 from dalembert.errors import DataError, quote
 from dalembert.figures import written
 from dalembert.results.columns import Table, names
-from dalembert.tables.files import is_input
-from dalembert.tables.table import read
 from dalembert.units import written as unit_written
 
 STYLE = """
@@ -55,16 +49,22 @@ class Student:
     others: Mapping[str, str]
 
     @property
-    def file(self) -> str:
-        """How a file is named after the student."""
-        return re.sub(r"[^\w.@+-]+", "-", self.name, flags=re.UNICODE).strip("-.") or "student"
+    def sheet(self) -> str:
+        """The name of the sheet's file."""
+        name = re.sub(r"[^\w.@+-]+", "-", self.name, flags=re.UNICODE).strip("-.") or "student"
+        return f"sheet-{name}.html"
 
 
-def page(title: str, body: str, style: str = "") -> bytes:
+def mark(file: str) -> str:
+    """Return what a page says of the command that wrote it, and under which name."""
+    return f'<meta name="generator" content="dalembert exercise: {file}">'
+
+
+def page(file: str, title: str, body: str, style: str = "") -> bytes:
     """Return a page of HTML that holds all it needs."""
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">{mark(file)}'
         f"<title>{html.escape(title)}</title><style>{STYLE}{style}</style></head>\n<body>\n{body}\n</body></html>\n"
     ).encode()
 
@@ -178,11 +178,11 @@ def sheet_page(
         f'<td class="n">{answer.ask.figures}</td><td class="n">{float(answer.ask.points):g}</td><td class="blank"></td></tr>\n'
         for answer in variant.answers
     )
-    angles = (
-        " Angles count counter-clockwise from x; a whole turn more or less is the same angle."
-        if any(answer.is_angle for answer in variant.answers)
-        else ""
-    )
+    angles = ""
+    if any(answer.is_angle for answer in variant.answers):
+        # in measured vibration they count as the instrument's phases do
+        sense = "" if exercise.command[0] in ("field", "index") else " Angles count counter-clockwise from x."
+        angles = f"{sense} A whole turn more or less is the same angle."
     body = (
         f"<h1>{html.escape(exercise.title)}</h1>\n"
         f'<div class="student"><span>student: <b>{html.escape(student.name)}</b></span>{others}</div>\n'
@@ -192,7 +192,7 @@ def sheet_page(
         f'<p class="small">“Figures” says how many significant figures the answer has. The numbers of this sheet count as exact.{angles}</p>'
         + (f'<p class="small">After {html.escape(exercise.source)}</p>' if exercise.source else "")
     )
-    return page(f"{exercise.title}: {student.name}", body)
+    return page(student.sheet, f"{exercise.title}: {student.name}", body)
 
 
 def table_text(header: Sequence[str], rows: Iterable[Sequence[str]]) -> bytes:
@@ -291,7 +291,7 @@ def solutions(
         shared.setdefault(variant, []).append(student.name)
     for variant, who in shared.items():
         parts += ["<section>\n", *_solution(variant, who, drawings[variant]), "</section>\n"]
-    return page(f"{exercise.title}: solutions", "".join(parts), SOLUTION_STYLE)
+    return page("solutions.html", f"{exercise.title}: solutions", "".join(parts), SOLUTION_STYLE)
 
 
 def _solution(variant: Variant, who: Sequence[str], drawing: str) -> Iterator[str]:
@@ -323,60 +323,3 @@ def _solution(variant: Variant, who: Sequence[str], drawing: str) -> Iterator[st
                 yield from map(html_part, parts)
     if result.method:
         yield f'<p class="small">{html.escape(result.method)}</p>\n'
-
-
-def put(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write all files of a folder, or none: a new folder appears at once, in one that is there files are replaced.
-
-    Raises
-    ------
-    DataError
-        Where the folder cannot be written, or would lose answers that were filled in, or one of the inputs.
-    """
-    _refuse(folder, files)
-    parent = folder.parent
-    if not parent.is_dir():
-        raise DataError(f"{folder}: cannot write: no folder {parent}")
-    try:
-        made = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".part", dir=parent))
-        try:
-            for name, data in files.items():
-                path = made / name
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_bytes(data)
-            if folder.is_dir():
-                for name in files:
-                    folder.joinpath(name).parent.mkdir(parents=True, exist_ok=True)
-                    os.replace(made / name, folder / name)
-            else:
-                made.chmod(0o777 & ~_mask())
-                os.replace(made, folder)
-        finally:
-            shutil.rmtree(made, ignore_errors=True)
-    except OSError as error:
-        raise DataError(f"{folder}: cannot write: {error.strerror or error}") from None
-
-
-def _mask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
-def _refuse(folder: Path, files: Mapping[str, bytes]) -> None:
-    if folder.exists() and not folder.is_dir():
-        raise DataError(f"{folder}: cannot write: found a file, expected a folder or a new name")
-    for name in files:
-        path = folder / name
-        if is_input(path):
-            raise DataError(f"{path}: is an input: expected another folder; nothing was written")
-    answers = folder / "answers.csv"
-    if answers.is_file():
-        try:
-            filled = any(cell.strip() for cell in read(str(answers), texts=None).texts.get("answer", []))
-        except DataError:
-            filled = True
-        if filled:
-            raise DataError(
-                f"{answers}: its answers would be lost: expected another folder; nothing was written"
-            )

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from functools import cached_property
 from math import isfinite, log, pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +60,10 @@ class Pairs:
     texts: Callable[[int], str]
     likely: NDArray[np.bool_]
     """Where one of the two is a sign."""
+
+
+Slips = tuple[list[Slip], Callable[[], Pairs | None]]
+"""The slips of an answer, and pairs of them, which are formed on request."""
 
 
 def joined(every: Sequence[Callable[[], Pairs | None]]) -> Callable[[], Pairs | None]:
@@ -138,7 +143,7 @@ class Candidates:
             met = self.met(a, halves[zeros])
             return met[0].text if len(met) == 1 and self._chance(a, halves[zeros]) <= CHANCE else None
         # a slip that makes all digits as they were typed goes before those that round to them
-        met = next(filter(None, (self.met(a, half) for half in halves[: zeros + 1])), [])
+        met = self.met(a, halves[0]) or self.met(a, halves[zeros])
         if met or number.digits < DIGITS or self._pairs is None:
             return met[0].text if len(met) == 1 else None
         return self._of_two(a, halves[0])
@@ -202,7 +207,7 @@ def of_sum(
     changes: Sequence[Change],
     total: complex,
     value_of: Callable[[NDArray[np.complex128]], Real],
-) -> tuple[list[Slip], Callable[[], Pairs | None]]:
+) -> Slips:
     """Return the slips of an answer that follows from a sum of terms: each change, and pairs of changes of two terms.
 
     `value_of`: the answer that follows from sums, in the unit asked for.
@@ -250,6 +255,52 @@ def changes_of(answer: Answer) -> Iterator[tuple[str, Callable[[float], float]]]
         yield "rpm in place of rad/s", lambda value: value * share
     yield "the answer is ten times too large", lambda value: value * 10
     yield "the answer is ten times too small", lambda value: value / 10
+
+
+TWICE = {"radius": "diameter", "throw": "stroke"}
+"""Lengths that are taken for twice as long."""
+TERMS = ("mass", "inertia", "force", "fx", "fy", "torque", "unbalance", "weight", "reciprocating", "rotating")
+"""Quantities that may be left out."""
+DEGREES, RPM = Decimal(180 / pi), Decimal(30 / pi)
+
+
+class DatumSlip(NamedTuple):
+    """A slip in a number of the data."""
+
+    text: str
+    """Behind the name of the number."""
+    change: Callable[[Decimal], Decimal]
+    likely: int = 1
+    """1 before 3."""
+    is_unit: bool = False
+    """Whether another quantity or unit is read: in an option, and in all cells of a column alike."""
+
+
+def of_datum(quantity: str, unit: str) -> Iterator[DatumSlip]:
+    """Yield what can go wrong with a number of the data."""
+    if unit == "deg":
+        yield DatumSlip(" is 180° off", lambda x: x + 180)
+        yield DatumSlip(" is counted the other way", lambda x: -x)
+        yield DatumSlip(": degrees taken as radians", lambda x: x * DEGREES, 2, is_unit=True)
+        yield DatumSlip(": sine in place of cosine", lambda x: 90 - x, 2)
+        return
+    if unit == "rpm":
+        yield DatumSlip(": rpm taken for rad/s", lambda x: x * RPM, is_unit=True)
+    length = quantity.rpartition("_")[2]
+    if length in TWICE:
+        yield DatumSlip(f": the {TWICE[length]} in place of the {length}", lambda x: 2 * x, is_unit=True)
+        yield DatumSlip(f": the {length} taken for the {TWICE[length]}", lambda x: x / 2, is_unit=True)
+    yield DatumSlip(" has the wrong sign", lambda x: -x)
+    if quantity in TERMS:
+        yield DatumSlip(" is left out", lambda x: Decimal(0), 2)
+    yield DatumSlip(" is ten times too large", lambda x: x * 10, 3)
+    yield DatumSlip(" is ten times too small", lambda x: x / 10, 3)
+
+
+def of_gravity(g: float) -> Iterator[tuple[str, float]]:
+    """Yield the slips in weights, and what each is multiplied by: 9.81 for 10 or the reverse, the mass for the weight."""
+    yield "the mass in place of the weight", 1 / g
+    yield from other_gravities(g)
 
 
 def other_gravities(g: float) -> Iterator[tuple[str, float]]:

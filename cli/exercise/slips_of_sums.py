@@ -14,7 +14,17 @@ from numpy.typing import NDArray
 
 from balancing import correct
 from cli.exercise.description import Answer, Value, same
-from cli.exercise.slips import GRAVITIES, Candidates, Change, Pairs, Slip, finals, of_sum, other_gravities
+from cli.exercise.slips import (
+    GRAVITIES,
+    Candidates,
+    Change,
+    Slip,
+    Slips,
+    finals,
+    of_gravity,
+    of_sum,
+    other_gravities,
+)
 from cli.exercise.solving import Problem
 from cli.exercise.variants import Variant
 from dalembert.angles import degrees
@@ -44,10 +54,31 @@ WRONG = {
 
 
 class Part(NamedTuple):
-    """A part of a velocity, an acceleration, a momentum, or of a load in an answer."""
+    """A part of a sum: of a velocity, an acceleration, a momentum, a power, or of a load in an answer."""
 
     name: str
     value: float
+
+
+def changes_of_part(term: int, name: str, value: complex, unit: str = "") -> Iterator[Change]:
+    """Yield what can go wrong with a part; with its unit it says which number is taken for which."""
+    for text, times in WRONG.items():
+        what = f"the {name} {text}"
+        if unit and abs(1 + times) not in (0, 1):
+            size, other = figures(abs(value)), figures(abs(value * (1 + times)))
+            what = f"the power of {what} ({size} {unit} taken as {other} {unit})"
+        yield Change(term, what, times * value, is_sign=times == -2.0)
+    if name.startswith("Coriolis"):
+        yield Change(term, f"the {name} lacks its factor 2", -value / 2)
+
+
+def of_parts(
+    answer: Answer, parts: Sequence[Part], total: float, unit: str = "", further: Sequence[Change] = ()
+) -> Slips:
+    """Return the slips of an answer in proportion to a sum of parts, and pairs of them."""
+    changes = [c for k, part in enumerate(parts) if part.value for c in changes_of_part(k, *part, unit)]
+    share = answer.value / total if total else 1.0
+    return of_sum(answer, [*changes, *further], complex(total), lambda sums: sums.real * share)
 
 
 def way_of(variant: Variant) -> Sequence[Mapping[str, Any]]:
@@ -56,24 +87,14 @@ def way_of(variant: Variant) -> Sequence[Mapping[str, Any]]:
     return way or ()
 
 
-def of_motion(variant: Variant, number: int) -> tuple[list[Slip], Callable[[], Pairs | None]]:
+def of_motion(variant: Variant, number: int) -> Slips:
     """Return the slips of an answer that is a sum of such parts, and pairs of them; none of any other answer."""
     answer = variant.answers[number]
     parts = [part for part in _parts(variant, answer) if part.value]
     total = sum(part.value for part in parts)
     if len(parts) < 2 or not total:
         return [], lambda: None
-    changes = [change for k, part in enumerate(parts) for change in _part_changes(k, part)]
-    factor = answer.value / total
-    return of_sum(answer, changes, complex(total), lambda sums: sums.real * factor)
-
-
-def _part_changes(k: int, part: Part) -> Iterator[Change]:
-    """What can go wrong with a part."""
-    for text, times in WRONG.items():
-        yield Change(k, f"the {part.name} {text}", times * part.value, is_sign=times == -2.0)
-    if part.name.startswith("Coriolis"):
-        yield Change(k, f"the {part.name} lacks its factor 2", -part.value / 2)
+    return of_parts(answer, parts, total)
 
 
 def _parts(variant: Variant, answer: Answer) -> Sequence[Part]:
@@ -197,13 +218,10 @@ def _less(more: Values | None, less: Values | None) -> list[float | None]:
     return [None if a is None or b is None else a - b for a, b in zip(more, less, strict=True)]
 
 
-def of_loads(
-    answer: Answer, number: int, every: Sequence[Load]
-) -> tuple[list[Slip], Callable[[], Pairs | None]]:
+def of_loads(answer: Answer, number: int, every: Sequence[Load]) -> Slips:
     """The slips of an answer that is a sum over the loads, and pairs of them."""
     parts = [Part(load.name, load.parts[number] or 0.0) for load in every if load.parts]
-    changes = [change for k, part in enumerate(parts) if part.value for change in _part_changes(k, part)]
-    return of_sum(answer, changes, complex(answer.value), lambda sums: sums.real)
+    return of_parts(answer, parts, answer.value)
 
 
 def is_sum(answer: Answer) -> bool:
@@ -211,29 +229,17 @@ def is_sum(answer: Answer) -> bool:
     return LINEAR.search(answer.ask.name) is not None
 
 
-class Term(NamedTuple):
-    """A term of the ledger."""
-
-    name: str
-    power: float
-    is_weight: bool
-
-
-def of_ledger(variant: Variant, number: int) -> tuple[list[Slip], Callable[[], Pairs | None]]:
+def of_ledger(variant: Variant, number: int) -> Slips:
     """Return the slips of an unknown load or effort, and pairs of them; none of any other answer, nor of several unknowns."""
     answer = variant.answers[number]
     terms = _ledger(variant, answer)
-    total = sum(term.power for term in terms)
+    total = sum(term.value for term in terms)
     if not total:
         return [], lambda: None
-    # the answer is in proportion to the sum of the powers
-    factor = answer.value / total
-    changes = [change for k, term in enumerate(terms) for change in _term_changes(k, term)]
-    changes += _gravity(variant, terms)
-    return of_sum(answer, changes, complex(total), lambda sums: sums.real * factor)
+    return of_parts(answer, terms, total, "W", list(_gravity(variant, terms)))
 
 
-def _ledger(variant: Variant, answer: Answer) -> list[Term]:
+def _ledger(variant: Variant, answer: Answer) -> list[Part]:
     """Return the terms of the instant that the question is about, where it has one unknown, which is asked for."""
     command, asked, where = variant.problem.exercise.command[0], answer.ask.quantity, answer.ask.where
     instant: Mapping[str, Any] = {}
@@ -251,7 +257,7 @@ def _ledger(variant: Variant, answer: Answer) -> list[Term]:
                 if entry["kind"] in ("spring", "damper", "friction")
                 else f"{entry['kind']} of link {entry['link']}"
             )
-            terms.append(Term(name, float(entry["power_W"]), entry["kind"] == "weight"))
+            terms.append(Part(name, float(entry["power_W"])))
     return terms if len(unknown) == 1 and unknown[0] else []
 
 
@@ -264,26 +270,12 @@ def _instant(listed: Any, where: Mapping[str, str]) -> Mapping[str, Any]:
     return instants[0] if len(instants) == 1 else {}
 
 
-def _term_changes(k: int, term: Term) -> Iterator[Change]:
-    """What can go wrong with a term."""
-    power = term.power
-    yield Change(k, f"the {term.name} has the wrong sign", -2 * power, is_sign=True)
-    yield Change(k, f"the {term.name} is left out", -power)
-    small = f"{figures(abs(power))} W taken as {figures(abs(power) / 10)} W"
-    large = f"{figures(abs(power))} W taken as {figures(abs(power) * 10)} W"
-    yield Change(k, f"the power of the {term.name} is ten times too small ({small})", -0.9 * power)
-    yield Change(k, f"the power of the {term.name} is ten times too large ({large})", 9 * power)
-
-
-def _gravity(variant: Variant, terms: Sequence[Term]) -> Iterator[Change]:
-    """Another g in all weights; their masses in place of the weights."""
-    weight = sum(term.power for term in terms if term.is_weight)
-    g = variant.problem.gravity
-    if weight and g:
-        # no term of its own: it goes together with any
-        for text, share in other_gravities(g):
+def _gravity(variant: Variant, terms: Sequence[Part]) -> Iterator[Change]:
+    """Another g in all weights; their masses in place of the weights. It is no term of its own: it goes together with any."""
+    weight = sum(term.value for term in terms if term.name.startswith("weight of"))
+    if weight and variant.problem.gravity:
+        for text, share in of_gravity(variant.problem.gravity):
             yield Change(len(terms), text, weight * (share - 1))
-        yield Change(len(terms), "the mass in place of the weight", weight * (1 / g - 1))
 
 
 # --- a correction is a sum over the masses -------------------------------------------------------------------------
@@ -328,10 +320,7 @@ class Rotor:
         for k, (name, u) in enumerate(zip(self.names, self.moment.tolist(), strict=True)):
             if not u:
                 continue
-            yield Change(k, f"the term of {name} has the wrong sign", -2 * u, is_sign=True)
-            yield Change(k, f"{name} is left out", -u)
-            yield Change(k, f"the term of {name} is ten times too large", 9 * u)
-            yield Change(k, f"the term of {name} is ten times too small", -0.9 * u)
+            yield from changes_of_part(k, f"term of {name}", u)
             yield Change(k, f"sine in place of cosine at {name}", 1j * np.conj(u) - u)
             if self.in_radians is not None:
                 turned = complex(self.in_radians[k])

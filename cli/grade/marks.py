@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
@@ -23,6 +24,8 @@ SHARES = {"right": Fraction(1), "carried": Fraction(1), "rounding": Fraction(1, 
 """Share of the points, by verdict."""
 MOST_POWER = 60
 """No answer has a larger power of ten, up or down."""
+BLANK = re.compile(r"[-–—?./\s]*|n\.?/?a\.?|none", re.IGNORECASE)
+"""What people type where they have no answer."""
 RANK = ("right", "rounding", "figures", "carried", "wrong")
 
 
@@ -101,7 +104,7 @@ class Judge:
     def _mark(
         self, student: Student, k: int, answer: Answer, text: str, unit: str, earlier: Mapping[int, _Reading]
     ) -> tuple[Mark, _Reading | None]:
-        if text in ("", "-", "–", "—", "?"):
+        if BLANK.fullmatch(text):
             return Mark(student, answer, text, "blank"), None
         numbers = typed(text)
         if not numbers:
@@ -112,16 +115,23 @@ class Judge:
         for number in numbers:
             scale = scale_of(number.unit or unit or answer.unit, answer.unit)
             if scale is None:
-                return Mark(
-                    student, answer, text, "wrong", f"the unit {quote(number.unit or unit)} does not fit"
-                ), None
+                # 7/2, 3 ½, 1.2 ± 0.1
+                further = any(map(str.isnumeric, number.unit)) and not any(map(str.isalpha, number.unit))
+                trouble = (
+                    f"{quote(text)} is no decimal number"
+                    if further
+                    else f"the unit {quote(number.unit or unit)} does not fit"
+                )
+                return Mark(student, answer, text, "wrong", trouble), None
             readings.append(_Reading(number, scale, judge(answer, number, scale)))
         best = min(readings, key=lambda reading: RANK.index(reading.verdict))
-        if best.verdict != "wrong":
-            return Mark(student, answer, text, best.verdict), best
+        if best.verdict == "right":
+            return Mark(student, answer, text, "right"), best
         for reading in readings:
             if self._follows(k, reading, earlier):
                 return Mark(student, answer, text, "carried"), reading
+        if best.verdict != "wrong":
+            return Mark(student, answer, text, best.verdict), best
         for reading in readings:
             mistake = self.slips[k].name(reading.number, float(reading.scale))
             if mistake is not None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.cli.test_exercise import PENDULUM
+from tests.cli.exercises import PENDULUM
 from tests.cli.test_grade_measured import BAR, RUNS
 
 
@@ -232,3 +232,13 @@ def test_of_several_rotors_each_has_its_own_answers(dalembert: Any, tmp_path: Pa
     assert grade(dalembert, tmp_path, command, questions, (3.456, 6, 120000, 69120)) == [
         "wrong", "right", "right", "carried",
     ]  # fmt: skip
+
+
+def test_what_follows_from_a_wrong_rounding_is_carried(dalembert: Any, tmp_path: Path) -> None:
+    """3 kg weigh 30 N at 10 m/s²: of 3.001 kg, one unit off, they are 30.01 N; 29.99 N are one unit off again."""
+    (tmp_path / "r.csv").write_text("weight_N,radius_mm,angle_deg\n20,30,0\n")
+    command = "balance r.csv --plane P:20mm --gravity 10"
+    for weight, verdict in ((30.01, "carried"), (29.99, "rounding"), (30, "right")):
+        verdicts = grade(dalembert, tmp_path, command, ("mass_kg", "weight_N"), (3.001, weight))
+        assert verdicts == ["rounding", verdict]
+    assert grade(dalembert, tmp_path, command, ("mass_kg", "weight_N"), (3, 30.01)) == ["right", "rounding"]

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from cli.grade.answers import scale_of
-from tests.cli.test_exercise import EXERCISE, ROTOR
+from tests.cli.exercises import EXERCISE, ROTOR
 from tests.conftest import Dalembert
 
 STATES = """link,mass_kg,inertia_kg_m2,vx_m_s,vy_m_s,ax_m_s2,ay_m_s2,omega_rad_s,alpha_rad_s2,fx_N,fy_N,torque_N_m
@@ -71,6 +71,9 @@ def test_82350_is_answered_by_its_two_slips(dalembert: Dalembert, work: Path) ->
         ("103000 kg", "wrong", "the unit 'kg' does not fit"), ("102800", "wrong", "the inertia torque of link 3 is left out"),
         ("102600", "wrong", "the inertia torque of link 3 has the wrong sign"), ("148000", "wrong", "the inertia force of link 4 is left out"),
         ("102700", "wrong", "the weight of link 3 is left out"), ("102994.3", "right", None),
+        ("N/A", "blank", None), ("??", "blank", None), ("T2 = 103000 Nm", "right", None), ("≈103000", "right", None), ("1.03", "wrong", None),
+        ("206000/2", "wrong", "'206000/2' is no decimal number"), ("3 ½", "wrong", "'3 ½' is no decimal number"),
+        ("103000 ± 500", "wrong", "'103000 ± 500' is no decimal number"), ("103000°", "wrong", "the unit '°' does not fit"),
         ("1e999", "wrong", None), ("-1e-999", "wrong", None), ("0e999", "wrong", None), ("9" * 400, "wrong", None),
     ],
 )  # fmt: skip
