@@ -153,9 +153,9 @@ def _stages(f: Many, scale: Reals, t: Reals, q: Reals, v: Reals, rates: Reals, h
             "nab,nb->na", np.abs(by_v), fastest
         )
         noise = spread @ np.tile(ROUNDINGS * EPS * rounded, STAGES)[..., None]
-        size = np.maximum(size[:, None], np.abs(step) / CLOSE * noise.reshape(n, STAGES, k))
-        much = (np.abs(step * change) / size).max(axis=(1, 2))
-        done = left & ((much <= CLOSE) | ((much >= before) & (much < 1e-10)))
+        rounds = (np.abs(change) <= noise.reshape(n, STAGES, k)).all(axis=(1, 2))
+        much = (np.abs(step * change).max(axis=1) / size).max(axis=1)
+        done = left & (rounds | (much <= CLOSE) | ((much >= before) & (much < 1e-10)))
         result[done] = np.concatenate([values, there[..., k:]], axis=2)[done]
         left = left & ~done & (much < np.inf) & ~((much > 2 * before) & (before < 1.0))
         if not left.any():
