@@ -20,11 +20,11 @@ from virtualwork.formulas.quantity import Quantity
 from virtualwork.intime.coordinates import Coordinates
 from virtualwork.intime.equations import Equations
 from virtualwork.intime.estimate import (
-    FIRST,
     GAIN,
     LEAST,
     TRIES,
     UNKNOWN,
+    first_tolerance,
     input_error,
     share,
     solutions_apart,
@@ -275,7 +275,7 @@ def _simulated(
     equations.refuse(float(t[0]), q, v)
     scale = np.array(equations.scale)
     levels = levels_of(m.inputs, until)
-    tolerance, end = max(LEAST, FIRST * accuracy), float(t[-1])
+    tolerance, end = first_tolerance(accuracy), float(t[-1])
     start, solutions = (float(t[0]), q, v), count(1)
 
     def reports() -> Callable[[float], None] | None:
