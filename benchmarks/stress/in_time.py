@@ -20,7 +20,7 @@ def _asked(rng: np.random.Generator, longest: float = 20.0) -> tuple[Any, float]
     """Times, few or some, and an accuracy."""
     end = 10.0 ** rng.uniform(-0.5, np.log10(longest))
     times = [0.0, end] if rng.random() < 0.5 else np.linspace(0, end, rng.integers(3, 9))
-    return times, 10.0 ** rng.uniform(-12, -5)
+    return times, 10.0 ** rng.uniform(-12, -2)
 
 
 def _pairs(run: Run, exact: Any) -> Pairs:
@@ -110,7 +110,7 @@ def _double_pendulum(rng: np.random.Generator) -> Pairs:
     a, b = (format(Decimal(x), "f") for x in start)
     exact = double_pendulum.state(1, a, b, steps=120)
     pairs: Pairs = []
-    for accuracy in (10.0 ** rng.uniform(-12, -5, 3)).tolist():
+    for accuracy in (10.0 ** rng.uniform(-12, -2, 3)).tolist():
         run = m.simulate([0, 1], angle=start, accuracy=accuracy)
         with mp.workdps(DIGITS):
             pairs += [
