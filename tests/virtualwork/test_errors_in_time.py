@@ -255,3 +255,23 @@ def test_what_rounds_beside_an_upper_rest_grows(off: float, speed: float, accura
     for q, error in zip(together.angle[..., 0], together.error_estimate[..., 0], strict=True):
         off_by = [abs(float(swung(angle, speed, x) - y)) for x, y in zip(t.tolist(), q, strict=True)]
         assert (np.array(off_by) <= error).all()
+
+
+@pytest.mark.parametrize(
+    ("off", "speed", "accuracy", "end"),
+    [
+        (3.953105713636374e-08, 4.885971771967024e-08, 1.6947138764892655e-07, 15.082072768526729),
+        (-6.754419288253687e-08, 3.003652100916716e-08, 3.238900001178786e-08, 16.31624929259092),
+        (8.531376152439921e-08, 0.0, 1.1875223384005631e-08, 14.936592426809822),
+    ],
+)
+def test_where_a_first_solution_goes_another_way(
+    off: float, speed: float, accuracy: float, end: float
+) -> None:
+    """Once round and back to the upper rest: the first solution does not turn back where the finer ones do."""
+    angle, t = np.pi / 2 + off, np.linspace(0.0, end, 9)
+    run = pendulum().simulate(t, angle=angle, speed=speed, accuracy=accuracy)
+    off_by = [
+        abs(float(swung(angle, speed, x) - q)) for x, q in zip(t.tolist(), run.angle[:, 0], strict=True)
+    ]
+    assert (np.array(off_by) <= run.error_estimate[:, 0]).all()

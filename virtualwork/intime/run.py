@@ -287,7 +287,6 @@ def _simulated(
     if fine.stiff:
         # what is stiff somewhere is from the beginning
         fine = travel(own, start, end, tolerance, levels, Radau(), accuracy, progress=reports())
-    first = fine
     for tries in range(TRIES):
         coarse, method = fine, fine.legs[0].method
         # near change points every solution is interpolated from other poses
@@ -297,7 +296,7 @@ def _simulated(
         # no tolerance lies below rounding
         finer = max(LEAST, tolerance / (GAIN + 1))
         fine = travel(ways, start, last, finer, levels, method, accuracy, coarse, reports())
-        fine.first = first
+        fine.coarse = coarse
         if last < end and fine.ended == "end":
             fine.ended = coarse.ended
         coarse.backwards()

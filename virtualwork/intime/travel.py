@@ -41,8 +41,9 @@ class Travel:
 
     legs: list[Path] = field(default_factory=list)
     ended: str = ""
-    # the first solution, whose nodes tell well enough how the motion makes what rounds grow; its own where there is none
-    first: Travel | None = None
+    # the solution in steps twice as long, whose nodes tell well enough how the motion makes what rounds grow; its own where
+    # there is none
+    coarse: Travel | None = None
 
     @property
     def end(self) -> float:
@@ -139,7 +140,7 @@ class Travel:
 
         Through several sets of coordinates it is not followed: 0.
         """
-        legs = (self.first or self).legs
+        legs = (self.coarse or self).legs
         leg = legs[0]
         if len(legs) > 1:
             return np.zeros((len(times), leg.equations.k))
