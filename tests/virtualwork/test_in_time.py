@@ -88,6 +88,30 @@ def test_a_stiff_spring_and_its_damper_come_to_rest(share: float, stiffness: flo
     assert abs(run.energy_drift[-1]) <= 10 * accuracy * run.energy[0]
 
 
+@pytest.mark.parametrize(("stiffness", "damping"), [(1e7, 1e3), (1e5, 1e3), (1e8, 1e4)])
+def test_a_stiff_coupling_in_absolute_and_in_relative_angles(stiffness: float, damping: float) -> None:
+    """Two bars that are all but one: the same motion, whichever angles are its coordinates."""
+    links = {
+        "upper": Link({"O": 0j, "P": 1 + 0j}, mass=1, center=0.6 + 0j, inertia=0.1),
+        "lower": Link({"P": 0j, "Q": 1 + 0j}, mass=1.3, center=0.5 + 0.1j, inertia=0.2),
+    }
+    coupling = TorsionSpring(("upper", "lower"), stiffness, 0.1, damping)
+    runs = []
+    for on, speed in (("ground", 2.0), ("upper", 1.0)):
+        m = Mechanism(
+            {"O": 0j},
+            links,
+            inputs=[Input(link="upper"), Input(link="lower", on=on)],
+            torsion_springs=[coupling],
+            gravity=-1j * G,
+        )
+        runs.append(m.simulate([0.0, 0.5, 1.0], angle=[0.0, -0.5], speed=[1.0, speed]))
+    absolute, relative = runs
+    error = np.maximum(absolute.error_estimate, relative.error_estimate.sum(axis=1)[:, None])
+    assert (np.abs(np.cumsum(relative.angle, axis=1) - absolute.angle) <= error).all()
+    assert error.max() < 1e-7
+
+
 def test_constant_torque_on_a_rotor() -> None:
     run = rotor(torques=[Torque("rotor", 3.0)]).simulate([0, 1, 100], angle=0.5, speed=-2.0)
     t = run.t

@@ -136,7 +136,7 @@ def _stages(f: Many, scale: Reals, t: Reals, q: Reals, v: Reals, rates: Reals, h
     spread = np.abs(inverse)
     values = np.repeat(rates[:, None, :k], STAGES, axis=1)
     times = (t[:, None] + h[:, None] * c).ravel()
-    before = np.full(n, np.inf)
+    before, last = np.full((2, n), np.inf)
     for _ in range(LIMIT):
         speeds = v[:, None] + step * np.einsum("ij,njk->nik", a, values)
         places = (
@@ -154,13 +154,16 @@ def _stages(f: Many, scale: Reals, t: Reals, q: Reals, v: Reals, rates: Reals, h
         )
         noise = spread @ np.tile(ROUNDINGS * EPS * rounded, STAGES)[..., None]
         rounds = (np.abs(change) <= noise.reshape(n, STAGES, k)).all(axis=(1, 2))
-        much = (np.abs(step * change).max(axis=1) / size).max(axis=1)
-        done = left & (rounds | (much <= CLOSE) | ((much >= before) & (much < 1e-10)))
+        moved = np.abs(step * change).max(axis=1)
+        much = (moved / size).max(axis=1)
+        # what it is a share of may shrink faster than it does
+        largest = (moved / scale).max(axis=1)
+        done = left & (rounds | (much <= CLOSE) | ((largest >= last) & (much < 1e-10)))
         result[done] = np.concatenate([values, there[..., k:]], axis=2)[done]
-        left = left & ~done & (much < np.inf) & ~((much > 2 * before) & (before < 1.0))
+        left = left & ~done & (much < np.inf) & ~((largest > 2 * last) & (before < 1.0))
         if not left.any():
             break
-        before = much
+        before, last = much, largest
         # a step that is done, or lost, goes no further
         values = np.where(left[:, None, None], values, rates[:, None, :k])
     return result
