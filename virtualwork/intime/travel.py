@@ -174,6 +174,15 @@ class Travel:
                 whole[rows] = part
         return out[0], out[1], out[2], work
 
+    def rests(self, times: Reals) -> NDArray[np.bool_]:
+        """Whether a joint that rubs is at rest, at times, (n,): what friction keeps it there, no joint force tells."""
+        out = np.zeros(len(times), dtype=bool)
+        for leg, rows in self._parts(times):
+            if isinstance(leg.equations, Rubbing) and any(leg.equations.arms):
+                still = (leg.at(times[rows])[1] == 0.0).all(axis=1)
+                out[rows] = still | (leg.equations.k > 1 and not all(leg.equations.mode))
+        return out
+
     def energy(self, times: Reals, moved: Moved | None = None) -> Reals:
         """Kinetic energy and that of gravity and springs, (n,) J; `moved`: with other inputs and speeds, by so much."""
         out = np.empty(len(times))
