@@ -20,7 +20,7 @@ def _asked(rng: np.random.Generator, longest: float = 20.0) -> tuple[Any, float]
     """Times, few or some, and an accuracy."""
     end = 10.0 ** rng.uniform(-0.5, np.log10(longest))
     times = [0.0, end] if rng.random() < 0.5 else np.linspace(0, end, rng.integers(3, 9))
-    return times, 10.0 ** rng.uniform(-12, -5)
+    return times, 10.0 ** rng.uniform(-12, -2)
 
 
 def _pairs(run: Run, exact: Any) -> Pairs:
@@ -58,24 +58,36 @@ def _pendulum(rng: np.random.Generator) -> Pairs:
     return _pairs(run, lambda t: 2 * mp.asin(k * mp.ellipfun("sn", u + mp.sqrt(g) * t, m=k2)) - mp.pi / 2)
 
 
-def _oscillator(rng: np.random.Generator) -> Pairs:
-    """A block on a spring with a damper, from swinging to stiff: its two exponentials."""
-    damping, stiffness = 10.0 ** rng.uniform(-2, 3), 10.0 ** rng.uniform(-1, 3)
+def _damped(stiffness: float, damping: float, at: float, times: Any, accuracy: float) -> Pairs:
+    """A block of 1 kg on a spring with a damper, released at rest: its two exponentials."""
     m = Mechanism(
         {"O": 0j},
         {"block": Link({"P": 0j}, mass=1)},
         guides=[Guide("P", "block", turned=0.0)],
         inputs=Input(slider="P", value=0.0),
-        springs=[Spring((("block", 0j), ("ground", -1 + 0j)), float(stiffness), 1.0, float(damping))],
+        springs=[Spring((("block", 0j), ("ground", -1 + 0j)), stiffness, 1.0, damping)],
     )
     with mp.workdps(DIGITS):
-        c, k, x = mp.mpf(float(damping)), mp.mpf(float(stiffness)), mp.mpf(1) / 2
+        c, k, x = mp.mpf(damping), mp.mpf(stiffness), mp.mpf(at)
         fast = (-c - mp.sqrt(c * c - 4 * k)) / 2
         slow = k / fast
         part = -x * slow / (fast - slow)
-    times, accuracy = _asked(rng)
-    run = m.simulate(times, angle=0.5, accuracy=accuracy)
+    run = m.simulate(times, angle=at, accuracy=accuracy)
     return _pairs(run, lambda t: mp.re(part * mp.exp(fast * t) + (x - part) * mp.exp(slow * t)))
+
+
+def _oscillator(rng: np.random.Generator) -> Pairs:
+    """From swinging to stiff."""
+    damping, stiffness = (10.0 ** rng.uniform([-2, -1], [3, 3])).tolist()
+    return _damped(stiffness, damping, 0.5, *_asked(rng))
+
+
+def _stiff(rng: np.random.Generator) -> Pairs:
+    """Up to 1 GN/m, damped so that it comes to rest within some fifty swings, and long after that."""
+    stiffness = float(10.0 ** rng.uniform(2, 9))
+    damping = float(10.0 ** rng.uniform(-1, 3)) * stiffness**0.5
+    at = float(rng.choice([0.5, 1e-3, -1e-2]))
+    return _damped(stiffness, damping, at, np.linspace(0, 1, 4), 10.0 ** rng.uniform(-8, -2))
 
 
 def _wheels(rng: np.random.Generator) -> Pairs:
@@ -110,7 +122,7 @@ def _double_pendulum(rng: np.random.Generator) -> Pairs:
     a, b = (format(Decimal(x), "f") for x in start)
     exact = double_pendulum.state(1, a, b, steps=120)
     pairs: Pairs = []
-    for accuracy in (10.0 ** rng.uniform(-12, -5, 3)).tolist():
+    for accuracy in (10.0 ** rng.uniform(-12, -2, 3)).tolist():
         run = m.simulate([0, 1], angle=start, accuracy=accuracy)
         with mp.workdps(DIGITS):
             pairs += [
@@ -125,6 +137,7 @@ def _double_pendulum(rng: np.random.Generator) -> Pairs:
 CAMPAIGNS = {
     "pendulum in time": ("any start and accuracy, against elliptic functions", _pendulum),
     "damped oscillator in time": ("from swinging to stiff, against its exponentials", _oscillator),
+    "stiff oscillator in time": ("to rest and long after, against its exponentials", _stiff),
     "geared wheels in time": ("constant torques, against their parabola", _wheels),
     "double pendulum in time": ("any start, against Taylor series of 40 digits", _double_pendulum),
 }

@@ -93,7 +93,7 @@ def pairs_of(m: Mechanism, end: float, accuracy: float) -> Pairs:
 def _released(rng: np.random.Generator) -> Pairs:
     """Any kind, from rest anywhere, for a second or so at any accuracy."""
     kind = [*LINKAGES, "slider-crank"][int(rng.integers(len(LINKAGES) + 1))]
-    accuracy = 10.0 ** rng.uniform(-10, -6)
+    accuracy = 10.0 ** rng.uniform(-10, -2)
     try:
         m = _slider_crank(rng) if kind == "slider-crank" else _linkage(rng, kind)
         return pairs_of(m, float(rng.uniform(0.3, 1.5)), accuracy)

@@ -201,7 +201,15 @@ class Motion(Case):
 
     def warnings(self) -> list[str]:
         """Return the warnings: an early end, and doubts."""
-        return [*self.analysis.warnings, *self.run.warnings, *idle_friction(self.analysis.mechanism)]
+        own = [*self.analysis.warnings, *self.run.warnings, *idle_friction(self.analysis.mechanism)]
+        rests = self.run.fine.rests(self.run.t) if self._forces else np.zeros(0, dtype=bool)
+        if rests.any():
+            more = int(rests.sum()) - 1
+            others = f" and {more} later time{'s' if more > 1 else ''}" if more else ""
+            own.append(
+                f"joint forces at {self.run.t[np.argmax(rests)]:.6g} s{others}: without the friction of joints that are at rest there"
+            )
+        return own
 
     def way(self) -> list[Topic]:
         """Return the start, and the energy."""

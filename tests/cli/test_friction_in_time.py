@@ -39,3 +39,17 @@ def test_the_textbook_block_stands_where_it_should(dalembert: Dalembert, tmp_pat
     last = rows[-1]["inputs"]["P"]
     assert last["position_m"] == pytest.approx(0.1 + speed * abs(speed) / (2 * 0.3 * 9.81), rel=1e-12)
     assert last["speed_m_s"] == 0
+
+
+@pytest.mark.parametrize(("speed", "warned"), [(3, "joint forces at 1.5 s and 3 later times:"), (9, "")])
+def test_joint_forces_of_a_block_at_rest(
+    dalembert: Dalembert, tmp_path: Path, speed: int, warned: str
+) -> None:
+    """It slides for v/(μ g); then friction is what the other loads need, and no joint force has it."""
+    path = tmp_path / "block.toml"
+    path.write_text(BLOCK.replace("SPEED", str(speed)))
+    done = dalembert("simulate", str(path), "--time", "0:3:0.5", "--forces")
+    assert warned in done.stderr
+    assert ("without the friction" in done.stderr) == bool(warned)
+    # without --forces there is nothing to warn of
+    assert not dalembert("simulate", str(path), "--time", "0:3:0.5").stderr

@@ -64,6 +64,33 @@ def test_the_pull_of_a_pendulum_at_one_time(accuracy: float) -> None:
             assert abs(answers[name][-1] - float(value)) <= errors[name][-1], (name, end)
 
 
+@pytest.mark.parametrize("accuracy", [1e-1, 1e-3, 1e-4, 1e-5])
+def test_a_rough_accuracy_has_an_estimate_that_holds(accuracy: float) -> None:
+    """Pendulums that swing over the top, and one that falls from the side: sin(φ/2) or φ/2 by elliptic functions of the time."""
+    from mpmath import asin, ellipf, ellipfun, ellipk, mp, mpf, nint, sqrt
+
+    bob = pendulum()
+    for speed, end in ((7.5, 9.5), (7.69, 10.0), (-6.5, 14.0), (0.0, 5.0), (0.0, 12.0)):
+        run = bob.simulate(np.linspace(0.0, end, 9), angle=0.0, speed=speed, accuracy=accuracy)
+        with mp.workdps(30):
+            omega, turns = sqrt(mpf(G)), (mpf(speed) / 2) ** 2 / mpf(G) + mpf(1) / 2
+            exact = []
+            for t in map(mpf, run.t.tolist()):
+                # turns = sin² of half the angle to which it would rise
+                if turns < 1:
+                    half = asin(sqrt(turns) * ellipfun("sn", ellipk(turns) - omega * t, m=turns))
+                else:
+                    way = 1 if speed > 0 else -1
+                    u = way * sqrt(turns) * omega * t + ellipf(mp.pi / 4, 1 / turns)
+                    whole = nint(u / (2 * ellipk(1 / turns)))
+                    rest = u - 2 * whole * ellipk(1 / turns)
+                    half = asin(ellipfun("sn", rest, m=1 / turns)) + whole * mp.pi
+                exact.append(2 * half - mp.pi / 2)
+            errors = [float(abs(mpf(q) - of)) for q, of in zip(run.angle[:, 0].tolist(), exact, strict=True)]
+        assert (np.array(errors) <= run.error_estimate[:, 0])[1:].all(), (speed, end)
+        assert max(errors) < accuracy
+
+
 @pytest.mark.parametrize("side", [1, -1, 0])
 @pytest.mark.parametrize(
     ("damping", "end", "n"), [(100.0, 7.0, 40), (107.5616723126892, 5.358242977268, 8), (400.0, 27.0, 40)]
@@ -228,3 +255,23 @@ def test_what_rounds_beside_an_upper_rest_grows(off: float, speed: float, accura
     for q, error in zip(together.angle[..., 0], together.error_estimate[..., 0], strict=True):
         off_by = [abs(float(swung(angle, speed, x) - y)) for x, y in zip(t.tolist(), q, strict=True)]
         assert (np.array(off_by) <= error).all()
+
+
+@pytest.mark.parametrize(
+    ("off", "speed", "accuracy", "end"),
+    [
+        (3.953105713636374e-08, 4.885971771967024e-08, 1.6947138764892655e-07, 15.082072768526729),
+        (-6.754419288253687e-08, 3.003652100916716e-08, 3.238900001178786e-08, 16.31624929259092),
+        (8.531376152439921e-08, 0.0, 1.1875223384005631e-08, 14.936592426809822),
+    ],
+)
+def test_where_a_first_solution_goes_another_way(
+    off: float, speed: float, accuracy: float, end: float
+) -> None:
+    """Once round and back to the upper rest: the first solution does not turn back where the finer ones do."""
+    angle, t = np.pi / 2 + off, np.linspace(0.0, end, 9)
+    run = pendulum().simulate(t, angle=angle, speed=speed, accuracy=accuracy)
+    off_by = [
+        abs(float(swung(angle, speed, x) - q)) for x, q in zip(t.tolist(), run.angle[:, 0], strict=True)
+    ]
+    assert (np.array(off_by) <= run.error_estimate[:, 0]).all()

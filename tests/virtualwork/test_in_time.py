@@ -75,6 +75,43 @@ def test_damped_oscillator_from_swinging_to_stiff(damping: float) -> None:
     assert np.abs(run.energy_drift).max() < 1e-8
 
 
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-6, 1e-9])
+@pytest.mark.parametrize(("share", "stiffness"), [(1.0, 2e6), (1.0, 2e10), (2.0, 2e8), (0.05, 2e6)])
+def test_a_stiff_spring_and_its_damper_come_to_rest(share: float, stiffness: float, accuracy: float) -> None:
+    """ẍ + 2 D ω ẋ + ω² x = 0 for many times the decay: the block stands at 0, and no energy comes from anywhere."""
+    w = math.sqrt(stiffness)
+    m = block(springs=[Spring((("block", 0j), ("ground", -1 + 0j)), stiffness, 1.0, 2 * share * w)])
+    run = m.simulate([0.0, 500 / (share * w), 1e4 / (share * w)], angle=1e-3, accuracy=accuracy)
+    # e^-67 is left of 1 mm, and rounding
+    assert np.abs(run.angle[1:, 0]).max() < 1e-13
+    assert (np.abs(run.angle[1:, 0]) <= run.error_estimate[1:, 0] + 1e-15).all()
+    assert abs(run.energy_drift[-1]) <= 10 * accuracy * run.energy[0]
+
+
+@pytest.mark.parametrize(("stiffness", "damping"), [(1e7, 1e3), (1e5, 1e3), (1e8, 1e4)])
+def test_a_stiff_coupling_in_absolute_and_in_relative_angles(stiffness: float, damping: float) -> None:
+    """Two bars that are all but one: the same motion, whichever angles are its coordinates."""
+    links = {
+        "upper": Link({"O": 0j, "P": 1 + 0j}, mass=1, center=0.6 + 0j, inertia=0.1),
+        "lower": Link({"P": 0j, "Q": 1 + 0j}, mass=1.3, center=0.5 + 0.1j, inertia=0.2),
+    }
+    coupling = TorsionSpring(("upper", "lower"), stiffness, 0.1, damping)
+    runs = []
+    for on, speed in (("ground", 2.0), ("upper", 1.0)):
+        m = Mechanism(
+            {"O": 0j},
+            links,
+            inputs=[Input(link="upper"), Input(link="lower", on=on)],
+            torsion_springs=[coupling],
+            gravity=-1j * G,
+        )
+        runs.append(m.simulate([0.0, 0.5, 1.0], angle=[0.0, -0.5], speed=[1.0, speed]))
+    absolute, relative = runs
+    error = np.maximum(absolute.error_estimate, relative.error_estimate.sum(axis=1)[:, None])
+    assert (np.abs(np.cumsum(relative.angle, axis=1) - absolute.angle) <= error).all()
+    assert error.max() < 1e-7
+
+
 def test_constant_torque_on_a_rotor() -> None:
     run = rotor(torques=[Torque("rotor", 3.0)]).simulate([0, 1, 100], angle=0.5, speed=-2.0)
     t = run.t

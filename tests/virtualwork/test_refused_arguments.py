@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.virtualwork.mechanisms import four_bar
-from virtualwork import Force, Guess, Guide, Input, Link, Mechanism
+from virtualwork import Force, Guess, Guide, Input, Link, Mechanism, Torque
 from virtualwork.describe import DescriptionError
 
 ARM = {"arm": Link({"O": 0j, "P": 1})}
@@ -132,3 +132,17 @@ def test_a_point_of_a_link_that_is_not_there():
             motion.at("arm", "Q")
         with pytest.raises(DescriptionError, match="no link is named 'arn'; did you mean 'arm'"):
             motion.at("arn", 1j)
+
+
+@pytest.mark.parametrize(
+    "rows", [((0.0, 1.0),), ((0.0, 1.0), (1.0, 1.0), (1.0, 3.0)), ((1.0, 1.0), (0.0, 2.0))]
+)
+def test_tables_that_do_not_rise(rows):
+    with pytest.raises(
+        DescriptionError, match="torque on arm history: expected at least two rows, the speed rising"
+    ):
+        Torque("arm", history=rows, over="speed")
+    with pytest.raises(
+        DescriptionError, match="force on arm history: expected at least two rows, the input rising"
+    ):
+        Force("arm", history=rows)

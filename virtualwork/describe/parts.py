@@ -9,6 +9,7 @@ Points and vectors of the plane are complex numbers x + iy: R e^{iθ} is then wr
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from types import MappingProxyType
 from typing import ClassVar, Literal
 
@@ -277,6 +278,11 @@ class Rigid:
     inertia: float
 
 
+def _check_rising(where: str, over: str, rows: Sequence[tuple[float, complex]] | None) -> None:
+    if rows is not None and (len(rows) < 2 or any(not b > a for (a, _), (b, _) in pairwise(rows))):
+        raise DescriptionError(f"{where} history: expected at least two rows, the {over} rising")
+
+
 @dataclass(frozen=True)
 class Force(Part):
     """A force of fixed components in ground or link axes (N), at a point of a link.
@@ -307,6 +313,9 @@ class Force(Part):
     )
     periodic: bool = False
 
+    def __post_init__(self) -> None:
+        _check_rising(f"force on {self.link}", "input", self.history)
+
 
 @dataclass(frozen=True)
 class Torque(Part):
@@ -336,6 +345,7 @@ class Torque(Part):
             raise DescriptionError(
                 f"torque on {self.link} over: found '{self.over}', expected time, angle or speed"
             )
+        _check_rising(f"torque on {self.link}", self.over, self.history)
 
 
 @dataclass(frozen=True)

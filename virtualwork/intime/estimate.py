@@ -16,8 +16,9 @@ import numpy as np
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.intime.travel import Travel
 
-# the tolerance of a step over the requested accuracy
-FIRST = 0.1
+# the tolerance of a step over the requested accuracy; the accuracy beyond which steps are so long that halves gain less than
+# the method's order
+FIRST, COARSE = 0.1, 1e-7
 # what the error of steps half as long is less by, one; of the estimate
 GAIN, SAFETY = 255.0, 10.0
 # the tolerance below which steps have errors of rounding alone
@@ -28,6 +29,15 @@ ROUNDINGS = 8.0
 UNKNOWN = 0.1
 # solutions at most, until the estimate meets the accuracy
 TRIES = 4
+
+
+def first_tolerance(accuracy: float) -> float:
+    """That of a step of the first solution.
+
+    >>> [f"{first_tolerance(accuracy):.0e}" for accuracy in (1e-3, 1e-9, 1e-20)]
+    ['1e-08', '1e-10', '1e-15']
+    """
+    return max(LEAST, FIRST * min(accuracy, COARSE))
 
 
 def share(tolerance: float) -> float:

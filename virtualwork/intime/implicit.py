@@ -26,6 +26,9 @@ STAGES = 5
 LIMIT, CLOSE = 40, 4 * EPS
 # of the length of a spring, or of a speed, in the accelerations
 ROUNDINGS = 8.0
+# how far from a state accelerations are looked at for their slopes: a share of what errors of the inputs are relative to,
+# and of the inputs themselves; of the speeds within a step; how many times what rounding of the inputs comes to
+BESIDE, FAR, FAST, ABOVE = 2.0**-26, 2.0**-40, 2.0**-23, 2.0**16
 Many = Callable[[Reals, Reals, Reals], Reals]
 
 
@@ -116,12 +119,12 @@ def _stages(f: Many, scale: Reals, t: Reals, q: Reals, v: Reals, rates: Reals, h
     """The rates at the nodes of steps from n states, (n, s, k + 1); NaN where Newton's method does not converge.
 
     `scale`: what errors of the inputs are relative to, (k,). The acceleration of a spring near its free length has no digit
-    beyond what rounding of its length leaves: there a change within this rounding has converged.
+    beyond what rounding of its length leaves: there a change that this rounding brings about has converged.
     """
     c, a, _ = nodes()
     n, k = q.shape
     twice, step = a @ a, h[:, None, None]
-    by_q, by_v = _slopes(f, t, q, v, rates)
+    by_q, by_v = _slopes(f, scale, t, q, v, rates, h)
     whole = (
         np.eye(STAGES * k)
         - step * np.einsum("ij,nab->niajb", a, by_v).reshape(n, STAGES * k, STAGES * k)
@@ -130,9 +133,10 @@ def _stages(f: Many, scale: Reals, t: Reals, q: Reals, v: Reals, rates: Reals, h
     result = np.full((n, STAGES, k + 1), np.nan)
     left = np.isfinite(whole).all(axis=(1, 2))
     inverse = np.linalg.inv(np.where(left[:, None, None], whole, np.eye(STAGES * k)))
+    spread = np.abs(inverse)
     values = np.repeat(rates[:, None, :k], STAGES, axis=1)
     times = (t[:, None] + h[:, None] * c).ravel()
-    before = np.full(n, np.inf)
+    before, last = np.full((2, n), np.inf)
     for _ in range(LIMIT):
         speeds = v[:, None] + step * np.einsum("ij,njk->nik", a, values)
         places = (
@@ -148,28 +152,44 @@ def _stages(f: Many, scale: Reals, t: Reals, q: Reals, v: Reals, rates: Reals, h
         rounded = np.einsum("nab,nb->na", np.abs(by_q), farthest) + np.einsum(
             "nab,nb->na", np.abs(by_v), fastest
         )
-        size = np.maximum(size, ROUNDINGS / CLOSE * EPS * h[:, None] * rounded)
-        much = (np.abs(step * change).max(axis=1) / size).max(axis=1)
-        done = left & ((much <= CLOSE) | ((much >= before) & (much < 1e-10)))
+        noise = spread @ np.tile(ROUNDINGS * EPS * rounded, STAGES)[..., None]
+        rounds = (np.abs(change) <= noise.reshape(n, STAGES, k)).all(axis=(1, 2))
+        moved = np.abs(step * change).max(axis=1)
+        much = (moved / size).max(axis=1)
+        # what it is a share of may shrink faster than it does
+        largest = (moved / scale).max(axis=1)
+        done = left & (rounds | (much <= CLOSE) | ((largest >= last) & (much < 1e-10)))
         result[done] = np.concatenate([values, there[..., k:]], axis=2)[done]
-        left = left & ~done & (much < np.inf) & ~((much > 2 * before) & (before < 1.0))
+        left = left & ~done & (much < np.inf) & ~((largest > 2 * last) & (before < 1.0))
         if not left.any():
             break
-        before = much
+        before, last = much, largest
         # a step that is done, or lost, goes no further
         values = np.where(left[:, None, None], values, rates[:, None, :k])
     return result
 
 
-def _slopes(f: Many, t: Reals, q: Reals, v: Reals, rates: Reals) -> tuple[Reals, Reals]:
-    """∂a/∂q and ∂a/∂q̇, (n, k, k), by differences: Newton's method needs them roughly."""
-    n, k = q.shape
-    result = np.empty((2, n, k, k))
-    for which, x in enumerate((q, v)):
+def _slopes(
+    f: Many, scale: Reals, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals
+) -> tuple[Reals, Reals]:
+    """∂a/∂q and ∂a/∂q̇, (n, k, k), by differences: Newton's method for steps h needs them roughly.
+
+    What rounds in an input rounds in the slopes of its speed too: the speed moves by more than this, as far as a step feels it.
+    """
+    k = q.shape[1]
+
+    def slopes(x: Reals, sizes: Reals, at: Callable[[Reals], Reals]) -> Reals:
+        columns = []
         for j in range(k):
             moved = x.copy()
-            size = 1e-7 * (np.abs(x[:, j]) + 1e-3 * np.abs(x).max() + 1e-6)
-            moved[:, j] += size
-            there = f(t, moved, v) if which == 0 else f(t, q, moved)
-            result[which, :, :, j] = (there - rates)[:, :k] / (moved[:, j] - x[:, j])[:, None]
-    return result[0], result[1]
+            moved[:, j] += sizes[:, j]
+            columns.append((at(moved) - rates)[:, :k] / (moved[:, j] - x[:, j])[:, None])
+        return np.stack(columns, axis=2)
+
+    by_q = slopes(q, BESIDE * scale + FAR * np.abs(q), lambda x: f(t, x, v))
+    length = np.abs(h)
+    steep = (np.abs(by_q) @ scale / scale).max(axis=1)
+    rounded = ABOVE * EPS * length * steep / (1 + length**2 * steep)
+    fastest = ((np.abs(v) + length[:, None] * np.abs(rates[:, :k])) / scale).max(axis=1)
+    by_v = slopes(v, np.outer(FAST * fastest + rounded + 1e-300, scale), lambda x: f(t, q, x))
+    return by_q, by_v

@@ -20,11 +20,11 @@ from virtualwork.formulas.quantity import Quantity
 from virtualwork.intime.coordinates import Coordinates
 from virtualwork.intime.equations import Equations
 from virtualwork.intime.estimate import (
-    FIRST,
     GAIN,
     LEAST,
     TRIES,
     UNKNOWN,
+    first_tolerance,
     input_error,
     share,
     solutions_apart,
@@ -275,7 +275,7 @@ def _simulated(
     equations.refuse(float(t[0]), q, v)
     scale = np.array(equations.scale)
     levels = levels_of(m.inputs, until)
-    tolerance, end = max(LEAST, FIRST * accuracy), float(t[-1])
+    tolerance, end = first_tolerance(accuracy), float(t[-1])
     start, solutions = (float(t[0]), q, v), count(1)
 
     def reports() -> Callable[[float], None] | None:
@@ -287,7 +287,6 @@ def _simulated(
     if fine.stiff:
         # what is stiff somewhere is from the beginning
         fine = travel(own, start, end, tolerance, levels, Radau(), accuracy, progress=reports())
-    first = fine
     for tries in range(TRIES):
         coarse, method = fine, fine.legs[0].method
         # near change points every solution is interpolated from other poses
@@ -297,7 +296,7 @@ def _simulated(
         # no tolerance lies below rounding
         finer = max(LEAST, tolerance / (GAIN + 1))
         fine = travel(ways, start, last, finer, levels, method, accuracy, coarse, reports())
-        fine.first = first
+        fine.coarse = coarse
         if last < end and fine.ended == "end":
             fine.ended = coarse.ended
         coarse.backwards()

@@ -41,8 +41,9 @@ class Travel:
 
     legs: list[Path] = field(default_factory=list)
     ended: str = ""
-    # the first solution, whose nodes tell well enough how the motion makes what rounds grow; its own where there is none
-    first: Travel | None = None
+    # the solution in steps twice as long, whose nodes tell well enough how the motion makes what rounds grow; its own where
+    # there is none
+    coarse: Travel | None = None
 
     @property
     def end(self) -> float:
@@ -139,7 +140,7 @@ class Travel:
 
         Through several sets of coordinates it is not followed: 0.
         """
-        legs = (self.first or self).legs
+        legs = (self.coarse or self).legs
         leg = legs[0]
         if len(legs) > 1:
             return np.zeros((len(times), leg.equations.k))
@@ -172,6 +173,15 @@ class Travel:
             for whole, part in zip(out, parts, strict=True):
                 whole[rows] = part
         return out[0], out[1], out[2], work
+
+    def rests(self, times: Reals) -> NDArray[np.bool_]:
+        """Whether a joint that rubs is at rest, at times, (n,): what friction keeps it there, no joint force tells."""
+        out = np.zeros(len(times), dtype=bool)
+        for leg, rows in self._parts(times):
+            if isinstance(leg.equations, Rubbing) and any(leg.equations.arms):
+                still = (leg.at(times[rows])[1] == 0.0).all(axis=1)
+                out[rows] = still | (leg.equations.k > 1 and not all(leg.equations.mode))
+        return out
 
     def energy(self, times: Reals, moved: Moved | None = None) -> Reals:
         """Kinetic energy and that of gravity and springs, (n,) J; `moved`: with other inputs and speeds, by so much."""

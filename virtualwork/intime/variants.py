@@ -27,7 +27,7 @@ from virtualwork.formulas.numbers import Reals, real_array
 from virtualwork.intime.control import first_steps
 from virtualwork.intime.coordinates import FOLDING
 from virtualwork.intime.ends import events, passed, sides
-from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, apart, rounding, share, spread
+from virtualwork.intime.estimate import GAIN, LEAST, TRIES, apart, first_tolerance, rounding, share, spread
 from virtualwork.intime.growth import grown
 from virtualwork.intime.marching import Nodes, beginning, follow, march, over
 from virtualwork.intime.powers import motion_of, names
@@ -269,7 +269,7 @@ class _Lanes:
     def fill(self, runs: Runs, accuracy: float) -> Mask:
         """Simulate all that can be simulated together; which variants must be done singly, (v,)."""
         alone = ~self.together
-        rows, tolerance = np.flatnonzero(self.together), max(LEAST, FIRST * accuracy)
+        rows, tolerance = np.flatnonzero(self.together), first_tolerance(accuracy)
         nodes = self.way(rows, tolerance, alone)
         for tries in range(TRIES):
             coarse, nodes = nodes, self.halved(rows, nodes)
