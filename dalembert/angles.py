@@ -55,18 +55,6 @@ def read_degrees(angle: float) -> float:
     return short if abs(math.radians(short) - angle) <= math.ulp(angle) else shown
 
 
-def read_radians(shown: float) -> float:
-    """Return an angle in rad from that in degrees which `read_degrees` returned: one that was written in radians comes out as it was.
-
-    >>> math.radians(read_degrees(0.3)), read_radians(read_degrees(0.3)), read_radians(60.0) == math.radians(60.0)
-    (0.30000000000000004, 0.3, True)
-    """
-    angle = math.radians(shown)
-    short = float(f"{angle:.15g}")
-    # twelve figures and fewer were written in degrees
-    return short if float(f"{shown:.12g}") != shown and read_degrees(short) == shown else angle
-
-
 def in_turn(angle: float, turns: int = 1) -> float:
     """Return an angle in degrees, in [0, 360), or in this number of turns.
 

@@ -171,7 +171,7 @@ def bounds(m: Mechanism, free: Sequence[str], bare: Mapping[str, str]) -> dict[s
         if len(ends) != 2:
             raise options.bad("--free", f"'{text}': expected NAME=LOW:HIGH, such as {first.path}=...:...")
         of = Varied(first)
-        low, high = (of.si(quantity(of, end, "--free", bare)) for end in ends)
+        low, high = (quantity(of, end, "--free", bare).si for end in ends)
         if not low < high:
             raise options.bad(
                 "--free", f"'{text}': expected the lower bound first, and a higher one after it"

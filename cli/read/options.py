@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from dalembert.arithmetic.doubled import Doubled
+
 
 STATES = 250_000  # what a gigabyte holds, integrated and shown
 PLACES = 10_000  # holes or blades on one rotor
@@ -109,10 +111,10 @@ def quantity(flag: str, text: str | None, dimension: str, *, positive: bool = Fa
     return None if text is None else needed(flag, text, dimension, positive=positive)
 
 
-def in_degrees(flag: str, text: str) -> float:
-    """Read an angle; one given in degrees is not turned to radians and back."""
-    value, unit = _read(flag, text, "angle", positive=False)
-    return value if unit == "deg" else value * 180 / math.pi
+def in_degrees(flag: str, text: str, *, positive: bool = False) -> float:
+    """Read an angle in degrees."""
+    _read(flag, text, "angle", positive)
+    return float(exact_degrees(text))
 
 
 def mass_at(
@@ -300,17 +302,34 @@ class Steps(NamedTuple):
         """The values at some places."""
         import numpy as np
 
-        largest = max(abs(self.first), abs(self.first + (self.n - 1) * self.each), self.below)
-        if largest < 2**53:
-            # whole numbers that doubles hold exactly: one rounding, that of the division
+        if self._fits:
+            # one rounding, that of the division
             return np.asarray((self.first + i * self.each) / self.below)
         return np.array([(self.first + k * self.each) / self.below for k in i.tolist()])
 
+    def exact(self, i: NDArray[np.intp]) -> Doubled:
+        """The values at some places in 32 digits."""
+        from fractions import Fraction
 
-def steps(flag: str, text: str, read: Callable[[list[str]], list[float]], example: str) -> Steps:
+        from dalembert.arithmetic.doubled import Doubled
+        from dalembert.arithmetic.doubled_vectors import doubled_array
+
+        if self._fits:
+            return Doubled((self.first + i * self.each).astype(float)) / float(self.below)
+        return doubled_array([Fraction(self.first + k * self.each, self.below) for k in i.tolist()], i.shape)
+
+    @property
+    def _fits(self) -> bool:
+        """Whether doubles hold the whole numbers exactly."""
+        return max(abs(self.first), abs(self.first + (self.n - 1) * self.each), self.below) < 2**53
+
+
+def steps(
+    flag: str, text: str, read: Callable[[list[str]], list[float] | list[Fraction]], example: str
+) -> Steps:
     """Read `START:STOP:STEP` or `START:STOP/N` (N equal steps); a step that divides the range includes its end.
 
-    `read` reads the two or three.
+    `read` reads the two or three; of floats the decimals that they print as count.
     """
     from fractions import Fraction
 
@@ -325,7 +344,7 @@ def steps(flag: str, text: str, read: Callable[[list[str]], list[float]], exampl
     if len(parts) != (2 if count else 3):
         raise bad(flag, f"'{text}': expected START:STOP:STEP or START:STOP/N, such as {example}")
     # the decimals that the numbers print as, exactly: 50mm and a step of 1mm are 0.051, not 0.051000000000000004
-    start, stop, *by = [Fraction(repr(value)) for value in read(parts)]
+    start, stop, *by = [Fraction(repr(x)) if isinstance(x, float) else x for x in read(parts)]
     if count is None:
         if by[0] == 0 or (stop - start) * by[0] < 0:
             raise bad(flag, f"'{text}': a step of {parts[2]} never gets from {parts[0]} to {parts[1]}")

@@ -53,19 +53,18 @@ class Decimals:
         """Note what the numbers of a table's column, SI, are written as, in the unit with this factor."""
         self._columns.append((dimension, factor, texts, numbers))
 
-    def and_also(self, read: Iterable[tuple[str, float, Any, Factor]]) -> Decimals:
-        """These and further numbers, each as `note` takes it."""
+    def and_also(self, rests: Iterable[tuple[str, float, float]]) -> Decimals:
+        """These and further numbers: the dimension of each, its float, and the exact number less it."""
         more = Decimals(self._written)
-        more._columns, more._rests = self._columns[:], self._rests
-        for each in read:
-            more.note(*each)
+        more._columns = self._columns[:]
+        more._rests = self._rests | {(dimension, number): rest for dimension, number, rest in rests}
         return more
 
     def rest(self, dimension: str, number: float) -> float:
         """Return the exact number less its float; 0 if the file does not have it."""
         if self._columns:
             # on the first request: a second run alone asks
-            self._rests, self._columns = self._rests | _rests(self._columns), []
+            self._rests, self._columns = _rests(self._columns) | self._rests, []
         if (dimension, number) in self._rests:
             return self._rests[dimension, number]
         if (dimension, number) not in self._written:
