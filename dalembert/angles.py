@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+ROUNDED = 4.0
+
 
 def cosine_sine(angle: NDArray[np.float64], unit: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return cos and sin of angles in `deg` or `rad`; degrees are reduced first, so that 90° has cosine 0.
@@ -73,10 +75,20 @@ def degrees(z: NDArray[np.complex128]) -> NDArray[np.float64]: ...
 @overload
 def degrees(z: complex) -> float: ...
 def degrees(z: complex | NDArray[np.complex128]) -> float | NDArray[np.float64]:
-    """Return the angle of a complex number, or of each in an array, in degrees in [0, 360); 0 for zero."""
+    """Return the angle of a complex number, or of each in an array, in degrees in [0, 360); 0 for zero.
+
+    An angle that is one of ten decimals but for the rounding of a vector at this angle comes out as that one.
+
+    >>> import numpy as np
+    >>> float(np.degrees(np.angle(phasor(2.0, 30.0, "deg")))), float(degrees(phasor(2.0, 30.0, "deg")))
+    (29.999999999999993, 30.0)
+    """
     import numpy as np
 
     vector = np.asarray(z)
     # + 0.0: the angle of -0 is 0, not 180; and a tiny negative angle plus 360 rounds to 360 itself
     angle = np.degrees(np.arctan2(vector.imag + 0.0, vector.real + 0.0)) % 360.0
+    short = np.round(angle, 10)
+    # cosine and sine, and their products with a size, turn a vector by four units of the last place of its angle at most
+    angle = np.where(np.abs(short - angle) <= ROUNDED * np.spacing(angle), short, angle)
     return np.where(angle >= 360.0, 0.0, angle)[()]

@@ -163,12 +163,22 @@ class FreeState(AtTimes):
     @cached_property
     def omega(self) -> Array:
         """Angular velocity in body axes, (..., n, 3), rad/s."""
-        return in_blocks(self.body._rotation.omega_at, self.time, self.body._lead, 3)
+        omega = in_blocks(self.body._rotation.omega_at, self.time, self.body._lead, 3)
+        return self._from_start(omega, self.body.omega)
 
     @cached_property
     def attitude(self) -> Array:
         """Quaternion [w, x, y, z], body to space, (..., n, 4), continuous in time."""
-        return in_blocks(self.body._rotation.attitude_at, self.time, self.body._lead, 4)
+        attitude = in_blocks(self.body._rotation.attitude_at, self.time, self.body._lead, 4)
+        return self._from_start(attitude, quaternion.normalize(as_numbers("attitude", self.body.attitude)))
+
+    def _from_start(self, values: Array, start: ArrayLike) -> Array:
+        """Return values of which those at time zero are the start itself, and no rounding of it."""
+        if is_doubled(values) or not (self.time == 0).any():
+            return values
+        own = np.asarray(start, dtype=float)
+        at_zero = self.time == 0
+        return np.where(at_zero[..., None], own[..., None, :] if self.time.ndim else own, values)
 
     @cached_property
     def momentum(self) -> Array:

@@ -46,6 +46,8 @@ class Rotors:
     table: Table
     names: list[str]
     rotor: NDArray[np.intp]
+    size: Real
+    """The unbalances without their angles."""
     moment: Complex
     z: Real | None
     mass_unit: str
@@ -103,6 +105,7 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
         table,
         names,
         rotor,
+        size,
         phasor(size, angle.values, angle.unit),
         None if z is None else z.si,
         column.unit if amount == "mass" else "kg" if amount == "weight" else column.unit.split("_")[0],
@@ -300,6 +303,12 @@ class Balancing:
     def mass_kg(self) -> Real:
         """The masses as given out."""
         return to_si(self.mass, "mass", self.rotors.mass_unit)
+
+    @property
+    def unbalance(self) -> Real:
+        """The corrections without their angles, as given out."""
+        rounded = self.request.mass_step is not None
+        return self.mass_kg * self.radius if rounded else np.abs(self.made)
 
     @property
     def length_unit(self) -> str:

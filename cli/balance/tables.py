@@ -107,7 +107,7 @@ def corrections(b: Balancing) -> Table:
 
     size, masses = np.abs(b.ideal), np.abs(b.ideal) / np.where(radius > 0, radius, np.nan)
     unit, mass_unit = rotors.unbalance_unit, rotors.mass_unit
-    unbalance = number("unbalance", "unbalance", np.abs(b.made), unit)
+    unbalance = number("unbalance", "unbalance", b.unbalance, unit)
     unbalance.error = lambda: wrong(
         from_si(size, "unbalance", unit), "unbalance", unit, lambda w: w.size
     ).tolist()
