@@ -14,7 +14,7 @@ from dalembert.arithmetic.shapes import as_array, as_numbers, common_shape, in_3
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.free_rotation import FreeRotation
 from rigidbody3d.inertia import check, principal
-from rigidbody3d.states import STATE, AtTimes, PictureData, difference, in_blocks, require
+from rigidbody3d.states import STATE, AtTimes, PictureData, difference, from_start, in_blocks, require
 
 Array = NDArray[np.float64]
 
@@ -164,21 +164,14 @@ class FreeState(AtTimes):
     def omega(self) -> Array:
         """Angular velocity in body axes, (..., n, 3), rad/s."""
         omega = in_blocks(self.body._rotation.omega_at, self.time, self.body._lead, 3)
-        return self._from_start(omega, self.body.omega)
+        return from_start(omega, self.body.omega, self.time)
 
     @cached_property
     def attitude(self) -> Array:
         """Quaternion [w, x, y, z], body to space, (..., n, 4), continuous in time."""
         attitude = in_blocks(self.body._rotation.attitude_at, self.time, self.body._lead, 4)
-        return self._from_start(attitude, quaternion.normalize(as_numbers("attitude", self.body.attitude)))
-
-    def _from_start(self, values: Array, start: ArrayLike) -> Array:
-        """Return values of which those at time zero are the start itself, and no rounding of it."""
-        if is_doubled(values) or not (self.time == 0).any():
-            return values
-        own = np.asarray(start, dtype=float)
-        at_zero = self.time == 0
-        return np.where(at_zero[..., None], own[..., None, :] if self.time.ndim else own, values)
+        start = quaternion.normalize(as_numbers("attitude", self.body.attitude))
+        return from_start(attitude, start, self.time)
 
     @cached_property
     def momentum(self) -> Array:

@@ -251,7 +251,9 @@ def test_moments_of_any_size(power: int) -> None:
     assert (scaled.period, scaled.energy) == (body.period, np.ldexp(body.energy, power))
 
 
-@pytest.mark.parametrize("omega", [[0.05, 12, 0.05], [-0.05, 12, -0.05], [0, 12, 0], [0, 0, 0], [3, 0.1, 0.7]])
+@pytest.mark.parametrize(
+    "omega", [[0.05, 12, 0.05], [-0.05, 12, -0.05], [0, 12, 0], [0, 0, 0], [3, 0.1, 0.7]]
+)
 def test_at_time_zero_it_is_as_it_was_given(omega):
     for inertia in ([0.002, 0.0011, 0.0009], [1, 1, 2], [1, 1, 1]):
         state = FreeBody(inertia, omega, (0.5, 0.5, 0.5, 0.5)).at([-1.0, 0.0, 0.3])

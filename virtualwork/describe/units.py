@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
+from dalembert.errors import toml_text
 from dalembert.quantities import decimals, exactly, expected, number_in_si
 from dalembert.units import DIMENSIONS, LARGEST, Factor, composed
 from virtualwork.describe import DescriptionError
@@ -16,9 +17,16 @@ LONGEST = 60
 
 def wrong(where: str, value: Any, expected: str) -> DescriptionError:
     """The error of a value: its place, the value, and the expected one."""
-    shown = repr(value)
+    shown = toml_text(value)
     shown = shown if len(shown) <= LONGEST else f"{shown[: LONGEST - 3]}..."
     return DescriptionError(f"{where}: found {shown}, expected {expected}")
+
+
+def text_of(value: Any, where: str, expected: str = "text") -> str:
+    """Return a text of the file, or a bare number as a text: names may be numbers."""
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        raise wrong(where, value, expected)
+    return str(value)
 
 
 # the dimension of a table's column, the factor of its unit, what is written in its cells, and their numbers in SI
