@@ -43,3 +43,9 @@ def test_small_angles_stay() -> None:
     assert 0 < float(degrees(1 + 1e-17j)) < 1e-15
     assert float(degrees(complex(-1, -0.0))) == 180.0
     assert float(degrees(0j)) == 0.0
+
+
+def test_turns() -> None:
+    turns = np.array([0.25, -0.25, 0.5, 1.0, 400.75, 0.1])
+    assert degrees(phasor(np.ones(6), turns, "rev")).tolist() == [90, 270, 180, 0, 270, 36]
+    assert phasor(np.array(2.0), np.array(0.25), "rev") == 2j
