@@ -11,6 +11,7 @@ from dalembert.units import (
     LARGEST,
     LISTED,
     MINUS,
+    UNITS,
     Factor,
     composed,
     find_unit,
@@ -159,6 +160,18 @@ def parse_quantity(text: str, dimension: str) -> tuple[float, str]:
             f"'{text}' has the unknown {dimension} unit '{suffix}' (units: {names}){nearest_unit(suffix, dimension)}"
         )
     return value, unit
+
+
+def option_digits(text: str, dimension: str) -> tuple[str, Factor]:
+    """Return the decimals of an option's value and the factor of its unit; ValueError as `parse_quantity`.
+
+    >>> option_digits("20MM", "length")
+    ('20', (1, 1000))
+    """
+    _, unit = parse_quantity(text, dimension)
+    number = number_and_unit(text)
+    assert number is not None
+    return number[0], UNITS[dimension][unit]
 
 
 def number_in_si(value: Any, dimension: str, factor: Factor = (1, 1)) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,7 @@ from cli.cases.written import DEGREES, ROWS, Range, Written, in_degrees
 from cli.read import exact, options
 from dalembert.errors import DataError
 from dalembert.hints import nearest
-from dalembert.quantities import decimals, exactly, is_number, number_and_unit, parse_quantity
+from dalembert.quantities import decimals, exactly, is_number, option_digits
 from dalembert.units import UNITS, Factor
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.units import Units
@@ -107,11 +108,15 @@ def digits(of: Driven | Varied, text: str, flag: str, bare: Mapping[str, str]) -
     kind = of.kind
     if isinstance(of, Driven) or (kind in ("length", "angle") and not (is_number(text) and kind not in bare)):
         return digits_of_place(text, kind, flag, bare)
+    parts = decimals(text.strip(), kind)
+    if parts is None:
+        # units of options may stand in capitals
+        with suppress(ValueError):
+            return option_digits(text, kind)
     try:
         Units({}).number(text.strip(), kind, of.label)
     except DescriptionError as error:
         raise options.bad(flag, error) from None
-    parts = decimals(text.strip(), kind)
     assert parts is not None
     return parts
 
@@ -129,12 +134,9 @@ def digits_of_place(text: str, kind: str, flag: str, bare: Mapping[str, str]) ->
         assert parts is not None
         return parts
     try:
-        _, its_unit = parse_quantity(text, kind)
+        return option_digits(text, kind)
     except ValueError as error:
         raise options.bad(flag, error) from None
-    number = number_and_unit(text)
-    assert number is not None
-    return number[0], UNITS[kind][its_unit]
 
 
 # --- --at and --over --------------------------------------------------------------------------------------------------

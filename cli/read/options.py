@@ -222,11 +222,9 @@ def exact_degrees(text: str) -> Fraction:
     """
     from fractions import Fraction
 
-    from dalembert.quantities import PI, decimals, exactly
+    from dalembert.quantities import PI, exactly, option_digits
 
-    parts = decimals(text, "angle")
-    assert parts is not None
-    return exactly(*parts) * 180 / Fraction(*PI)
+    return exactly(*option_digits(text, "angle")) * 180 / Fraction(*PI)
 
 
 def exact_places(

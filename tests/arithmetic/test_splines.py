@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from decimal import Decimal
 from fractions import Fraction
+from itertools import pairwise
 
 import pytest
 
@@ -21,7 +22,7 @@ def decimal_rates(t: list[str], degrees: list[str]) -> tuple[list[float], list[f
 def exact_rates(t: list[str], degrees: list[str]) -> tuple[list[Fraction], list[Fraction]]:
     """The same spline by Gauss' elimination of rational numbers: M of all rows, not-a-knot at both ends."""
     x, y, n = [*map(Fraction, t)], [*map(Fraction, degrees)], len(t)
-    h = [b - a for a, b in zip(x, x[1:], strict=False)]
+    h = [b - a for a, b in pairwise(x)]
     rows = []
     for i in range(1, n - 1):
         row = [Fraction(0)] * (n + 1)

@@ -144,3 +144,18 @@ def test_counts_of_a_fit_and_its_digits(dalembert: Dalembert, tmp_path: Path) ->
     assert 2 in values
     assert any("starts" in str(head) for head in heads)
     assert "| 2 |" in (tmp_path / "fit.md").read_text()
+
+
+def test_units_in_capitals_are_those_of_the_second_run_too(dalembert: Dalembert, tmp_path: Path) -> None:
+    places = ("--positions", "30DEG,60deg")
+    drill = ("--drill", "10MM", "--density", "7850KG_m3", "--drill-point", "118DEG")
+    for options in (places, drill):
+        same = [option.replace("DEG", "deg").replace("MM", "mm").replace("KG", "kg") for option in options]
+        done = dalembert("place", "5G@40DEG", *options, "--digits")
+        assert done.returncode == 0, done.stderr
+        assert done.stdout == dalembert("place", "5g@40deg", *same, "--digits").stdout
+    (tmp_path / "m.toml").write_text(FOUR_BAR)
+    ways = [("--set", f"input.speed={text}") for text in ("30 RPM", "30rpm", "0.5 HZ")]
+    shown = {dalembert("mechanism", "m.toml", *way, "--at", "60DEG", "--only", "P.vx").stdout for way in ways}
+    assert len(shown) == 1
+    assert "P_vx_m_s" in shown.pop()
