@@ -116,8 +116,8 @@ def rates(x: Sequence[Decimal], y: Sequence[Decimal]) -> tuple[Decimals, Decimal
 
 def _sum(*terms: Decimal) -> Decimal:
     """Add terms of 40 digits; a sum that is no more than their rounding is zero."""
-    total = sum(terms)
-    return total if abs(total) > ROUNDED * sum(map(abs, terms)) else Decimal(0)
+    total, size = sum(terms, Decimal(0)), sum(map(abs, terms), Decimal(0))
+    return total if abs(total) > ROUNDED * size else Decimal(0)
 
 
 def _steps(x: Sequence[Decimal], y: Sequence[Decimal]) -> tuple[Decimals, Decimals]:
