@@ -48,7 +48,7 @@ def decimal_to_si(number: str, factor: Factor) -> float:
     (0.0003, 0.12)
     """
     value, (num, den) = float(number), factor
-    if den == 1 or not math.isfinite(value):
+    if den == 1 or not value or not math.isfinite(value):
         return value * num
     if not (isinstance(num, int) and isinstance(den, int)):
         return value * (num / den)
@@ -77,7 +77,8 @@ def exactly(number: str, factor: Factor) -> Fraction:
         # the only irrational factor is π, times a ratio
         return Fraction(part / math.pi).limit_denominator(10**6) * Fraction(*PI)
 
-    return Fraction(number) * exact(factor[0]) / exact(factor[1])
+    # what is below all floats is zero: its power of ten may have a billion digits
+    return Fraction(number) * exact(factor[0]) / exact(factor[1]) if float(number) else Fraction(0)
 
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.ASCII | re.DOTALL)

@@ -200,9 +200,7 @@ def _in_one_unit(parts: list[tuple[str, Factor]]) -> tuple[list[Fraction], Facto
     >>> _in_one_unit([("0", (1, 1)), ("90", DEGREES)]), _in_one_unit([("5", (1, 1000))])
     (([Fraction(0, 1), Fraction(90, 1)], (3.141592653589793, 180)), ([Fraction(1, 200)], (1, 1)))
     """
-    from fractions import Fraction
-
-    numbers = [Fraction(number) for number, _ in parts]
+    numbers = [exactly(number, (1, 1)) for number, _ in parts]
     factors = {factor for number, (_, factor) in zip(numbers, parts, strict=True) if number}
     only = factors.pop() if len(factors) == 1 else None
     if only is not None and not all(isinstance(part, int) for part in only):

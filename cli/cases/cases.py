@@ -205,8 +205,8 @@ class Cases:
         if varied is None or varied.n > 1:
             return replace(self, varied=varied, moved=None)
         with naming(self.request.file):
-            dimensions = [name.of for name in varied.names if isinstance(name, Varied)]
-            m = with_numbers(self.mechanism, dimensions, written(varied.written(0, 1)[0]))
+            paths = [name.of for name in varied.names if isinstance(name, Varied)]
+            m = with_numbers(self.mechanism, paths, written(varied.written(0, 1)[0]))
         return replace(self, mechanism=m, varied=None, moved=None)
 
     # --- one variant, some variants -------------------------------------------------------------------------------

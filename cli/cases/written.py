@@ -48,10 +48,11 @@ class Written(NamedTuple):
         >>> Written.of("60", DEGREES, is_angle=True)[:2], Written.of("0.3", (1, 1), is_angle=True)[1]
         ((60.0, 1.0471975511965976), 0.3)
         """
-        si, exact = decimal_to_si(digits, factor), exactly(digits, factor)
+        # the sum has no −0
+        si, exact = decimal_to_si(digits, factor) + 0.0, exactly(digits, factor)
         shown = si
         if is_angle:
-            shown = float(digits) if factor == DEGREES else float(in_degrees(exact))
+            shown = float(digits) + 0.0 if factor == DEGREES else float(in_degrees(exact))
         return cls(shown, si, float(exact - type(exact)(si)))
 
 

@@ -235,7 +235,7 @@ def _largest_errors(
 
 def _errors(fit: Fit[Mechanism], each: Reached) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the rounding errors of the values of a quantity and of their distances from the target, SI."""
-    from virtualwork.family.target import place_key
+    from virtualwork.family.design import place_key
 
     motion = fit.mechanism.motion(each.inputs)
     (error,) = motion.error_estimates(each.name).values()

@@ -203,3 +203,10 @@ def test_a_variant_of_an_angle_in_radians_is_set_exactly(m: Mechanism) -> None:
     cases = Cases(None, m, {}, varied)  # type: ignore[arg-type]
     assert cases.in_si(cases.rows(0, 7)) == {"links.coupler.H.angle": [k / 10 for k in range(1, 8)]}
     assert Driven.of(m, 0).own(m).shown == 40.0
+
+
+@pytest.mark.parametrize("text", ["1e-999999999deg", "-1e-999999999rad", "1e-999999999mrad", "-0deg", "0rev"])
+def test_what_is_below_all_floats_is_zero(m: Mechanism, text: str) -> None:
+    inputs = of_one(m, Grid((at_axis(m, [text], {}),))).whole
+    assert inputs.rest is not None
+    assert (inputs.values.tolist(), inputs.shown.tolist(), inputs.rest().tolist()) == ([[0]], [[0]], [[0]])
