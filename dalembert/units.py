@@ -176,18 +176,8 @@ def _lowest(num: float, den: float) -> Factor:
     return num, den
 
 
-SIGNS = {
-    "µ": "u",
-    "μ": "u",
-    "²": "2",
-    "³": "3",
-    "·": "*",
-    "⋅": "*",
-    "×": "*",
-    MINUS: "-",
-    "°": "deg",
-    "º": "deg",
-}
+SIGNS = {"µ": "u", "μ": "u", "²": "2", "³": "3", MINUS: "-", "°": "deg", "º": "deg"}
+SIGNS |= dict.fromkeys("·⋅×", "*")
 _PLAIN = str.maketrans(SIGNS)
 # revolutions a minute, as instruments of several languages print them
 PER_MINUTE = r"(?:1|r|rev|u|tr|giri|rot)\s*/\s*min|min\s*(?:\^?-1|⁻¹)"
