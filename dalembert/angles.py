@@ -11,9 +11,11 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+ROUNDED = 4.0
+
 
 def cosine_sine(angle: NDArray[np.float64], unit: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return cos and sin of angles in `deg` or `rad`; degrees are reduced first, so that 90° has cosine 0.
+    """Return cos and sin of angles in a unit; degrees and turns are reduced first, so that 90° and a quarter turn have cosine 0.
 
     The reduction to within 45° of a quarter turn is exact in degrees, where 360 is a number. The angles may be numbers of 32
     digits too.
@@ -21,6 +23,8 @@ def cosine_sine(angle: NDArray[np.float64], unit: str) -> tuple[NDArray[np.float
     import numpy as np
 
     angle = angle if hasattr(angle, "high") else np.asarray(angle, dtype=float)
+    if unit == "rev":
+        angle, unit = np.fmod(angle, 1.0) * 360.0, "deg"
     if unit != "deg":
         angle = to_si(angle, "angle", unit)
         return np.cos(angle), np.sin(angle)
@@ -34,7 +38,7 @@ def cosine_sine(angle: NDArray[np.float64], unit: str) -> tuple[NDArray[np.float
 
 
 def phasor(magnitude: NDArray[np.float64], angle: NDArray[np.float64], unit: str) -> NDArray[np.complex128]:
-    """Return magnitude·e^{i·angle} for an angle in `deg` or `rad`, of floats or of numbers of 32 digits."""
+    """Return magnitude·e^{i·angle} for an angle in a unit, of floats or of numbers of 32 digits."""
     import numpy as np
 
     c, s = cosine_sine(angle, unit)
@@ -55,18 +59,6 @@ def read_degrees(angle: float) -> float:
     return short if abs(math.radians(short) - angle) <= math.ulp(angle) else shown
 
 
-def read_radians(shown: float) -> float:
-    """Return an angle in rad from that in degrees which `read_degrees` returned: one that was written in radians comes out as it was.
-
-    >>> math.radians(read_degrees(0.3)), read_radians(read_degrees(0.3)), read_radians(60.0) == math.radians(60.0)
-    (0.30000000000000004, 0.3, True)
-    """
-    angle = math.radians(shown)
-    short = float(f"{angle:.15g}")
-    # twelve figures and fewer were written in degrees
-    return short if float(f"{shown:.12g}") != shown and read_degrees(short) == shown else angle
-
-
 def in_turn(angle: float, turns: int = 1) -> float:
     """Return an angle in degrees, in [0, 360), or in this number of turns.
 
@@ -85,10 +77,21 @@ def degrees(z: NDArray[np.complex128]) -> NDArray[np.float64]: ...
 @overload
 def degrees(z: complex) -> float: ...
 def degrees(z: complex | NDArray[np.complex128]) -> float | NDArray[np.float64]:
-    """Return the angle of a complex number, or of each in an array, in degrees in [0, 360); 0 for zero."""
+    """Return the angle of a complex number, or of each in an array, in degrees in [0, 360); 0 for zero.
+
+    An angle that is one of ten decimals but for the rounding of a vector at this angle comes out as that one.
+
+    >>> import numpy as np
+    >>> z = phasor(2.0, 30.0, "deg")
+    >>> float(np.degrees(np.angle(z))) == 30.0, float(degrees(z))
+    (False, 30.0)
+    """
     import numpy as np
 
     vector = np.asarray(z)
     # + 0.0: the angle of -0 is 0, not 180; and a tiny negative angle plus 360 rounds to 360 itself
     angle = np.degrees(np.arctan2(vector.imag + 0.0, vector.real + 0.0)) % 360.0
+    short = np.round(angle, 10)
+    # cosine and sine, and their products with a size, turn a vector by four units of the last place of its angle at most
+    angle = np.where(np.abs(short - angle) <= ROUNDED * np.spacing(angle), short, angle)
     return np.where(angle >= 360.0, 0.0, angle)[()]

@@ -30,6 +30,22 @@ def quote(value: str) -> str:
     return text if len(text) <= 60 else text[:57] + "...'"
 
 
+def toml_text(value: object) -> str:
+    """Write a value of a TOML file as TOML has it, texts in single quotes.
+
+    >>> toml_text([True, {"x": 1.5}, "a"])
+    "[true, {x = 1.5}, 'a']"
+    """
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list):
+        return f"[{', '.join(map(toml_text, value))}]"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{key} = {toml_text(each)}' for key, each in value.items())}}}"
+    # dates and times of a day
+    return value.isoformat() if hasattr(value, "isoformat") else repr(value)
+
+
 def one_line(message: str) -> str:
     """Return a message as one line that a terminal can show, for any names and values from a file."""
     line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in " ".join(message.split()))

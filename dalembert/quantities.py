@@ -11,6 +11,7 @@ from dalembert.units import (
     LARGEST,
     LISTED,
     MINUS,
+    UNITS,
     Factor,
     composed,
     find_unit,
@@ -47,7 +48,7 @@ def decimal_to_si(number: str, factor: Factor) -> float:
     (0.0003, 0.12)
     """
     value, (num, den) = float(number), factor
-    if den == 1 or not math.isfinite(value):
+    if den == 1 or not value or not math.isfinite(value):
         return value * num
     if not (isinstance(num, int) and isinstance(den, int)):
         return value * (num / den)
@@ -76,7 +77,8 @@ def exactly(number: str, factor: Factor) -> Fraction:
         # the only irrational factor is π, times a ratio
         return Fraction(part / math.pi).limit_denominator(10**6) * Fraction(*PI)
 
-    return Fraction(number) * exact(factor[0]) / exact(factor[1])
+    # what is below all floats is zero: its power of ten may have a billion digits
+    return Fraction(number) * exact(factor[0]) / exact(factor[1]) if float(number) else Fraction(0)
 
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.ASCII | re.DOTALL)
@@ -159,6 +161,18 @@ def parse_quantity(text: str, dimension: str) -> tuple[float, str]:
             f"'{text}' has the unknown {dimension} unit '{suffix}' (units: {names}){nearest_unit(suffix, dimension)}"
         )
     return value, unit
+
+
+def option_digits(text: str, dimension: str) -> tuple[str, Factor]:
+    """Return the decimals of an option's value and the factor of its unit; ValueError as `parse_quantity`.
+
+    >>> option_digits("20MM", "length")
+    ('20', (1, 1000))
+    """
+    _, unit = parse_quantity(text, dimension)
+    number = number_and_unit(text)
+    assert number is not None
+    return number[0], UNITS[dimension][unit]
 
 
 def number_in_si(value: Any, dimension: str, factor: Factor = (1, 1)) -> float | None:

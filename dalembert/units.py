@@ -147,8 +147,6 @@ def composed(text: str) -> tuple[Factor, Exponents] | None:
 
     Words behind a `/` or `_per_` divide; in a header the time behind another word divides too (`mm_s`, `rpm_s`).
 
-    Examples
-    --------
     >>> composed("N/mm"), composed("mm_s"), composed("furlong")
     (((1000, 1), (0, 1, -2, 0)), ((1, 1000), (1, 0, -1, 0)), None)
     """
@@ -178,7 +176,8 @@ def _lowest(num: float, den: float) -> Factor:
     return num, den
 
 
-SIGNS = {"µ": "u", "μ": "u", "²": "2", "³": "3", "·": "*", "⋅": "*", "×": "*", MINUS: "-", "°": "deg"}
+SIGNS = {"µ": "u", "μ": "u", "²": "2", "³": "3", MINUS: "-", "°": "deg", "º": "deg"}
+SIGNS |= dict.fromkeys("·⋅×", "*")
 _PLAIN = str.maketrans(SIGNS)
 # revolutions a minute, as instruments of several languages print them
 PER_MINUTE = r"(?:1|r|rev|u|tr|giri|rot)\s*/\s*min|min\s*(?:\^?-1|⁻¹)"
@@ -210,13 +209,15 @@ JOINED = r"(?!gm\b)([kMm]?N|k?g|mg|oz|lbf?)(mm|cm|m|in|ft)(s?)(?![A-Za-z])"
 def _spelled(text: str) -> str:
     """A unit in plain signs: `µ` is u, `°` deg, `1/min` rpm, `degrees` deg, `Nm` N*m.
 
-    >>> [_spelled(text) for text in ("µm", "inches", "kNm", "gmm", "kgm²", "Nm/rad", "gm", "mm")]
-    ['um', 'in', 'kN*m', 'g*mm', 'kg*m2', 'N*m/rad', 'gm', 'mm']
+    >>> [_spelled(text) for text in ("µm", "inches", "kNm", "gmm", "kgm²", "Nm/rad", "oz-in", "s-1", "gm", "mm")]
+    ['um', 'in', 'kN*m', 'g*mm', 'kg*m2', 'N*m/rad', 'oz*in', 's-1', 'gm', 'mm']
     """
     text = text.strip()
     if "min" in text.lower() and re.fullmatch(PER_MINUTE, text.lower()):
         return "rpm"
     text = text.translate(_PLAIN).replace("**", "^")
+    # `oz-in` is a product, `s-1` a power
+    text = re.sub("(?<=[A-Za-z])-(?=[A-Za-z])", "*", text)
     return re.sub("[A-Za-z]+", _word, text)
 
 
@@ -228,8 +229,19 @@ def _word(match: re.Match[str]) -> str:
     return ABBREVIATIONS.get(word.lower(), word)
 
 
+# how an amplitude is read, as instruments and people write it
+_READ_AS = {"_pp": r"pk-?pk|p-?p|peak[- ]to[- ]peak", "_rms": r"r\.?m\.?s\.?", "_pk": "pk|0-p|peak"}
+
+
 def unit_name(written: str) -> str:
-    """Return a unit as headers spell it: `mm/s` is mm_s, `g·mm` and `g.mm` g_mm, `N/mm` N_per_mm, `µm` um, `°` deg, `1/min` rpm."""
+    """Return a unit as headers spell it: `mm/s` is mm_s, `g·mm` and `g.mm` g_mm, `N/mm` N_per_mm, `µm` um, `°` deg, `1/min` rpm.
+
+    >>> unit_name("µm pk-pk"), unit_name("mm/s RMS"), unit_name("um_pp"), unit_name("oz-in")
+    ('um_pp', 'mm_s_rms', 'um_pp', 'oz_in')
+    """
+    for tag, words in _READ_AS.items():
+        if match := re.fullmatch(rf"(.*[^\s_])[\s_]+(?:{words})", written.strip(), re.IGNORECASE):
+            return unit_name(match[1]) + tag
     text = _spelled(written).replace("^", "")
     above, slash, below = (part.strip() for part in text.partition("/"))
     if slash:
@@ -372,8 +384,6 @@ def dimensions(unit: str) -> set[str]:
 def parted(name: str, further: Container[str] = ()) -> tuple[str, str]:
     """Part a column's name from the unit at its end, the longest that is one; `further` are units of no input.
 
-    Examples
-    --------
     >>> parted("trial_mass_g"), parted("x_N_m"), parted("plane")
     (('trial_mass', 'g'), ('x', 'N_m'), ('plane', ''))
     """
@@ -417,8 +427,6 @@ def nearest_unit(suffix: str, dimension: str) -> str:
 def common_dimension(unit: str, other: str) -> str | None:
     """Return the dimension of a listed unit that `unit`, in any case of letters, is of too; None if it is of another.
 
-    Examples
-    --------
     >>> common_dimension("mg_mm", "kg_m"), common_dimension("um_pp", "um"), common_dimension("kJ", "N_m")
     ('unbalance', None, None)
     """

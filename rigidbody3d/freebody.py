@@ -14,7 +14,7 @@ from dalembert.arithmetic.shapes import as_array, as_numbers, common_shape, in_3
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.free_rotation import FreeRotation
 from rigidbody3d.inertia import check, principal
-from rigidbody3d.states import STATE, AtTimes, PictureData, difference, in_blocks, require
+from rigidbody3d.states import STATE, AtTimes, PictureData, difference, from_start, in_blocks, require
 
 Array = NDArray[np.float64]
 
@@ -163,12 +163,15 @@ class FreeState(AtTimes):
     @cached_property
     def omega(self) -> Array:
         """Angular velocity in body axes, (..., n, 3), rad/s."""
-        return in_blocks(self.body._rotation.omega_at, self.time, self.body._lead, 3)
+        omega = in_blocks(self.body._rotation.omega_at, self.time, self.body._lead, 3)
+        return from_start(omega, self.body.omega, self.time)
 
     @cached_property
     def attitude(self) -> Array:
         """Quaternion [w, x, y, z], body to space, (..., n, 4), continuous in time."""
-        return in_blocks(self.body._rotation.attitude_at, self.time, self.body._lead, 4)
+        attitude = in_blocks(self.body._rotation.attitude_at, self.time, self.body._lead, 4)
+        start = quaternion.normalize(as_numbers("attitude", self.body.attitude))
+        return from_start(attitude, start, self.time)
 
     @cached_property
     def momentum(self) -> Array:

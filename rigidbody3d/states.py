@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.records import components, table
+from dalembert.arithmetic.shapes import is_doubled
 from rigidbody3d import attitude as quaternion
 
 if TYPE_CHECKING:
@@ -33,6 +34,14 @@ def in_blocks(work: Callable[[Array], Array], time: Array, lead: tuple[int, ...]
     ]
     out = blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=1)
     return out.reshape(lead + time.shape + (width,))
+
+
+def from_start(values: Array, start: ArrayLike, time: Array) -> Array:
+    """Return values (..., n, k), of which those at time zero are the start (..., k) itself, and no rounding of it."""
+    if is_doubled(values) or not (time == 0).any():
+        return values
+    own = np.asarray(start, dtype=float)
+    return np.where((time == 0)[..., None], own[..., None, :] if time.ndim else own, values)
 
 
 STATE = ("attitude", "quaternion", "omega", "momentum", "energy")

@@ -30,7 +30,7 @@ from dalembert.arithmetic.records import record
 from dalembert.arithmetic.shapes import as_array, as_numbers, common_shape, filled, in_32_digits, is_doubled
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
-from rigidbody3d.states import STATE, AtTimes, PictureData, difference, in_blocks, require
+from rigidbody3d.states import STATE, AtTimes, PictureData, difference, from_start, in_blocks, require
 from rigidbody3d.top_roots import constants
 
 Array = NDArray[np.float64]
@@ -155,12 +155,13 @@ class TopState(AtTimes):
     @property
     def attitude(self) -> Array:
         """Quaternion [w, x, y, z], body to space, (..., n, 4)."""
-        return self._both[..., :4]
+        start = quaternion.normalize(as_numbers("attitude", self.top.attitude))
+        return from_start(self._both[..., :4], start, self.time)
 
     @property
     def omega(self) -> Array:
         """Angular velocity in body axes, (..., n, 3), rad/s."""
-        return self._both[..., 4:]
+        return from_start(self._both[..., 4:], self.top.omega, self.time)
 
     @cached_property
     def momentum(self) -> Array:

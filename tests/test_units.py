@@ -126,3 +126,28 @@ def test_units_of_two_meanings_are_refused(text: str, dimension: str) -> None:
     """Grams or g·m, newton or nautical, rad/s or Hz."""
     with pytest.raises(ValueError, match="unknown"):
         parse_quantity(text, dimension)
+
+
+@pytest.mark.whole
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("oz-in", "oz_in"),
+        ("N-m", "N_m"),
+        ("º", "deg"),
+        ("µm pk-pk", "um_pp"),
+        ("µm p-p", "um_pp"),
+        ("mm/s RMS", "mm_s_rms"),
+        ("mm/s r.m.s.", "mm_s_rms"),
+        ("mil pk", "mil_pk"),
+        ("mm/s 0-p", "mm_s_pk"),
+    ],
+)
+def test_spellings_of_instruments(text: str, name: str) -> None:
+    assert unit_name(text) == name
+
+
+def test_a_unit_as_people_write_it_is_read_again() -> None:
+    for dimension in ("length", "unbalance", "amplitude", "speed", "torque", "density"):
+        for unit in UNITS[dimension]:
+            assert unit_name(written(unit)) == unit

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from cli.read.options import (
     bad,
+    in_degrees,
     needed,
     number_or_quantity,
     processes,
@@ -101,7 +102,9 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
         gravity=g,
         remove=options.remove,
         mass_step=with_unit("--round-mass", options.round_mass, "mass", positive=True),
-        angle_step=with_unit("--round-angle", options.round_angle, "angle", positive=True),
+        angle_step=None
+        if options.round_angle is None
+        else in_degrees("--round-angle", options.round_angle, positive=True),
         center=quantity("--center-z", options.center_z, "length"),
         tolerance=None
         if only_forces

@@ -229,12 +229,9 @@ def _steps(b: Balancing) -> dict[str, list[float]]:
     """To what corrections are rounded, (one in SI, the step in such units) of mass and of angle."""
     steps, unit = dict[str, list[float]](), b.rotors.mass_unit
     if b.request.mass_step is not None:
-        step, of_step = b.request.mass_step
-        own = step if of_step == unit else float(from_si(to_si(step, "mass", of_step), "mass", unit))
-        steps["mass"] = [float(to_si(1.0, "mass", unit)), own]
+        steps["mass"] = [float(to_si(1.0, "mass", unit)), float(b.mass_step)]
     if b.request.angle_step is not None:
-        step, of_step = b.request.angle_step
-        steps["angle"] = [math.pi / 180, step if of_step == "deg" else math.degrees(step)]
+        steps["angle"] = [math.pi / 180, b.request.angle_step]
     return steps
 
 

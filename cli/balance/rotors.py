@@ -16,10 +16,11 @@ from dalembert.arithmetic.exact import EPS
 from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError, quote
 from dalembert.tables.table import Table, read
-from dalembert.units import from_si, to_si
+from dalembert.units import UNITS, from_si, to_si
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
+    from fractions import Fraction
 
     from balancing import ModalCorrection
     from cli.balance.modes import Modes
@@ -45,6 +46,8 @@ class Rotors:
     table: Table
     names: list[str]
     rotor: NDArray[np.intp]
+    size: Real
+    """The unbalances without their angles."""
     moment: Complex
     z: Real | None
     mass_unit: str
@@ -102,6 +105,7 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
         table,
         names,
         rotor,
+        size,
         phasor(size, angle.values, angle.unit),
         None if z is None else z.si,
         column.unit if amount == "mass" else "kg" if amount == "weight" else column.unit.split("_")[0],
@@ -118,7 +122,7 @@ class Request:
     gravity: float
     remove: bool
     mass_step: tuple[float, str] | None
-    angle_step: tuple[float, str] | None
+    angle_step: float | None
     center: float | None
     tolerance: Tolerance | None
     modes: Modes | None = None
@@ -238,17 +242,22 @@ class Balancing:
             )
             return mass, angle, made
         if request.mass_step is not None:
-            step, step_unit = request.mass_step
-            if step_unit != unit:
-                step = from_si(to_si(step, "mass", step_unit), "mass", unit)
             # a mass that is given is that of the weight there is
-            mass = np.where(np.isnan(fixed), _to_step(mass, step), mass)
+            mass = np.where(np.isnan(fixed), _to_step(mass, self.mass_step), mass)
         if request.angle_step is not None:
-            step, step_unit = request.angle_step
-            step = step if step_unit == "deg" else float(np.degrees(step))
-            angle = _to_mark(angle, step)
+            angle = _to_mark(angle, request.angle_step)
         rounded = phasor(to_si(mass, "mass", unit) * radius, angle, "deg")
         return mass, angle, -rounded if request.remove else rounded
+
+    @property
+    def mass_step(self) -> Fraction:
+        """The step of rounded masses, in the table's unit."""
+        from fractions import Fraction
+
+        assert self.request.mass_step is not None
+        step, of_step = self.request.mass_step
+        (a, b), (c, d) = (UNITS["mass"][unit] for unit in (of_step, self.rotors.mass_unit))
+        return Fraction(repr(step)) * Fraction(a) / Fraction(b) * Fraction(d) / Fraction(c)
 
     @cached_property
     def given_mass(self) -> Real:
@@ -294,6 +303,12 @@ class Balancing:
     def mass_kg(self) -> Real:
         """The masses as given out."""
         return to_si(self.mass, "mass", self.rotors.mass_unit)
+
+    @property
+    def unbalance(self) -> Real:
+        """The corrections without their angles, as given out."""
+        rounded = self.request.mass_step is not None
+        return self.mass_kg * self.radius if rounded else np.abs(self.made)
 
     @property
     def length_unit(self) -> str:
@@ -386,13 +401,17 @@ def _nonzero(value: Complex, terms: Real) -> Complex:
 
 def _to_mark(angle: Real, step: float) -> Real:
     """Round to the nearest mark on a circle whose marks begin at 0°; where the step does not divide it, the last gap is smaller."""
-    mark = _to_step(angle, step)
+    from fractions import Fraction
+
+    mark = _to_step(angle, Fraction(repr(step)))
     return np.where((mark >= 360.0) | (360.0 - angle < np.abs(mark - angle)), 0.0, mark)
 
 
-def _to_step(value: Real, step: float) -> Real:
-    """Round to a multiple of a step; a step such as 0.1 divides by 10, which prints as it should."""
-    inverse = round(1 / step) if step < 1 else 0
-    if inverse and abs(inverse * step - 1) < 4e-16:
-        return np.asarray(np.rint(value * inverse) / inverse)
-    return np.asarray(np.rint(value / step) * step)
+def _to_step(value: Real, step: Fraction) -> Real:
+    """Round to a multiple of a step, the double nearest to it.
+
+    >>> from fractions import Fraction
+    >>> _to_step(np.array([0.88, 0.31]), Fraction("0.3")).tolist()
+    [0.9, 0.3]
+    """
+    return np.asarray(np.rint(value / float(step)) * float(step.numerator) / float(step.denominator))

@@ -14,7 +14,7 @@ from cli.balance.rotors import Balancing
 from cli.read.rotor_options import verdict_table
 from dalembert.angles import degrees
 from dalembert.results.columns import Column, Table, apart, names, number, read_number, vector
-from dalembert.units import from_si
+from dalembert.units import UNITS, from_si
 
 if TYPE_CHECKING:
     from cli.balance.rotors import Complex, Real
@@ -107,7 +107,9 @@ def corrections(b: Balancing) -> Table:
 
     size, masses = np.abs(b.ideal), np.abs(b.ideal) / np.where(radius > 0, radius, np.nan)
     unit, mass_unit = rotors.unbalance_unit, rotors.mass_unit
-    unbalance = number("unbalance", "unbalance", np.abs(b.made), unit)
+    unbalance = number("unbalance", "unbalance", b.unbalance, unit)
+    if b.request.mass_step is not None:
+        unbalance.values = b.mass * _arms(radius, mass_unit, unit)
     unbalance.error = lambda: wrong(
         from_si(size, "unbalance", unit), "unbalance", unit, lambda w: w.size
     ).tolist()
@@ -139,6 +141,18 @@ def corrections(b: Balancing) -> Table:
         above=f"material to {'remove' if b.request.remove else 'add'}:",
         documented=[*([z] if planes.z is None else []), *([] if rotors.weights else [weight])],
     )
+
+
+def _arms(radius: Real, mass_unit: str, unit: str) -> Real:
+    """Return what takes masses in a unit to unbalances in another, by radii in m as they are written: 20 for g and g·mm at 20 mm."""
+    from fractions import Fraction
+
+    from cli.read.exact import written
+
+    (a, b), (c, d) = UNITS["mass"][mass_unit], UNITS["unbalance"][unit]
+    scale = Fraction(a) / Fraction(b) * Fraction(d) / Fraction(c)
+    each, where = np.unique(radius, return_inverse=True)
+    return np.array([float(written(r) * scale) if np.isfinite(r) else r for r in each.tolist()])[where]
 
 
 def states(b: Balancing) -> Table:

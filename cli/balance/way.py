@@ -119,7 +119,7 @@ def _components(b: Balancing, rotor: int, about: float | None, plane: str, scale
     shown = [c for c in COMPONENTS if about is not None or len(c) == 1]
     columns = [
         names("name", b.mass_names(rotor)),
-        number("unbalance", "unbalance", np.abs(u), unit),
+        number("unbalance", "unbalance", rotors.size[mine], unit),
         number("angle", "angle", angle),
         *([number("z", "length", z, length)] if rotors.z is not None else []),
         *(component(name, values[name]) for name in shown),

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.cases.inputs import Axis, Driven, Grid, Varied, listed, with_numbers
-from cli.read import options
-from dalembert.angles import read_degrees
+from cli.cases.inputs import Axis, Driven, Grid, Varied, with_numbers
+from cli.cases.written import DEGREES, ROWS, Range, Written, in_degrees
+from cli.read import exact, options
 from dalembert.errors import DataError
 from dalembert.hints import nearest
-from dalembert.quantities import is_number, parse_number, parse_quantity
-from dalembert.units import UNITS, to_si
+from dalembert.quantities import decimals, exactly, is_number, option_digits
+from dalembert.units import UNITS, Factor
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.units import Units
 
 if TYPE_CHECKING:
     from decimal import Decimal
+    from fractions import Fraction
 
     from numpy.typing import NDArray
 
@@ -78,7 +81,7 @@ def _named(m: Mechanism, path: str, flag: str) -> tuple[Dimension, ...]:
 
 def assigned(m: Mechanism, bare: Mapping[str, str], texts: Sequence[str]) -> Mechanism:
     """Return the mechanism after every `--set NAME=VALUE`; a point takes both coordinates as `X,Y`."""
-    numbers: dict[Dimension, float] = {}
+    numbers: dict[Dimension, Written] = {}
     for text in texts:
         dimensions, value = assigned_paths(m, text, "--set", "VALUE")
         parts = value.split(",")
@@ -95,43 +98,45 @@ def assigned(m: Mechanism, bare: Mapping[str, str], texts: Sequence[str]) -> Mec
         raise options.bad("--set", error) from None
 
 
-def quantity(of: Driven | Varied, text: str, flag: str, bare: Mapping[str, str]) -> float:
-    """Return a value as it is shown: SI, angles in degrees; a bare number is in the unit of the file."""
-    return quantities(of, [text], flag, bare)[0]
+def quantity(of: Driven | Varied, text: str, flag: str, bare: Mapping[str, str]) -> Written:
+    """Read a value; a bare number is in the unit of the file."""
+    return Written.of(*digits(of, text, flag, bare), is_angle=of.unit == "deg")
 
 
-def quantities(of: Driven | Varied, texts: Sequence[str], flag: str, bare: Mapping[str, str]) -> list[float]:
-    """Return values as they are shown: SI, angles in degrees; a bare number is in the unit of the file."""
-    kind, values = of.kind, []
-    for text in texts:
-        if isinstance(of, Driven) or (
-            kind in ("length", "angle") and not (is_number(text) and kind not in bare)
-        ):
-            values.append(place_or_angle(text, kind, flag, bare))
-            continue
-        try:
-            si = Units({}).number(text.strip(), kind, of.label)
-        except DescriptionError as error:
-            raise options.bad(flag, error) from None
-        values.append(read_degrees(si) if of.unit == "deg" else si)
-    return values
+def digits(of: Driven | Varied, text: str, flag: str, bare: Mapping[str, str]) -> tuple[str, Factor]:
+    """Read the decimals of a value, and the factor of its unit."""
+    kind = of.kind
+    if isinstance(of, Driven) or (kind in ("length", "angle") and not (is_number(text) and kind not in bare)):
+        return digits_of_place(text, kind, flag, bare)
+    parts = decimals(text.strip(), kind)
+    if parts is None:
+        # units of options may stand in capitals
+        with suppress(ValueError):
+            return option_digits(text, kind)
+    try:
+        Units({}).number(text.strip(), kind, of.label)
+    except DescriptionError as error:
+        raise options.bad(flag, error) from None
+    assert parts is not None
+    return parts
 
 
-def place_or_angle(text: str, kind: str, flag: str, bare: Mapping[str, str]) -> float:
-    """Return a length in metres, or an angle in degrees; an angle that is typed in degrees keeps its digits."""
+def place_or_angle(text: str, kind: str, flag: str, bare: Mapping[str, str]) -> Written:
+    """Read a length or an angle; a bare number is in the unit of the file."""
+    return Written.of(*digits_of_place(text, kind, flag, bare), is_angle=kind == "angle")
+
+
+def digits_of_place(text: str, kind: str, flag: str, bare: Mapping[str, str]) -> tuple[str, Factor]:
+    """Read the decimals of a length or an angle, and the factor of its unit."""
     named_unit = bare.get(kind)
     if named_unit is not None and is_number(text):
-        if named_unit in ("deg", "°"):
-            return parse_number(text)
-        si = Units({kind: named_unit}).number(text, kind, flag)
-        return si if kind == "length" else read_degrees(si)
+        parts = decimals(text, kind, Units({kind: named_unit}).factors[kind])
+        assert parts is not None
+        return parts
     try:
-        value, its_unit = parse_quantity(text, kind)
+        return option_digits(text, kind)
     except ValueError as error:
         raise options.bad(flag, error) from None
-    if kind == "length":
-        return float(to_si(value, "length", its_unit))
-    return value if its_unit == "deg" else read_degrees(value)
 
 
 # --- --at and --over --------------------------------------------------------------------------------------------------
@@ -139,14 +144,14 @@ def at_axis(m: Mechanism, texts: Sequence[str], bare: Mapping[str, str]) -> Axis
     """Return the axis of `--at crank=60deg,arm=30deg`: a row for each option."""
     rows = [input_values(m, text, "--at", bare) for text in texts]
     names = [Driven.of(m, j) for j in sorted({j for row in rows for j in row})]
-    shown = [[row.get(name.j, name.own(m)) for name in names] for row in rows]
-    return listed("--at", names, np.array(shown, dtype=float))
+    cells = [[row.get(name.j) or name.own(m) for name in names] for row in rows]
+    return Axis("--at", tuple(names), rows=np.array(cells, dtype=ROWS))
 
 
-def input_values(m: Mechanism, text: str, flag: str, bare: Mapping[str, str]) -> dict[int, float]:
-    """Return the values of `crank=60deg,arm=30deg` by input, as they are shown; a bare value belongs to the only input."""
+def input_values(m: Mechanism, text: str, flag: str, bare: Mapping[str, str]) -> dict[int, Written]:
+    """Return the values of `crank=60deg,arm=30deg` by input; a bare value belongs to the only input."""
     names = [e.name for e in m.inputs]
-    result: dict[int, float] = {}
+    result: dict[int, Written] = {}
     for part in text.split(","):
         name, equals, value = part.partition("=")
         if not equals:
@@ -176,13 +181,34 @@ def over_axis(m: Mechanism, text: str, bare: Mapping[str, str]) -> Axis:
     else:
         of = dimension_named(m, name.strip(), text, "--over")
 
-    def values(parts: list[str]) -> list[float]:
-        return quantities(of, parts, "--over", bare)
+    factor: Factor = (1, 1)
+
+    def values(parts: list[str]) -> list[Fraction]:
+        nonlocal factor
+        numbers, factor = _in_one_unit([digits(of, part, "--over", bare) for part in parts])
+        return numbers
 
     steps = options.steps("--over", span, values, "0deg:360deg:1deg")
     if steps.n > MOST:
         raise options.bad("--over", f"'{span}': {steps.n:.3g} values: expected at most {MOST:.0e}")
-    return Axis("--over", (of,), steps)
+    return Axis("--over", (of,), Range(steps, factor, of.unit == "deg"))
+
+
+def _in_one_unit(parts: list[tuple[str, Factor]]) -> tuple[list[Fraction], Factor]:
+    """Return the numbers of a range in one unit, and its factor: SI, or their own unit where π is in its factor.
+
+    >>> _in_one_unit([("0", (1, 1)), ("90", DEGREES)]), _in_one_unit([("5", (1, 1000))])
+    (([Fraction(0, 1), Fraction(90, 1)], (3.141592653589793, 180)), ([Fraction(1, 200)], (1, 1)))
+    """
+    numbers = [exactly(number, (1, 1)) for number, _ in parts]
+    factors = {factor for number, (_, factor) in zip(numbers, parts, strict=True) if number}
+    only = factors.pop() if len(factors) == 1 else None
+    if only is not None and not all(isinstance(part, int) for part in only):
+        return numbers, only
+    exact = [exactly(*part) for part in parts]
+    if DEGREES in factors:
+        return [in_degrees(x) for x in exact], DEGREES
+    return exact, (1, 1)
 
 
 # --- --cases ----------------------------------------------------------------------------------------------------------
@@ -223,14 +249,10 @@ def cases_axis(m: Mechanism, path: str, elsewhere: set[int], remarks: list[str])
                 f"{table.file}: no column {_headers(Driven.of(m, j))} for the input '{m.inputs[j].name}' {table.hint}"
             )
     remarks += table.warnings
-    shown, si = [], []
-    for name, column in columns.items():
-        value = column.si
-        si.append(value)
-        in_degrees = column.values if column.unit == "deg" else np.degrees(value)
-        shown.append(in_degrees if name.unit == "deg" else value)
+    cells = [_shown_and_si(column) for column in columns.values()]
+    shown = [each for each, _ in cells]
     order = list(columns)
-    values = np.array(si).T
+    values = np.array([si for _, si in cells]).T
     times = [table.numbers[t] for t in TIMES if t in table.numbers]
     if len(times) > 1:
         raise DataError(
@@ -244,13 +266,31 @@ def cases_axis(m: Mechanism, path: str, elsewhere: set[int], remarks: list[str])
         order, shown, values = _with_rates_at_rest(m, order, shown, values)
     elif time is not None and driven_here:
         here = [i for i, name in enumerate(order) if isinstance(name, Driven)]
-        exact = [_exact(columns[order[i]]) for i in here]
-        speed, acceleration = rates_over_time(f"{table.file}: column {time.header}", _exact(time), exact)
+        laws = [_decimals(columns[order[i]]) for i in here]
+        speed, acceleration = rates_over_time(f"{table.file}: column {time.header}", _decimals(time), laws)
         order = [*order, *(order[i].rate(1) for i in here), *(order[i].rate(2) for i in here)]  # type: ignore[union-attr]
         shown = [*shown, *speed.T, *acceleration.T]
         values = np.concatenate([values, speed, acceleration], axis=1)
     seconds = None if time is None else time.si
-    return listed("--cases", order, np.array(shown).T, values, table.texts.get("step"), seconds)
+    rows = np.zeros(values.shape, dtype=ROWS)
+    rows["shown"], rows["si"] = np.array(shown).T, values
+    rest = partial(_rest_of_columns, [*columns.values()])
+    return Axis("--cases", tuple(order), rows=rows, labels=table.texts.get("step"), time=seconds, rest=rest)
+
+
+def _shown_and_si(column: Numbers) -> tuple[Reals, Reals]:
+    """Return the numbers of a column as they are shown, and in SI."""
+    if column.unit == "deg":
+        return column.values, np.radians(column.values)
+    if column.dimension == "angle":
+        return exact.as_written(column).value, column.si
+    return column.si, column.si
+
+
+def _rest_of_columns(columns: Sequence[Numbers]) -> Reals:
+    """Return the exact numbers of columns less their floats, SI, (n, columns)."""
+    each = range(len(columns[0].values))
+    return np.array([(exact.column(c, each) - _shown_and_si(c)[1]).value for c in columns]).T
 
 
 def _headers(of: Driven) -> str:
@@ -271,7 +311,7 @@ def _with_rates_at_rest(
     return order, shown, values
 
 
-def _exact(column: Numbers) -> list[Decimal]:
+def _decimals(column: Numbers) -> list[Decimal]:
     """Return the numbers of a column in SI, as the decimals that the file has."""
     from dalembert.arithmetic.splines import decimals
 
@@ -313,20 +353,27 @@ def history_axis(m: Mechanism) -> Axis:
     # loaded where a file has a table over time
     from dalembert.arithmetic.splines import sums
 
-    def exact(values: list[float], dimension: str) -> list[Decimal]:
+    def written(values: list[float], dimension: str) -> list[Decimal]:
         return sums(values, [m.decimals.rest(dimension, x) if m.decimals else 0.0 for x in values])
 
-    columns = [exact(q[:, name.j].tolist(), name.dimension) for name in names]
+    columns = [written(q[:, name.j].tolist(), name.dimension) for name in names]
     try:
-        speed, acceleration = rates_over_time("[input] law", exact(time.tolist(), "time"), columns)
+        speed, acceleration = rates_over_time("[input] law", written(time.tolist(), "time"), columns)
     except DataError as error:
         # the name of the file is added to it
         raise DescriptionError(str(error)) from None
     shown = np.array([[name.shown(v) for name, v in zip(names, row, strict=True)] for row in q])
     order = [*names, *(name.rate(1) for name in names), *(name.rate(2) for name in names)]
-    si = np.concatenate([q, speed, acceleration], axis=1)
-    shown = np.concatenate([shown, speed, acceleration], axis=1)
-    return listed("[input] law", order, shown, si, time=time)
+    rows = np.zeros((len(q), len(order)), dtype=ROWS)
+    rows["si"] = np.concatenate([q, speed, acceleration], axis=1)
+    rows["shown"] = np.concatenate([shown, speed, acceleration], axis=1)
+    return Axis("[input] law", tuple(order), rows=rows, time=time, rest=partial(_rest_of_file, m, names, q))
+
+
+def _rest_of_file(m: Mechanism, names: Sequence[Driven], q: Reals) -> Reals:
+    """Return the exact numbers of a file less their floats, SI."""
+    rest = m.decimals.rest if m.decimals else lambda dimension, x: 0.0
+    return np.array([[rest(n.dimension, x) for n, x in zip(names, row, strict=True)] for row in q.tolist()])
 
 
 # --- all of them -----------

@@ -16,6 +16,7 @@ import numpy as np
 from cli.cases.analysis import Analysis, Request
 from cli.cases.axes import assigned, grids
 from cli.cases.inputs import Driven, Grid, Varied, of_one, with_numbers
+from cli.cases.written import written
 from cli.read.options import about, bad
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError
@@ -32,7 +33,9 @@ if TYPE_CHECKING:
     from virtualwork.describe.dimensions import Dimension
     from virtualwork.family.part import Part
 
-    Rows = NDArray[np.float64]
+    # of `Written` numbers
+    Rows = NDArray[Any]
+    Reals = NDArray[np.float64]
 
 
 class Described(NamedTuple):
@@ -153,9 +156,9 @@ class Cases:
         return 1 if self.moved is None else self.moved.n
 
     def rows(self, low: int, high: int) -> Rows:
-        """Return the numbers of the variants from low to high, as they are shown."""
+        """Return the numbers of the variants from low to high."""
         assert self.varied is not None
-        return self.varied.part(low, high).shown
+        return self.varied.written(low, high)
 
     @cached_property
     def names(self) -> tuple[Driven | Varied, ...]:
@@ -202,9 +205,8 @@ class Cases:
         if varied is None or varied.n > 1:
             return replace(self, varied=varied, moved=None)
         with naming(self.request.file):
-            row = varied.part(0, 1).shown[0].tolist()
-            numbers = [name.of for name in varied.names if isinstance(name, Varied)]
-            m = with_numbers(self.mechanism, numbers, row)
+            paths = [name.of for name in varied.names if isinstance(name, Varied)]
+            m = with_numbers(self.mechanism, paths, written(varied.written(0, 1)[0]))
         return replace(self, mechanism=m, varied=None, moved=None)
 
     # --- one variant, some variants -------------------------------------------------------------------------------
@@ -215,12 +217,9 @@ class Cases:
         ------
         MechanismError
         """
-        m = with_numbers(self.mechanism, self.dimensions, self.numbers(row[None])[0].tolist())
-        inputs = [
-            (name, float(x), float(np.radians(x)) if name.unit == "deg" else float(x))
-            for name, x in zip(self.names, row, strict=True)
-            if isinstance(name, Driven)
-        ]
+        numbers = list(zip(self.names, written(row), strict=True))
+        m = with_numbers(self.mechanism, self.dimensions, [x for of, x in numbers if isinstance(of, Varied)])
+        inputs = [(of, x) for of, x in numbers if isinstance(of, Driven)]
         return Analysis(self.request, m, of_one(m, self.moved, inputs))
 
     @property
@@ -235,11 +234,11 @@ class Cases:
     def in_si(self, rows: Rows) -> dict[str, list[float]]:
         """Return the numbers of variants by path, SI."""
         return {
-            d.path: [Varied(d).si(x) for x in column]
-            for d, column in zip(self.dimensions, self.numbers(rows).T.tolist(), strict=True)
+            d.path: column
+            for d, column in zip(self.dimensions, self.numbers(rows)["si"].T.tolist(), strict=True)
         }
 
-    def part(self, rows: Rows) -> tuple[Part, Rows]:
+    def part(self, rows: Rows) -> tuple[Part, Reals]:
         """Return variants as a part of a family, and their inputs as they are shown, (v or 1, n, k)."""
         from virtualwork.family.family import Family
         from virtualwork.family.part import Part
@@ -262,7 +261,7 @@ class Cases:
             )
             if j < 0 or (j in moved and not isinstance(name, Driven)):
                 continue
-            numbers = np.radians(column) if name.unit == "deg" else np.asarray(column, dtype=float)
+            numbers = column["si"]
             if isinstance(name, Driven) and name.order:
                 rates[name.order - 1][j] = numbers[:, None]
             elif isinstance(name, Driven) or name.of.where[-1] == "value":
@@ -270,6 +269,10 @@ class Cases:
                     si, shown = (np.repeat(x, v, axis=0) for x in (si, shown))
                 value = Driven.of(m, j)
                 si[:, :, j] = numbers[:, None]
-                cells = column if isinstance(name, Driven) else [value.shown(x) for x in numbers.tolist()]
+                cells = (
+                    column["shown"]
+                    if isinstance(name, Driven)
+                    else [value.shown(x) for x in numbers.tolist()]
+                )
                 shown[:, :, j] = np.asarray(cells)[:, None]
         return Part(m, family.dimensions, family.values, si, rates), shown

@@ -10,6 +10,7 @@ from cli.cases.analysis import Analysis
 from cli.cases.axes import dimension_named, place_or_angle
 from cli.cases.inputs import of_one, with_numbers
 from cli.cases.poses import cells_of, column, keys_of, solved
+from cli.cases.written import DEGREES, Written
 from cli.read import root_search
 from cli.read.options import bad
 from dalembert.dataclass import replace
@@ -50,9 +51,13 @@ def with_root(cases: Cases, find: str | None, so_that: str | None) -> Cases:
     component = _quantity(analysis(m), word)
     target, unit = _target(component, text, bare)
 
+    def at(x: float) -> Written:
+        is_angle = dimension.unit == "deg"
+        return Written.of(repr(x), DEGREES if is_angle else (1, 1), is_angle=is_angle)
+
     def value(x: float) -> float | None:
         try:
-            return number_at(analysis(with_numbers(m, [dimension.of], [x])), component)
+            return number_at(analysis(with_numbers(m, [dimension.of], [at(x)])), component)
         except (MechanismError, DataError):
             return None
 
@@ -63,7 +68,7 @@ def with_root(cases: Cases, find: str | None, so_that: str | None) -> Cases:
     root = root_search.search(name, sought, goal, value)
     sentence = f"{name} = {_in_unit_of_file(dimension, root, bare)} gives {word} = {root_search.amount(target, unit)}"
     found = root_search.Found(sought.header, root, sentence)
-    return replace(cases, mechanism=with_numbers(m, [dimension.of], [root]), found=found)
+    return replace(cases, mechanism=with_numbers(m, [dimension.of], [at(root)]), found=found)
 
 
 def _quantity(nominal: Analysis, word: str) -> Component:
@@ -88,7 +93,7 @@ def _target(component: Component, text: str, bare: Mapping[str, str]) -> tuple[f
     kind = {"deg": "angle", "m": "length"}.get(unit)
     if kind is None:
         return root_search.value_in(unit, text), unit
-    return place_or_angle(text, kind, "--so-that", bare), unit
+    return place_or_angle(text, kind, "--so-that", bare).shown, unit
 
 
 def _in_unit_of_file(dimension: Varied, shown: float, bare: Mapping[str, str]) -> str:

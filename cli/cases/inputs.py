@@ -7,21 +7,20 @@ the last fastest. The inputs of the poses are formed when they are needed, a par
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cli.read.options import Steps
-from dalembert.angles import read_degrees, read_radians
+from cli.cases.written import ROWS, Range, Written
+from dalembert.angles import read_degrees
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.units import UNITS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dalembert.arithmetic.doubled import Doubled
     from virtualwork import Mechanism
     from virtualwork.describe.dimensions import Dimension
 
@@ -89,10 +88,11 @@ class Driven:
         """Return a value as it is shown."""
         return si if self.slides or self.order else read_degrees(si)
 
-    def own(self, m: Mechanism) -> float:
-        """Return the file's own value as it is shown; where the file has none, that of the guess."""
+    def own(self, m: Mechanism) -> Written:
+        """Return the file's own value; where the file has none, that of the guess."""
         value = m.inputs[self.j].value
-        return self.shown(m.at[self.j] if value is None else value)
+        si = m.at[self.j] if value is None else value
+        return Written(self.shown(si), si, m.decimals.rest(self.dimension, si) if m.decimals else 0.0)
 
     @property
     def kind(self) -> str:
@@ -126,36 +126,18 @@ class Varied:
         """The unit that a bare number of it takes, as `[units]` of a file has it."""
         return self.of.kind
 
-    def si(self, shown: float) -> float:
-        """Return a value in SI."""
-        return math.radians(shown) if self.of.unit == "deg" else shown
 
-
-def with_numbers(m: Mechanism, dimensions: Sequence[Dimension], shown: Sequence[float]) -> Mechanism:
-    """Return the mechanism with other numbers, which are as they are shown."""
+def with_numbers(m: Mechanism, dimensions: Sequence[Dimension], numbers: Sequence[Written]) -> Mechanism:
+    """Return the mechanism with other numbers."""
     from virtualwork.describe.dimensions import changed
 
-    numbers = {d.path: Varied(d).si(value) for d, value in zip(dimensions, shown, strict=True)}
     if m.decimals is not None:
-        read = ((d.kind, numbers[d.path], x, _factor(d)) for d, x in zip(dimensions, shown, strict=True))
-        m = replace(m, decimals=m.decimals.and_also(read))
-    return changed(m, numbers)
-
-
-def _factor(dimension: Dimension) -> tuple[float, float]:
-    """Return numerator and denominator that take a number as it is shown to SI."""
-    return (math.pi, 180) if dimension.unit == "deg" else (1, 1)
+        rests = ((d.kind, each.si, each.rest) for d, each in zip(dimensions, numbers, strict=True))
+        m = replace(m, decimals=m.decimals.and_also(rests))
+    return changed(m, {d.path: each.si for d, each in zip(dimensions, numbers, strict=True)})
 
 
 # --- axes, and their grid ---------------------------------------------------------------------------------------------
-class Values(NamedTuple):
-    """The values of an axis at some places."""
-
-    shown: Reals
-    """(places, numbers): SI, but angles in degrees."""
-    si: Reals
-
-
 class Part(NamedTuple):
     """Some rows of a grid."""
 
@@ -166,6 +148,8 @@ class Part(NamedTuple):
     """The names of the rows: those of a table, else their numbers from 1."""
     time: Reals | None
     """The times of a law of motion, s."""
+    rest: Callable[[], Reals]
+    """The exact numbers less their floats, SI."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,59 +162,55 @@ class Axis:
         Where they were requested, for messages.
     names : tuple of Driven or Varied
         The inputs, rates of inputs or dimensions that they are values of.
-    steps : Steps, optional
-        The range.
-    rows : Values, optional
+    range : Range, optional
+    rows : array (rows, names), optional
+        Of `Written` numbers.
     labels : sequence of str, optional
         The names of the rows.
     time : array, optional
         The times of the rows, s.
+    rest : function, optional
+        Returns what the first names of the rows are exactly less their floats, SI, where the rows do not have it: of a long
+        table it takes time.
     """
 
     option: str
     names: tuple[Driven | Varied, ...]
-    steps: Steps | None = None
-    rows: Values | None = None
+    range: Range | None = None
+    rows: NDArray[Any] | None = None
     labels: Sequence[str] | None = None
     time: Reals | None = None
+    rest: Callable[[], Reals] | None = None
 
     @property
     def n(self) -> int:
         """The number of values."""
-        if self.steps is not None:
-            return self.steps.n
-        return 0 if self.rows is None else len(self.rows.shown)
+        if self.range is not None:
+            return self.range.steps.n
+        return 0 if self.rows is None else len(self.rows)
 
-    def at(self, i: NDArray[np.intp]) -> Values:
-        """Return the values at some places."""
+    def at(self, i: NDArray[np.intp]) -> tuple[Reals, Reals]:
+        """Return the values at some places as they are shown, and in SI, (places, names)."""
         if self.rows is not None:
-            return Values(self.rows.shown[i], self.rows.si[i])
-        assert self.steps is not None
-        shown = self.steps.at(i)[:, None]
-        return Values(shown, _in_si(self.names, shown))
+            return self.rows["shown"][i], self.rows["si"][i]
+        assert self.range is not None
+        shown, si = self.range.at(i)
+        return shown[:, None], si[:, None]
 
+    def rest_at(self, i: NDArray[np.intp]) -> Reals:
+        """Return the exact values at some places less their floats, SI."""
+        if self.range is not None:
+            return np.asarray((self.range.exact(i) - self.range.at(i)[1]).value)[:, None]
+        return self._rests[i]
 
-def listed(
-    option: str,
-    names: Sequence[Driven | Varied],
-    shown: Reals,
-    si: Reals | None = None,
-    labels: Sequence[str] | None = None,
-    time: Reals | None = None,
-) -> Axis:
-    """Return an axis of rows."""
-    if si is None:
-        si = shown.copy()
-        for j, name in enumerate(names):
-            if name.unit == "deg":
-                si[:, j] = list(map(read_radians, shown[:, j].tolist()))
-    rows = Values(shown, si)
-    return Axis(option, tuple(names), rows=rows, labels=labels, time=time)
-
-
-def _in_si(names: Sequence[Driven | Varied], shown: Reals) -> Reals:
-    degrees = [name.unit == "deg" for name in names]
-    return np.where(degrees, np.radians(shown), shown)
+    @cached_property
+    def _rests(self) -> Reals:
+        """Those of all rows."""
+        assert self.rows is not None
+        if self.rest is None:
+            return np.asarray(self.rows["rest"])
+        rest = self.rest()
+        return np.pad(rest, ((0, 0), (0, len(self.names) - rest.shape[1])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,14 +232,31 @@ class Grid:
     def part(self, low: int, high: int) -> Part:
         """Return the rows from low to high, or to the last."""
         axes, high = self.axes, min(high, self.n)
-        places: Any = np.arange(low, high)
-        each = np.unravel_index(places, [axis.n for axis in axes]) if len(axes) > 1 else [places]
-        parts = [axis.at(i) for axis, i in zip(axes, each, strict=True)]
+        parts = [axis.at(i) for axis, i in self._places(low, high)]
         shown, si = (np.concatenate(values, axis=1) for values in zip(*parts, strict=True))
         # the names and times of the rows of a table, where nothing else varies
         names, time = (axes[0].labels, axes[0].time) if len(axes) == 1 else (None, None)
         labels = [str(i + 1) for i in range(low, high)] if names is None else list(names[low:high])
-        return Part(shown, si, labels, None if time is None else time[low:high])
+        rest = partial(self.rest, low, high)
+        return Part(shown, si, labels, None if time is None else time[low:high], rest)
+
+    def rest(self, low: int, high: int) -> Reals:
+        """Return the exact numbers of the rows from low to high less their floats, SI."""
+        return np.concatenate([axis.rest_at(i) for axis, i in self._places(low, high)], axis=1)
+
+    def written(self, low: int, high: int) -> NDArray[Any]:
+        """Return the rows from low to high, or to the last, as `Written` numbers."""
+        part = self.part(low, high)
+        rows = np.empty(part.si.shape, dtype=ROWS)
+        rows["shown"], rows["si"], rows["rest"] = part.shown, part.si, part.rest()
+        return rows
+
+    def _places(self, low: int, high: int) -> Iterator[tuple[Axis, NDArray[np.intp]]]:
+        """Yield each axis with the places in it of the rows from low to high."""
+        places: Any = np.arange(low, high)
+        several = len(self.axes) > 1
+        each = np.unravel_index(places, [axis.n for axis in self.axes]) if several else [places]
+        return zip(self.axes, each, strict=True)
 
 
 # --- the inputs of the poses of one mechanism -------------------------------------------------------------------------
@@ -276,6 +273,8 @@ class Inputs:
     steps: list[str] = field(default_factory=list)
     time: Reals | None = None
     """(n,) s, of a law of motion over time."""
+    rest: Callable[[], Reals] | None = None
+    """What the inputs are exactly less their floats, SI, (n, k)."""
 
     @property
     def n(self) -> int:
@@ -297,41 +296,18 @@ class Inputs:
         """The least and the largest value of the first input."""
         return float(self.values[:, 0].min()), float(self.values[:, 0].max())
 
-    def rest(self) -> Reals:
-        """Return the exact inputs, by their decimals in degrees, metres or radians, less the floats in SI, (n, k)."""
-        from dalembert.arithmetic.doubled import PI, Doubled
-
-        rest = np.zeros(self.values.shape)
-        for j, (si, shown) in enumerate(zip(self.values.T, self.shown.T, strict=True)):
-            exact, unit = decimals(shown), 1.0 if np.array_equal(si, shown) else PI / 180.0
-            if exact is None and (exact := decimals(si)) is not None:
-                # it is written in radians
-                unit = 1.0
-            rest[:, j] = ((exact or Doubled(shown)) * unit - Doubled(si)).value
-        return rest
-
     def part(self, low: int, high: int) -> Inputs:
         """Return the poses from low to high."""
         speed, acceleration = (None if r is None else r[low:high] for r in (self.speed, self.acceleration))
         time = None if self.time is None else self.time[low:high]
+        rest = None if self.rest is None else partial(_rows_of, self.rest, low, high)
         return Inputs(
-            self.values[low:high], self.shown[low:high], speed, acceleration, self.steps[low:high], time
+            self.values[low:high], self.shown[low:high], speed, acceleration, self.steps[low:high], time, rest
         )
 
 
-def decimals(shown: Reals) -> Doubled | None:
-    """Return the decimals of numbers in 32 digits; None of numbers with many decimals.
-
-    >>> float(decimals(np.array([0.1, 2.5])).low[0])
-    -5.551115123125783e-18
-    """
-    from dalembert.arithmetic.doubled import Doubled
-
-    for places in range(13):
-        whole = np.rint(shown * 10.0**places)
-        if (np.abs(whole) < 2.0**53).all() and (whole / 10.0**places == shown).all():
-            return Doubled(whole) / 10.0**places
-    return None
+def _rows_of(rest: Callable[[], Reals], low: int, high: int) -> Reals:
+    return rest()[low:high]
 
 
 @dataclass(frozen=True, eq=False)
@@ -342,15 +318,15 @@ class InputGrid:
     ----------
     names : tuple of Driven
         The inputs.
-    held : array (k,), array (k,)
-        What the grid does not move, as it is shown and in SI.
+    held : sequence of Written
+        What the grid does not move.
     rates : dict of Driven to float
         Rates that a row of a table gives all poses.
     """
 
     grid: Grid
     names: tuple[Driven, ...]
-    held: Values
+    held: Sequence[Written]
     rates: dict[Driven, float] = field(default_factory=dict)
 
     @property
@@ -368,11 +344,11 @@ class InputGrid:
     def span(self) -> tuple[float, float]:
         """The least and the largest value of the first input."""
         first, *others = self.grid.axes
-        if others or first.steps is None:
+        if others or first.range is None:
             return self.whole.span
         if first.names[0] != self.names[0]:
-            return (float(self.held.si[0]),) * 2
-        ends = first.at(np.array([0, first.n - 1])).si[:, 0].tolist()
+            return (self.held[0].si,) * 2
+        ends = first.at(np.array([0, first.n - 1]))[1][:, 0].tolist()
         return min(ends), max(ends)
 
     def part(self, low: int, high: int) -> Inputs:
@@ -380,7 +356,7 @@ class InputGrid:
         moved = self.grid.part(low, high)
         n = len(moved.shown)
         # what is held, and in its place what the grid moves
-        shown, values = (np.tile(held, (n, 1)) for held in self.held)
+        shown, values = (np.tile([each[i] for each in self.held], (n, 1)) for i in range(2))
         rates = {order: np.zeros((n, len(self.names))) for order in self.orders}
         for name, rate in self.rates.items():
             rates[name.order][:, name.j] = rate
@@ -390,7 +366,17 @@ class InputGrid:
                 rates[of.order][:, of.j] = moved.si[:, i]
             else:
                 shown[:, of.j], values[:, of.j] = moved.shown[:, i], moved.si[:, i]
-        return Inputs(values, shown, rates.get(1), rates.get(2), moved.labels, moved.time)
+        rest = partial(self._rest, moved.rest, n)
+        return Inputs(values, shown, rates.get(1), rates.get(2), moved.labels, moved.time, rest)
+
+    def _rest(self, moved: Callable[[], Reals], n: int) -> Reals:
+        """Return the exact inputs less their floats, SI, where the grid moves some."""
+        rest = np.tile([each.rest for each in self.held], (n, 1))
+        for of, column in zip(self.grid.names, moved().T, strict=True):
+            assert isinstance(of, Driven)
+            if not of.order:
+                rest[:, of.j] = column
+        return rest
 
     @cached_property
     def whole(self) -> Inputs:
@@ -398,23 +384,19 @@ class InputGrid:
         return self.part(0, self.n)
 
 
-def of_one(
-    m: Mechanism, grid: Grid | None, row: Sequence[tuple[Driven, float, float]] = ()
-) -> Inputs | InputGrid:
+def of_one(m: Mechanism, grid: Grid | None, row: Sequence[tuple[Driven, Written]] = ()) -> Inputs | InputGrid:
     """Return the inputs of a mechanism: those of a grid; an input that the grid does not move stays at the file's pose.
 
-    `row`: inputs and rates that a row of variants sets, as they are shown and in SI.
+    `row`: inputs and rates that a row of variants sets.
     """
     names = tuple(Driven.of(m, j) for j in range(len(m.inputs)))
-    own = [m.at[j] if e.value is None else e.value for j, e in enumerate(m.inputs)]
-    shown = [name.shown(value) for name, value in zip(names, own, strict=True)]
+    held = [name.own(m) for name in names]
     rates = {}
-    for name, value, si in row:
+    for name, value in row:
         if name.order:
-            rates[name] = si
+            rates[name] = value.si
         else:
-            shown[name.j], own[name.j] = value, si
-    held = Values(np.array(shown, dtype=float), np.array(own, dtype=float))
+            held[name.j] = value
     if grid is not None:
         return InputGrid(grid, names, held, rates)
     listed = {
@@ -422,4 +404,5 @@ def of_one(
         for order in (1, 2)
         if any(name.order == order for name in rates)
     }
-    return Inputs(held.si[None], held.shown[None], listed.get(1), listed.get(2), ["1"])
+    shown, si, rest = (np.array([row], dtype=float) for row in zip(*held, strict=True))
+    return Inputs(si, shown, listed.get(1), listed.get(2), ["1"], rest=rest.copy)

@@ -326,7 +326,9 @@ class Variants:
         headers = [d.header for d in cases.dimensions]
         return [
             {"variant": str(self.first + i), "set": dict(zip(headers, row, strict=True)), **document}
-            for i, (row, document) in enumerate(zip(cases.numbers(self.rows).tolist(), listed, strict=True))
+            for i, (row, document) in enumerate(
+                zip(cases.numbers(self.rows)["shown"].tolist(), listed, strict=True)
+            )
         ]
 
     # --- as a table -----------------------------------------------------------------------------------------------
@@ -342,7 +344,7 @@ class Variants:
             below = joined([table for table, _ in parts])
         names = [str(self.first + i) for i, n in enumerate(lengths.tolist()) for _ in range(n)]
         dimensions = self.study.cases.dimensions
-        numbers = np.repeat(self.study.cases.numbers(self.rows), lengths, axis=0).T
+        numbers = np.repeat(self.study.cases.numbers(self.rows)["shown"], lengths, axis=0).T
         lead = [
             Column("variant", "", names),
             *(Column(d.path, d.unit, x) for d, x in zip(dimensions, numbers, strict=True)),

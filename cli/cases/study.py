@@ -84,7 +84,9 @@ class PoseCase(Case):
             table = form(block)
             if pattern is None:
                 # the columns of the block, or of the guess's own pose: of that which is assembled
-                at_guess = block.at(replace(block.inputs.part(0, 1), values=np.array([a.mechanism.at])))
+                at_guess = block.at(
+                    replace(block.inputs.part(0, 1), values=np.array([a.mechanism.at]), rest=None)
+                )
                 pattern = max(table, form(at_guess), key=lambda each: len(each.columns))
             yield like(pattern, table)
 

@@ -13,7 +13,7 @@ from math import inf, isfinite, remainder, tau
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dalembert.errors import DataError, quote
+from dalembert.errors import DataError, quote, toml_text
 from dalembert.hints import nearest
 from dalembert.quantities import is_number
 from dalembert.results.text import plain
@@ -152,7 +152,8 @@ class _Place:
     file: str
 
     def error(self, where: str, value: object, expected: str) -> DataError:
-        return DataError(f"{self.file}: {where}: found {quote(str(value))}, expected {expected}")
+        shown = quote(value) if isinstance(value, str) else toml_text(value)
+        return DataError(f"{self.file}: {where}: found {shown}, expected {expected}")
 
     def known(self, table: object, keys: tuple[str, ...], where: str) -> None:
         """Refuse a key that means nothing."""

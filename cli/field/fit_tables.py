@@ -406,8 +406,13 @@ def _errors(b: FieldBalancing, rows: Rows, size: Real) -> list[Column]:
     return [
         *columns,
         Column("reading_sd", b.runs.amplitude_unit, of_rotor(lambda one: one.reading_sd)),
-        Column("degrees_of_freedom", "", np.where(np.isfinite(freedom), freedom, np.nan)),
+        Column("degrees_of_freedom", "", [_count(x) for x in freedom.tolist()]),
     ]
+
+
+def _count(x: float) -> float | None:
+    """Return a count as a whole number; of an infinite one the cell is empty."""
+    return int(x) if x.is_integer() else x if np.isfinite(x) else None
 
 
 def _correlations(one: CoefficientSpread) -> NDArray[np.object_]:

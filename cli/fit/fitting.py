@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ from cli.read import options
 from cli.show.picture import blank
 from cli.show.result import Result
 from dalembert.angles import read_degrees
+from dalembert.arithmetic.exact import EPS
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError
 from dalembert.results.columns import ABSENT, Column, Table, names, number
@@ -171,7 +172,7 @@ def bounds(m: Mechanism, free: Sequence[str], bare: Mapping[str, str]) -> dict[s
         if len(ends) != 2:
             raise options.bad("--free", f"'{text}': expected NAME=LOW:HIGH, such as {first.path}=...:...")
         of = Varied(first)
-        low, high = (of.si(quantity(of, end, "--free", bare)) for end in ends)
+        low, high = (quantity(of, end, "--free", bare).si for end in ends)
         if not low < high:
             raise options.bad(
                 "--free", f"'{text}': expected the lower bound first, and a higher one after it"
@@ -199,22 +200,50 @@ def _shown(dimension: Dimension, si: float) -> float:
     return read_degrees(si) if dimension.unit == "deg" else si
 
 
-def _misses(fit: Fit[Mechanism], every: Sequence[Sequence[Reached]]) -> list[Column]:
-    """Return r.m.s. and largest distance of all lengths, of all angles and of all efforts; a row for each group."""
+def _misses(fits: Sequence[Fit[Mechanism]], every: Sequence[Sequence[Reached]]) -> list[Column]:
+    """Return r.m.s. and largest distance of all lengths, of all angles and of all efforts; a row for each group, of the fit beside it."""
+    fit = fits[0]
     columns = []
     for dimension in ("length", "angle", "torque", "force"):
         rows = [[_size(r, r.distances) for r in group if _dimension(fit, r) == dimension] for group in every]
         if any(rows):
             parts = [np.concatenate(row) if row else np.array([np.nan]) for row in rows]
             # a target of the other kind has none
-            rms, most = ([norm(part) for part in parts] for norm in (_rms, np.max))
             absent = [not row for row in rows]
-            for name, values in (("rms", rms), ("max", most)):
-                column = number(name, dimension, values)
+            for name, norm in (("rms", _rms), ("max", np.max)):
+                errors = partial(_largest_errors, fits, every, dimension, norm)
+                column = number(name, dimension, [norm(part) for part in parts], error=errors)
                 cells = zip(column.documented, absent, strict=True)
                 column.stored = [ABSENT if none else value for value, none in cells]
                 columns.append(column)
     return columns
+
+
+def _largest_errors(
+    fits: Sequence[Fit[Mechanism]],
+    every: Sequence[Sequence[Reached]],
+    dimension: str,
+    norm: Callable[[Any], float],
+) -> list[float]:
+    """Return the rounding errors of a norm of distances; a row for each group."""
+    rows = [
+        [_size(r, _errors(fit, r)[1]) for r in group if _dimension(fit, r) == dimension]
+        for fit, group in zip(fits, every, strict=True)
+    ]
+    return [norm(np.concatenate(row)) if row else 0.0 for row in rows]
+
+
+def _errors(fit: Fit[Mechanism], each: Reached) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the rounding errors of the values of a quantity and of their distances from the target, SI."""
+    from virtualwork.family.design import place_key
+
+    motion = fit.mechanism.motion(each.inputs)
+    (error,) = motion.error_estimates(each.name).values()
+    # the fit computes a value in another order
+    apart = motion.value(place_key(fit.mechanism, each.name)) - each.values
+    apart = np.abs(np.remainder(apart + np.pi, 2 * np.pi) - np.pi if each.kind == "angle" else apart)
+    # a target is the double nearest to its decimals, and a difference is rounded
+    return error + apart, error + apart + EPS * (np.abs(each.target) + each.distances)
 
 
 def _rms(distances: NDArray[np.float64]) -> float:
@@ -233,13 +262,10 @@ def _numbers(solutions: Sequence[Fit[Mechanism]], place: str | None = None) -> T
         )
         for i, d in enumerate(best.dimensions)
     ]
-    columns += _misses(best, [solution.reached for solution in solutions])
+    columns += _misses(solutions, [solution.reached for solution in solutions])
     if not others:
         counts = {"starts": best.starts, "evaluations": best.evaluations}
-        columns += [
-            Column(name, "", [float(count)] * len(solutions), place=name, stored=[count])
-            for name, count in counts.items()
-        ]
+        columns += [Column(name, "", [count] * len(solutions), place=name) for name, count in counts.items()]
     if len(solutions) == 1 and not others:
         return Table(columns, place=place)
     return Table([_solution(solutions), *columns], ("solution",), place)
@@ -252,7 +278,8 @@ def _solution(solutions: Sequence[Fit[Mechanism]]) -> Column:
 def _misses_by_target(solutions: Sequence[Fit[Mechanism]], place: str) -> Table:
     """Return a row for each solution and target."""
     every = [r for solution in solutions for r in solution.reached]
-    columns = [names("name", [_name(r) for r in every]), *_misses(solutions[0], [[r] for r in every])]
+    owners = [solution for solution in solutions for _ in solution.reached]
+    columns = [names("name", [_name(r) for r in every]), *_misses(owners, [[r] for r in every])]
     keys: tuple[str, ...] = ("name",)
     if place.endswith("[]"):
         numbers = [str(i) for i, solution in enumerate(solutions, 1) for _ in solution.reached]
@@ -308,13 +335,16 @@ def _places(fit: Fit[Mechanism]) -> dict[str, Callable[[], Table]]:
         for each in reached:
             name = "" if len(fit.reached) == 1 else f"{_name(each)}_"
             what = {"angle": "angle", "point": "", "slide": "position"}.get(each.kind, _dimension(fit, each))
+            errors = cache(lambda each=each: [_size(each, error) for error in _errors(fit, each)])
             for title, values in (("", each.values), ("target_", each.target)):
                 parts = {what: _size(each, values)} if what else {"x": values.real, "y": values.imag}
+                own = None if title else lambda of=errors: of()[0]
                 columns += [
-                    number(f"{name}{title}{part}", _dimension(fit, each), values)
+                    number(f"{name}{title}{part}", _dimension(fit, each), values, error=own)
                     for part, values in parts.items()
                 ]
-            columns.append(number(f"{name}distance", _dimension(fit, each), _size(each, each.distances)))
+            far, off = _size(each, each.distances), lambda of=errors: of()[1]
+            columns.append(number(f"{name}distance", _dimension(fit, each), far, error=off))
         return Table(columns)
 
     names = ["points" if i == 0 else f"points {i + 1}" for i in range(len(by_target))]

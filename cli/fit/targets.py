@@ -134,8 +134,7 @@ def kept(m: Mechanism, texts: Sequence[str] | None, bare: Mapping[str, str]) -> 
             )
         path, kind = choices[name]
         if kind in ("length", "angle"):
-            number = place_or_angle(value, kind, "--keep", bare)
-            number = math.radians(number) if kind == "angle" else number
+            number = place_or_angle(value, kind, "--keep", bare).si
         elif is_number(value):
             number = parse_number(value)
         else:

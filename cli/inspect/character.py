@@ -292,7 +292,7 @@ def operations(analysis: Analysis) -> Table:
         keys += [Effort(j) for j in range(len(m.inputs))]
         if motion.poses.takes(keys):
             counts["forces"] = motion.poses.operations(keys)
-    return Table([names(what, [float(count)], None) for what, count in counts.items()], place="")
+    return Table([names(what, [count], None) for what, count in counts.items()], place="")
 
 
 def working(analysis: Analysis) -> Table:

@@ -327,8 +327,8 @@ def way(p: Placing, name: str = "") -> list[Topic]:
         rows = Table(
             [
                 names("position", [str(m.place + 1) for m in its]),
-                number("mass", "mass", np.abs(placed), unit),
-                number("angle", "angle", degrees(placed)),
+                number("mass", "mass", [m.mass for m in its], unit),
+                number("angle", "angle", [m.angle for m in its]),
                 number("x", "mass", placed.real, unit),
                 number("y", "mass", placed.imag, unit),
             ],

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from dalembert.arithmetic.doubled import PI, Doubled
 from dalembert.arithmetic.doubled_arrays import DoubledArray
 from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array
-from dalembert.quantities import decimals, exactly
+from dalembert.quantities import exactly, option_digits
 from dalembert.tables.table import Numbers
 from dalembert.units import UNITS
 
@@ -42,9 +42,7 @@ def quantity(text: str, dimension: str) -> Doubled:
     >>> quantity("0.1 mm", "length").high
     0.0001
     """
-    parts = decimals(text, dimension)
-    assert parts is not None
-    return Doubled.of(exactly(*parts))
+    return Doubled.of(exactly(*option_digits(text, dimension)))
 
 
 def turns(angle: Numbers) -> Vectors:

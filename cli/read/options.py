@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import typer
 
 from dalembert.angles import in_turn
-from dalembert.errors import DataError
+from dalembert.errors import DataError, toml_text
 from dalembert.hints import nearest
 
 if TYPE_CHECKING:
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
     import numpy as np
     from numpy.typing import NDArray
+
+    from dalembert.arithmetic.doubled import Doubled
 
 
 STATES = 250_000  # what a gigabyte holds, integrated and shown
@@ -109,10 +111,10 @@ def quantity(flag: str, text: str | None, dimension: str, *, positive: bool = Fa
     return None if text is None else needed(flag, text, dimension, positive=positive)
 
 
-def in_degrees(flag: str, text: str) -> float:
-    """Read an angle; one given in degrees is not turned to radians and back."""
-    value, unit = _read(flag, text, "angle", positive=False)
-    return value if unit == "deg" else value * 180 / math.pi
+def in_degrees(flag: str, text: str, *, positive: bool = False) -> float:
+    """Read an angle in degrees."""
+    _read(flag, text, "angle", positive)
+    return float(exact_degrees(text))
 
 
 def mass_at(
@@ -220,11 +222,9 @@ def exact_degrees(text: str) -> Fraction:
     """
     from fractions import Fraction
 
-    from dalembert.quantities import PI, decimals, exactly
+    from dalembert.quantities import PI, exactly, option_digits
 
-    parts = decimals(text, "angle")
-    assert parts is not None
-    return exactly(*parts) * 180 / Fraction(*PI)
+    return exactly(*option_digits(text, "angle")) * 180 / Fraction(*PI)
 
 
 def exact_places(
@@ -300,17 +300,34 @@ class Steps(NamedTuple):
         """The values at some places."""
         import numpy as np
 
-        largest = max(abs(self.first), abs(self.first + (self.n - 1) * self.each), self.below)
-        if largest < 2**53:
-            # whole numbers that doubles hold exactly: one rounding, that of the division
+        if self._fits:
+            # one rounding, that of the division
             return np.asarray((self.first + i * self.each) / self.below)
         return np.array([(self.first + k * self.each) / self.below for k in i.tolist()])
 
+    def exact(self, i: NDArray[np.intp]) -> Doubled:
+        """The values at some places in 32 digits."""
+        from fractions import Fraction
 
-def steps(flag: str, text: str, read: Callable[[list[str]], list[float]], example: str) -> Steps:
+        from dalembert.arithmetic.doubled import Doubled
+        from dalembert.arithmetic.doubled_vectors import doubled_array
+
+        if self._fits:
+            return Doubled((self.first + i * self.each).astype(float)) / float(self.below)
+        return doubled_array([Fraction(self.first + k * self.each, self.below) for k in i.tolist()], i.shape)
+
+    @property
+    def _fits(self) -> bool:
+        """Whether doubles hold the whole numbers exactly."""
+        return max(abs(self.first), abs(self.first + (self.n - 1) * self.each), self.below) < 2**53
+
+
+def steps(
+    flag: str, text: str, read: Callable[[list[str]], list[float] | list[Fraction]], example: str
+) -> Steps:
     """Read `START:STOP:STEP` or `START:STOP/N` (N equal steps); a step that divides the range includes its end.
 
-    `read` reads the two or three.
+    `read` reads the two or three; of floats the decimals that they print as count.
     """
     from fractions import Fraction
 
@@ -325,7 +342,7 @@ def steps(flag: str, text: str, read: Callable[[list[str]], list[float]], exampl
     if len(parts) != (2 if count else 3):
         raise bad(flag, f"'{text}': expected START:STOP:STEP or START:STOP/N, such as {example}")
     # the decimals that the numbers print as, exactly: 50mm and a step of 1mm are 0.051, not 0.051000000000000004
-    start, stop, *by = [Fraction(repr(value)) for value in read(parts)]
+    start, stop, *by = [Fraction(repr(x)) if isinstance(x, float) else x for x in read(parts)]
     if count is None:
         if by[0] == 0 or (stop - start) * by[0] < 0:
             raise bad(flag, f"'{text}': a step of {parts[2]} never gets from {parts[0]} to {parts[1]}")
@@ -368,21 +385,27 @@ HEAD = ("title", "machine", "customer", "date", "author")
 
 
 def about(file: str, document: Mapping[str, object]) -> dict[str, str]:
-    """Read the table `[report]`: texts, a date may be TOML's own.
+    """Read the table `[report]`: texts; a date may be TOML's own, or a bare year.
 
     Raises
     ------
     DataError
         No table, an unknown key, or a value that is no text.
     """
+    from datetime import date
+
     result = document.get("report", {})
     if not isinstance(result, dict):
-        raise DataError(f"{file}: [report]: expected a table with some of {', '.join(HEAD)}")
+        raise DataError(
+            f"{file}: [report]: found {toml_text(result)}, expected a table with some of {', '.join(HEAD)}"
+        )
     for key, value in result.items():
         if key not in HEAD:
             raise DataError(
                 f"{file}: [report]: unknown key '{key}': expected {', '.join(HEAD)}{nearest(key, HEAD)}"
             )
-        if isinstance(value, (dict, list)):
-            raise DataError(f"{file}: [report] {key}: expected text")
+        kinds = (str, date, int) if key == "date" else (str,)
+        if isinstance(value, bool) or not isinstance(value, kinds):
+            expected = "text in quotes, or a date" if key == "date" else "text in quotes"
+            raise DataError(f"{file}: [report] {key}: found {toml_text(value)}, expected {expected}")
     return {key: str(value) for key, value in result.items()}

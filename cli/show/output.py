@@ -139,8 +139,10 @@ def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> 
     from dalembert.results.text import csv_text, paragraphs, table_text
 
     verdict = "" if checked is None else f"{table_text(checked.table.cells)}\n{checked.summary}"
+    # JSON keeps every digit
+    every_digit, result = result, _with_further_cut(result) if options.digits else result
     if options.json:
-        sys.stdout.writelines(_json_parts(result))
+        sys.stdout.writelines(_json_parts(every_digit))
         if checked is not None:
             print(verdict, file=sys.stderr)
     elif checked is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
 from functools import cached_property
@@ -274,11 +273,8 @@ class Simulation(Study):
         """Return the inputs at which it ends, SI."""
         if self.until is None:
             return None
-        shown = input_values(m, self.until, "--until", self.cases.bare)
-        return {
-            m.inputs[j].name: value if m.inputs[j].is_slide else math.radians(value)
-            for j, value in shown.items()
-        }
+        levels = input_values(m, self.until, "--until", self.cases.bare)
+        return {m.inputs[j].name: value.si for j, value in levels.items()}
 
     def case(self, analysis: Analysis) -> Motion:
         """Return the motion of one mechanism."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cli.read.options import about
-from dalembert.errors import DataError
+from dalembert.errors import DataError, toml_text
 from dalembert.hints import nearest
 from dalembert.quantities import decimals, exactly, expected, number_in_si
 from dalembert.results.columns import document_unit, finite
@@ -144,16 +144,19 @@ def read_body(path: str) -> TurningBody:
     torque = document.get("torque")
     frame = document.get("frame", "body")
     if frame not in ("body", "space"):
-        raise DataError(f'{file}: frame: found {frame!r}, expected "body" or "space"')
+        raise DataError(f'{file}: frame: found {toml_text(frame)}, expected "body" or "space"')
     if "frame" in document and torque is None:
         warnings.append(f"{file}: frame: these are the axes of a torque, and there is none: not used")
     try:
         attitude = normalize(numbers("attitude", document.get("attitude", [1, 0, 0, 0]), (4,)))
     except ValueError as error:
         raise DataError(f"{file}: attitude: {error}") from None
+    name = document.get("name", "")
+    if not isinstance(name, str):
+        raise DataError(f"{file}: name: found {toml_text(name)}, expected text in quotes")
     return TurningBody(
         file,
-        str(document.get("name", "")),
+        name,
         inertia,
         numbers("omega", document["omega"], (3,)),
         attitude,
@@ -172,7 +175,7 @@ def _of_parts(
 ) -> tuple[Array, Callable[[], DoubledArray], list[str]]:
     """Return the tensor of a table of parts, the same to 32 digits, and warnings."""
     if not isinstance(named, str):
-        raise DataError(f"{file}: parts: found {named!r}, expected the name of a CSV file")
+        raise DataError(f"{file}: parts: found {toml_text(named)}, expected the name of a CSV file")
     from cli.read.parts import read_parts
 
     parts = read_parts(str((Path() if path == "-" else Path(path).parent) / named))
@@ -211,7 +214,9 @@ def _written(file: str, key: str, value: object, *shapes: tuple[int, ...]) -> Wr
             if dimension == "number"
             else f" in {spelled(document_unit(dimension))}, or {expected(dimension)}"
         )
-        raise DataError(f"{file}: {key}: found {value!r}, expected {wanted} finite number{plural}{units}")
+        raise DataError(
+            f"{file}: {key}: found {toml_text(value)}, expected {wanted} finite number{plural}{units}"
+        )
     return Written(array, texts.ravel().tolist(), dimension)
 
 

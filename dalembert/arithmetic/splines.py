@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     Decimals = list[Decimal]
 
 DIGITS = 40
+# relative: four digits for the rounding of the terms themselves; decimals of 17 digits differ by more
+ROUNDED = Decimal("1e-36")
 
 
 def decimals(numbers: Iterable[str], factor: Factor = (1, 1)) -> Decimals:
@@ -69,11 +71,11 @@ def periodic(x: Sequence[Decimal], y: Sequence[Decimal]) -> Decimals:
         split = -diagonal[0]
         diagonal[0] -= split
         diagonal[-1] -= corner * corner / split
-        right = [6 * (slope[i] - slope[i - 1]) for i in range(n)]
+        right = [6 * _sum(slope[i], -slope[i - 1]) for i in range(n)]
         bends = _solved(h, diagonal, h, right)
         ends = _solved(h, diagonal, h, [split, *(0 * x for x in h[2:]), corner])
         share = (bends[0] + corner * bends[-1] / split) / (1 + ends[0] + corner * ends[-1] / split)
-        return [bend - share * end for bend, end in zip(bends, ends, strict=True)]
+        return [_sum(bend, -share * end) for bend, end in zip(bends, ends, strict=True)]
 
 
 def rates(x: Sequence[Decimal], y: Sequence[Decimal]) -> tuple[Decimals, Decimals]:
@@ -97,17 +99,25 @@ def rates(x: Sequence[Decimal], y: Sequence[Decimal]) -> tuple[Decimals, Decimal
         h, slope = _steps(x, y)
         diagonal = [2 * (a + b) for a, b in pairwise(h)]
         above, below = h[1:-1], h[1:-1]
-        right = [6 * (b - a) for a, b in pairwise(slope)]
+        right = [6 * _sum(b, -a) for a, b in pairwise(slope)]
         # M at both ends by the two next to it
         for at, beside, (end, following) in ((0, above, h[:2]), (-1, below, h[:-3:-1])):
             diagonal[at] += end + end * end / following
             beside[at] -= end * end / following
         inner = _solved(below, diagonal, above, right)
-        first = inner[0] + (inner[0] - inner[1]) * h[0] / h[1]
-        last = inner[-1] + (inner[-1] - inner[-2]) * h[-1] / h[-2]
+        first = _sum(inner[0], inner[0] * h[0] / h[1], -inner[1] * h[0] / h[1])
+        last = _sum(inner[-1], inner[-1] * h[-1] / h[-2], -inner[-2] * h[-1] / h[-2])
         bends = [first, *inner, last]
-        speeds = [s - w * (2 * a + b) / 6 for s, w, (a, b) in zip(slope, h, pairwise(bends), strict=True)]
-        return [*speeds, slope[-1] + h[-1] * (bends[-2] + 2 * bends[-1]) / 6], bends
+        speeds = [
+            _sum(s, -w * a / 3, -w * b / 6) for s, w, (a, b) in zip(slope, h, pairwise(bends), strict=True)
+        ]
+        return [*speeds, _sum(slope[-1], h[-1] * bends[-2] / 6, h[-1] * bends[-1] / 3)], bends
+
+
+def _sum(*terms: Decimal) -> Decimal:
+    """Add terms of 40 digits; a sum that is no more than their rounding is zero."""
+    total, size = sum(terms, Decimal(0)), sum(map(abs, terms), Decimal(0))
+    return total if abs(total) > ROUNDED * size else Decimal(0)
 
 
 def _steps(x: Sequence[Decimal], y: Sequence[Decimal]) -> tuple[Decimals, Decimals]:
@@ -124,8 +134,8 @@ def _solved(
     for i in range(1, len(diagonal)):
         share = below[i - 1] / pivots[-1]
         pivots.append(diagonal[i] - share * above[i - 1])
-        values.append(right[i] - share * values[-1])
+        values.append(_sum(right[i], -share * values[-1]))
     result = [values[-1] / pivots[-1]]
     for i in range(len(diagonal) - 2, -1, -1):
-        result.append((values[i] - above[i] * result[-1]) / pivots[i])
+        result.append(_sum(values[i], -above[i] * result[-1]) / pivots[i])
     return result[::-1]

@@ -4,7 +4,7 @@ const { signs, joined, perMinute, largest, ...unitTable } = data.unitTable;
 const [unitWords, inFull] = [unitTable.words, unitTable.inFull].map((table) => new Map(Object.entries(table)));
 function plainUnit(text) {
   if (new RegExp(`^(?:${perMinute})$`).test(text.toLowerCase())) return "rpm";
-  const plain = text.replace(/[^\x00-\x7f]/g, (sign) => (Object.hasOwn(signs, sign) ? signs[sign] : sign)).replaceAll("**", "^");
+  const plain = text.replace(/[^\x00-\x7f]/g, (sign) => (Object.hasOwn(signs, sign) ? signs[sign] : sign)).replaceAll("**", "^").replace(/([A-Za-z])-(?=[A-Za-z])/g, "$1*");
   return plain.replace(/[A-Za-z]+/g, (word) => {
     const parts = new RegExp(`^(?:${joined})$`).exec(word);
     return parts ? parts.slice(1).filter(Boolean).join("*") : inFull.get(word.toLowerCase()) ?? word;

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from dalembert.dataclass import dataclass, replace
-from dalembert.errors import DataError
+from dalembert.errors import DataError, toml_text
 from dalembert.tables.files import read_toml
 from dalembert.units import AMPLITUDES, TAGS, UNITS, dimensions, find_unit, nearest_unit, parted, unit_name
 
@@ -101,7 +101,9 @@ def rename_from(path: str) -> None:
     own = {header.strip().lower() for header in _renamed.values()}
     for name, header in read_toml(path)[1].items():
         if not isinstance(header, str):
-            raise DataError(f'{path}: {name}: expected a header in quotes, such as mass_g = "Masse"')
+            raise DataError(
+                f'{path}: {name}: found {toml_text(header)}, expected a header in quotes, such as mass_g = "Masse"'
+            )
         if header.strip().lower() not in own:
             _renamed.setdefault(name, header.strip())
 

@@ -10,11 +10,13 @@ import pytest
 from cli.cases.analysis import Request
 from cli.cases.axes import grids
 from cli.cases.cases import Cases
-from cli.cases.inputs import Grid, Varied, listed
+from cli.cases.inputs import Grid, Varied
 from cli.cases.loop import Loop
 from cli.forces.cycle import Forces
 from cli.mechanism.solution import Poses
 from cli.show.commands import ShowOptions
+from tests.cli.rows import axis
+from tests.cli.rows import rows as as_rows
 from virtualwork import Mechanism
 from virtualwork.describe.dimensions import dimensions
 
@@ -79,13 +81,14 @@ def many(text, rows, at=range(0, 360, 60), one_by_one=False, **request):
     """The variants of some rows, at some angles of the crank; None: at that of the file."""
     m = Mechanism.from_toml_text(text)
     every = dimensions(m)
-    varied = Grid((listed("--cases", [Varied(every[path]) for path in OWN[text]], np.array(rows)),))
+    names = [Varied(every[path]) for path in OWN[text]]
+    varied = Grid((axis(names, rows),))
     _, moved = grids(m, None if at is None else [f"{angle}deg" for angle in at], None, None, {}, [])
     kinds = (Forces, ForcesOneByOne) if request.get("forces") else (Poses, PosesOneByOne)
     cases = Cases(Request("m.toml", **request), m, {}, varied, moved)
     study = kinds[one_by_one](cases, ShowOptions())
     if not one_by_one:
-        assert study.together(np.array(list(OWN[text].values())), json=True) is not None
+        assert study.together(as_rows(names, list(OWN[text].values())), json=True) is not None
     return Loop(study)
 
 

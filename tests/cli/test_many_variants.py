@@ -13,11 +13,12 @@ import pytest
 from cli.cases.analysis import Request
 from cli.cases.axes import grids
 from cli.cases.cases import Cases
-from cli.cases.inputs import Grid, Varied, listed
+from cli.cases.inputs import Grid, Varied
 from cli.cases.loop import Loop, unchanged
 from cli.mechanism.solution import Poses
 from cli.show.commands import ShowOptions
 from dalembert.errors import DataError
+from tests.cli.rows import axis
 from virtualwork import Mechanism
 from virtualwork.describe.dimensions import dimensions
 
@@ -149,9 +150,7 @@ class Sent:
 def question(v):
     """Variants of the four-bar at one pose, one by one, as with --branch."""
     m = Mechanism.from_toml_text(FOUR_BAR)
-    varied = Grid(
-        (listed("--cases", [Varied(dimensions(m)["ground.D.x"])], np.linspace(0.1, 0.11, v)[:, None]),)
-    )
+    varied = Grid((axis([Varied(dimensions(m)["ground.D.x"])], np.linspace(0.1, 0.11, v)[:, None]),))
     _, moved = grids(m, ["40deg"], None, None, {}, [])
     cases = Cases(Request("m.toml", order=0, branch="1"), m, {}, varied, moved)
     return Loop(Poses(cases, ShowOptions()), 2)

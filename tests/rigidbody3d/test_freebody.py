@@ -249,3 +249,15 @@ def test_moments_of_any_size(power: int) -> None:
         np.testing.assert_array_equal(getattr(scaled.at(times), quantity), getattr(body.at(times), quantity))
     np.testing.assert_array_equal(scaled.momentum, np.ldexp(body.momentum, power))
     assert (scaled.period, scaled.energy) == (body.period, np.ldexp(body.energy, power))
+
+
+@pytest.mark.parametrize(
+    "omega", [[0.05, 12, 0.05], [-0.05, 12, -0.05], [0, 12, 0], [0, 0, 0], [3, 0.1, 0.7]]
+)
+def test_at_time_zero_it_is_as_it_was_given(omega):
+    for inertia in ([0.002, 0.0011, 0.0009], [1, 1, 2], [1, 1, 1]):
+        state = FreeBody(inertia, omega, (0.5, 0.5, 0.5, 0.5)).at([-1.0, 0.0, 0.3])
+        assert state.omega[1].tolist() == omega
+        assert state.attitude[1].tolist() == [0.5, 0.5, 0.5, 0.5]
+    several = FreeBody([1, 2, 3], [omega, omega]).at(0.0)
+    assert several.omega.tolist() == [omega, omega]

@@ -177,3 +177,10 @@ def test_a_rotation_beside_which_the_weight_is_nothing_is_refused() -> None:
 
 def test_no_top_at_all() -> None:
     assert Top([1, 1, 0.5], 1.0, np.zeros((0, 3))).at([0.0, 1.0]).attitude.shape == (0, 2, 4)
+
+
+@pytest.mark.parametrize("omega", [[0, 0, 60], [0, 0, -60], [0, 0, 0], [0.3, -0.1, 20]])
+def test_at_time_zero_it_is_as_it_was_given(omega):
+    state = Top([0.002, 0.002, 0.0008], 0.1962, omega, (0.6, 0.8, 0, 0)).at([0.0, 0.1])
+    assert state.omega[0].tolist() == omega
+    assert state.attitude[0].tolist() == [0.6, 0.8, 0, 0]

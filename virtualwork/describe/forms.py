@@ -13,7 +13,7 @@ from dalembert.dataclass import dataclass
 from dalembert.hints import nearest
 from virtualwork.describe import DescriptionError, require
 from virtualwork.describe.file import GROUND, Entry
-from virtualwork.describe.units import SI, Units, wrong
+from virtualwork.describe.units import SI, Units, text_of, wrong
 
 Schema = dict[str, Any]
 
@@ -68,7 +68,7 @@ class Form:
 
     def read(self, value: Any, where: str, entry: Entry) -> Any:
         """The value of the field, SI."""
-        return str(value)
+        return text_of(value, where)
 
     def fields(self, name: str, value: Any, where: str, entry: Entry) -> dict[str, Any]:
         """The fields that a value fills: its own, and those that a table in the file's folder fills too."""
@@ -217,7 +217,7 @@ class TwoBodies(Form):
     def read(self, value: Any, where: str, entry: Entry) -> tuple[Any, Any]:
         if not isinstance(value, list) or len(value) != 2:
             raise wrong(where, value, "two links")
-        return str(value[0]), str(value[1])
+        return text_of(value[0], where), text_of(value[1], where)
 
     def check(self, value: Any, where: str, part: Any, names: Names) -> None:
         for body in value:

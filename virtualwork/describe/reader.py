@@ -12,7 +12,7 @@ from virtualwork.describe.description import FILE, UNITS, Description
 from virtualwork.describe.file import Entry, File, Load, require_keys
 from virtualwork.describe.keys import Part, place_of, read_fields, table_keys
 from virtualwork.describe.parts import GROUND, PARTS, TABLES, Guess, Input, Link, Polar
-from virtualwork.describe.units import Units, wrong
+from virtualwork.describe.units import Units, text_of, wrong
 
 D = TypeVar("D", bound=Description)
 
@@ -90,10 +90,7 @@ def _parts(file: File) -> dict[str, Any]:
 
 
 def _name(file: File) -> str:
-    name = file.data.get("name", "")
-    if isinstance(name, bool) or not isinstance(name, (str, int, float)):
-        raise wrong("name", name, "text")
-    return str(name)
+    return text_of(file.data.get("name", ""), "name")
 
 
 def _gravity(file: File) -> complex:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
+from dalembert.errors import toml_text
 from dalembert.quantities import decimals, exactly, expected, number_in_si
 from dalembert.units import DIMENSIONS, LARGEST, Factor, composed
 from virtualwork.describe import DescriptionError
@@ -16,9 +17,16 @@ LONGEST = 60
 
 def wrong(where: str, value: Any, expected: str) -> DescriptionError:
     """The error of a value: its place, the value, and the expected one."""
-    shown = repr(value)
+    shown = toml_text(value)
     shown = shown if len(shown) <= LONGEST else f"{shown[: LONGEST - 3]}..."
     return DescriptionError(f"{where}: found {shown}, expected {expected}")
+
+
+def text_of(value: Any, where: str, expected: str = "text") -> str:
+    """Return a text of the file, or a bare number as a text: names may be numbers."""
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        raise wrong(where, value, expected)
+    return str(value)
 
 
 # the dimension of a table's column, the factor of its unit, what is written in its cells, and their numbers in SI
@@ -53,19 +61,18 @@ class Decimals:
         """Note what the numbers of a table's column, SI, are written as, in the unit with this factor."""
         self._columns.append((dimension, factor, texts, numbers))
 
-    def and_also(self, read: Iterable[tuple[str, float, Any, Factor]]) -> Decimals:
-        """These and further numbers, each as `note` takes it."""
+    def and_also(self, rests: Iterable[tuple[str, float, float]]) -> Decimals:
+        """These and further numbers: the dimension of each, its float, and the exact number less it."""
         more = Decimals(self._written)
-        more._columns, more._rests = self._columns[:], self._rests
-        for each in read:
-            more.note(*each)
+        more._columns = self._columns[:]
+        more._rests = self._rests | {(dimension, number): rest for dimension, number, rest in rests}
         return more
 
     def rest(self, dimension: str, number: float) -> float:
         """Return the exact number less its float; 0 if the file does not have it."""
         if self._columns:
             # on the first request: a second run alone asks
-            self._rests, self._columns = self._rests | _rests(self._columns), []
+            self._rests, self._columns = _rests(self._columns) | self._rests, []
         if (dimension, number) in self._rests:
             return self._rests[dimension, number]
         if (dimension, number) not in self._written:

@@ -1,0 +1,101 @@
+"""A number as it is written: as it is shown, in SI, and exactly; each comes from the decimals, none from another."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from dalembert.quantities import PI, decimal_to_si, exactly
+from dalembert.units import Factor
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from numpy.typing import NDArray
+
+    from cli.read.options import Steps
+    from dalembert.arithmetic.doubled import Doubled
+
+    Reals = NDArray[np.float64]
+
+DEGREES: Factor = (math.pi, 180)
+ROWS = np.dtype([("shown", float), ("si", float), ("rest", float)])
+"""Numbers of many rows, with the fields of `Written`."""
+
+
+class Written(NamedTuple):
+    """A number.
+
+    Attributes
+    ----------
+    shown : float
+        SI, but degrees of an angle.
+    si : float
+    rest : float
+        The exact number in SI less its float.
+    """
+
+    shown: float
+    si: float
+    rest: float
+
+    @classmethod
+    def of(cls, digits: str, factor: Factor, *, is_angle: bool) -> Written:
+        """Return a decimal number in the unit with this factor.
+
+        >>> Written.of("60", DEGREES, is_angle=True)[:2], Written.of("0.3", (1, 1), is_angle=True)[1]
+        ((60.0, 1.0471975511965976), 0.3)
+        """
+        # the sum has no −0
+        si, exact = decimal_to_si(digits, factor) + 0.0, exactly(digits, factor)
+        shown = si
+        if is_angle:
+            shown = float(digits) + 0.0 if factor == DEGREES else float(in_degrees(exact))
+        return cls(shown, si, float(exact - type(exact)(si)))
+
+
+def written(row: NDArray[Any]) -> list[Written]:
+    """Return the numbers of a row."""
+    return [Written(*each) for each in row.tolist()]
+
+
+def in_degrees(exact: Fraction) -> Fraction:
+    """Return an angle in degrees, exact where it is written in degrees or turns.
+
+    >>> in_degrees(exactly("0.25", (2 * math.pi, 1)))
+    Fraction(90, 1)
+    """
+    return exact * 180 / type(exact)(*PI)
+
+
+class Range(NamedTuple):
+    """A range of equal steps in the unit with this factor.
+
+    Attributes
+    ----------
+    steps : Steps
+    factor : pair
+    is_angle : bool
+    """
+
+    steps: Steps
+    factor: Factor
+    is_angle: bool
+
+    def at(self, i: NDArray[np.intp]) -> tuple[Reals, Reals]:
+        """Return the numbers at some places as they are shown, and in SI."""
+        numbers, (num, den) = self.steps.at(i), self.factor
+        si = numbers if self.factor == (1, 1) else numbers * (num if den == 1 else num / den)
+        if not self.is_angle or self.factor == DEGREES:
+            return (numbers if self.is_angle else si), si
+        from dalembert.arithmetic.doubled import PI
+
+        return (self.exact(i) * 180.0 / PI).value, si
+
+    def exact(self, i: NDArray[np.intp]) -> Doubled:
+        """Return the numbers at some places in 32 digits, SI."""
+        from dalembert.arithmetic.doubled import Doubled
+
+        return self.steps.exact(i) * Doubled.of(exactly("1", self.factor))
