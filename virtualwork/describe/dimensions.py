@@ -19,7 +19,7 @@ from virtualwork.describe.description import Description, listed
 from virtualwork.describe.forms import Nested
 from virtualwork.describe.keys import Part, keys_of, table_keys
 from virtualwork.describe.parts import TABLES, Input, Link
-from virtualwork.describe.points import joined
+from virtualwork.describe.values import joined
 
 D = TypeVar("D", bound=Description)
 Where = tuple[str | int, ...]
