@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
+from warnings import warn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,7 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
 from virtualwork.describe.numbered import Numbered
 from virtualwork.describe.reader import read, read_text
+from virtualwork.describe.values import as_number
 from virtualwork.motion import Motion
 
 if TYPE_CHECKING:
@@ -125,8 +127,12 @@ class Mechanism(Numbered):
 
     @cached_property
     def assembly(self) -> Assembly:
-        """The assembly that the guess chooses, ready to move."""
-        return Assembly.from_guess(self)
+        """The assembly that the guess chooses, ready to move; a doubtful guess is warned of (UserWarning), once."""
+        result = Assembly.from_guess(self)
+        for text in result.warnings:
+            # of the caller of `motion` and of all else that moves
+            warn(text, UserWarning, stacklevel=4)
+        return result
 
     def _repr_html_(self) -> str | None:
         """Draw the mechanism in the pose of its file; None, which shows its `repr`, if it cannot be assembled."""
@@ -413,8 +419,13 @@ class Mechanism(Numbered):
         """Solve all loops at once by Newton-Raphson from the guess, with the table of iterates."""
         from virtualwork.study.newton_table import all_at_once
 
+        given = tuple(as_number(value, "inputs") for value in inputs) or self.at
+        if len(given) != len(self.inputs):
+            raise ValueError(
+                f"inputs: found {len(given)}, expected one number for each of {len(self.inputs)}"
+            )
         with self.assembly.lock:
-            return all_at_once(self.assembly, inputs or self.at, limit)
+            return all_at_once(self.assembly, given, limit)
 
     def assemblies(self) -> tuple[Assembly, ...]:
         """Return every assembly at the input of the guess, the one that the guess chooses first."""
