@@ -27,7 +27,7 @@ def by_name(what: str, entries: Mapping[str, Any]) -> Mapping[str, Any]:
 def as_points(points: Mapping[str, Point], what: str = "points") -> Mapping[str, complex]:
     """Read named points, and freeze them."""
     return MappingProxyType(
-        {name: as_point(value, f"{what}.{name}") for name, value in by_name(what, points).items()}
+        {name: as_point(value, what, name) for name, value in by_name(what, points).items()}
     )
 
 
@@ -77,7 +77,5 @@ def placed(points: Mapping[str, Point | Polar]) -> Mapping[str, complex]:
             raise DescriptionError(f"points.{point} from: '{at.origin}' itself is placed from '{point}'")
         for point in ready:
             z = waiting.pop(point)
-            places[point] = (
-                places[z.origin] + z.arm if isinstance(z, Polar) else as_point(z, f"points.{point}")
-            )
+            places[point] = places[z.origin] + z.arm if isinstance(z, Polar) else as_point(z, "points", point)
     return MappingProxyType({point: places[point] for point in points})

@@ -12,8 +12,8 @@ from virtualwork.describe import DescriptionError
 Point = complex | tuple[float, float] | Sequence[float]
 
 
-def as_point(value: Point, where: str = "") -> complex:
-    """Read a point of the plane, `x + iy` or `(x, y)`, as a complex number.
+def as_point(value: Point, where: str = "", name: str = "") -> complex:
+    """Read a point of the plane, `x + iy` or `(x, y)`, as a complex number; its place and its name are for the message.
 
     >>> as_point((3, 4))
     (3+4j)
@@ -23,7 +23,7 @@ def as_point(value: Point, where: str = "") -> complex:
     DescriptionError
         It is neither, or not finite.
     """
-    if getattr(value, "ndim", None) == 0:
+    if type(value) is not complex and getattr(value, "ndim", None) == 0:
         # of numpy
         value = value.item()  # type: ignore[union-attr]
     if isinstance(value, complex):
@@ -40,10 +40,10 @@ def as_point(value: Point, where: str = "") -> complex:
             point = joined(x, y)
         except (TypeError, ValueError):
             raise DescriptionError(
-                f"{_at(where)}expected a point (x, y) or x + iy, found {value!r}"
+                f"{_at(where, name)}expected a point (x, y) or x + iy, found {value!r}"
             ) from None
     if not isfinite(point):
-        raise DescriptionError(f"{_at(where)}expected finite coordinates, found {value!r}")
+        raise DescriptionError(f"{_at(where, name)}expected finite coordinates, found {value!r}")
     return point
 
 
@@ -79,6 +79,8 @@ def as_number(value: float, where: str = "") -> float:
     Traceback (most recent call last):
     virtualwork.describe.DescriptionError: Input speed: found '700 rpm', expected a finite real number (SI units, radians)
     """
+    if type(value) is float and isfinite(value):
+        return value
     if isinstance(value, complex) and type(value) is not complex and not hasattr(value, "dtype"):
         return value
     try:
@@ -96,5 +98,5 @@ def as_number(value: float, where: str = "") -> float:
     return number
 
 
-def _at(where: str) -> str:
-    return f"{where}: " if where else ""
+def _at(where: str, name: str = "") -> str:
+    return f"{where}{'.' * bool(name)}{name}: " if where else ""
