@@ -342,7 +342,13 @@ class Mechanism(Numbered):
             wanted = [Target({wanted: () if target is None else target}, inputs)]
         elif target is not None or inputs is not None:
             raise ValueError("fit: expected targets, or one name with its target and inputs")
-        return fit(self, wanted, free or {}, starts, seed, best, executor, keep)
+        free = {} if free is None else free
+        if not isinstance(free, Mapping) or any(np.shape(bounds) != (2,) for bounds in free.values()):
+            example = "{'links.crank.B.x': (0.01, 0.1)}"
+            raise ValueError(
+                f"free: found {free!r}, expected a low and a high bound by path, such as {example}"
+            )
+        return fit(self, wanted, free, starts, seed, best, executor, keep)
 
     def design(self, paths: Sequence[str], *wanted: str) -> Design:
         """Return positions as a function of some dimensions, with exact derivatives, for an optimiser of your own.

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from virtualwork.describe import DescriptionError, require
 from virtualwork.formulas.lanes import Lanes
 
 if TYPE_CHECKING:
@@ -63,16 +64,23 @@ class MotionViews:
     def plot(self, points: Sequence[str] | None = None, figure: FigureBase | None = None) -> Axes:
         """Draw the mechanism to scale and the paths of points (default: of all that are no joint); return the axes.
 
-        Without a figure it is a new one of pyplot's; without matplotlib (the extra `plot`) an ImportError.
+        Without a figure it is a new one of pyplot's; without matplotlib (the extra `plot`) an ImportError. A name that is no
+        point's is a DescriptionError.
         """
         from virtualwork.picture.paper import on_paper
 
+        every = self.poses.mechanism.points
+        points = [points] if isinstance(points, str) else points
+        for name in points or ():
+            require(name, every, "plot", "point")
         return on_paper(self._shown(), points, figure)
 
     def plot_curves(self, *names: str, figure: FigureBase | None = None) -> NDArray[np.object_]:
         """Draw `H.x`, `coupler.omega`, `crank.torque` … against the input, a panel for each unit; return their axes."""
         from virtualwork.picture.over_input import curves
 
+        if not names:
+            raise DescriptionError("plot_curves: expected the names of quantities, such as 'crank.torque'")
         return curves(self._shown(), names, lambda: self.dynamics, figure)
 
     def animate(self, forces: bool = False) -> Page:

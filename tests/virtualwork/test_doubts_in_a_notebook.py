@@ -175,3 +175,32 @@ def test_ranges_of_rest_and_inputs_of_newton():
         m.newton(0.7, 0.8)
     with pytest.raises(DescriptionError, match="inputs: found 'a', expected a finite real number"):
         m.newton("a")
+
+
+def test_names_of_pictures():
+    """A path of a point that is not there was left out of the picture without a word."""
+    motion = four_bar().motion([0.7, 0.8])
+    for points in ("Z", ["C", "Z"]):
+        with pytest.raises(DescriptionError, match="plot: unknown point 'Z': expected one of A, D, B, C"):
+            motion.plot(points)
+    with pytest.raises(DescriptionError, match="plot_curves: expected the names of quantities"):
+        motion.plot_curves()
+
+
+def test_numbers_of_variants_changes_and_events():
+    m = four_bar(gravity=-9.81j)
+    path = "links.crank.B.x"
+    with pytest.raises(ValueError, match=f"{path}: found nan at 1, expected finite numbers"):
+        m.vary({path: np.ma.array([0.04, 0.05], mask=[False, True])})
+    with pytest.raises(DescriptionError, match=r"'gravity': found 9\.81, expected its two components"):
+        m.changed({"gravity": 9.81})
+    with pytest.raises(DescriptionError, match=r"expected numbers by their paths, such as .*, found 'a'"):
+        m.changed("a")
+    for free in ([path], {path: 0.05}, {path: (0.1,)}):
+        with pytest.raises(ValueError, match=r"free: found .*, expected a low and a high bound by path"):
+            m.fit("C", [(0.1, 0.1), (0.12, 0.1)], free)
+    with pytest.raises(DescriptionError, match="until crank: found nan, expected a finite real number"):
+        m.simulate([0.0, 0.1], until={"crank": float("nan")})
+    for links in ("crank", []):
+        with pytest.raises(DescriptionError, match=r"counterweights: found .*, expected a list of links"):
+            m.motion(0.7, speed=1.0).counterweights(links)
