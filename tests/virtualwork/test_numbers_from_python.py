@@ -20,6 +20,7 @@ from virtualwork import (
     Link,
     Mechanism,
     Motor,
+    Polar,
     Rack,
     Segment,
     Spring,
@@ -27,7 +28,6 @@ from virtualwork import (
     TorsionSpring,
 )
 from virtualwork.describe import DescriptionError
-from virtualwork.describe.parts import Polar
 
 ARM = Link({"O": 0j, "P": 2.0}, mass=1.0, center=1.0)
 

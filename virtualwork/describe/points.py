@@ -33,7 +33,12 @@ def as_points(points: Mapping[str, Point], what: str = "points") -> Mapping[str,
 
 @dataclass(frozen=True)
 class Polar:
-    """A point of a link by its distance and direction from another point of it, in the link's axes, m and rad."""
+    """A point of a link by its distance and direction from another point of it, in the link's axes, m and rad.
+
+    >>> from virtualwork import Link
+    >>> Link({"C": 0.3, "G": Polar("C", 0.5, 0.0)}).points["G"]
+    (0.8+0j)
+    """
 
     origin: str = declared(Form(), "another point of this link", name="from")
     length: float = declared(Scalar("length"), "the distance from there")
