@@ -55,8 +55,7 @@ class Recorder:
 
     def pair(self, kind: str, a: int, b: int) -> int:
         """The node of a sum or product, whose arguments may change places."""
-        by = kind == "add" and self.structures.are_products(a, b)
-        turn = self.structures.turns(a, b) if by else a > b
+        turn = self.structures.turns(a, b) if kind == "add" and self.structures.are_products(a, b) else a > b
         return self.node(kind, *((b, a) if turn else (a, b)))
 
     def difference(self, a: int, b: int) -> Real:
@@ -142,7 +141,9 @@ class Real:
             return self.number
         # −(a − b) = b − a, and a constant factor has its sign for nothing
         kind, *of = self.recorder.operations[self.number]
-        if kind == "sub" and not self.recorder.structures.are_products(*of):
+        if kind == "sub":
+            if self.recorder.structures.are_products(*of):  # no −0 where they are equal
+                of = [self.number, self.recorder.node("const", 0.0)]
             return self.recorder.node("sub", of[1], of[0])
         if kind == "mul":
             for factor, other in (of, of[::-1]):

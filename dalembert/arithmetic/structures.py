@@ -36,7 +36,7 @@ class Structures:
 
     def are_products(self, a: int, b: int) -> bool:
         """Whether two operations are products."""
-        return self.operations[a][0] == self.operations[b][0] == "mul"  # type: ignore[no-any-return]
+        return self.operations[a][0] == self.operations[b][0] == "mul"
 
     def turns(self, a: int, b: int) -> bool:
         """Whether two operations change places."""

@@ -163,7 +163,7 @@ def test_ranges_of_rest_and_inputs_of_newton():
     m = four_bar(gravity=-9.81j)
     assert len(m.equilibria([[0.0, 2 * np.pi]]).found) == 2
     for spans in ([[2 * np.pi, 0.0]], [[0.0, np.nan]], [[0.0, np.inf]]):
-        with pytest.raises(ValueError, match=r"spans: found .* to .*, expected a range from the lower"):
+        with pytest.raises(ValueError, match=r"spans: found .* to .*, expected the lower and the higher end"):
             m.equilibria(spans)
     with pytest.raises(
         ValueError, match=r"spans: expected shape \(1, 2\), a range of each input, found \(3,\)"

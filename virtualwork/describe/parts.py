@@ -253,7 +253,7 @@ class Guess(Record):
         angles: Mapping[str, float] | None = None,
         points: Mapping[str, Point] | None = None,
     ) -> None:
-        every: Any = at if isinstance(at, Iterable) and getattr(at, "ndim", 1) else (at,)
+        every: Any = at if isinstance(at, Iterable) and getattr(at, "ndim", True) else (at,)
         values = None if at is None else tuple(as_number(value, "[guess] at") for value in every)
         turns = by_name("[guess] angles", angles or {})
         object.__setattr__(self, "at", values)

@@ -84,9 +84,10 @@ def as_number(value: float, where: str = "") -> float:
     if isinstance(value, complex) and type(value) is not complex and not hasattr(value, "dtype"):
         return value
     try:
-        kind = getattr(getattr(value, "dtype", None), "kind", "f")
+        kind: str = getattr(getattr(value, "dtype", None), "kind", "f")
+        axes: int = getattr(value, "ndim", False)
         # numpy takes the real part of a complex number, nanoseconds of a time, and a row of one number
-        if isinstance(value, str | bytes | complex) or kind not in "biufO" or getattr(value, "ndim", 0):
+        if isinstance(value, str | bytes | complex) or kind not in "biufO" or axes:
             raise TypeError
         number = float(value)
     except (TypeError, ValueError, OverflowError):

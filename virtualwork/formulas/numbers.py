@@ -94,7 +94,7 @@ def real_array(name: str, value: ArrayLike, once: bool = False) -> Reals:
                 # numpy takes the real part of complex numbers, and nanoseconds of times
                 raise TypeError
             if isinstance(value, np.ma.MaskedArray):
-                value = value.astype(float).filled(np.nan)
+                value = np.ma.filled(value.astype(float), np.nan)
         return np.asarray(value, dtype=float) if once else np.array(value, dtype=float)
     except (TypeError, ValueError):
         text = " ".join(repr(value).split())

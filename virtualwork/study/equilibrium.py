@@ -207,13 +207,11 @@ def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int 
     if given.size != 2 * k or given.ndim > 2:
         raise ValueError(f"spans: expected shape ({k}, 2), a range of each input, found {given.shape}")
     for low, high in (given := given.reshape(k, 2)).tolist():
-        if not (low <= high and math.isfinite(high - low)) and not (math.isnan(low) and math.isnan(high)):
-            raise ValueError(
-                f"spans: found {low:g} to {high:g}, expected a range from the lower to the higher end"
-            )
+        if not (0 <= high - low < math.inf or (math.isnan(low) and math.isnan(high))):
+            raise ValueError(f"spans: found {low:g} to {high:g}, expected the lower and the higher end")
     if not samples >= 1:
         raise ValueError(f"samples: found {samples}, expected one or more")
-    limited = ~np.isnan(given).any(axis=1)
+    limited = np.asarray(~np.isnan(given).any(axis=1))
     # at a limit, and beyond it, a loop has no rates
     with np.errstate(all="ignore"):
         turns, ranges = _searched(assembly)
