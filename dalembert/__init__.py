@@ -24,7 +24,7 @@ Rotors (`balancing`):
 Mechanisms (`virtualwork`):
     AssemblyError, Belt, Bound, Cam, Check, Cycle, DescriptionError, Equilibria, Equilibrium, Force, Friction, GROUND,
     Gear, Guess, Guide, Input, Link, LinkStates, Mechanism, MechanismError, MobilityError, Motion,
-    Motor, Rack, Segment, Spring, Target, Torque, TorsionSpring, UnitLoad, balance_virtual_power, block_on_bar,
+    Motor, Polar, Rack, Segment, Spring, Target, Torque, TorsionSpring, UnitLoad, balance_virtual_power, block_on_bar,
     counterweights, crank_rod_piston, direction_angle, grashof_class, newton, on_incline,
     on_moving_ramp, rotation_of_point, second_point, work_ledger
 

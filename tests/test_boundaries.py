@@ -73,7 +73,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("computing_page",),
         ("family",),
         ("animation", "evaluator", "notebook_picture", "page_shapes", "parts_of_motion", "toml_template"),
-        ("forces", "motion_table"),
+        ("doubts", "forces", "motion_table"),
         ("picture",),
         ("quantities",),
         ("study",),

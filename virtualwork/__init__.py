@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         Input,
         Link,
         Motor,
+        Polar,
         Rack,
         Segment,
         Spring,
@@ -69,6 +70,7 @@ __all__ = [
     "MobilityError",
     "Motion",
     "Motor",
+    "Polar",
     "Rack",
     "Segment",
     "Spring",
@@ -93,7 +95,7 @@ __all__ = [
 # where each name stands; a room is loaded when one of its names is used
 _ROOMS = {
     "virtualwork.describe": "AssemblyError DescriptionError MechanismError MobilityError",
-    "virtualwork.describe.parts": "GROUND Belt Cam Force Friction Gear Guess Guide Input Link Motor Rack Segment Spring Torque TorsionSpring",
+    "virtualwork.describe.parts": "GROUND Belt Cam Force Friction Gear Guess Guide Input Link Motor Polar Rack Segment Spring Torque TorsionSpring",
     "virtualwork.study.ledger": "ledger",
     "virtualwork.mechanism": "Mechanism",
     "virtualwork.motion": "Motion",

@@ -24,7 +24,7 @@ from virtualwork.describe.cams import CamDrive
 from virtualwork.describe.description import Description
 from virtualwork.describe.meshes import Belt, Gear, Rack
 from virtualwork.describe.parts import GROUND, Guide, Spring
-from virtualwork.describe.points import joined
+from virtualwork.describe.values import joined
 from virtualwork.formulas.profiles import STEPS, profile
 from virtualwork.shapes import Circle as Circle
 from virtualwork.shapes import Coil as Coil

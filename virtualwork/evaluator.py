@@ -54,12 +54,19 @@ class Evaluator:
         # what is requested under two names is in two arrays
         self._once = len(set(self.keys)) == len(self.keys)
         self._ready: dict[tuple[bool, ...], Ready | None] = {}
+        inputs, own = assembly.mechanism.inputs, ("speed", "acceleration", "jerk")
+        # of one input as floats; of several the poses look them up
+        self._own = [getattr(inputs[0], rate) or 0.0 for rate in own] if len(inputs) == 1 else [None] * 3
 
     def __repr__(self) -> str:
         return f"Evaluator({self.assembly.mechanism.name!r}: {', '.join(self.wanted)})"
 
     def __call__(
-        self, angle: ArrayLike, speed: ArrayLike = 0.0, acceleration: ArrayLike = 0.0, jerk: ArrayLike = 0.0
+        self,
+        angle: ArrayLike,
+        speed: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+        jerk: ArrayLike | None = None,
     ) -> dict[str, Any]:
         """The quantities, by the names they were requested with.
 
@@ -68,13 +75,19 @@ class Evaluator:
         angle : float, or array (n,); (n, k) for k inputs
             The input: rad for a turning input, m for a slide.
         speed, acceleration, jerk : scalar or of the same shape
-            Its derivatives in time.
+            Its derivatives in time; default: the description's own, as in `Mechanism.motion`.
 
         Returns
         -------
         dict of name to float or (x, y); to array (n,) or (n, 2)
             NaN where the pose cannot be assembled.
         """
+        if speed is None:
+            speed = self._own[0]
+        if acceleration is None:
+            acceleration = self._own[1]
+        if jerk is None:
+            jerk = self._own[2]
         rates = isinstance(speed, float) and isinstance(acceleration, float) and isinstance(jerk, float)
         if rates and isinstance(angle, float) and isfinite(angle):
             moves = speed != 0.0, acceleration != 0.0, jerk != 0.0

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
+from warnings import warn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,7 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
 from virtualwork.describe.numbered import Numbered
 from virtualwork.describe.reader import read, read_text
+from virtualwork.describe.values import as_number
 from virtualwork.motion import Motion
 
 if TYPE_CHECKING:
@@ -125,8 +127,12 @@ class Mechanism(Numbered):
 
     @cached_property
     def assembly(self) -> Assembly:
-        """The assembly that the guess chooses, ready to move."""
-        return Assembly.from_guess(self)
+        """The assembly that the guess chooses, ready to move; a doubtful guess is warned of (UserWarning), once."""
+        result = Assembly.from_guess(self)
+        for text in result.warnings:
+            # of the caller of `motion` and of all else that moves
+            warn(text, UserWarning, stacklevel=4)
+        return result
 
     def _repr_html_(self) -> str | None:
         """Draw the mechanism in the pose of its file; None, which shows its `repr`, if it cannot be assembled."""
@@ -336,7 +342,13 @@ class Mechanism(Numbered):
             wanted = [Target({wanted: () if target is None else target}, inputs)]
         elif target is not None or inputs is not None:
             raise ValueError("fit: expected targets, or one name with its target and inputs")
-        return fit(self, wanted, free or {}, starts, seed, best, executor, keep)
+        free = {} if free is None else free
+        if not isinstance(free, Mapping) or any(np.shape(bounds) != (2,) for bounds in free.values()):
+            example = "{'links.crank.B.x': (0.01, 0.1)}"
+            raise ValueError(
+                f"free: found {free!r}, expected a low and a high bound by path, such as {example}"
+            )
+        return fit(self, wanted, free, starts, seed, best, executor, keep)
 
     def design(self, paths: Sequence[str], *wanted: str) -> Design:
         """Return positions as a function of some dimensions, with exact derivatives, for an optimiser of your own.
@@ -413,8 +425,13 @@ class Mechanism(Numbered):
         """Solve all loops at once by Newton-Raphson from the guess, with the table of iterates."""
         from virtualwork.study.newton_table import all_at_once
 
+        given = tuple(as_number(value, "inputs") for value in inputs) or self.at
+        if len(given) != len(self.inputs):
+            raise ValueError(
+                f"inputs: found {len(given)}, expected one number for each of {len(self.inputs)}"
+            )
         with self.assembly.lock:
-            return all_at_once(self.assembly, inputs or self.at, limit)
+            return all_at_once(self.assembly, given, limit)
 
     def assemblies(self) -> tuple[Assembly, ...]:
         """Return every assembly at the input of the guess, the one that the guess chooses first."""

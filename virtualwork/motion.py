@@ -29,7 +29,7 @@ from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.one_pose import one_pose
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.motion_views import MotionViews
-from virtualwork.parts_of_motion import LinkMotion, NamedParts, PointMotion, SlideMotion
+from virtualwork.parts_of_motion import LinkMotion, NamedParts, PointMotion, SlideMotion, number_of_input
 from virtualwork.plan.steps import Step
 
 if TYPE_CHECKING:
@@ -43,8 +43,6 @@ if TYPE_CHECKING:
 EFFORT = Effort(0)
 # what a loop asks of each pose is made once
 _reaction = lru_cache(maxsize=1024)(Reaction)
-# poses at each end of a motion that a notebook shows
-ENDS = 10
 
 
 @guarded
@@ -76,8 +74,9 @@ class Motion(NamedParts[PointMotion, LinkMotion, SlideMotion], MotionViews):
             self.poses = Lanes(assembly, angle, speed, acceleration, jerk, block_of)
 
     def __repr__(self) -> str:
-        m = self.mechanism
-        return f"Motion({m.name!r}: {self.n} poses over {', '.join(e.name for e in m.inputs)})"
+        m, over = self.mechanism, ", ".join(e.name for e in self.mechanism.inputs)
+        doubts = "; see .warnings" if self.assembly.warnings else ""
+        return f"Motion({m.name!r}: {self.n} pose{'s' * (self.n != 1)} over {over}{doubts})"
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Motion):
@@ -120,7 +119,7 @@ class Motion(NamedParts[PointMotion, LinkMotion, SlideMotion], MotionViews):
     @property
     def inputs(self) -> Reals:
         """(n, k): the inputs, rad or m."""
-        return self.poses.inputs
+        return self.poses.inputs.copy()
 
     @property
     def n(self) -> int:
@@ -145,6 +144,31 @@ class Motion(NamedParts[PointMotion, LinkMotion, SlideMotion], MotionViews):
     def assembled(self) -> NDArray[np.bool_]:
         """Whether each pose can be assembled, (n,) bool."""
         return self.poses.assembled.copy()
+
+    def reason(self, i: int) -> str | None:
+        """Return why the i-th pose cannot be assembled, in m and rad; None if it can.
+
+        Examples
+        --------
+        A rod of 50 mm reaches a line 52 mm away no longer:
+
+        >>> from virtualwork import Guess, Guide, Input, Link, Mechanism
+        >>> m = Mechanism({"O": (0, 0)}, {"crank": Link({"O": (0, 0), "A": (0.06, 0)}),
+        ...               "rod": Link({"A": (0, 0), "B": (0.05, 0)})}, [Guide("B", "rod")],
+        ...               inputs=Input("crank"), guess=Guess(0.0, {"rod": 0.1}))
+        >>> m.motion([0.5, np.arcsin(52 / 60)]).reason(1)
+        'rod reaches 0.05 m, 0.052 m needed: 0.002 m short; it would close at 0.985111 rad'
+        """
+        from virtualwork.doubts import reason_at
+
+        return reason_at(self.assembly, tuple(self.poses.inputs[i].tolist()))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is doubtful: guesses that contradict each other, loops without a speed, poses that cannot be assembled and why."""
+        from virtualwork.doubts import warnings_of
+
+        return warnings_of(self.assembly, self.poses)
 
     @property
     def condition(self) -> Reals:
@@ -262,13 +286,14 @@ class Motion(NamedParts[PointMotion, LinkMotion, SlideMotion], MotionViews):
 
     def applied(self, link: str) -> tuple[Complexes, Reals]:
         """Return the applied loads of a link without weight and inertia, at its centre of mass: (n,) complex N, (n,) N·m."""
+        self.link(link)
         if not self.mechanism.applies:
             return np.zeros(self.n, complex), np.zeros(self.n)
         return self.dynamics.applied(link)
 
     def unit(self, j: int = 0) -> Motion:
         """Return the motion through these poses at a unit speed of input j alone; its velocities are virtual displacements."""
-        if j not in self._units:
+        if number_of_input(self.mechanism, j) not in self._units:
             k = self.inputs.shape[1]
             rates: list[list[Number]] = [[float(i == j) for i in range(k)], [0.0] * k, [0.0] * k]
             own = self.inputs, self.poses.input_error, self.poses.input_rest
@@ -277,7 +302,17 @@ class Motion(NamedParts[PointMotion, LinkMotion, SlideMotion], MotionViews):
 
     @property
     def cycle(self) -> Cycle:
-        """Return the sweep as a cycle of work: mean and peak effort, energy balance, flywheel."""
+        """Return the sweep as a cycle of work: mean and peak effort, energy balance, flywheel.
+
+        Raises
+        ------
+        ValueError
+            A motion of several inputs, or of no poses.
+        """
+        if len(self.mechanism.inputs) > 1 or not self.n:
+            raise ValueError(
+                f"a cycle of work needs a sweep of one input, found {self.n} poses of {len(self.mechanism.inputs)}"
+            )
         from virtualwork.study.cycle import Cycle
 
         return Cycle(self)
@@ -366,20 +401,6 @@ class Motion(NamedParts[PointMotion, LinkMotion, SlideMotion], MotionViews):
         from virtualwork.motion_table import columns
 
         return DataFrame(columns(self.poses))
-
-    def _repr_html_(self) -> str:
-        from pandas import DataFrame
-
-        from virtualwork.motion_table import columns
-
-        # of many poses those alone are solved that are shown, and one more, which is shown as dots
-        shown = np.arange(self.n)
-        if self.n > 2 * ENDS:
-            shown = np.concatenate([shown[: ENDS + 1], shown[-ENDS:]])
-        which = np.zeros(self.n, dtype=bool)
-        which[shown] = True
-        frame = DataFrame(columns(self.poses.some(which)), index=shown)
-        return str(frame.to_html(max_rows=2 * ENDS))
 
 
 def _again(

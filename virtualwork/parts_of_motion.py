@@ -18,8 +18,44 @@ if TYPE_CHECKING:
     from virtualwork.digits.estimates import Estimates
 
 
+ORDERS = range(4)
+"""Of derivatives in time: position, velocity, acceleration, jerk."""
+
+
+def _checked(order: int) -> int:
+    if order not in ORDERS:
+        raise ValueError(f"order: found {order!r}, expected 0 (position or angle), 1, 2 or 3 (jerk)")
+    return order
+
+
 # what a loop asks of each pose is made once
-_point = lru_cache(maxsize=1024)(Point)
+@lru_cache(maxsize=1024)
+def _point(body: str, place: complex, node: str | None, order: int) -> Point:
+    return Point(body, place, node, _checked(order))
+
+
+@lru_cache(maxsize=1024)
+def _angle(body: str, order: int) -> Angle:
+    return Angle(body, _checked(order))
+
+
+@lru_cache(maxsize=1024)
+def _slide(guide: int, order: int) -> Slide:
+    return Slide(guide, _checked(order))
+
+
+def number_of_input(m: Description, j: int) -> int:
+    """The number of an input, from 0.
+
+    Raises
+    ------
+    ValueError
+        There is no such input.
+    """
+    if j not in range(len(m.inputs)):
+        names = ", ".join(f"{i} ({entry.name})" for i, entry in enumerate(m.inputs))
+        raise ValueError(f"input: found {j!r}, expected the number of an input: {names}")
+    return j
 
 
 class AnyMotion(Protocol):
@@ -133,7 +169,7 @@ class LinkRates(PartOfMotion):
         return self.value(3)
 
     def key(self, order: int = 0) -> Quantity:
-        return Angle(self.body, order)
+        return _angle(self.body, order)
 
 
 class SlideRates(PartOfMotion):
@@ -164,7 +200,7 @@ class SlideRates(PartOfMotion):
         return self.value(3)
 
     def key(self, order: int = 0) -> Quantity:
-        return Slide(self.guide, order)
+        return _slide(self.guide, order)
 
 
 class OfOneMechanism(PartOfMotion):
@@ -240,6 +276,7 @@ class PointMotion(OfOneMechanism, PointRates):
 
     def coefficient(self, j: int = 0) -> Complexes:
         """The velocity coefficient dP/dq_j as x + iy, (n,): the point's virtual displacement for a unit of input j."""
+        number_of_input(self.motion.mechanism, j)
         return self.motion.value(PointPartial(self.body, self._where, self.node, j, 1))  # type: ignore[no-any-return]
 
 
@@ -259,6 +296,7 @@ class LinkMotion(OfOneMechanism, LinkRates):
 
     def coefficient(self, j: int = 0) -> Reals:
         """The velocity coefficient dθ/dq_j, (n,): the link's virtual rotation for a unit of input j."""
+        number_of_input(self.motion.mechanism, j)
         return self.motion.value(AnglePartial(self.body, j, 1))  # type: ignore[no-any-return]
 
 
@@ -343,4 +381,7 @@ class NamedParts(Generic[P, L, S]):
         for i, guide in enumerate(self.mechanism.guides):
             if guide.point == name:
                 return self.kinds[2](self, i)
-        raise DescriptionError(f"no slot or slider runs at a point named '{name}'")
+        points = dict.fromkeys(guide.point for guide in self.mechanism.guides)
+        raise DescriptionError(
+            f"no slot or slider runs at a point named '{name}'{choices(str(name), points)}"
+        )

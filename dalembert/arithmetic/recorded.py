@@ -14,6 +14,7 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
+from dalembert.arithmetic.structures import Structures
 from dalembert.arithmetic.tape import Operation, Tape, shortened
 
 Number = Any
@@ -38,6 +39,7 @@ class Recorder:
     def __init__(self) -> None:
         self.operations: list[Operation] = []
         self._known: dict[Operation, int] = {}
+        self.structures = Structures(self.operations)
 
     def input(self, name: str) -> Real:
         """An input; the same name is the same number."""
@@ -53,10 +55,14 @@ class Recorder:
 
     def pair(self, kind: str, a: int, b: int) -> int:
         """The node of a sum or product, whose arguments may change places."""
-        return self.node(kind, a, b) if a <= b else self.node(kind, b, a)
+        turn = self.structures.turns(a, b) if kind == "add" and self.structures.are_products(a, b) else a > b
+        return self.node(kind, *((b, a) if turn else (a, b)))
 
     def difference(self, a: int, b: int) -> Real:
-        """a − b; or b − a with the other sign, if that is recorded."""
+        """a − b; or b − a with the other sign: of two products the one or the other, else if that is recorded."""
+        if self.structures.are_products(a, b):
+            turn = self.structures.turns(a, b)
+            return Real(self, self.node("sub", *((b, a) if turn else (a, b))), turn)
         turned = self._known.get(("sub", b, a))
         return Real(self, self.node("sub", a, b)) if turned is None else Real(self, turned, True)
 
@@ -136,6 +142,8 @@ class Real:
         # −(a − b) = b − a, and a constant factor has its sign for nothing
         kind, *of = self.recorder.operations[self.number]
         if kind == "sub":
+            if self.recorder.structures.are_products(*of):  # no −0 where they are equal
+                of = [self.number, self.recorder.node("const", 0.0)]
             return self.recorder.node("sub", of[1], of[0])
         if kind == "mul":
             for factor, other in (of, of[::-1]):

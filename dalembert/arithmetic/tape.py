@@ -82,7 +82,7 @@ class Tape:
     y
     v2 = x * x
     v3 = y * y
-    v4 = v2 + v3
+    v4 = v3 + v2
     v5 = sqrt(v4)
     v6 = x * y
     norm: v5

@@ -309,3 +309,24 @@ def test_blocks_do_uniform_work_once() -> None:
     np.testing.assert_array_equal(found["y"], math.sin(0.5) * np.arange(3.0))
     np.testing.assert_array_equal(found["a"], [0.5] * 3)
     assert os.environ.get("DALEMBERT_ENGINE") is None
+
+
+@pytest.mark.whole
+@pytest.mark.parametrize("sign", [1, -1])
+def test_sums_of_two_products_have_the_same_digits_whatever_was_recorded_before(sign: int) -> None:
+    """Compiled code joins one product and the sum into one rounding: it took the one that was recorded later."""
+    x = {name: np.random.default_rng(k).normal(size=100) for k, name in enumerate("abcd")}
+    results = []
+    for order in ("", "ab", "cd", "ba,dc", "cd,ab"):
+        recorder = Recorder()
+        for a, b in filter(None, order.split(",")):
+            _ = recorder.input(a) * recorder.input(b)
+        a, b, c, d = (recorder.input(name) for name in "abcd")
+        if order == "cd":
+            _ = sign * c * d + a * b, a * b - sign * c * d
+        total = a * b + sign * c * d
+        tape = recorder.tape({"sum": total, "turned": -total})
+        results.append(run(tape, x, "llvm"))
+    for of in results:
+        assert np.array_equal(of["sum"], results[0]["sum"])
+        assert np.array_equal(of["turned"], -of["sum"])

@@ -76,7 +76,7 @@ def test_rates_of_another_length_than_the_angle(name):
         (lambda m: Link("OP"), "points: expected a mapping of names, found str"),
         (lambda m: Guide("P", "arm", through=(0, 0, 0)), "expected a point .* found \\(0, 0, 0\\)"),
         (lambda m: Mechanism({"O": 0j}, ARM, gravity=(0, 0, -9.81)), "expected a point"),
-        (lambda m: Mechanism(3, ARM), "points: expected a mapping of names, found int"),
+        (lambda m: Mechanism(3, ARM), "ground: expected a mapping of names, found int"),
         (lambda m: Mechanism({"O": 0j}, [Link({"O": 0j})]), "links: expected a mapping of names, found list"),
         (
             lambda m: Mechanism({"O": 0j}, ARM, forces=Force("arm", "P", 1j)),

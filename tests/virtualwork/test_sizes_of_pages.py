@@ -158,7 +158,7 @@ def test_teeth_follow_the_dimensions(tmp_path: Path) -> None:
         (part,) = (p for p in draw(changed(m, change), travel).parts if isinstance(p, Row) and p.joined)
         (shape,) = (shape for shape in shapes if shape.get("j"))
         points = np.array(shape["p"]).reshape(-1, 2) @ [1, 1j]
-        step = complex(*shape["d"])
+        step = complex(*map(float, shape["d"]))
         if not change:
             assert shape["n"] == part.count
             assert np.allclose([*points, step], [*part.points, part.step], rtol=0, atol=1e-15)

@@ -364,7 +364,8 @@ class _Chooser:
         result = every_solution(loops, st, self.m.size)
         if len(result) == 0 and len(group.angles) + len(group.slides) < 2 * len(group.closures):
             raise MobilityError(
-                f"{group.name}: more constraints than unknowns, and they contradict each other: a structure, or lengths "
+                f"{group.name}{': ' * bool(group.name)}more constraints than unknowns, and they contradict each other: a "
+                "structure, or lengths "
                 f"that do not fit (look at {', '.join(self.plan.blocks.redundant)})"
             )
         if len(result) == 0:

@@ -21,7 +21,6 @@ from virtualwork.describe.curves import LiftTable
 from virtualwork.describe.forms import Body, Choice, FollowerPoint, Nested, PointName, Scalar
 from virtualwork.describe.keys import Part, check, declared
 from virtualwork.describe.laws import Lift, Segment, pieces, spans, splined
-from virtualwork.describe.points import as_number
 
 FACES = ("knife", "roller", "flat")
 SENSES = ("ccw", "cw")
@@ -75,11 +74,6 @@ class Cam(Part):
     # in a run with more digits π has them too, and the spline through a table
     pi: float = field(default=math.pi, compare=False, repr=False)
     spline: Any = field(default=None, compare=False, repr=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "base_radius", as_number(self.base_radius))
-        if self.roller_radius is not None:
-            object.__setattr__(self, "roller_radius", as_number(self.roller_radius))
 
     @property
     def slides(self) -> bool:

@@ -111,6 +111,9 @@ class TorqueOrTable(Form):
         periodic = axis == "angle" and is_cycle(rows[0][0], rows[-1][0])
         return {name: 0.0, "history": rows, "over": "time" if axis in TIME else axis, "periodic": periodic}
 
+    def converted(self, value: Any, where: str) -> float:
+        return self.torque.converted(value, where)
+
     def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
         return self.torque.text(value, units, slides)
 

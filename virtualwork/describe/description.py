@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
+from numbers import Real
 from types import MappingProxyType
 from typing import Any
 
@@ -37,8 +38,9 @@ from virtualwork.describe.parts import (
     Torque,
     TorsionSpring,
 )
-from virtualwork.describe.points import Point, as_point, as_points, by_name
+from virtualwork.describe.points import as_points, by_name
 from virtualwork.describe.units import Decimals
+from virtualwork.describe.values import Point, as_point
 
 
 @record
@@ -100,14 +102,14 @@ class Description(Record):
         decimals: Decimals | None = None,
     ) -> None:
         values = {
-            "ground": as_points(ground),
+            "ground": as_points(ground, "ground"),
             "links": MappingProxyType(dict(by_name("links", links))),
             "guides": _several("guides", guides),
             "gears": _several("gears", gears),
             "inputs": (inputs,) if isinstance(inputs, Input) else _several("inputs", inputs),
             "guess": guess or Guess(),
             "name": name,
-            "gravity": as_point(gravity),
+            "gravity": _gravity(gravity),
             "forces": _several("forces", forces),
             "torques": _several("torques", torques),
             "springs": _several("springs", springs),
@@ -366,6 +368,8 @@ def refuse_kinds(m: Description) -> None:
                 raise DescriptionError(
                     f"{kind.collection} {i}: expected {kind.__name__}, found {type(part).__name__}"
                 )
+    if not isinstance(m.guess, Guess):
+        raise DescriptionError(f"guess: expected Guess, found {type(m.guess).__name__}")
     for name, link in m.links.items():
         if not isinstance(link, Link):
             raise DescriptionError(f"links '{name}': expected Link, found {type(link).__name__}")
@@ -410,6 +414,8 @@ def refuse(m: Description) -> None:
         )
     for name in m.guess.angles:
         require(name, m.links, f"[guess] {name}", "link or point")
+    for name in m.guess.points:
+        require(name, m.points, f"[guess] {name}", "link or point")
 
 
 def listed(m: Description, *kinds: type[Part]) -> Iterator[tuple[int, int, Part]]:
@@ -419,6 +425,13 @@ def listed(m: Description, *kinds: type[Part]) -> Iterator[tuple[int, int, Part]
         for i, part in enumerate(getattr(m, kind.collection)):
             count[part.table] = count.get(part.table, 0) + 1
             yield i, count[part.table], part
+
+
+def _gravity(value: Point) -> complex:
+    """Read gravity; a number alone, which would act along x, is refused."""
+    if isinstance(value, Real) and value != 0:
+        raise DescriptionError(f"gravity: found {value!r}, expected its two components, such as (0, -9.81)")
+    return as_point(value, "gravity")
 
 
 def _several(what: str, entries: object) -> tuple[Any, ...]:

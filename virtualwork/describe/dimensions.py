@@ -19,7 +19,7 @@ from virtualwork.describe.description import Description, listed
 from virtualwork.describe.forms import Nested
 from virtualwork.describe.keys import Part, keys_of, table_keys
 from virtualwork.describe.parts import TABLES, Input, Link
-from virtualwork.describe.points import joined
+from virtualwork.describe.values import joined
 
 D = TypeVar("D", bound=Description)
 Where = tuple[str | int, ...]
@@ -250,6 +250,10 @@ def changed(m: D, numbers: Mapping[str, Any]) -> D:
 
 def parts_with(m: Description, numbers: Mapping[str, Any]) -> dict[str, Any]:
     """The parts of a mechanism with other numbers at some paths, as `changed` takes them; whether they fit is not checked."""
+    if not isinstance(numbers, Mapping):
+        raise DescriptionError(
+            f"expected numbers by their paths, such as {{'{next(iter(dimensions(m)))}': 1.0}}, found {numbers!r}"
+        )
     every = dimensions(m)
     parts: dict[Any, Any] = {f.name: getattr(m, f.name) for f in fields(m)}
     for path, number in numbers.items():
@@ -268,6 +272,10 @@ def _finite(path: str, number: Any, count: int) -> tuple[Any, ...]:
     DescriptionError
     """
     parts: tuple[Any, ...] = (number,)
+    if path == "gravity" and isinstance(number, Real) and number != 0:
+        raise DescriptionError(
+            f"'gravity': found {number!r}, expected its two components, such as (0, -9.81)"
+        )
     if count == 2 and isinstance(number, complex | Real):
         parts = number.real, number.imag
     elif count == 2 and isinstance(number, Iterable):

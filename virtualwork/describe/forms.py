@@ -5,7 +5,7 @@ Names are checked when the whole mechanism is there: the same check serves a fil
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from numbers import Real
 from typing import Any, Protocol
 
@@ -14,6 +14,7 @@ from dalembert.hints import nearest
 from virtualwork.describe import DescriptionError, require
 from virtualwork.describe.file import GROUND, Entry
 from virtualwork.describe.units import SI, Units, text_of, wrong
+from virtualwork.describe.values import as_number, as_point
 
 Schema = dict[str, Any]
 
@@ -21,6 +22,10 @@ Schema = dict[str, Any]
 SCALAR: Schema = {"$ref": "#/$defs/quantity"}
 PAIR: Schema = {"$ref": "#/$defs/pair"}
 TEXT: Schema = {"type": "string"}
+
+
+# the two ends of a spring in Python
+ENDS = 'two ends such as ("crank", "B") and ("ground", "D")'
 
 
 class Names(Protocol):
@@ -58,6 +63,11 @@ class Form:
         """Whether `check` refuses anything."""
         return type(self).check is not Form.check
 
+    @property
+    def converts(self) -> bool:
+        """Whether `converted` changes or refuses anything."""
+        return type(self).converted is not Form.converted
+
     def dimension(self, slides: bool) -> str:
         """The dimension of its numbers, of a part that slides or turns; empty where it holds none."""
         return ""
@@ -74,12 +84,25 @@ class Form:
         """The fields that a value fills: its own, and those that a table in the file's folder fills too."""
         return {name: self.read(value, where, entry)}
 
+    def converted(self, value: Any, where: str) -> Any:
+        """The value of the field from one that comes from Python; what is no such value is refused."""
+        return value
+
     def check(self, value: Any, where: str, part: Any, names: Names) -> None:
         """Refuse a value that this mechanism cannot have."""
 
     def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
         """The value of a field as the file has it."""
         return value
+
+
+def _row(value: Any, count: int | None, where: str, expected: str) -> tuple[Any, ...]:
+    """The entries of a row that comes from Python, of as many as are expected."""
+    ordered = isinstance(value, Iterable) and not isinstance(value, str | Set | Mapping)
+    entries = tuple(value) if ordered else ()
+    if not ordered or count not in (None, len(entries)):
+        raise wrong(where, value, expected)
+    return entries
 
 
 def whole(number: float) -> float:
@@ -114,6 +137,9 @@ class Scalar(Form):
     def read(self, value: Any, where: str, entry: Entry) -> float:
         return entry.file.units.number(value, self.dimension(entry.slides), where)
 
+    def converted(self, value: Any, where: str) -> float:
+        return as_number(value, where)
+
     def check(self, value: Any, where: str, part: Any, names: Names) -> None:
         if not self.negative and not value >= 0:
             raise DescriptionError(f"{where}: found {value}, but it must not be negative")
@@ -141,6 +167,9 @@ class Pair(Form):
     def read(self, value: Any, where: str, entry: Entry) -> Any:
         return entry.file.units.pair(value, self.of, where)
 
+    def converted(self, value: Any, where: str) -> complex:
+        return as_point(value, where)
+
     def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
         return [whole(units.bare(x, self.of)) for x in (value.real, value.imag)]
 
@@ -166,6 +195,9 @@ class Lengths(Form):
             raise wrong(where, value, f"{self.count} lengths")
         return tuple(entry.file.units.number(x, "length", where) for x in value)
 
+    def converted(self, value: Any, where: str) -> tuple[float, ...]:
+        return tuple(as_number(x, where) for x in _row(value, self.count, where, f"{self.count} lengths"))
+
     def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
         return [whole(units.bare(x, "length")) for x in value]
 
@@ -181,6 +213,11 @@ class Flag(Form):
         if not isinstance(value, bool):
             raise wrong(where, value, "true or false")
         return value
+
+    def converted(self, value: Any, where: str) -> bool:
+        if isinstance(value, str) or value not in (True, False):
+            raise wrong(where, value, "True or False")
+        return bool(value)
 
 
 @dataclass(eq=False, repr=False)
@@ -218,6 +255,9 @@ class TwoBodies(Form):
         if not isinstance(value, list) or len(value) != 2:
             raise wrong(where, value, "two links")
         return text_of(value[0], where), text_of(value[1], where)
+
+    def converted(self, value: Any, where: str) -> tuple[Any, ...]:
+        return _row(value, 2, where, "two links")
 
     def check(self, value: Any, where: str, part: Any, names: Names) -> None:
         for body in value:
@@ -266,6 +306,9 @@ class Place(Form):
     def read(self, value: Any, where: str, entry: Entry) -> Any:
         return value if isinstance(value, str) else entry.file.units.pair(value, "length", where)
 
+    def converted(self, value: Any, where: str) -> str | complex:
+        return value if isinstance(value, str) else as_point(value, where)
+
     def check(self, value: Any, where: str, part: Any, names: Names) -> None:
         if isinstance(value, str):
             _has(names, getattr(part, self.of), value, where)
@@ -282,6 +325,13 @@ class Ends(TwoBodies):
         if not isinstance(value, list) or len(value) != 2:
             raise wrong(where, value, 'two points such as ["crank.B", "ground.D"]')
         return entry.file.point_of(value[0], where), entry.file.point_of(value[1], where)
+
+    def converted(self, value: Any, where: str) -> tuple[Any, ...]:
+        ends = _row(value, 2, where, ENDS)
+        return tuple(
+            (body, point if isinstance(point, str) else as_point(point, where))
+            for body, point in (_row(end, 2, where, ENDS) for end in ends)
+        )
 
     def check(self, value: Any, where: str, part: Any, names: Names) -> None:
         for body, point in value:
@@ -342,6 +392,9 @@ class Nested(Form):
     """A list of tables, each with the keys that a dataclass declares."""
 
     of: type
+
+    def converted(self, value: Any, where: str) -> tuple[Any, ...]:
+        return _row(value, None, where, f"a list of {self.of.__name__}")
 
     def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
         raise NotImplementedError("`describe.text` writes the tables of a part")

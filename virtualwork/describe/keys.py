@@ -110,6 +110,8 @@ def declared(
 
 # the keys of each class, read from its fields once
 _KEYS: dict[type, tuple[Key, ...]] = {}
+# the fields of each class whose values from Python are converted, with their defaults
+_CONVERTED: dict[type, list[tuple[str, Any, Any]]] = {}
 # those whose values a mechanism may refuse
 _CHECKED: dict[type, list[Key]] = {}
 
@@ -135,6 +137,26 @@ def table_keys(kind: type, table: str = "") -> Keys:
     return {key.name: key for key in keys_of(kind) if key.table in ("", table)}
 
 
+def convert(part: Any) -> None:
+    """Convert the values of a frozen part that come from Python: real numbers to floats, pairs to x + iy.
+
+    Raises
+    ------
+    DescriptionError
+        A value that is no number, or not finite; None in a field that has no such default.
+    """
+    kind = type(part)
+    if kind not in _CONVERTED:
+        forms = {key.field: key.form for key in reversed(keys_of(kind)) if key.form.converts}
+        _CONVERTED[kind] = [
+            (f.name, f.default, forms[f.name].converted) for f in fields(kind) if f.name in forms
+        ]
+    for name, default, converted in _CONVERTED[kind]:
+        value = getattr(part, name)
+        if value is not default:
+            object.__setattr__(part, name, converted(value, f"{kind.__name__} {name}"))
+
+
 class Part:
     """Base of the parts that stand in the lists of a description.
 
@@ -143,6 +165,9 @@ class Part:
 
     tables: ClassVar[tuple[str, ...]]
     collection: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        convert(self)
 
     @property
     def table(self) -> str:

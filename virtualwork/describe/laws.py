@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING, Any
 from dalembert.dataclass import dataclass
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.forms import Choice, Scalar
-from virtualwork.describe.keys import declared
-from virtualwork.describe.points import as_number
+from virtualwork.describe.keys import convert, declared
 
 if TYPE_CHECKING:
     from decimal import Decimal
@@ -139,9 +138,7 @@ class Segment:
     motion: str = declared(Choice(MOTIONS), f"the law: {', '.join(MOTIONS)}", default=DWELL, needed=True)
 
     def __post_init__(self) -> None:
-        for name in ("start", "end", "rise"):
-            value = getattr(self, name)
-            object.__setattr__(self, name, None if value is None else as_number(value))
+        convert(self)
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ Points and vectors of the plane are complex numbers x + iy: R e^{iθ} is then wr
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from types import MappingProxyType
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from dalembert.arithmetic.records import Record, record
 from dalembert.dataclass import dataclass, field
@@ -37,10 +37,11 @@ from virtualwork.describe.laws import Segment as Segment
 from virtualwork.describe.meshes import Belt as Belt
 from virtualwork.describe.meshes import Gear as Gear
 from virtualwork.describe.meshes import Rack as Rack
-from virtualwork.describe.points import Point as Point
 from virtualwork.describe.points import Polar as Polar
-from virtualwork.describe.points import as_number, as_points, by_name, placed
-from virtualwork.describe.points import as_point as as_point
+from virtualwork.describe.points import as_points, by_name, placed
+from virtualwork.describe.values import Point as Point
+from virtualwork.describe.values import as_number
+from virtualwork.describe.values import as_point as as_point
 
 
 @record
@@ -86,9 +87,9 @@ class Link(Record):
     ) -> None:
         every = {**by_name("points", points), **(polar or {})}
         object.__setattr__(self, "points", placed(every))
-        object.__setattr__(self, "mass", as_number(mass))
-        object.__setattr__(self, "center", as_point(center))
-        object.__setattr__(self, "inertia", as_number(inertia))
+        object.__setattr__(self, "mass", as_number(mass, "mass"))
+        object.__setattr__(self, "center", as_point(center, "center"))
+        object.__setattr__(self, "inertia", as_number(inertia, "inertia"))
         relative = {point: at for point, at in every.items() if isinstance(at, Polar)}
         object.__setattr__(self, "polar", MappingProxyType(relative))
 
@@ -140,10 +141,6 @@ class Guide(Part):
     turned: float | None = declared(
         Scalar("angle"), "the link's x-axis against the line", default=None, absent=0.0, table="sliders"
     )
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.through, str):
-            object.__setattr__(self, "through", as_point(self.through))
 
     @property
     def is_slider(self) -> bool:
@@ -257,16 +254,16 @@ class Guess(Record):
         angles: Mapping[str, float] | None = None,
         points: Mapping[str, Point] | None = None,
     ) -> None:
-        values = (
-            None
-            if at is None
-            else (as_number(at),)
-            if isinstance(at, (int, float, complex))
-            else tuple(map(as_number, at))
-        )
+        every: Any = at if isinstance(at, Iterable) and getattr(at, "ndim", True) else (at,)
+        values = None if at is None else tuple(as_number(value, "[guess] at") for value in every)
+        turns = by_name("[guess] angles", angles or {})
         object.__setattr__(self, "at", values)
-        object.__setattr__(self, "angles", MappingProxyType(dict(angles or {})))
-        object.__setattr__(self, "points", as_points(points or {}))
+        object.__setattr__(
+            self,
+            "angles",
+            MappingProxyType({link: as_number(turn, f"[guess] {link}") for link, turn in turns.items()}),
+        )
+        object.__setattr__(self, "points", as_points(points or {}, "[guess] points"))
 
 
 @dataclass(frozen=True)
@@ -341,6 +338,7 @@ class Torque(Part):
     periodic: bool = False
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.over not in ("time", "angle", "speed"):
             raise DescriptionError(
                 f"torque on {self.link} over: found '{self.over}', expected time, angle or speed"

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from numbers import Real
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
@@ -11,68 +10,42 @@ from dalembert.dataclass import dataclass
 from dalembert.hints import choices
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.forms import Form, Scalar
-from virtualwork.describe.keys import declared
-
-Point = complex | tuple[float, float] | Sequence[float]
-
-
-def as_point(value: Point) -> complex:
-    """Read a point of the plane, `x + iy` or `(x, y)`, as a complex number.
-
-    >>> as_point((3, 4))
-    (3+4j)
-    """
-    if isinstance(value, complex):
-        # a number that varies stays what it is
-        return complex(value) if hasattr(value, "dtype") else value
-    if isinstance(value, Real):
-        return complex(value)
-    try:
-        x, y = value
-        return joined(x, y)
-    except (TypeError, ValueError):
-        # a text of two letters is no point either
-        raise DescriptionError(f"expected a point (x, y) or x + iy, found {value!r}") from None
-
-
-def joined(x: float, y: float) -> complex:
-    """x + iy, of numbers that vary too.
-
-    >>> joined(3, 4)
-    (3+4j)
-    """
-    plain = isinstance(x, Real) and isinstance(y, Real)
-    return complex(x, y) if plain else as_number(x) + 1j * as_number(y)
-
-
-def as_number(value: float) -> float:
-    """Read a real number as a float; one that varies stays what it is.
-
-    >>> as_number(3)
-    3.0
-    """
-    return value if isinstance(value, complex) else float(value)
+from virtualwork.describe.keys import convert, declared
+from virtualwork.describe.values import Point, as_point
 
 
 def by_name(what: str, entries: Mapping[str, Any]) -> Mapping[str, Any]:
     """Refuse what is no mapping of names."""
     if not isinstance(entries, Mapping):
         raise DescriptionError(f"{what}: expected a mapping of names, found {type(entries).__name__}")
+    for name in entries:
+        if not isinstance(name, str):
+            raise DescriptionError(f"{what}: found the name {name!r}, expected a text such as '{name}'")
     return entries
 
 
-def as_points(points: Mapping[str, Point]) -> Mapping[str, complex]:
+def as_points(points: Mapping[str, Point], what: str = "points") -> Mapping[str, complex]:
     """Read named points, and freeze them."""
-    return MappingProxyType({name: as_point(value) for name, value in by_name("points", points).items()})
+    return MappingProxyType(
+        {name: as_point(value, what, name) for name, value in by_name(what, points).items()}
+    )
 
 
 @dataclass(frozen=True)
 class Polar:
-    """A point of a link by its distance and direction from another point of it, in the link's axes, m and rad."""
+    """A point of a link by its distance and direction from another point of it, in the link's axes, m and rad.
+
+    >>> from virtualwork import Link
+    >>> Link({"C": 0.3, "G": Polar("C", 0.5, 0.0)}).points["G"]
+    (0.8+0j)
+    """
 
     origin: str = declared(Form(), "another point of this link", name="from")
     length: float = declared(Scalar("length"), "the distance from there")
     angle: float = declared(Scalar("angle"), "its direction against the link's x-axis")
+
+    def __post_init__(self) -> None:
+        convert(self)
 
     @property
     def arm(self) -> complex:
@@ -109,5 +82,5 @@ def placed(points: Mapping[str, Point | Polar]) -> Mapping[str, complex]:
             raise DescriptionError(f"points.{point} from: '{at.origin}' itself is placed from '{point}'")
         for point in ready:
             z = waiting.pop(point)
-            places[point] = places[z.origin] + z.arm if isinstance(z, Polar) else as_point(z)
+            places[point] = places[z.origin] + z.arm if isinstance(z, Polar) else as_point(z, "points", point)
     return MappingProxyType({point: places[point] for point in points})

@@ -66,7 +66,7 @@ class Family:
         columns: dict[Dimension, Reals] = {}
         for path, values in numbers.items():
             components = named(mechanism, path, paths)
-            column = np.asarray(values)
+            column = np.asanyarray(values)
             if np.iscomplexobj(column) and len(components) == 2:
                 column = np.stack([column.real, column.imag], axis=-1)
             column = real_array(path, column)

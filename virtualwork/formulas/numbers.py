@@ -79,7 +79,7 @@ def leave_out(values: NDArray[Any], which: NDArray[np.bool_]) -> None:
 
 
 def real_array(name: str, value: ArrayLike, once: bool = False) -> Reals:
-    """Read real numbers as an array of its own; ValueError names what holds something else.
+    """Read real numbers as an array of its own; ValueError names what holds something else. What is masked is NaN.
 
     A motion is solved on the first request: what the caller does to his array in between does not change it. What is
     solved at `once` may read the caller's own.
@@ -89,9 +89,15 @@ def real_array(name: str, value: ArrayLike, once: bool = False) -> Reals:
     ValueError: angle: expected real numbers, found 'abc'
     """
     try:
+        if hasattr(value, "dtype"):
+            if value.dtype.kind in "cmM":
+                # numpy takes the real part of complex numbers, and nanoseconds of times
+                raise TypeError
+            if isinstance(value, np.ma.MaskedArray):
+                value = np.ma.filled(value.astype(float), np.nan)
         return np.asarray(value, dtype=float) if once else np.array(value, dtype=float)
     except (TypeError, ValueError):
-        text = repr(value)
+        text = " ".join(repr(value).split())
         text = text if len(text) <= 60 else f"{text[:60]} …"
         raise ValueError(f"{name}: expected real numbers, found {text}") from None
 

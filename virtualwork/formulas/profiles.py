@@ -12,7 +12,7 @@ from dalembert.arithmetic.varied import direction, heading
 from virtualwork.describe.cams import CamDrive
 from virtualwork.describe.description import Description
 from virtualwork.describe.laws import TURN, Lift
-from virtualwork.describe.points import joined
+from virtualwork.describe.values import joined
 from virtualwork.formulas.lifts import lift, placed
 from virtualwork.formulas.numbers import WRITTEN, Number, One
 from virtualwork.formulas.touches import carried

@@ -133,7 +133,7 @@ class Later:
     leaves: dict[str, int]
 
 
-def later(recording: Recording, keys: Sequence[Quantity], formed: Container[int], first: bool) -> Later:
+def later(recording: Recording, keys: Sequence[Quantity], formed: frozenset[int], first: bool) -> Later:
     """The tape of quantities from the values of operations that are known, and what it leaves besides.
 
     What is requested first may be all: it leaves the sines and cosines alone, which cost as much as all else of a position.
@@ -142,10 +142,13 @@ def later(recording: Recording, keys: Sequence[Quantity], formed: Container[int]
     with recording.lock:
         outputs = recorder.numbers(recording.outputs(keys))
         operations = recorder.operations
+        # since a product was left it may have become part of a sum
+        summed = set() if first else _summed_products(operations)
+        formed = formed - summed
         below = reached(operations, (number for _, number in outputs), formed)
         # what is known with the other sign is not worked out anew
         turned = {number: recorder.opposite(number) for number in below if number not in formed}
-    signs = {a: b for a, b in turned.items() if b is not None and b in formed and b < a}
+    signs = {a: b for a, b in turned.items() if b is not None and b in formed and b < a and a not in summed}
     if signs:
         operations = [("neg", signs[k]) if k in signs else of for k, of in enumerate(operations)]
         below = reached(operations, (number for _, number in outputs), formed)
@@ -153,7 +156,7 @@ def later(recording: Recording, keys: Sequence[Quantity], formed: Container[int]
     if first:
         worth = {number for number in below if operations[number][0] in ("sin", "cos")}
     else:
-        worth = _worth_keeping(recording, operations) if len(operations) <= LONGEST else set()
+        worth = _worth_keeping(recording, operations, summed) if len(operations) <= LONGEST else set()
     known = set(below)
     others = (number for number in worth - known if number not in formed)
     near = {number for number in others if _is_near(operations, number, known)}
@@ -162,9 +165,18 @@ def later(recording: Recording, keys: Sequence[Quantity], formed: Container[int]
     return Later(tape, {name: number for number, name in takes.items()}, leaves)
 
 
-def _worth_keeping(recording: Recording, operations: Sequence[Operation]) -> set[int]:
+def _summed_products(operations: Sequence[Operation]) -> set[int]:
+    """The products that are part of a sum: compiled code rounds both at once, so that no request may begin between them."""
+    terms = {number for kind, *of in operations if kind in ("add", "sub") for number in of}
+    return {number for number in terms if operations[number][0] == "mul"}
+
+
+def _worth_keeping(recording: Recording, operations: Sequence[Operation], summed: Container[int]) -> set[int]:
     """The operations whose values are the state of a pose and cost much, with nothing but others of these known."""
-    state = {number for value in recording.state() for number in _numbers(value)}
+    whole = {number for value in recording.state() for number in _numbers(value)}
+    # of a product within a sum the factors
+    state = {number for number in whole if number not in summed}
+    state.update(factor for number in whole - state for factor in operations[number][1:])
     result: set[int] = set()
     costs: list[int] = []
     for number, operation in enumerate(operations):

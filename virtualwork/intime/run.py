@@ -15,6 +15,7 @@ from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
 from virtualwork.describe.parts import Input
+from virtualwork.describe.values import as_number
 from virtualwork.formulas.numbers import EPS, Reals, real_array
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.intime.coordinates import Coordinates
@@ -395,7 +396,7 @@ def levels_of(inputs: Sequence[Input], until: Mapping[str, float] | None) -> dic
     for name in until or ():
         if name not in names:
             raise ValueError(f"until: no input is named '{name}': expected {', '.join(names)}")
-    return {names.index(name): float(level) for name, level in (until or {}).items()}
+    return {names.index(name): as_number(level, f"until {name}") for name, level in (until or {}).items()}
 
 
 def reached(t: Reals, end: float) -> Reals:

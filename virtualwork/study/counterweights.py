@@ -57,6 +57,8 @@ def least_squares(motion: Moving, links: Sequence[str]) -> tuple[dict[str, compl
     Solved by orthogonal factors, never by normal equations. Where two links turn alike (a parallelogram's cranks)
     only the sum of their counterweights counts: that is an error and names them.
     """
+    if isinstance(links, str) or not links:
+        raise DescriptionError(f"counterweights: found {links!r}, expected a list of links")
     scene, poses = motion.dynamics.scene, motion.dynamics.poses
     if not scene.moves:
         raise DescriptionError("counterweights: the speed is zero: expected a motion that shakes")

@@ -79,7 +79,14 @@ class Cycle(Sweep):
         )
 
     def integral(self, values: Reals) -> float:
-        """∫ values over the sweep: dt over time, else dq."""
+        """∫ values over the sweep: dt over time, else dq.
+
+        Raises
+        ------
+        ValueError
+            Of one pose, of an input that turns back, or where a value is missing: there is no integral.
+        """
+        self._refuse_gaps(values)
         if self.is_periodic:
             return float(np.mean(values[:-1]) * self.span)
         if len(values) < 4:
@@ -90,6 +97,16 @@ class Cycle(Sweep):
         return float(
             CubicSpline(self.place[forward], values[forward]).integrate(self.place[0], self.place[-1])
         )
+
+    def _refuse_gaps(self, values: Reals) -> None:
+        steps = np.diff(self.place)
+        if not len(steps) or not ((steps > 0).all() or (steps < 0).all()):
+            raise ValueError(self.reason)
+        if not np.isfinite(values).all():
+            count = int((~np.isfinite(values)).sum())
+            raise ValueError(
+                f"{count} of {self.poses.n} poses of the sweep have no effort: expected all of a cycle"
+            )
 
     @property
     def forward(self) -> slice:
@@ -316,13 +333,17 @@ class Cycle(Sweep):
         Raises
         ------
         ValueError
-            Where the input does not turn, or stands or turns back in its cycle.
+            Where the sweep is no whole cycle; where the input does not turn, or stands or turns back in its cycle.
         """
+        if not coefficient > 0:
+            raise ValueError(f"coefficient: found {coefficient}, expected a number above zero, such as 0.02")
         speed = np.asarray(self.speed)
         if not np.any(speed):
             raise ValueError("a flywheel needs a speed of the input that is not zero")
         if not ((speed > 0).all() or (speed < 0).all()):
             raise ValueError("the input stands or turns back: a flywheel on it has no steady speed to keep")
+        if self.reason is not None:
+            raise ValueError(self.reason)
         mean = float(speed) if speed.ndim == 0 else self.integral(speed) / self.span
         return self.fluctuation / (coefficient * mean * mean)
 

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.branch.assembly import Assembly
 from virtualwork.digits.balance import Balance
-from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.formulas.numbers import EPS, Reals, real_array
 from virtualwork.study.loads_at_rest import AROUND, Rest, goes_round, turns_of_loads
 
 SAMPLES = 1440
@@ -187,6 +187,11 @@ def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int 
     -------
     Equilibria
 
+    Raises
+    ------
+    ValueError
+        Ranges of another shape, or whose ends change places; no samples.
+
     Examples
     --------
     A pendulum hangs stably and stands unstably.
@@ -198,8 +203,15 @@ def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int 
     [(90, False), (270, True)]
     """
     k = len(assembly.mechanism.inputs)
-    given = np.full((k, 2), np.nan) if spans is None else np.asarray(spans, dtype=float).reshape(k, 2)
-    limited = ~np.isnan(given).any(axis=1)
+    given = np.full((k, 2), np.nan) if spans is None else real_array("spans", spans)
+    if given.size != 2 * k or given.ndim > 2:
+        raise ValueError(f"spans: expected shape ({k}, 2), a range of each input, found {given.shape}")
+    for low, high in (given := given.reshape(k, 2)).tolist():
+        if not (0 <= high - low < math.inf or (math.isnan(low) and math.isnan(high))):
+            raise ValueError(f"spans: found {low:g} to {high:g}, expected the lower and the higher end")
+    if not samples >= 1:
+        raise ValueError(f"samples: found {samples}, expected one or more")
+    limited = np.asarray(~np.isnan(given).any(axis=1))
     # at a limit, and beyond it, a loop has no rates
     with np.errstate(all="ignore"):
         turns, ranges = _searched(assembly)
