@@ -191,6 +191,7 @@ _IN_FULL = {
     "in": "inch inches",
     "ft": "foot feet",
     "mil": "mils thou",
+    "in_s": "ips",
     "kg": "kilogram kilograms",
     "g": "gram grams",
     "lb": "lbs pound pounds",

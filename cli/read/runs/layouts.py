@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from cli.read.runs.vectors import Layout, vectors_of
+from cli.read.runs.vectors import AMPLITUDE, MASS, UNBALANCE, Layout, parted_cells, vectors_of
 from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number
 from dalembert.tables.headers import Heading, plain_word, quantity_meant
@@ -131,20 +131,9 @@ def _states_are_masses(table: Table, states: list[re.Match[str]]) -> None:
 
 # -- sheets with a row a run and a column pair for each sensor, in English or German -----------------------------
 
-AMPLITUDE = (
-    "amplitude",
-    "amp",
-    "schwinggeschwindigkeit",
-    "schwingweg",
-    "schwingung",
-    "schwingungen",
-    "vibration",
-)
 PHASE = ("phase", "phasenwinkel", "phasenlage")
 TRIAL_ANGLE = ("testwinkel", "probewinkel")
 ANGLE = ("angle", "winkel", "winkellage", *TRIAL_ANGLE)
-MASS = ("mass", "masse", "gewicht", "weight", "testmasse", "probemasse", "testgewicht", "probegewicht")
-UNBALANCE = ("unbalance", "unwucht")
 PLACE = ("sensor", "lager", "messstelle", "messpunkt", "messebene", "aufnehmer", "bearing", "at", "am", "an")
 PLANE = ("plane", "ebene", "in", "der", "trial", "test", "probe", "ausgleichsebene")
 KEPT = ("bleibt", "kept", "trial_kept", "bleibt_drauf")
@@ -196,6 +185,7 @@ class _Column:
 
 def long_form(source: Source) -> Source:
     """Return a table of runs with a row for each reading; of one that is such a table already only foreign names change."""
+    source = parted_cells(source)
     if not is_wide(source):
         return _translated(source)
     columns = list(_columns(source.headings))
@@ -259,6 +249,8 @@ def _translated(source: Source) -> Source:
         for k, (each, name) in enumerate(zip(source.headings, names, strict=True))
         if name != each.name and names.count(name) == 1
     ]
+    if not read:
+        return source
     taken = ", ".join(f"{quote(each.written)} as {name}" for _, each, name in read)
     source.warnings.append(f"{source.file}: read {taken}")
     headings = list(source.headings)
@@ -337,7 +329,7 @@ def _known(place: int, each: Heading, before: str) -> _Column | None:
         return _Column(place, each, "amplitude", name(AMPLITUDE), amplitude)
     quantity = quantity_meant(stem, WHOLE) or (meant if meant in WHOLE else "")
     if quantity == "speed":
-        speed = find_unit("speed", unit)
+        speed = find_unit("speed", unit or meant)
         return _Column(place, each, "speed", "", speed) if speed else None
     return _Column(place, each, quantity, "") if quantity else None
 

@@ -318,8 +318,8 @@ class MassColumns:
         parts, around = cell.split(";"), turn.split(";") if turn else [""] * len(names)
         for cells, target in ((size, parts), (angle or size, around)):
             if len(target) != len(names):
-                joined = f"{len(names)} joined by ';' as in trial_plane"
-                raise self._wrong(i, cells.header, cells.values[i], f"masses and angles, {joined}")
+                expected = f"{len(names)} joined by ';'" if len(names) > 1 else "one"
+                raise self._wrong(i, cells.header, cells.values[i], f"{expected}, as trial_plane has planes")
         for one, part, at in zip(names, parts, around, strict=True):
             mass = self._number(size, i, part, "a trial mass")
             if mass < 0 or 0 < mass < SMALLEST:
