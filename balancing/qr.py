@@ -22,7 +22,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> tuple[Complex, Real]:
+def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> tuple[Complex, Complex]:
     """Return w (..., p) with Σ|b + a w|² + λ² Σ_p ‖a_p‖² |w_p|² least, and the triangle R (..., p, p) of the scaled columns.
 
     Parameters

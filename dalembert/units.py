@@ -183,7 +183,6 @@ _PLAIN = str.maketrans(SIGNS)
 # revolutions a minute, as instruments of several languages print them
 PER_MINUTE = r"(?:1|r|rev|u|tr|giri|rot)\s*/\s*min|min\s*(?:\^?-1|⁻¹)"
 
-
 _IN_FULL = {
     "m": "metre meter metres meters",
     "mm": "millimetre millimeter millimetres millimeters",
@@ -229,8 +228,16 @@ def _word(match: re.Match[str]) -> str:
     return ABBREVIATIONS.get(word.lower(), word)
 
 
+_PEAK = r"p(?:ea)?k?"  # how an amplitude is read, behind its unit: `µm pk-pk`, `in/s 0-pk`, `mm/s RMS`
+_READ = re.compile(
+    rf"(?i)[\s_]+(?:(?P<pp>{_PEAK}[ -]*(?:to)?[ -]*{_PEAK})|(?P<pk>(?:0-)?{_PEAK})|(?P<rms>rms|eff))$"
+)
+
+
 def unit_name(written: str) -> str:
     """Return a unit as headers spell it: `mm/s` is mm_s, `g·mm` and `g.mm` g_mm, `N/mm` N_per_mm, `µm` um, `°` deg, `1/min` rpm."""
+    if read := _READ.search(written):
+        return f"{unit_name(written[: read.start()])}_{read.lastgroup}"
     text = _spelled(written).replace("^", "")
     above, slash, below = (part.strip() for part in text.partition("/"))
     if slash:

@@ -278,6 +278,21 @@ def test_words_for_the_speed(dalembert: Dalembert, header: str, speed: str) -> N
     assert not any(line.endswith("read ") for line in result["warnings"])
 
 
-def test_inches_a_second_as_instruments_print_them(dalembert: Dalembert) -> None:
-    text = "run,sensor,amplitude_ips,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n0,1,0.4,90,,,\n1,1,0.2,90,1,5,0\n"
-    assert document(dalembert("field", "-", "--json", stdin=text))["amplitude_unit"] == "in_s"
+@pytest.mark.parametrize(
+    ("header", "unit"),
+    [
+        ("amplitude_ips", "in_s"),
+        ("amplitude (µm pk-pk)", "um_pp"),
+        ("velocity (mm/s RMS)", "mm_s_rms"),
+        ("velocity_mm_s", "mm_s"),
+        ("displacement [mils p-p]", "mil_pp"),
+        ("1X amp [in/s 0-pk]", "in_s_pk"),
+        ("acceleration [g peak]", "g_pk"),
+        ("Schwinggeschwindigkeit [mm/s eff]", "mm_s_rms"),
+    ],
+)
+def test_amplitudes_as_instruments_print_them(dalembert: Dalembert, header: str, unit: str) -> None:
+    text = f"run,sensor,{header},phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n0,1,0.4,90,,,\n1,1,0.2,90,1,5,0\n"
+    result = document(dalembert("field", "-", "--json", stdin=text))
+    assert result["amplitude_unit"] == unit
+    assert result["rotors"][0]["corrections"][0]["mass_kg"] == pytest.approx(0.010, rel=1e-12)

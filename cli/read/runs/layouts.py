@@ -227,7 +227,10 @@ def _translated(source: Source) -> Source:
     names, before = [each.name for each in source.headings], ""
     own = [OWN.get(_stem(each), "") for each in source.headings]
     whole = any(_is_foreign_sensor(each) for each in source.headings)
-    if not whole and not any(quantity_meant(_stem(each), MEANT) for each in _foreign(source.headings)):
+    foreign = [_stem(each) for each in source.headings if _stem(each) not in OWN]
+    if not whole and not any(
+        quantity_meant(stem, MEANT) or {*stem.split("_")} & {*AMPLITUDE} for stem in foreign
+    ):
         return source
     for place, each in enumerate(source.headings):
         column = _known(place, each, before)
@@ -262,10 +265,6 @@ def _translated(source: Source) -> Source:
 def _stem(each: Heading) -> str:
     """The plain words of a header without its unit."""
     return plain_word(each.base if each.unit else parted(each.name)[0])
-
-
-def _foreign(headings: Sequence[Heading]) -> list[Heading]:
-    return [each for each in headings if _stem(each) not in OWN]
 
 
 def _is_word(words: Sequence[str]) -> bool:

@@ -27,7 +27,11 @@ AMPLITUDE = (
     "schwingweg",
     "schwingung",
     "schwingungen",
+    "schwingbeschleunigung",
     "vibration",
+    "displacement",
+    "velocity",
+    "acceleration",
 )
 MASS = ("mass", "masse", "gewicht", "weight", "testmasse", "probemasse", "testgewicht", "probegewicht")
 UNBALANCE = ("unbalance", "unwucht")
