@@ -180,7 +180,10 @@ class _Reading:
         if self.four_run:
             table.reject(unread, "amplitude", "a number")
             return amplitude.values.astype(complex)
-        phase = table.require("phase", "angle")
+        try:
+            phase = table.require("phase", "angle")
+        except DataError as error:
+            raise DataError(f"{error}; of amplitudes alone: --method four-run") from None
         # a sensor that a run lacks may be a row with blank cells
         unread = unread & np.isnan(phase.values)
         expected = "a number, or amplitude and phase both blank"
