@@ -63,8 +63,8 @@ class Balance:
     max_residual: Real | None = None
     """The limits of the residual that were requested, (s,)."""
 
-    singular_values: Real | None = field(default=None, repr=False, compare=False)
-    """The singular values of the scaled coefficients, (..., p), where they are known from the solution."""
+    triangle: Complex | None = field(default=None, repr=False, compare=False)
+    """R (..., p, p) of the QR of the scaled coefficients, where the solution has it."""
 
     def __repr__(self) -> str:
         largest = numbers(self.residual_max)
@@ -149,8 +149,9 @@ class Balance:
     @cached_property
     def condition_number(self) -> Real:
         """σ_max/σ_min of the coefficients after scaling the columns (see `condition_number`), (...)."""
-        if self.singular_values is not None:
-            return np.asarray(self.singular_values[..., 0] / self.singular_values[..., -1])
+        if self.triangle is not None:
+            sigma = np.linalg.svd(self.triangle, compute_uv=False)
+            return np.asarray(sigma[..., 0] / sigma[..., -1])
         return condition_number(self.influence, self.weights)
 
     def error_estimate(
@@ -304,7 +305,7 @@ def least_squares(
     array([17., 31.])
     """
     alpha, v, root = checked(influence, initial, weights)
-    if np.ndim(ridge) or ridge < 0 or not np.isfinite(ridge):
+    if np.ndim(ridge) or not 0 <= ridge < np.inf:
         raise ValueError("ridge must be one number, not negative")
     w = None if weights is None else np.asarray(weights, dtype=float)
     if max_mass is not None or max_residual is not None:
@@ -322,10 +323,10 @@ def least_squares(
         return Balance(alpha, v, corrections, w, bound, gap, of_largest, 0.0, *limits)
     a, b = (alpha, v) if root is None else (alpha * root[..., None], v * root)
     with np.errstate(over="ignore", invalid="ignore"):
-        solution, sigma = smallest_squares(a, b, ridge)
+        solution, r = smallest_squares(a, b, ridge)
     if not np.isfinite(solution).all():
         raise ValueError(OUT_OF_RANGE)
-    return Balance(alpha, v, solution, w, ridge=ridge, singular_values=None if ridge else sigma)
+    return Balance(alpha, v, solution, w, ridge=ridge, triangle=None if ridge else r)
 
 
 def minimax(

@@ -191,13 +191,13 @@ def require_independent(
     columns: int,
     what: str,
     error: type[DependentPlanes | DependentTrials],
-) -> Real:
-    """Return the singular values of scaled columns, or raise with the combination that is not seen."""
+) -> None:
+    """Raise where the columns, which are scaled, depend on each other: with the combination that is not seen."""
     if rows >= columns:
         sigma = np.linalg.svd(a, compute_uv=False)
         bad = ~(sigma[..., -1] > threshold(rows, columns) * sigma[..., 0])
         if not bad.any():
-            return np.asarray(sigma)
+            return
         case = tuple(int(i[0]) for i in np.nonzero(bad)) if bad.ndim else ()
     else:
         case = (0,) * (a.ndim - 2)

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.cone_problem import ConeProblem, solve
+from balancing.cone_problem import ConeProblem, real_rows, solve
 from balancing.dependence import DependentPlanes, adjoint, columns_scaled, roundings
 from balancing.qr import smallest_squares
 from balancing.triangle import triangle
@@ -73,10 +73,15 @@ class Infeasible(ValueError):
 class NotConverged(ArithmeticError):
     """The best corrections are not proven optimal; `gap` is the largest relative excess of their residual."""
 
-    def __init__(self, gap: float, condition: float) -> None:
+    def __init__(self, gap: float, condition: float, apart: float = 1.0) -> None:
         self.gap, self.condition = gap, condition
         text = f"the corrections cannot be proven to be the best: the residual may exceed the least one by a share of {gap:.2g}"
-        if condition > 1e5:
+        if apart > condition:
+            text += (
+                f": the readings respond to the masses in sizes {apart:.2g} times apart, as in different units: give weights, or "
+                "readings in one unit"
+            )
+        elif condition > 1e5:
             text += (
                 f": the planes are nearly dependent (condition number {condition:.2g}), and the rounding of the masses alone "
                 "changes the residual by as much: leave a plane out, or limit the masses further"
@@ -230,7 +235,7 @@ class _Limited:
                 own = np.concatenate([own, np.ones(len(self.limited))])
                 problem.h -= np.minimum(ROOM * EPS * own, PROVEN)
             step, force = solve(problem)
-            w = self._within(start + step)
+            w = self._within(start + step, problem.to_w)
             force = force[: len(self.cones[1])] / self.share
             # of the step as it was solved: w is rounded, which shows where it leaves little
             stepped = residual(self.a, self.b, start) + self.a @ step
@@ -242,8 +247,12 @@ class _Limited:
             start = best.corrections
         assert best is not None
         if best.gap > PROVEN:
-            sigma = np.linalg.svd(columns_scaled(self.a)[0], compute_uv=False)
-            raise NotConverged(best.gap, float(sigma[0] / sigma[-1]) if sigma[-1] > 0 else np.inf)
+            scaled, _ = columns_scaled(self.a)
+            size = np.abs(scaled).max(axis=1)
+            alike = scaled[size > 0] / size[size > 0, None]
+            sigma = np.linalg.svd(alike, compute_uv=False)
+            condition = float(sigma[0] / sigma[-1]) if sigma[-1] > 0 else np.inf
+            raise NotConverged(best.gap, condition, float(size.max() / size[size > 0].min()))
         return best
 
     def _problem(self, start: Complex, unit: float, residual: Residual, cut: float) -> ConeProblem:
@@ -273,12 +282,13 @@ class _Limited:
             cut,
         )
 
-    def _within(self, w: Complex) -> Complex:
+    def _within(self, w: Complex, to_w: Complex) -> Complex:
         """Bring w, which misses its limits by rounding, within all of them.
 
-        It is shortened as a whole: what planes do against each other then changes by no more than their sum.
+        By the last digits it is shortened as a whole: what planes do against each other then changes by no more than their sum.
         """
         if len(self.limited):
+            w = self._moved_within(w, to_w)
             w = w / max(1.0, float((np.abs(w) / self.limit).max()))
             while (np.abs(w) > self.limit).any():
                 w = w * (1 - EPS)
@@ -291,6 +301,19 @@ class _Limited:
                 low, high = (low, middle) if kept(w + middle * (inside - w)) else (middle, high)
             w = inside if high == 1 else w + high * (inside - w)
         return np.asarray(w + 0.0, dtype=complex)
+
+    def _moved_within(self, w: Complex, to_w: Complex) -> Complex:
+        """Return the nearest masses within their limits: of readings in units far apart a part of 1e-12 turns a row round."""
+        for _ in range(4):
+            over = np.abs(w) / self.limit - 1
+            beyond = np.flatnonzero(over > ROOM * EPS)
+            if not len(beyond):
+                break
+            rows = (w[beyond].conj() / np.abs(w[beyond]) / self.limit[beyond])[:, None] * to_w[beyond]
+            real, _ = real_rows(rows)
+            moved = np.linalg.lstsq(real, -over[beyond] - 2 * EPS, rcond=None)[0]
+            w = w + to_w @ (moved[: len(w)] + 1j * moved[len(w) :])
+        return w
 
     def _reach(self, to_w: Complex, unit: float, left: Complex) -> Real:
         """Bound how far the masses (p,) of the optimum are from ones that keep the limits and leave `left`: it leaves less."""

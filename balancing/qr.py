@@ -9,15 +9,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.dependence import DependentPlanes, columns_scaled, damping_norms, require_independent
+from balancing.dependence import (
+    DependentPlanes,
+    columns_scaled,
+    damping_norms,
+    require_independent,
+    threshold,
+)
 from balancing.triangle import triangle
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> tuple[Complex, Real]:
-    """Return w (..., p) with Σ|b + a w|² + λ² Σ_p ‖a_p‖² |w_p|² least, and the singular values of the scaled columns.
+def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> tuple[Complex, Complex]:
+    """Return w (..., p) with Σ|b + a w|² + λ² Σ_p ‖a_p‖² |w_p|² least, and the triangle R (..., p, p) of the scaled columns.
 
     Parameters
     ----------
@@ -56,10 +62,32 @@ def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> tuple[Comple
     readings = rows.shape[-2]
     if readings < planes:
         require_independent(rows[..., :planes], scale, readings, planes, "readings", DependentPlanes)
-    r = triangle(rows)[..., :planes, :]
-    sigma = require_independent(r[..., :planes], scale, readings, planes, "readings", DependentPlanes)
-    x = np.linalg.solve(r[..., :planes], -r[..., planes:])[..., 0]
-    return np.asarray(x * scale + 0.0, dtype=complex), sigma
+    both = triangle(rows)[..., :planes, :]
+    r = both[..., :planes]
+    if not _surely_independent(r, threshold(readings, planes)):
+        require_independent(r, scale, readings, planes, "readings", DependentPlanes)
+    x = np.linalg.solve(r, -both[..., planes:])[..., 0]
+    return np.asarray(x * scale + 0.0, dtype=complex), r
+
+
+def _surely_independent(r: Complex, least: float) -> bool:
+    """Whether σ_min > least·σ_max of every triangle R (..., p, p) is sure without its singular values.
+
+    σ_min >= |det R| ((p - 1)/‖R‖²)^((p - 1)/2), Frobenius' norm, for the product of the others is largest where they are alike
+    (Yu and Gu, Linear Algebra Appl. 252 (1997) 25-38).
+    """
+    planes = max(r.shape[-1] - 1, 1)
+    if r.ndim == 2:
+        whole = low = high = float(np.vdot(r, r).real)
+    else:
+        whole = np.square(np.abs(r)).sum(axis=(-2, -1))[..., None]
+        low, high = whole.min(initial=1.0), whole.max(initial=1.0)
+    if not 1e-280 < low <= high < 1e280:
+        # squares may have left the range of numbers
+        return False
+    shares = np.abs(np.diagonal(r, axis1=-2, axis2=-1)) * (planes / whole) ** 0.5
+    # twice: rounding
+    return bool((shares.prod(axis=-1) > 2 * least * planes**0.5).all())
 
 
 def factors(a: Complex) -> tuple[Complex, Complex, Real]:

@@ -13,6 +13,9 @@ from cli.show.output import command
 from dalembert.errors import DataError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from balancing.synchronous import OncePerTurn
     from cli.show.commands import ShowOptions
     from cli.show.result import Result
@@ -132,8 +135,32 @@ def read_recording(path: str, pulses: int) -> Recording:
             f"{table.file}: the speed varies (standard deviation {100 * result.speed_deviation / result.speed:.2g} %), and the "
             "vectors are means over it: near a resonance record at a steady speed"
         )
+    for sensor, samples in zip(sensors, signal.T, strict=True):
+        if share := _clipped(samples):
+            table.warnings.append(
+                f"{table.file}: {share:.0%} of the samples of {sensor} have its largest or smallest value: the recording is "
+                "clipped, and the amplitude too small; record with a larger range"
+            )
     exact = partial(_exact, table, (time, mark, tacho), list(units), pulses)
     return Recording(sensors, unit, result, table.warnings, exact)
+
+
+def _clipped(samples: NDArray[np.float64]) -> float:
+    """Return the share of samples at the largest or the smallest value; 0 where a sine in steps as fine has a third as many.
+
+    >>> import numpy as np
+    >>> sine = np.cos(np.arange(1000) / 9)
+    >>> _clipped(sine), round(_clipped(np.clip(sine, -0.8, 1)), 2), _clipped(sine.round(1))
+    (0.0, 0.21, 0.0)
+    """
+    import numpy as np
+
+    values, counts = np.unique(samples, return_counts=True)
+    if len(values) < 3:
+        return 0.0
+    steps = np.array([values[1] - values[0], values[-1] - values[-2]]) / (values[-1] - values[0])
+    expected, shares = np.arccos(1 - 2 * steps) / np.pi, counts[[0, -1]] / len(samples)
+    return float(shares[shares > np.maximum(3 * expected, 0.01)].sum())
 
 
 def _without_volts(header: list[str]) -> list[str]:

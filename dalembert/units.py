@@ -182,7 +182,6 @@ _PLAIN = str.maketrans(SIGNS)
 # revolutions a minute, as instruments of several languages print them
 PER_MINUTE = r"(?:1|r|rev|u|tr|giri|rot)\s*/\s*min|min\s*(?:\^?-1|⁻¹)"
 
-
 _IN_FULL = {
     "m": "metre meter metres meters",
     "mm": "millimetre millimeter millimetres millimeters",
@@ -190,6 +189,7 @@ _IN_FULL = {
     "in": "inch inches",
     "ft": "foot feet",
     "mil": "mils thou",
+    "in_s": "ips",
     "kg": "kilogram kilograms",
     "g": "gram grams",
     "lb": "lbs pound pounds",
@@ -229,8 +229,9 @@ def _word(match: re.Match[str]) -> str:
     return ABBREVIATIONS.get(word.lower(), word)
 
 
-# how an amplitude is read, as instruments and people write it
-_READ_AS = {"_pp": r"pk-?pk|p-?p|peak[- ]to[- ]peak", "_rms": r"r\.?m\.?s\.?", "_pk": "pk|0-p|peak"}
+# how an amplitude is read, as instruments and people write it: `µm pk-pk`, `in/s 0-pk`, `mm/s RMS`
+_PEAK = r"p(?:ea)?k?"
+_READ_AS = {"_pp": rf"{_PEAK}[ -]*(?:to)?[ -]*{_PEAK}", "_rms": r"r\.?m\.?s\.?|eff", "_pk": rf"(?:0-)?{_PEAK}"}
 
 
 def unit_name(written: str) -> str:

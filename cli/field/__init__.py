@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
     from cli.show.result import Result, Sheet
     from dalembert.results.columns import Column
-    from dalembert.results.way import Topic
 
 
 EXAMPLE = "fan-one-plane"
@@ -126,28 +125,21 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     from cli.field.fit import Request, measured_groups
     from cli.read.rotor_options import tolerance_of
 
+    same = (
+        "objective", "from_here", "monte_carlo", "ridge", "phase_lag", "rotation", "fit", "predict", "suggest", "robust", "view",
+        "zone_class",
+    )  # fmt: skip
     request = Request(
+        **{name: getattr(options, name) for name in same},
         reading_error=reading_error(options.reading_error),
         tolerance=tolerance_of(options.grade, options.speed, options.rotor_mass, options.permissible, None),
         max_mass=mass_limits(options.max_mass or []),
         max_residual=with_unit("--max-residual", options.max_residual, "amplitude", positive=True),
-        objective=options.objective,
-        from_here=options.from_here,
-        monte_carlo=options.monte_carlo,
         four_run=four_run,
-        ridge=options.ridge,
         radius=arm,
-        phase_lag=options.phase_lag,
-        rotation=options.rotation,
         places=chosen,
         stock=in_stock,
-        fit=options.fit,
         exclude=options.exclude or (),
-        predict=options.predict,
-        suggest=options.suggest,
-        robust=options.robust,
-        view=options.view,
-        zone_class=options.zone_class,
     )
     measured, stored = measured_groups(options.runs, request, options.influence or (), options.runout)
     with processes(options.workers) as executor:
@@ -209,6 +201,7 @@ def _tables(b: FieldBalancing, warnings: list[str]) -> Tables:
 
 def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -> Result:
     from cli.field.remarks import sense, warnings
+    from cli.field.rotor import each, way
     from cli.read.runs.runs import latest
     from cli.show.result import Result
 
@@ -227,14 +220,8 @@ def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -
 
     def figure() -> Figure:
         from cli.field.report import draw
-        from cli.field.rotor import each
 
         return draw(b, list(each(b, 3)))
-
-    def way() -> list[Topic]:
-        from cli.field.rotor import way
-
-        return way(b)
 
     beside: dict[Path, Callable[[], bytes]] = {} if save_influence is None else {save_influence: stored}
     if page is not None:
@@ -257,7 +244,7 @@ def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -
         sheets=sheets,
         shows_input=True,
         about={"title": "Balancing in the field"} | ({} if day is None else {"date": day}),
-        way=way,
+        way=lambda: way(b),
         beside=beside,
         warnings=remarks,
     )

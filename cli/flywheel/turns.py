@@ -202,6 +202,10 @@ def warnings(wheel: Flywheel) -> list[str]:
     lines = []
     if wheel.constant:
         lines.append("the torque does not vary: there is nothing for a flywheel to store")
+    if wheel.coefficient > 0.5:
+        lines.append(
+            f"a fluctuation of {wheel.coefficient:g} is {wheel.coefficient:.0%} of the mean speed: 2 % is written 2% or 0.02"
+        )
     first, last = float(wheel.torque[0]), float(wheel.torque[-1])
     if abs(first - last) > 1e-6 * float(np.abs(wheel.torque).max()):
         lines.append(

@@ -186,10 +186,39 @@ def test_nearly_dependent_planes_are_right_or_refused_by_name() -> None:
 
 def test_a_gap_that_rounding_leaves_open_is_refused() -> None:
     """The best doubles for masses of 1e9 kg leave some 1e-7 more than the optimum: once an answer with a warning."""
-    a, v, limit = problem(np.random.default_rng(11), 24, 5, kappa=1e10)
+    a, v, limit = problem(np.random.default_rng(19), 24, 5, kappa=1e10)
     with pytest.raises(NotConverged, match=r"nearly dependent \(condition number") as caught:
         minimax(a, v, limit)
     assert 1e-9 < caught.value.gap < 1e-6
+
+
+@pytest.mark.parametrize(("seed", "size"), [(5, 2), (68, 2), (10, 3), (90, 3)])
+def test_one_sensor_in_a_unit_a_million_times_as_small(seed: int, size: int) -> None:
+    """The masses missed their limits by 1e-12, and shortened by that they turned the large reading: refused with gaps to 2e-4."""
+    rng = np.random.default_rng(seed)
+    a, v = noise(rng, size, size), noise(rng, size)
+    limit = 0.9 * np.abs(np.linalg.solve(a, v))
+    unit = np.ones(size)
+    unit[0] = 1e6
+    fix = minimax(a * unit[:, None], v * unit, limit)
+    assert fix.gap <= 1e-12
+    assert (np.abs(fix.corrections) <= limit).all()
+
+
+@pytest.mark.parametrize("seed", [1, 82, 113, 155, 348])
+def test_eight_sensors_in_units_far_apart(seed: int) -> None:
+    """Independent planes, in units to 1e8 apart: refused once, as "nearly dependent"."""
+    a, v, limit = problem(np.random.default_rng(seed), 8, 8, scales=4)
+    assert minimax(a, v, limit).gap <= 1e-9
+
+
+def test_units_that_are_too_far_apart_are_the_reason() -> None:
+    rng = np.random.default_rng(1)
+    a, v = noise(rng, 2, 2), noise(rng, 2)
+    unit = np.array([1e12, 1])
+    with pytest.raises(NotConverged, match=r"respond to the masses in sizes 6\.8e\+11 times apart") as caught:
+        minimax(a * unit[:, None], v * unit, 0.9 * np.abs(np.linalg.solve(a, v)))
+    assert caught.value.condition < 10
 
 
 def test_a_condition_of_1e10_is_solved_or_refused() -> None:

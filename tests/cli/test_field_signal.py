@@ -90,3 +90,22 @@ def test_the_header_below_a_title(dalembert: Dalembert) -> None:
     assert "the header is in line 3" in below.stderr
     unmarked = dalembert("signal", "-", stdin="t_s,A_um\n0,1\n")
     assert unmarked.stderr.startswith("dalembert: standard input: no column mark")
+
+
+@pytest.mark.parametrize(
+    ("level", "digits", "is_clipped"), [(2.0, 6, True), (9.0, 6, False), (9.0, 1, False)]
+)
+def test_a_clipped_recording_is_named(
+    dalembert: Dalembert, level: float, digits: int, is_clipped: bool
+) -> None:
+    """A sine of 3.2 µm cut off at 2 gives 2.4 µm; one in steps of 0.1 is whole."""
+    t = (np.arange(3000) + 0.5) / 1000
+    wave = np.clip(3.2 * np.cos(2 * np.pi * 9.7 * t), -level, level).round(digits)
+    rows = [f"{s},{int((9.7 * s) % 1 < 0.1)},{v}" for s, v in zip(t.tolist(), wave.tolist(), strict=True)]
+    done = dalembert("signal", "-", "--json", stdin="\n".join(["t_s,mark,A_um", *rows]) + "\n")
+    result = json.loads(done.stdout)
+    assert any("57% of the samples of A" in warning for warning in result["warnings"]) == is_clipped
+    # of cos cut off at c = cos a: the first harmonic is (2/π)(π/2 - a + sin a cos a), times the size
+    edge = np.arccos(min(level / 3.2, 1.0))
+    first = 3.2 * 2 / np.pi * (np.pi / 2 - edge + np.sin(edge) * np.cos(edge))
+    assert result["signal"][0]["amplitude"] == pytest.approx(first, rel=2e-3)

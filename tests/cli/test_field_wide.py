@@ -223,3 +223,76 @@ def test_column_goes_before_the_file_of_columns(dalembert: Dalembert, tmp_path: 
     runs = "run,amplitude_um,Ph,TW,trial_angle_deg\n0,10,0,,\n1,12,45,2,0\n"
     call = ("field", "-", "--columns", "names.toml", "--column", "trial_mass_kg=TW")
     assert dalembert(*call, stdin=runs).stdout.startswith("rotor,plane,mass_kg,")
+
+
+# -- cells that hold size and angle ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mark", ["@", "∠", " / ", " @ ", "<", "/"])
+@pytest.mark.parametrize("degree", ["", "°", " deg"])
+def test_a_cell_may_hold_amplitude_and_phase(dalembert: Dalembert, mark: str, degree: str) -> None:
+    """A mass of 5 g at 0° halves 4 mm/s at 90°: the unbalance is 10 g, to be corrected at 0°."""
+    rows = [("0", "4", "90", "", ""), ("1", "2", "90", "5", "0")]
+    long = "run,sensor,amplitude_mm_s,trial_plane,trial_mass_g\n" + "".join(
+        f"{run},1,{size}{mark}{turn}{degree},{'1' if mass else ''},{f'{mass}{mark}{at}{degree}' if mass else ''}\n"
+        for run, size, turn, mass, at in rows
+    )
+    wide = "Lauf;A [mm/s];B [mm/s];Masse [g]\n" + "".join(
+        f"{run};{size},0{mark}{turn},0{degree};{size}{mark}{turn}{degree};{f'{mass},0{mark}{at}{degree}' if mass else ''}\n"
+        for run, size, turn, mass, at in rows
+    )
+    for text in (long, wide):
+        result = document(dalembert("field", "-", "--json", stdin=text))
+        (fix,) = result["rotors"][0]["corrections"]
+        assert fix["mass_kg"] == pytest.approx(0.010, rel=1e-12)
+        assert fix["angle_deg"] % 360 == pytest.approx(0, abs=1e-9)
+        assert any("read size and angle (degrees) from the cells of" in line for line in result["warnings"])
+
+
+def test_several_masses_in_a_cell(dalembert: Dalembert) -> None:
+    """4 mm/s at 90° that 10 g at 0° would correct, with 5 g at 0° in A, and with this and 3 g at 90° in B."""
+    head = "run,sensor,amplitude_mm_s,trial_plane,trial_mass_g\n"
+    text = head + "0,1,4@90,,\n1,1,2@90,A,5@0\n2,1,2@90,A;B,5@0;3@90\n"
+    text += "0,2,1@0,,\n1,2,1@0,A,5@0\n2,2,2@0,A;B,5@0;3@90\n"
+    fix = document(dalembert("field", "-", "--json", stdin=text))["rotors"][0]["corrections"]
+    assert [each["mass_kg"] for each in fix] == pytest.approx([0.010, 0.003], rel=1e-12)
+    assert fix[1]["angle_deg"] == pytest.approx(270, abs=1e-9)
+
+
+def test_a_cell_without_its_angle_is_named(dalembert: Dalembert) -> None:
+    text = "run,sensor,amplitude_mm_s,trial_plane,trial_mass_g,trial_angle_deg\n0,1,4@90,,,\n1,1,2,1,5,0\n"
+    result = dalembert("field", "-", stdin=text)
+    assert result.returncode == 1
+    assert "row 2 (line 3), column amplitude_mm_s: found '2', expected size@angle" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("header", "speed"), [("rpm", "1500"), ("RPM", "1500"), ("speed [1/min]", "1500"), ("speed_Hz", "25")]
+)
+def test_words_for_the_speed(dalembert: Dalembert, header: str, speed: str) -> None:
+    """`rpm` alone was ignored, with an empty sentence beside."""
+    text = f"run,sensor,{header},amplitude_mm_s,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n"
+    text += f"0,1,{speed},4,90,,,\n1,1,{speed},2,90,1,5,0\n"
+    result = document(dalembert("field", "-", "--json", stdin=text))
+    assert result["rotors"][0]["influence"][0]["speed_rad_s"] == pytest.approx(50 * np.pi, rel=1e-12)
+    assert not any(line.endswith("read ") for line in result["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("header", "unit"),
+    [
+        ("amplitude_ips", "in_s"),
+        ("amplitude (µm pk-pk)", "um_pp"),
+        ("velocity (mm/s RMS)", "mm_s_rms"),
+        ("velocity_mm_s", "mm_s"),
+        ("displacement [mils p-p]", "mil_pp"),
+        ("1X amp [in/s 0-pk]", "in_s_pk"),
+        ("acceleration [g peak]", "g_pk"),
+        ("Schwinggeschwindigkeit [mm/s eff]", "mm_s_rms"),
+    ],
+)
+def test_amplitudes_as_instruments_print_them(dalembert: Dalembert, header: str, unit: str) -> None:
+    text = f"run,sensor,{header},phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n0,1,0.4,90,,,\n1,1,0.2,90,1,5,0\n"
+    result = document(dalembert("field", "-", "--json", stdin=text))
+    assert result["amplitude_unit"] == unit
+    assert result["rotors"][0]["corrections"][0]["mass_kg"] == pytest.approx(0.010, rel=1e-12)

@@ -157,3 +157,11 @@ def test_bad_options(options: tuple[str, ...], message: str, dalembert: Dalember
     done = dalembert("flywheel", "-", *options, stdin=table([0, 360], [1, 2]))
     assert done.returncode == 2
     assert message in " ".join(done.stderr.split())
+
+
+def test_a_percentage_without_its_sign_is_doubted(dalembert: Dalembert) -> None:
+    """`--fluctuation 2` for 2 % gave a flywheel of a hundredth without a word."""
+    table = "angle_deg,torque_N_m\n0,0\n180,10\n360,0\n"
+    for coefficient, doubt in (("2", True), ("0.6", True), ("2%", False), ("0.02", False)):
+        done = dalembert("flywheel", "-", "--speed", "600rpm", "--fluctuation", coefficient, stdin=table)
+        assert ("2 % is written 2% or 0.02" in done.stderr) == doubt

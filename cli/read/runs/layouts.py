@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from cli.read.runs.vectors import Layout, vectors_of
+from cli.read.runs.vectors import AMPLITUDE, MASS, UNBALANCE, Layout, parted_cells, vectors_of
 from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number
 from dalembert.tables.headers import Heading, plain_word, quantity_meant
@@ -131,20 +131,9 @@ def _states_are_masses(table: Table, states: list[re.Match[str]]) -> None:
 
 # -- sheets with a row a run and a column pair for each sensor, in English or German -----------------------------
 
-AMPLITUDE = (
-    "amplitude",
-    "amp",
-    "schwinggeschwindigkeit",
-    "schwingweg",
-    "schwingung",
-    "schwingungen",
-    "vibration",
-)
 PHASE = ("phase", "phasenwinkel", "phasenlage")
 TRIAL_ANGLE = ("testwinkel", "probewinkel")
 ANGLE = ("angle", "winkel", "winkellage", *TRIAL_ANGLE)
-MASS = ("mass", "masse", "gewicht", "weight", "testmasse", "probemasse", "testgewicht", "probegewicht")
-UNBALANCE = ("unbalance", "unwucht")
 PLACE = ("sensor", "lager", "messstelle", "messpunkt", "messebene", "aufnehmer", "bearing", "at", "am", "an")
 PLANE = ("plane", "ebene", "in", "der", "trial", "test", "probe", "ausgleichsebene")
 KEPT = ("bleibt", "kept", "trial_kept", "bleibt_drauf")
@@ -196,6 +185,7 @@ class _Column:
 
 def long_form(source: Source) -> Source:
     """Return a table of runs with a row for each reading; of one that is such a table already only foreign names change."""
+    source = parted_cells(source)
     if not is_wide(source):
         return _translated(source)
     columns = list(_columns(source.headings))
@@ -237,7 +227,10 @@ def _translated(source: Source) -> Source:
     names, before = [each.name for each in source.headings], ""
     own = [OWN.get(_stem(each), "") for each in source.headings]
     whole = any(_is_foreign_sensor(each) for each in source.headings)
-    if not whole and not any(quantity_meant(_stem(each), MEANT) for each in _foreign(source.headings)):
+    foreign = [_stem(each) for each in source.headings if _stem(each) not in OWN]
+    if not whole and not any(
+        quantity_meant(stem, MEANT) or {*stem.split("_")} & {*AMPLITUDE} for stem in foreign
+    ):
         return source
     for place, each in enumerate(source.headings):
         column = _known(place, each, before)
@@ -259,6 +252,8 @@ def _translated(source: Source) -> Source:
         for k, (each, name) in enumerate(zip(source.headings, names, strict=True))
         if name != each.name and names.count(name) == 1
     ]
+    if not read:
+        return source
     taken = ", ".join(f"{quote(each.written)} as {name}" for _, each, name in read)
     source.warnings.append(f"{source.file}: read {taken}")
     headings = list(source.headings)
@@ -270,10 +265,6 @@ def _translated(source: Source) -> Source:
 def _stem(each: Heading) -> str:
     """The plain words of a header without its unit."""
     return plain_word(each.base if each.unit else parted(each.name)[0])
-
-
-def _foreign(headings: Sequence[Heading]) -> list[Heading]:
-    return [each for each in headings if _stem(each) not in OWN]
 
 
 def _is_word(words: Sequence[str]) -> bool:
@@ -337,7 +328,7 @@ def _known(place: int, each: Heading, before: str) -> _Column | None:
         return _Column(place, each, "amplitude", name(AMPLITUDE), amplitude)
     quantity = quantity_meant(stem, WHOLE) or (meant if meant in WHOLE else "")
     if quantity == "speed":
-        speed = find_unit("speed", unit)
+        speed = find_unit("speed", unit or meant)
         return _Column(place, each, "speed", "", speed) if speed else None
     return _Column(place, each, quantity, "") if quantity else None
 

@@ -178,7 +178,10 @@ class _Reading:
         if self.four_run:
             table.reject(unread, "amplitude", "a number")
             return amplitude.values.astype(complex)
-        phase = table.require("phase", "angle")
+        try:
+            phase = table.require("phase", "angle")
+        except DataError as error:
+            raise DataError(f"{error}; of amplitudes alone: --method four-run") from None
         # a sensor that a run lacks may be a row with blank cells
         unread = unread & np.isnan(phase.values)
         expected = "a number, or amplitude and phase both blank"
@@ -316,8 +319,8 @@ class MassColumns:
         parts, around = cell.split(";"), turn.split(";") if turn else [""] * len(names)
         for cells, target in ((size, parts), (angle or size, around)):
             if len(target) != len(names):
-                joined = f"{len(names)} joined by ';' as in trial_plane"
-                raise self._wrong(i, cells.header, cells.values[i], f"masses and angles, {joined}")
+                expected = f"{len(names)} joined by ';'" if len(names) > 1 else "one"
+                raise self._wrong(i, cells.header, cells.values[i], f"{expected}, as trial_plane has planes")
         for one, part, at in zip(names, parts, around, strict=True):
             mass = self._number(size, i, part, "a trial mass")
             if mass < 0 or 0 < mass < SMALLEST:

@@ -1,21 +1,40 @@
-"""Logs as vectors `amplitude@phase` behind keys: YAML, JSON, text, or the cells of a sheet, brought to a table of runs."""
+"""Vectors `amplitude@phase`: in cells of a table, or behind keys (YAML, JSON, text, a sheet), brought to a table of runs."""
 
 from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 
 from dalembert.angles import phasor
-from dalembert.errors import DataError
+from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number
 from dalembert.tables.files import read_bytes, remember, split_sheet
-from dalembert.tables.sources import LINE, decoded, open_source
+from dalembert.tables.headers import Heading, plain_word
+from dalembert.tables.sources import LINE, Source, decoded, open_source
 from dalembert.tables.table import Cells, Numbers, Table
+from dalembert.units import find_unit, parted
 
+AMPLITUDE = (
+    "amplitude",
+    "amp",
+    "schwinggeschwindigkeit",
+    "schwingweg",
+    "schwingung",
+    "schwingungen",
+    "schwingbeschleunigung",
+    "vibration",
+    "displacement",
+    "velocity",
+    "acceleration",
+)
+MASS = ("mass", "masse", "gewicht", "weight", "testmasse", "probemasse", "testgewicht", "probegewicht")
+UNBALANCE = ("unbalance", "unwucht")
 KEYS = ("A", "B", "U", "ALPHA", "A0", "keep_trial", "weight_const")
 
 
@@ -280,3 +299,78 @@ def _polar(file: str, key: str, cell: str) -> tuple[str, str]:
     except ValueError:
         raise DataError(f"{file}: {key}: found '{cell}', expected amplitude@phase, such as 80@40") from None
     return size.strip(), turn.strip()
+
+
+# -- cells of a table that hold size and angle ------------------------------------------------------------------
+
+POLAR = re.compile(r"([-+\d.,e]*\d)\s*[@∠<∡/]\s*([-+\u2212\d.,]*\d)\s*(?:°|deg)?", re.IGNORECASE)
+FIRST = 50
+"""So many rows show whether the cells of a column hold vectors."""
+
+
+def parted_cells(source: Source) -> Source:
+    """Return a table in which each column of cells such as `12@45`, `12∠45°` or `12 / 45` is two, the second its angle."""
+    names = {k: name for k, each in enumerate(source.headings) if (name := _name_of_angle(each))}
+    head = [cells for _, cells in islice(source.rows(), FIRST)]
+    columns = {
+        k: name
+        for k, name in names.items()
+        if any(
+            POLAR.fullmatch(part.strip()) for cells in head if k < len(cells) for part in cells[k].split(";")
+        )
+    }
+    if not columns:
+        return source
+    source.check_cells(k for k, each in enumerate(source.headings) if each.written)
+    headings = [
+        one
+        for k, each in enumerate(source.headings)
+        for one in (each, *([Heading(each.written, columns[k], "deg")] if k in columns else []))
+    ]
+
+    def rows() -> Iterator[tuple[int, list[str]]]:
+        for i, (line, cells) in enumerate(source.rows()):
+            parts = [
+                _sizes_and_angles(source, i, k, cell) if k in columns else (cell,)
+                for k, cell in enumerate(cells)
+            ]
+            yield line, [one for part in parts for one in part]
+
+    taken = ", ".join(quote(source.headings[k].written) for k in columns)
+    source.warnings.append(f"{source.file}: read size and angle (degrees) from the cells of {taken}")
+    records = [(0, [each.written for each in headings]), *rows()]
+    return replace(
+        source,
+        headings=headings,
+        records=records,
+        sheet=None,
+        above=0,
+        units_below=False,
+        unnamed_first=False,
+    )
+
+
+def _name_of_angle(each: Heading) -> str:
+    """Return what the column of the angles that belong to a vibration or a mass is called; empty for other columns."""
+    stem, unit = (each.base, each.unit) if each.unit else parted(each.name)
+    words = stem.split("_")
+    plain = [plain_word(word) for word in words]
+    for kinds, dimension, name in (
+        (MASS, "mass", "angle"),
+        (UNBALANCE, "unbalance", "angle"),
+        (AMPLITUDE, "amplitude", "phase"),
+    ):
+        if find_unit(dimension, unit) and any(word in kinds for word in plain):
+            return "_".join(name if p in kinds else word for p, word in zip(plain, words, strict=True))
+    return f"phase_{stem}" if find_unit("amplitude", unit) else ""
+
+
+def _sizes_and_angles(source: Source, row: int, column: int, cell: str) -> tuple[str, str]:
+    """Return the sizes and the angles of a cell, several joined by ';'."""
+    parts = [part.strip() for part in cell.split(";")]
+    matches = [POLAR.fullmatch(part) for part in parts]
+    if not any(parts) or parts == ["0"]:
+        return cell, ""
+    if not all(matches):
+        raise source.error(row, source.header[column], cell, "size@angle as in other rows, such as 80@40")
+    return ";".join(m[1] for m in matches if m), ";".join(m[2] for m in matches if m)
