@@ -180,19 +180,13 @@ def bounds(m: Mechanism, free: Sequence[str], bare: Mapping[str, str]) -> dict[s
     return bounds
 
 
-def _name(each: Reached) -> str:
-    return each.name.rpartition(".")[2]
-
-
 def _dimension(fit: Fit[Mechanism], each: Reached) -> str:
-    if each.kind == "effort":
-        return "force" if fit.before.inputs[0].is_slide else "torque"
-    return "angle" if each.kind == "angle" else "length"
+    return each.dimension or ("force" if fit.before.inputs[0].is_slide else "torque")
 
 
 def _size(each: Reached, value: Any) -> Any:
     """Return a distance in the unit of JSON."""
-    return np.degrees(value) if each.kind == "angle" else value
+    return np.degrees(value) if each.dimension == "angle" else value
 
 
 def _shown(dimension: Dimension, si: float) -> float:
@@ -252,7 +246,7 @@ def _solution(solutions: Sequence[Fit[Mechanism]]) -> Column:
 def _misses_by_target(solutions: Sequence[Fit[Mechanism]], place: str) -> Table:
     """Return a row for each solution and target."""
     every = [r for solution in solutions for r in solution.reached]
-    columns = [names("name", [_name(r) for r in every]), *_misses(solutions[0], [[r] for r in every])]
+    columns = [names("name", [r.label for r in every]), *_misses(solutions[0], [[r] for r in every])]
     keys: tuple[str, ...] = ("name",)
     if place.endswith("[]"):
         numbers = [str(i) for i, solution in enumerate(solutions, 1) for _ in solution.reached]
@@ -306,15 +300,19 @@ def _places(fit: Fit[Mechanism]) -> dict[str, Callable[[], Table]]:
             number("input", "angle", np.degrees(inputs)) if turning else number("input", "length", inputs)
         ]
         for each in reached:
-            name = "" if len(fit.reached) == 1 else f"{_name(each)}_"
-            what = {"angle": "angle", "point": "", "slide": "position"}.get(each.kind, _dimension(fit, each))
+            name, dimension = each.label, _dimension(fit, each)
+            what = {"angle": "angle", "point": "", "slide": "position"}.get(each.kind, dimension)
+            if each.kind == "coordinate":
+                name, _, what = name.rpartition(".")
+            lead = "" if len(fit.reached) == 1 else f"{name}_"
             for title, values in (("", each.values), ("target_", each.target)):
                 parts = {what: _size(each, values)} if what else {"x": values.real, "y": values.imag}
                 columns += [
-                    number(f"{name}{title}{part}", _dimension(fit, each), values)
-                    for part, values in parts.items()
+                    number(f"{lead}{title}{part}", dimension, values) for part, values in parts.items()
                 ]
-            columns.append(number(f"{name}distance", _dimension(fit, each), _size(each, each.distances)))
+            # both coordinates of a point have one
+            lead = f"{lead}{what}_" if each.kind == "coordinate" and lead else lead
+            columns.append(number(f"{lead}distance", dimension, _size(each, each.distances)))
         return Table(columns)
 
     names = ["points" if i == 0 else f"points {i + 1}" for i in range(len(by_target))]

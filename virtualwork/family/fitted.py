@@ -102,7 +102,9 @@ class Fit(Generic[D]):
     @property
     def _dimension(self) -> str:
         """Lengths count before angles, angles before efforts."""
-        return next(of for of in ("length", "angle", "") if any(each.dimension == of for each in self.reached))
+        return next(
+            of for of in ("length", "angle", "") if any(each.dimension == of for each in self.reached)
+        )
 
     def plot(self, figure: FigureBase | None = None) -> list[Axes]:
         """Draw the targets and the motion of the mechanism over their range: a panel for each point, link and slide.
