@@ -84,7 +84,9 @@ def wanted(m: Mechanism, names: Sequence[str]) -> list[Wanted]:
     result: list[Wanted] = []
     for text in (part.strip() for name in names for part in name.split(",")):
         if text not in choices:
-            raise options.bad("--want", f"no point, link or slide is named '{text}'{hint(text, choices)}")
+            raise options.bad(
+                "--want", f"no point, link or slide is named '{text}'{hint(text, reversed(choices))}"
+            )
         new = choices[text]
         if any(new.columns.keys() & each.columns.keys() for each in result):
             raise options.bad("--want", f"'{text}' is given twice")
@@ -130,7 +132,7 @@ def kept(m: Mechanism, texts: Sequence[str] | None, bare: Mapping[str, str]) -> 
             )
         name, sense, value = match.groups()
         if name not in choices:
-            raise options.bad("--keep", f"no quantity is named '{name}'{hint(name, choices)}")
+            raise options.bad("--keep", f"no quantity is named '{name}'{hint(name, reversed(choices))}")
         path, kind = choices[name]
         if kind in ("length", "angle"):
             number = place_or_angle(value, kind, "--keep", bare)
