@@ -122,8 +122,8 @@ class Analysis:
 
     @property
     def several(self) -> bool:
-        """Whether several assemblies are requested."""
-        return len((self.block_of or self).assemblies) > 1
+        """Whether every assembly is requested, however many there are: their number differs from variant to variant."""
+        return self.request.branch == "all"
 
     @cached_property
     def assemblies(self) -> tuple[Assembly, ...]:

@@ -135,6 +135,33 @@ def test_rows_are_the_grid_of_variants_with_the_poses_of_each_together(dalembert
     assert in_json == shown
 
 
+SLIDER_CRANK = """ground = { O = [0, 0] }
+links.crank.points = { O = [0, 0], A = [0.06, 0] }
+links.rod.points = { A = [0, 0], B = [0.1, 0] }
+slots = [{ point = "B", link = "rod", on = "ground", through = "O", angle = 0 }]
+input = { link = "crank", angle = "30 deg" }
+guess = { at = "90 deg", rod = "-30 deg" }
+"""
+
+
+def test_every_branch_of_every_variant_has_its_number(dalembert, tmp_path) -> None:
+    """At the guess, 90°, a rod of 40 mm does not reach the guide from 60 mm above: it has one assembly, longer ones have two."""
+    (tmp_path / "m.toml").write_text(SLIDER_CRANK)
+    words = (
+        "mechanism",
+        "m.toml",
+        "--over",
+        "links.rod.B.x=0.04:0.1:0.03",
+        "--branch",
+        "all",
+        "--only",
+        "B.x",
+    )
+    header, *rows = (line.split(",") for line in dalembert(*words).stdout.splitlines())
+    shown = [(row[header.index("variant")], row[header.index("branch")]) for row in rows]
+    assert shown == [("1", "1"), ("2", "1"), ("2", "2"), ("3", "1"), ("3", "2")]
+
+
 def test_a_row_of_cases_sets_inputs_and_dimensions(dalembert: Dalembert, tmp_path) -> None:
     (tmp_path / "m.toml").write_text(four_bar())
     (tmp_path / "cases.csv").write_text("crank_deg,links.crank.B.x_mm\n40,40\n50,42\n")
