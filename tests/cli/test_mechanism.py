@@ -243,7 +243,7 @@ def test_standard_input_and_pictures(dalembert: Dalembert, tmp_path: Path) -> No
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "b.png").stat().st_size > 10_000
     done = dalembert("mechanism", KLANN, "--plot", "c.png", "--only", "H.q")
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert not (tmp_path / "c.png").exists()
 
 
