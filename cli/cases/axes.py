@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.cases.inputs import Axis, Driven, Grid, Varied, listed, with_numbers
+from cli.cases.inputs import Axis, Driven, Grid, Varied, axis_of_rows, with_numbers
 from cli.read import options
 from dalembert.angles import read_degrees
 from dalembert.errors import DataError
@@ -140,7 +140,7 @@ def at_axis(m: Mechanism, texts: Sequence[str], bare: Mapping[str, str]) -> Axis
     rows = [input_values(m, text, "--at", bare) for text in texts]
     names = [Driven.of(m, j) for j in sorted({j for row in rows for j in row})]
     shown = [[row.get(name.j, name.own(m)) for name in names] for row in rows]
-    return listed("--at", names, np.array(shown, dtype=float))
+    return axis_of_rows("--at", names, np.array(shown, dtype=float))
 
 
 def input_values(m: Mechanism, text: str, flag: str, bare: Mapping[str, str]) -> dict[int, float]:
@@ -250,7 +250,7 @@ def cases_axis(m: Mechanism, path: str, elsewhere: set[int], remarks: list[str])
         shown = [*shown, *speed.T, *acceleration.T]
         values = np.concatenate([values, speed, acceleration], axis=1)
     seconds = None if time is None else time.si
-    return listed("--cases", order, np.array(shown).T, values, table.texts.get("step"), seconds)
+    return axis_of_rows("--cases", order, np.array(shown).T, values, table.texts.get("step"), seconds)
 
 
 def _headers(of: Driven) -> str:
@@ -326,7 +326,7 @@ def history_axis(m: Mechanism) -> Axis:
     order = [*names, *(name.rate(1) for name in names), *(name.rate(2) for name in names)]
     si = np.concatenate([q, speed, acceleration], axis=1)
     shown = np.concatenate([shown, speed, acceleration], axis=1)
-    return listed("[input] law", order, shown, si, time=time)
+    return axis_of_rows("[input] law", order, shown, si, time=time)
 
 
 # --- all of them -----------

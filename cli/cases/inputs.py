@@ -156,7 +156,7 @@ class Values(NamedTuple):
     si: Reals
 
 
-class Part(NamedTuple):
+class GridRows(NamedTuple):
     """Some rows of a grid."""
 
     shown: Reals
@@ -210,7 +210,7 @@ class Axis:
         return Values(shown, _in_si(self.names, shown))
 
 
-def listed(
+def axis_of_rows(
     option: str,
     names: Sequence[Driven | Varied],
     shown: Reals,
@@ -249,7 +249,7 @@ class Grid:
         """The number of combinations."""
         return math.prod(axis.n for axis in self.axes)
 
-    def part(self, low: int, high: int) -> Part:
+    def part(self, low: int, high: int) -> GridRows:
         """Return the rows from low to high, or to the last."""
         axes, high = self.axes, min(high, self.n)
         places: Any = np.arange(low, high)
@@ -259,7 +259,7 @@ class Grid:
         # the names and times of the rows of a table, where nothing else varies
         names, time = (axes[0].labels, axes[0].time) if len(axes) == 1 else (None, None)
         labels = [str(i + 1) for i in range(low, high)] if names is None else list(names[low:high])
-        return Part(shown, si, labels, None if time is None else time[low:high])
+        return GridRows(shown, si, labels, None if time is None else time[low:high])
 
 
 # --- the inputs of the poses of one mechanism -------------------------------------------------------------------------

@@ -10,7 +10,7 @@ import pytest
 from cli.cases.analysis import Request
 from cli.cases.axes import grids
 from cli.cases.cases import Cases
-from cli.cases.inputs import Grid, Varied, listed
+from cli.cases.inputs import Grid, Varied, axis_of_rows
 from cli.cases.loop import Loop
 from cli.forces.cycle import Forces
 from cli.mechanism.solution import Poses
@@ -79,7 +79,7 @@ def many(text, rows, at=range(0, 360, 60), one_by_one=False, **request):
     """The variants of some rows, at some angles of the crank; None: at that of the file."""
     m = Mechanism.from_toml_text(text)
     every = dimensions(m)
-    varied = Grid((listed("--cases", [Varied(every[path]) for path in OWN[text]], np.array(rows)),))
+    varied = Grid((axis_of_rows("--cases", [Varied(every[path]) for path in OWN[text]], np.array(rows)),))
     _, moved = grids(m, None if at is None else [f"{angle}deg" for angle in at], None, None, {}, [])
     kinds = (Forces, ForcesOneByOne) if request.get("forces") else (Poses, PosesOneByOne)
     cases = Cases(Request("m.toml", **request), m, {}, varied, moved)

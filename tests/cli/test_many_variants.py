@@ -13,7 +13,7 @@ import pytest
 from cli.cases.analysis import Request
 from cli.cases.axes import grids
 from cli.cases.cases import Cases
-from cli.cases.inputs import Grid, Varied, listed
+from cli.cases.inputs import Grid, Varied, axis_of_rows
 from cli.cases.loop import Loop, unchanged
 from cli.mechanism.solution import Poses
 from cli.show.commands import ShowOptions
@@ -150,7 +150,7 @@ def question(v):
     """Variants of the four-bar at one pose, one by one, as with --branch."""
     m = Mechanism.from_toml_text(FOUR_BAR)
     varied = Grid(
-        (listed("--cases", [Varied(dimensions(m)["ground.D.x"])], np.linspace(0.1, 0.11, v)[:, None]),)
+        (axis_of_rows("--cases", [Varied(dimensions(m)["ground.D.x"])], np.linspace(0.1, 0.11, v)[:, None]),)
     )
     _, moved = grids(m, ["40deg"], None, None, {}, [])
     cases = Cases(Request("m.toml", order=0, branch="1"), m, {}, varied, moved)
