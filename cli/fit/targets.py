@@ -63,12 +63,12 @@ def every_wanted(m: Mechanism) -> list[Wanted]:
     """Return all quantities that a fit can aim at."""
     points = dict.fromkeys(point for named in m.bodies.values() for point in named)
     slides = dict.fromkeys(str(guide.point) for guide in m.guides)
-    effort = "force" if m.inputs[0].is_slide else "torque"
+    efforts = [(str(entry.name), "force" if entry.is_slide else "torque") for entry in m.inputs]
     return [
         *(Wanted(f"points.{name}", name, ("x", "y"), (name,)) for name in points),
         *(Wanted(f"links.{name}", name, ("angle",), (name, f"{name}.angle")) for name in m.links),
         *(Wanted(f"slides.{name}", name, ("position",), (f"{name}.position",)) for name in slides),
-        *(Wanted(f"effort.{of.name}", of.name, (effort,), (f"{of.name}.{effort}",)) for of in m.inputs),
+        *(Wanted(f"effort.{name}", name, (effort,), (f"{name}.{effort}",)) for name, effort in efforts),
         *(
             Wanted(f"points.{name}.{axis}", name, (axis,), (f"{name}.{axis}",))
             for name in points
