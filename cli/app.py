@@ -124,7 +124,8 @@ def build(called: str | None) -> typer.Typer:
 
     Help, completion and a name that is mistyped need the names of all: to build the others takes longer than to read a table.
     """
-    alone = called in COMMANDS and COMPLETE not in os.environ
+    called = called or ""
+    names = [called] if called in COMMANDS and COMPLETE not in os.environ else [*COMMANDS]
     app = typer.Typer(
         cls=Front,
         rich_markup_mode=None,
@@ -135,7 +136,7 @@ def build(called: str | None) -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 10_000},
     )
     app.callback()(_front)
-    for name in [called] if alone else COMMANDS:
+    for name in names:
         module, line = COMMANDS[name]
         if name == called:
             # the front door's own help is shown without it

@@ -297,11 +297,12 @@ class Mechanism(Numbered):
         Parameters
         ----------
         wanted : str, or sequence of Target
-            `H` or `points.H`: a point along a path; `links.rocker`: a link's angle, `slides.B`: a slide's travel, over
-            the input (function generation); `effort.crank`: the input's torque or force. Targets hold their own places,
-            inputs and weights.
+            `H` or `points.H`: a point along a path; `H.y`: one of its coordinates, `links.rocker`: a link's angle,
+            `slides.B`: a slide's travel, over the input (function generation); `effort.crank`: the input's torque or
+            force. Targets hold their own places, inputs and weights.
         target : array (n, 2), or complex (n,); array (n,)
-            Of the one name: places in m; angles in rad, travels in m, efforts in N·m or N. Two rows or more.
+            Of the one name: places in m; coordinates and travels in m, angles in rad, efforts in N·m or N. Two rows or
+            more.
         free : mapping of path to (low, high)
             The dimensions that are looked for, and their bounds, SI.
         inputs : array (n,), optional
@@ -358,7 +359,7 @@ class Mechanism(Numbered):
         paths : sequence of str
             The dimensions, in the order in which their numbers are given.
         wanted : str
-            `points.H`, `links.rocker`, `slides.B`: the requested quantities.
+            `points.H`, `points.H.y`, `links.rocker`, `slides.B`: the requested quantities.
 
         Returns
         -------
@@ -370,6 +371,8 @@ class Mechanism(Numbered):
         ------
         DescriptionError
             A path or a name that is not there; more than one input.
+        ValueError
+            Two names of one number.
 
         Examples
         --------
@@ -380,10 +383,10 @@ class Mechanism(Numbered):
         ([[2.0], [0.0]], [[1.0, 0.0], [0.0, 2.0]])
         """
         from virtualwork.describe.dimensions import named
-        from virtualwork.family.design import Design, place_key
+        from virtualwork.family.design import Design, numbers_of_each
 
         dimensions = [dimension for path in paths for dimension in named(self, path)]
-        return Design(self, dimensions, [place_key(self, name) for name in wanted])
+        return Design(self, dimensions, [key for of in numbers_of_each(self, wanted).values() for key in of])
 
     @cached_property
     def check(self) -> Check:

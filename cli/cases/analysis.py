@@ -122,8 +122,8 @@ class Analysis:
 
     @property
     def several(self) -> bool:
-        """Whether several assemblies are requested."""
-        return len((self.block_of or self).assemblies) > 1
+        """Whether every assembly is requested, however many there are: their number differs from variant to variant."""
+        return self.request.branch == "all"
 
     @cached_property
     def assemblies(self) -> tuple[Assembly, ...]:
@@ -228,7 +228,7 @@ class Analysis:
         return tuple(name for name in names if name in requested)
 
     def check_names(self, flag: str = "--only") -> None:
-        """Refuse names of an option that are no quantities."""
+        """Refuse names of an option that are no quantities of this mechanism, as any wrong value of an option."""
         only = self.request.only
         if only is None:
             return
@@ -240,7 +240,7 @@ class Analysis:
             return
         if unknown(forces, [word]) is None:
             where = "dalembert forces shows it, dalembert simulate with --forces"
-            raise DataError(f"{self.file}: {flag} {word}: this is a force: {where}")
+            raise bad(flag, f"'{word}': this is a force: {where}")
         names = {name for each in components for name in (*each.names, *each.owners)}
         owner = word.rpartition(".")[0]
         parts = [
@@ -251,10 +251,8 @@ class Analysis:
         ]
         if parts:
             choices = ", ".join(dict.fromkeys(parts))
-            raise DataError(f"{self.file}: {flag}: '{word}': expected {owner}. with one of {choices}")
-        raise DataError(
-            f"{self.file}: {flag}: no link or point is named '{owner or word}'{nearest(word, names)}"
-        )
+            raise bad(flag, f"'{word}': expected {owner}. with one of {choices}")
+        raise bad(flag, f"no link or point is named '{owner or word}'{nearest(word, names)}")
 
     # --- inputs ---------------------------------------------------------------------------------------------------
     def pose_text(self, i: int) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from uuid import UUID, uuid4
 
 from cli.cases.cases import Cases
@@ -31,14 +31,29 @@ if TYPE_CHECKING:
     from dalembert.results.way import Topic
     from virtualwork.family.part import Part
 
-    Mask = NDArray[np.bool_]
-    # for some variants and their inputs as they are shown: their table or documents, (v, n) which of their poses are
-    # assembled, (v,) which of them have to be solved one by one
-    Together = Callable[[Part, Rows], tuple[Any, Mask, Mask]]
+    # for some variants and their inputs as they are shown, (v or 1, n, k)
+    Together = Callable[[Part, Rows], "AtOnce"]
 
 # rows of a part that is solved together; variants and rows of one that is solved one by one; of a table and of
 # documents, where a row takes some kilobytes
 TOGETHER, ONE_BY_ONE = (1 << 16, 1 << 12), (64, (1 << 14, 1 << 12))
+
+
+class AtOnce(NamedTuple):
+    """Some variants that are solved at once.
+
+    Attributes
+    ----------
+    answer : Table or list of documents
+        One variant after the other, a row or a document for each pose; without meaning where a variant is left alone.
+    assembled : array (v, n)
+    alone : array (v,)
+        The variants that have to be solved one by one.
+    """
+
+    answer: Any
+    assembled: NDArray[np.bool_]
+    alone: NDArray[np.bool_]
 
 
 class Case:
@@ -254,12 +269,12 @@ def joined(tables: Sequence[Table]) -> Table:
     return replace(tables[0], columns=list(map(column, *(table.columns for table in tables))))
 
 
-def blank(part: Any, key: str = "") -> Any:
+def unassembled(part: Any, key: str = "") -> Any:
     """Return poses that are not assembled, in the form of others: what names a pose stays."""
     if isinstance(part, dict):
-        return {key: blank(value, key) for key, value in part.items()}
+        return {key: unassembled(value, key) for key, value in part.items()}
     if isinstance(part, list):
-        return [] if key == "marks" else [blank(each, key) for each in part]
+        return [] if key == "marks" else [unassembled(each, key) for each in part]
     if isinstance(part, bool):
         return False
     return part if isinstance(part, str) or key in ("input_deg", "input_m", "branch") else None

@@ -15,7 +15,7 @@ import numpy as np
 
 from cli.cases.analysis import Analysis, Request
 from cli.cases.axes import assigned, grids
-from cli.cases.inputs import Driven, Grid, Varied, of_one, with_numbers
+from cli.cases.inputs import Axis, Driven, Grid, Varied, of_one, with_numbers
 from cli.cases.written import written
 from cli.read.options import about, bad
 from dalembert.dataclass import dataclass, field, replace
@@ -177,30 +177,27 @@ class Cases:
 
     def refuse_inputs(self, message: str) -> None:
         """Refuse options that move inputs, where these mean nothing."""
-        for grid in (self.varied, self.moved):
-            for axis in () if grid is None else grid.axes:
-                if axis.option.startswith("--") and any(isinstance(name, Driven) for name in axis.names):
-                    raise bad(axis.option, message)
+        for axis in self._requested:
+            if any(isinstance(name, Driven) for name in axis.names):
+                raise bad(axis.option, message)
+
+    @property
+    def _requested(self) -> list[Axis]:
+        """The axes that options request: a law of motion in the file is none of them."""
+        grids = [grid for grid in (self.varied, self.moved) if grid is not None]
+        return [axis for grid in grids for axis in grid.axes if axis.option.startswith("--")]
 
     def at_start(self) -> Cases:
         """Return these cases with their inputs as numbers of the file: a motion in time starts there."""
         from virtualwork.describe.dimensions import dimensions
 
         by_place = {d.where: Varied(d) for d in dimensions(self.mechanism).values()}
-        grids = [grid for grid in (self.varied, self.moved) if grid is not None]
-        # a law of motion in the file gives no start
-        axes = [axis for grid in grids for axis in grid.axes if axis.option.startswith("--")]
         kinds = ("value", "speed", "acceleration")
-        axes = [
-            replace(
-                axis,
-                names=tuple(
-                    by_place["inputs", name.j, kinds[name.order]] if isinstance(name, Driven) else name
-                    for name in axis.names
-                ),
-            )
-            for axis in axes
-        ]
+
+        def in_file(name: Driven | Varied) -> Varied:
+            return by_place["inputs", name.j, kinds[name.order]] if isinstance(name, Driven) else name
+
+        axes = [replace(axis, names=tuple(map(in_file, axis.names))) for axis in self._requested]
         varied = Grid(tuple(axes)) if axes else None
         if varied is None or varied.n > 1:
             return replace(self, varied=varied, moved=None)
@@ -252,27 +249,20 @@ class Cases:
         rates = family.rates(nominal.speed, nominal.acceleration)
         # a variant may set an input: by a column of inputs, or by another position in its file
         for name, column in zip(self.names, rows.T, strict=True):
-            j = (
-                name.j
-                if isinstance(name, Driven)
-                else int(name.of.where[1])
-                if name.of.where[0] == "inputs"
-                else -1
-            )
-            if j < 0 or (j in moved and not isinstance(name, Driven)):
-                continue
             numbers = column["si"]
-            if isinstance(name, Driven) and name.order:
-                rates[name.order - 1][j] = numbers[:, None]
-            elif isinstance(name, Driven) or name.of.where[-1] == "value":
-                if len(si) == 1:
-                    si, shown = (np.repeat(x, v, axis=0) for x in (si, shown))
-                value = Driven.of(m, j)
-                si[:, :, j] = numbers[:, None]
-                cells = (
-                    column["shown"]
-                    if isinstance(name, Driven)
-                    else [value.shown(x) for x in numbers.tolist()]
-                )
-                shown[:, :, j] = np.asarray(cells)[:, None]
+            if isinstance(name, Driven):
+                j, cells = name.j, column["shown"]
+                if name.order:
+                    rates[name.order - 1][j] = numbers[:, None]
+                    continue
+            else:
+                table, *key = name.of.where
+                # another number than a position, or one that the grid of inputs moves anyhow
+                if table != "inputs" or key[-1] != "value" or int(key[0]) in moved:
+                    continue
+                j = int(key[0])
+                cells = np.array([Driven.of(m, j).shown(x) for x in numbers.tolist()])
+            if len(si) == 1:
+                si, shown = (np.repeat(x, v, axis=0) for x in (si, shown))
+            si[:, :, j], shown[:, :, j] = numbers[:, None], cells[:, None]
         return Part(m, family.dimensions, family.values, si, rates), shown

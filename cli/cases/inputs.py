@@ -138,7 +138,7 @@ def with_numbers(m: Mechanism, dimensions: Sequence[Dimension], numbers: Sequenc
 
 
 # --- axes, and their grid ---------------------------------------------------------------------------------------------
-class Part(NamedTuple):
+class GridRows(NamedTuple):
     """Some rows of a grid."""
 
     shown: Reals
@@ -229,7 +229,7 @@ class Grid:
         """The number of combinations."""
         return math.prod(axis.n for axis in self.axes)
 
-    def part(self, low: int, high: int) -> Part:
+    def part(self, low: int, high: int) -> GridRows:
         """Return the rows from low to high, or to the last."""
         axes, high = self.axes, min(high, self.n)
         parts = [axis.at(i) for axis, i in self._places(low, high)]
@@ -238,7 +238,7 @@ class Grid:
         names, time = (axes[0].labels, axes[0].time) if len(axes) == 1 else (None, None)
         labels = [str(i + 1) for i in range(low, high)] if names is None else list(names[low:high])
         rest = partial(self.rest, low, high)
-        return Part(shown, si, labels, None if time is None else time[low:high], rest)
+        return GridRows(shown, si, labels, None if time is None else time[low:high], rest)
 
     def rest(self, low: int, high: int) -> Reals:
         """Return the exact numbers of the rows from low to high less their floats, SI."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cli.cases.case import Case, Study, blank, emptied, joined, length, like, without_errors
+from cli.cases.case import AtOnce, Case, Study, emptied, joined, length, like, unassembled, without_errors
 from cli.cases.cases import naming
 from cli.cases.remarks import Remarks
 from cli.read.options import bad, processes
@@ -236,17 +236,17 @@ class Loop:
         return result
 
 
-class Solved(NamedTuple):
-    """A part that is solved: what is written of it, and its remarks."""
+class WrittenPart(NamedTuple):
+    """What is written of a part, and its remarks."""
 
     written: Written
     remarks: Remarks
 
 
-def _solved(study: Study, plan: Plan, form: Form, json: bool, first: int, rows: Rows) -> Solved:
+def _solved(study: Study, plan: Plan, form: Form, json: bool, first: int, rows: Rows) -> WrittenPart:
     """Solve a part: some variants, named from `first` on."""
     part = Variants(study, plan, first, rows)
-    return Solved(form(part.documents() if json else part.table(), first - 1), part.remarks)
+    return WrittenPart(form(part.documents() if json else part.table(), first - 1), part.remarks)
 
 
 def unchanged(part: Part, number: int) -> Written:
@@ -321,7 +321,7 @@ class Variants:
             empty: Document = dict(self.study.blank)
             if self.plan.row is not None and not self.study.one_blank_row:
                 other = Variants(self.study, self.plan, 0, self.plan.row[None]).one(0, True)
-                empty = {key: blank(value) for key, value in other.items()}
+                empty = {key: unassembled(value) for key, value in other.items()}
             listed = [empty if document is None else document for document in listed]
         headers = [d.header for d in cases.dimensions]
         return [
@@ -380,7 +380,7 @@ class Variants:
         return Table(made, pattern.keys), np.full(v, n), whole
 
     # --- at once --------------------------------------------------------------------------------------------------
-    def at_once(self, json: bool) -> tuple[Any, Mask, Mask]:
+    def at_once(self, json: bool) -> AtOnce:
         """Solve all of them at once."""
         assert self.plan.row is not None
         together = _together(self.study, self.plan.row, json)

@@ -329,12 +329,8 @@ def poses_of(
     marks: list[list[str]],
 ) -> Iterator[Document]:
     """Yield the documents of the poses of one assembly, from computed quantities."""
-    n, driven, m = len(assembled), analysis.set_angles, analysis.mechanism
-    shown = {
-        e.name: {analysis.input_names[e.name]: values.tolist()}
-        for e, values in zip(m.inputs, analysis.inputs.whole.shown.T, strict=True)
-    }
-    tree: Document = {**(next(iter(shown.values())) if len(m.inputs) == 1 else {"inputs": shown})}
+    n, driven = len(assembled), analysis.set_angles
+    tree = _inputs(analysis, analysis.inputs.whole.shown.T.tolist())
     tree |= {"branch": [branch] * n, "assembled": assembled.tolist()}
     if condition is not None:
         tree["condition"] = cells(condition)
@@ -346,11 +342,13 @@ def poses_of(
 
 def pose_head(analysis: Analysis, i: int) -> Document:
     """Return the inputs of a pose for JSON: `input_deg`, or `inputs` of several."""
-    shown = analysis.inputs.whole.shown[i].tolist()
-    every = {
-        e.name: {analysis.input_names[e.name]: value}
-        for e, value in zip(analysis.mechanism.inputs, shown, strict=True)
-    }
+    return _inputs(analysis, analysis.inputs.whole.shown[i].tolist())
+
+
+def _inputs(analysis: Analysis, values: Sequence[Any]) -> Document:
+    """Return the place of each input's value in JSON: `input_deg`, or below `inputs` of several."""
+    pairs = zip(analysis.input_names.items(), values, strict=True)
+    every = {name: {key: value} for (name, key), value in pairs}
     return next(iter(every.values())) if len(every) == 1 else {"inputs": every}
 
 

@@ -124,7 +124,7 @@ def _crossing(analysis: Analysis, assembly: Assembly, change: ChangePoint) -> st
 
 def of_forces(analysis: Analysis) -> list[str]:
     """Return the warnings of forces without a value: dead points, change points, locked friction, redundant joints."""
-    result = [listed(analysis, what, places, len(places)) for what, places in troubles(analysis)]
+    result = [at_places(analysis, what, places, len(places)) for what, places in troubles(analysis)]
     return list(dict.fromkeys([*result, *statements(analysis)]))
 
 
@@ -251,7 +251,7 @@ def without_meaning(analysis: Analysis, varied: Sequence[Driven | Varied] = ()) 
     return lines
 
 
-def listed(analysis: Analysis, what: str, places: list[float], count: int) -> str:
+def at_places(analysis: Analysis, what: str, places: list[float], count: int) -> str:
     """Return one line for what happens at some inputs: the first five of them, and the number of the others."""
     named = ", ".join(f"{place:g} {analysis.unit}" for place in places[:5])
     more = f" and {count - 5} further poses" if count > 5 else ""

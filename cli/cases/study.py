@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from cli.cases import poses, remarks
 from cli.cases.analysis import Analysis
-from cli.cases.case import Case, Study, like
+from cli.cases.case import AtOnce, Case, Study, like
 from cli.cases.inputs import Inputs
 from cli.show.result import Result, Section, Sheet
 from cli.show.terminal import progress
@@ -159,7 +159,7 @@ class PoseCase(Case):
         if not request.forces or not a.forces:
             return lines
         if self.gaps:
-            troubles = [remarks.listed(a, what, *at) for what, at in self.troubles.items()]
+            troubles = [remarks.at_places(a, what, *at) for what, at in self.troubles.items()]
             return [*lines, *troubles, *self.statements]
         return [*lines, *remarks.of_forces(a)]
 
@@ -241,7 +241,7 @@ class PoseStudy(Study):
             return None
         # a rate that only the variants have makes for more columns
         request = cases.request._replace(order=cases.analysis(row).order)
-        family = Family(replace(cases.nominal, request=request), Solver(cases.part(row[None])[0]), json)
+        family = PoseFamily(replace(cases.nominal, request=request), Solver(cases.part(row[None])[0]), json)
         return family.solved if family.is_possible else None
 
     @property
@@ -268,28 +268,11 @@ class PoseStudy(Study):
 MARKED = 1e-4
 
 
-class Solved(NamedTuple):
-    """The variants of a part.
-
-    Attributes
-    ----------
-    answer : Table or list of documents
-        One variant after the other, a row or a document for each pose; without meaning where a variant is left alone.
-    assembled : array (v, n)
-    alone : array (v,)
-        The variants that have to be solved one by one.
-    """
-
-    answer: Any
-    assembled: NDArray[np.bool_]
-    alone: NDArray[np.bool_]
-
-
 SIZE: Quantity = Size()
 
 
 @dataclass(frozen=True)
-class Family:
+class PoseFamily:
     """A family of variants, and the quantities that are requested of it.
 
     Attributes
@@ -338,7 +321,7 @@ class Family:
             return False
         return self.solver.takes(self.keys)
 
-    def solved(self, part: Part, shown: Rows) -> Solved:
+    def solved(self, part: Part, shown: Rows) -> AtOnce:
         """Solve some variants; `shown`: their inputs as they are shown, (v or 1, n, k)."""
         # loaded where there are variants
         from virtualwork.family.part import ASSEMBLED, Solver
@@ -364,13 +347,13 @@ class Family:
             whole = np.logical_and.reduce([np.isfinite(flat[key]) for key in analysis.named], initial=True)
         whole = np.broadcast_to(whole, v * n)
         if not self.json:
-            return Solved(poses.table(analysis, [flat]), whole.reshape(v, n), alone)
+            return AtOnce(poses.table(analysis, [flat]), whole.reshape(v, n), alone)
         conditions = self._condition(flat, assembled.ravel()) if analysis.request.only is None else None
         # no marks: variants that may have one are solved alone
         marks: list[list[str]] = [[]] * (v * n)
         branch = analysis.assemblies[0].number
         listed = poses.poses_of(analysis, branch, flat, whole, conditions, marks)
-        return Solved(list(listed), whole.reshape(v, n), alone)
+        return AtOnce(list(listed), whole.reshape(v, n), alone)
 
     def _condition(self, lanes: Mapping[Quantity, Any], assembled: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Return the condition of each pose, (v n,); see `Motion.condition`."""

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 EXAMPLE = "straight-line-fit"
 OPTIONS = f"""
-{FILE}  target TARGET.csv...  The target: columns H_x_mm, coupler_angle_deg, crank_torque_N_m, optionally input_deg.
+{FILE}  target TARGET.csv...  The target: columns H_x_mm, H_y_mm, coupler_angle_deg, crank_torque_N_m, optionally input_deg.
 {VARIANTS}{WORKERS}
 Target and free dimensions:
-  want NAME...  Quantity that meets the target: H, coupler.angle, B.position, crank.torque; repeatable.
+  want NAME...  Quantity that meets the target: H, H.y, coupler.angle, B.position, crank.torque; repeatable.
   free NAME=LOW:HIGH...  Dimension to fit, with its bounds; repeatable.
   weight NAME=NUMBER...  Weight of a wanted quantity (default 1); repeatable.
   keep QUANTITY>=VALUE...  Constraint over the range of the input: transmission>=40deg, H.y<=0.3m; repeatable.

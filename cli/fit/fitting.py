@@ -181,19 +181,13 @@ def bounds(m: Mechanism, free: Sequence[str], bare: Mapping[str, str]) -> dict[s
     return bounds
 
 
-def _name(each: Reached) -> str:
-    return each.name.rpartition(".")[2]
-
-
 def _dimension(fit: Fit[Mechanism], each: Reached) -> str:
-    if each.kind == "effort":
-        return "force" if fit.before.inputs[0].is_slide else "torque"
-    return "angle" if each.kind == "angle" else "length"
+    return each.dimension or ("force" if fit.before.inputs[0].is_slide else "torque")
 
 
 def _size(each: Reached, value: Any) -> Any:
     """Return a distance in the unit of JSON."""
-    return np.degrees(value) if each.kind == "angle" else value
+    return np.degrees(value) if each.dimension == "angle" else value
 
 
 def _shown(dimension: Dimension, si: float) -> float:
@@ -235,12 +229,13 @@ def _largest_errors(
 
 def _errors(fit: Fit[Mechanism], each: Reached) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the rounding errors of the values of a quantity and of their distances from the target, SI."""
-    from virtualwork.family.design import place_key
+    from virtualwork.family.design import numbers_of
 
     motion = fit.mechanism.motion(each.inputs)
-    (error,) = motion.error_estimates(each.name).values()
+    (error,) = motion.error_estimates(each.label if each.kind == "coordinate" else each.name).values()
     # the fit computes a value in another order
-    apart = motion.value(place_key(fit.mechanism, each.name)) - each.values
+    numbers = map(motion.value, numbers_of(fit.mechanism, each.name))
+    apart = sum(number * unit for number, unit in zip(numbers, (1, 1j), strict=False)) - each.values
     apart = np.abs(np.remainder(apart + np.pi, 2 * np.pi) - np.pi if each.kind == "angle" else apart)
     # a target is the double nearest to its decimals, and a difference is rounded
     return error + apart, error + apart + EPS * (np.abs(each.target) + each.distances)
@@ -279,7 +274,7 @@ def _misses_by_target(solutions: Sequence[Fit[Mechanism]], place: str) -> Table:
     """Return a row for each solution and target."""
     every = [r for solution in solutions for r in solution.reached]
     owners = [solution for solution in solutions for _ in solution.reached]
-    columns = [names("name", [_name(r) for r in every]), *_misses(owners, [[r] for r in every])]
+    columns = [names("name", [r.label for r in every]), *_misses(owners, [[r] for r in every])]
     keys: tuple[str, ...] = ("name",)
     if place.endswith("[]"):
         numbers = [str(i) for i, solution in enumerate(solutions, 1) for _ in solution.reached]
@@ -333,18 +328,23 @@ def _places(fit: Fit[Mechanism]) -> dict[str, Callable[[], Table]]:
             number("input", "angle", np.degrees(inputs)) if turning else number("input", "length", inputs)
         ]
         for each in reached:
-            name = "" if len(fit.reached) == 1 else f"{_name(each)}_"
-            what = {"angle": "angle", "point": "", "slide": "position"}.get(each.kind, _dimension(fit, each))
+            name, dimension = each.label, _dimension(fit, each)
+            what = {"angle": "angle", "point": "", "slide": "position"}.get(each.kind, dimension)
+            if each.kind == "coordinate":
+                name, _, what = name.rpartition(".")
+            lead = "" if len(fit.reached) == 1 else f"{name}_"
             errors = cache(lambda each=each: [_size(each, error) for error in _errors(fit, each)])
             for title, values in (("", each.values), ("target_", each.target)):
                 parts = {what: _size(each, values)} if what else {"x": values.real, "y": values.imag}
                 own = None if title else lambda of=errors: of()[0]
                 columns += [
-                    number(f"{name}{title}{part}", _dimension(fit, each), values, error=own)
+                    number(f"{lead}{title}{part}", dimension, values, error=own)
                     for part, values in parts.items()
                 ]
+            # both coordinates of a point have one
+            lead = f"{lead}{what}_" if each.kind == "coordinate" and lead else lead
             far, off = _size(each, each.distances), lambda of=errors: of()[1]
-            columns.append(number(f"{name}distance", _dimension(fit, each), far, error=off))
+            columns.append(number(f"{lead}distance", dimension, far, error=off))
         return Table(columns)
 
     names = ["points" if i == 0 else f"points {i + 1}" for i in range(len(by_target))]

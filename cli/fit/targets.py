@@ -1,4 +1,4 @@
-"""The target of a fit: tables of places, angles, travels and efforts, read into the library's targets."""
+"""The target of a fit: tables of places, coordinates, angles, travels and efforts, read into the library's targets."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from cli.cases.axes import place_or_angle
 from cli.read import options
 from dalembert.errors import DataError
-from dalembert.hints import nearest
+from dalembert.hints import choices as hint
 from dalembert.quantities import is_number, parse_number
 
 if TYPE_CHECKING:
@@ -21,71 +21,76 @@ if TYPE_CHECKING:
     from virtualwork.family.keep import Bound
     from virtualwork.family.target import Target
 
-# of each kind: the columns that it has behind its name, the room of the library's names
-KINDS = {
-    "point": ({"x": "length", "y": "length"}, "points"),
-    "link": ({"angle": "angle"}, "links"),
-    "slide": ({"position": "length"}, "slides"),
-    "torque": ({"torque": "torque"}, "effort"),
-    "force": ({"force": "force"}, "effort"),
+# the dimension of each part of a name
+DIMENSIONS = {
+    "x": "length",
+    "y": "length",
+    "angle": "angle",
+    "position": "length",
+    "torque": "torque",
+    "force": "force",
 }
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """A point, the angle of a link, the position of a slide or the input's effort that `--want` names."""
+    """A point or its coordinate, the angle of a link, the position of a slide or the input's effort that `--want` names.
 
-    kind: str
+    Attributes
+    ----------
+    path : str
+        Its name in the library.
+    name : str
+        The name of the point, link, slide or input.
+    parts : tuple of str
+        Its numbers.
+    names : tuple of str
+        Its names in the options.
+    """
+
+    path: str
     name: str
-
-    @property
-    def path(self) -> str:
-        """Its name in the library."""
-        return f"{KINDS[self.kind][1]}.{self.name}"
+    parts: tuple[str, ...]
+    names: tuple[str, ...]
 
     @property
     def columns(self) -> dict[str, str]:
         """Its columns, as a table of poses calls them, with their dimensions."""
-        return {f"{self.name}_{part}": kind for part, kind in KINDS[self.kind][0].items()}
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Its names in the options."""
-        parts = KINDS[self.kind][0]
-        full = tuple(f"{self.name}.{part}" for part in parts) if len(parts) == 1 else ()
-        return (self.name, *full) if self.kind in ("point", "link") else full
+        return {f"{self.name}_{part}": DIMENSIONS[part] for part in self.parts}
 
 
 def every_wanted(m: Mechanism) -> list[Wanted]:
     """Return all quantities that a fit can aim at."""
     points = dict.fromkeys(point for named in m.bodies.values() for point in named)
     slides = dict.fromkeys(str(guide.point) for guide in m.guides)
+    efforts = [(str(entry.name), "force" if entry.is_slide else "torque") for entry in m.inputs]
     return [
-        *(Wanted("point", name) for name in points),
-        *(Wanted("link", name) for name in m.links),
-        *(Wanted("slide", name) for name in slides),
-        *(Wanted("force" if entry.is_slide else "torque", entry.name) for entry in m.inputs),
+        *(Wanted(f"points.{name}", name, ("x", "y"), (name,)) for name in points),
+        *(Wanted(f"links.{name}", name, ("angle",), (name, f"{name}.angle")) for name in m.links),
+        *(Wanted(f"slides.{name}", name, ("position",), (f"{name}.position",)) for name in slides),
+        *(Wanted(f"effort.{name}", name, (effort,), (f"{name}.{effort}",)) for name, effort in efforts),
+        *(
+            Wanted(f"points.{name}.{axis}", name, (axis,), (f"{name}.{axis}",))
+            for name in points
+            for axis in "xy"
+        ),
     ]
 
 
 def wanted(m: Mechanism, names: Sequence[str]) -> list[Wanted]:
-    """Read the names of `--want`: `H`, `coupler.angle`, `B.position`; the error of an unknown name suggests the nearest."""
+    """Read the names of `--want`: `H`, `H.y`, `coupler.angle`; the error of an unknown name suggests the nearest."""
     every = every_wanted(m)
     choices = {name: each for each in reversed(every) for name in each.names}
     result: list[Wanted] = []
     for text in (part.strip() for name in names for part in name.split(",")):
-        owner, _, part = text.rpartition(".")
         if text not in choices:
-            if part in ("x", "y") and owner in choices:
-                raise options.bad("--want", f"'{text}': a point has both coordinates: expected {owner}")
-            others = ", ".join(dict.fromkeys(each.names[-1] for each in every))
             raise options.bad(
-                "--want",
-                f"no point, link or slide is named '{text}'{nearest(text, choices)}: expected one of {others}",
+                "--want", f"no point, link or slide is named '{text}'{hint(text, reversed(choices))}"
             )
-        if choices[text] in result:
+        new = choices[text]
+        if any(new.columns.keys() & each.columns.keys() for each in result):
             raise options.bad("--want", f"'{text}' is given twice")
-        result.append(choices[text])
+        result.append(new)
     return result
 
 
@@ -115,9 +120,8 @@ def kept(m: Mechanism, texts: Sequence[str] | None, bare: Mapping[str, str]) -> 
     every = every_wanted(m)
     choices: dict[str, tuple[str, str]] = {"transmission": ("transmission", "angle")}
     for each in reversed(every):
-        for part, kind in KINDS[each.kind][0].items():
-            path = f"{each.path}.{part}" if each.kind == "point" else each.path
-            choices[f"{each.name}.{part}"] = path, kind
+        if len(each.parts) == 1:
+            choices[each.names[-1]] = each.path, DIMENSIONS[each.parts[0]]
     result = []
     for text in texts or ():
         match = re.fullmatch(r"\s*(\S+?)\s*(>=|<=|≥|≤)\s*(\S.*?)\s*", text)
@@ -128,10 +132,7 @@ def kept(m: Mechanism, texts: Sequence[str] | None, bare: Mapping[str, str]) -> 
             )
         name, sense, value = match.groups()
         if name not in choices:
-            raise options.bad(
-                "--keep",
-                f"no quantity is named '{name}'{nearest(name, choices)}: expected one of {', '.join(choices)}",
-            )
+            raise options.bad("--keep", f"no quantity is named '{name}'{hint(name, reversed(choices))}")
         path, kind = choices[name]
         if kind in ("length", "angle"):
             number = place_or_angle(value, kind, "--keep", bare).si
@@ -157,11 +158,9 @@ def targets(
         met |= present
     missing = [each for each in aims if each not in met]
     if missing:
-        parts = ", ".join(
-            f"{missing[0].name}_{part}_{'m' if kind == 'length' else 'deg'}"
-            for part, kind in KINDS[missing[0].kind][0].items()
-        )
-        raise DataError(f"{paths[-1]}: no columns of {missing[0].name}: expected {parts}")
+        units = {"length": "m", "angle": "deg", "torque": "N_m", "force": "N"}
+        columns = ", ".join(f"{column}_{units[of]}" for column, of in missing[0].columns.items())
+        raise DataError(f"{paths[-1]}: no columns of {missing[0].names[-1]}: expected {columns}")
     return result
 
 
@@ -174,17 +173,20 @@ def _target(
     turning = not m.inputs[0].is_slide
     kinds = {"input": "angle" if turning else "length", "weight": "number"}
     short: dict[str, str] = {}
-    named = {each.name.lower() for each in aims}
+    names = {each.name for each in aims}
+    alike = {name.lower() for name in names}
     for each in every_wanted(m):
         # a point H beside a wanted h has columns of its own
-        kinds |= each.columns if each.name.lower() in named else {}
+        if each in aims or (each.name.lower() in alike and each.name not in names):
+            kinds |= each.columns
     for each in aims:
-        if sum(other.kind == each.kind for other in aims) == 1:
-            # one alone may go without its name: x_mm, angle_deg, position_mm
-            short |= {f"{part}_": f"{each.name}_{part}_" for part in KINDS[each.kind][0]}
-        if each.kind in ("torque", "force"):
-            # as `dalembert forces` writes it
-            short |= {f"input_{each.kind}_": f"{each.name}_{each.kind}_"}
+        for part in each.parts:
+            if sum(part in other.parts for other in aims) == 1:
+                # one alone may go without its name: x_mm, angle_deg, position_mm
+                short[f"{part}_"] = f"{each.name}_{part}_"
+            if part in ("torque", "force"):
+                # as `dalembert forces` writes it
+                short[f"input_{part}_"] = f"{each.name}_{part}_"
 
     def meant(headers: list[str]) -> list[str]:
         lower = [h.strip().lower() for h in headers]

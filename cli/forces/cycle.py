@@ -16,6 +16,7 @@ from dalembert.angles import degrees, in_turn
 from dalembert.arithmetic.exact import EPS
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
+from dalembert.hints import choices
 from dalembert.results.columns import Column, Table, names, number
 
 if TYPE_CHECKING:
@@ -140,6 +141,10 @@ class Forces(PoseStudy):
         for flag, value in (("--flywheel", self.flywheel), ("--counterweights", self.counterweights)):
             if value is not None and not self.is_swept:
                 raise bad(flag, "expected a cycle too, such as --over 0deg:360deg:1deg")
+        links = self.cases.mechanism.links
+        for link in self.counterweights or ():
+            if link not in links:
+                raise bad("--counterweights", f"unknown link '{link}'{choices(link, links)}")
         if self.states is not None and self.cases.varied is not None:
             raise bad("--states", "expected one mechanism: --over and --cases of dimensions make several")
 

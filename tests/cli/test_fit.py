@@ -137,6 +137,114 @@ def test_a_file_of_several_variants_is_refused(dalembert, target, tmp_path):
     assert not (tmp_path / "fitted.toml").exists()
 
 
+UPRIGHT = """[units]
+length = "mm"
+angle = "deg"
+[ground]
+O = [0, 0]
+[links.crank]
+points = { O = [0, 0], A = [50, 0] }
+[links.rod]
+points = { A = [0, 0], B = [170, 0] }
+[[slots]]
+point = "B"
+link = "rod"
+on = "ground"
+through = "O"
+angle = 90
+[input]
+link = "crank"
+angle = 90
+[guess]
+at = 90
+rod = 90
+"""
+STROKE = ("--free", "links.crank.A.x=40:90", "--free", "links.rod.B.x=100:200")
+
+
+@pytest.mark.parametrize("header", ["B_y_mm", "y_mm", "b_Y_mm"])
+def test_one_coordinate_is_a_target(dalembert, tmp_path, header):
+    """The ends of the stroke are l + r = 210 mm above the crank and l − r = 90 mm: r = 60 mm, l = 150 mm."""
+    (tmp_path / "m.toml").write_text(UPRIGHT)
+    (tmp_path / "t.csv").write_text(f"input_deg,{header}\n90,210\n-90,90\n")
+    found = dalembert(
+        "fit", "m.toml", "t.csv", "--want", "B.y", *STROKE, "-o", "fitted.toml", "--json", "--plot", "p.svg"
+    )
+    assert found.returncode == 0
+    assert found.stderr == ""
+    fit = json.loads(found.stdout)["fit"]
+    right = {"links.crank.A.x_m": 0.06, "links.rod.B.x_m": 0.15}
+    assert fit["parameters"] == pytest.approx(right, rel=1e-12)
+    assert {"rms_m", "max_m"} < set(fit)
+    assert [each["name"] for each in fit["targets"]] == ["B.y"]
+    assert "B.y, mm over the input" in (tmp_path / "p.svg").read_text()
+    again = dalembert("mechanism", "fitted.toml", "--at", "90", "--at", "-90", "--only", "B.y")
+    assert [float(row["B_y_m"]) for row in rows(again.stdout)] == pytest.approx([0.21, 0.09], rel=1e-12)
+
+
+def test_one_coordinate_off_its_target_has_its_distance_in_metres(dalembert, tmp_path):
+    """One length for both ends: r = (200 − 80)/2 mm leaves 10 mm at either; a bound on y keeps 205 mm: r = 55 mm."""
+    (tmp_path / "m.toml").write_text(UPRIGHT.replace("170", "150"))
+    (tmp_path / "t.csv").write_text("input_deg,B_y_mm,B_x_mm\n90,200,-\n-90,80,-\n")
+    options = ("fit", "m.toml", "t.csv", "--want", "B.y", "--free", "links.crank.A.x=40:90", "--json")
+    fit = json.loads(dalembert(*options).stdout)["fit"]
+    assert fit["parameters"]["links.crank.A.x_m"] == pytest.approx(0.06, rel=1e-9)
+    assert (fit["rms_m"], fit["max_m"]) == pytest.approx((0.01, 0.01), rel=1e-7)
+    fit = json.loads(dalembert(*options, "--keep", "B.y<=205mm").stdout)["fit"]
+    assert fit["parameters"]["links.crank.A.x_m"] == pytest.approx(0.055, rel=1e-7)
+    assert fit["kept"] == [{"quantity": "B.y", "most": pytest.approx(0.205), "met": True}]
+
+
+def test_coordinates_stand_beside_each_other_and_an_angle(dalembert, target, tmp_path):
+    """A four-bar whose target another one wrote: y of the coupler point and the coupler's angle; weights by name."""
+    options = (*TRUE, "--over", "0:330:30", "--only", "H,coupler.angle", "-o", "t.csv")
+    assert dalembert("mechanism", "m.toml", *options).returncode == 0
+    found = dalembert(
+        "fit", "m.toml", "t.csv", "--want", "H.y", "--want", "H.x,coupler.angle", "--weight", "H.y=2", *FREE, "--json",
+        "-o", "f.xlsx",
+    )  # fmt: skip
+    assert found.returncode == 0, found.stderr
+    fit = json.loads(found.stdout)["fit"]
+    assert fit["parameters"]["links.coupler.H.angle_deg"] == pytest.approx(34, rel=1e-9)
+    assert [each["name"] for each in fit["targets"]] == ["H.y", "H.x", "coupler"]
+    assert [set(each) - {"name"} for each in fit["targets"]] == [{"rms_m", "max_m"}] * 2 + [
+        {"rms_deg", "max_deg"}
+    ]
+    openpyxl = pytest.importorskip("openpyxl")
+    sheets = openpyxl.load_workbook(tmp_path / "f.xlsx")
+    (headers,) = sheets["points"].iter_rows(max_row=1, values_only=True)
+    assert headers[1:7] == (
+        "H_y_m",
+        "H_target_y_m",
+        "H_y_distance_m",
+        "H_x_m",
+        "H_target_x_m",
+        "H_x_distance_m",
+    )
+
+
+def test_one_number_a_row_at_free_inputs_is_doubted(dalembert, tmp_path):
+    (tmp_path / "m.toml").write_text(UPRIGHT)
+    (tmp_path / "t.csv").write_text("y_mm\n210\n90\n")
+    found = dalembert("fit", "m.toml", "t.csv", "--want", "B.y", *STROKE)
+    assert found.returncode == 0
+    assert "one number a row is met by every mechanism that reaches it" in found.stderr
+
+
+@pytest.mark.parametrize(
+    ("want", "said"),
+    [
+        ("H.x,H", "'H' is given twice"),
+        ("H.y,H.y", "'H.y' is given twice"),
+        ("H.z", "did you mean 'H.y'"),
+    ],
+)
+def test_a_coordinate_is_wanted_once(dalembert, target, want, said):
+    found = dalembert("fit", "m.toml", "t.csv", "--want", want, *FREE)
+    assert found.returncode == 2
+    assert said in found.stderr
+
+
 @pytest.mark.parametrize(
     ("table", "said"),
     [

@@ -243,7 +243,7 @@ def test_standard_input_and_pictures(dalembert: Dalembert, tmp_path: Path) -> No
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "b.png").stat().st_size > 10_000
     done = dalembert("mechanism", KLANN, "--plot", "c.png", "--only", "H.q")
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert not (tmp_path / "c.png").exists()
 
 
@@ -295,10 +295,10 @@ def test_wrong_usage_is_status_2(arguments: tuple[str, ...], dalembert: Dalember
     assert done.stdout == ""
 
 
-def test_missing_file_and_unknown_names(dalembert: Dalembert) -> None:
+def test_missing_file_name_and_assembly(dalembert: Dalembert) -> None:
     assert dalembert("mechanism", "nothing.toml").returncode == 1
     done = dalembert("mechanism", KLANN, "--only", "Q")
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert "'Q'" in done.stderr
     assert dalembert("mechanism", KLANN, "--branch", "9").returncode == 1
     assert dalembert("mechanism", "-", stdin=b"\xff\xfe\x00").returncode == 1

@@ -329,7 +329,7 @@ BAD = {
         1,
         "does not turn about a pin",
     ),
-    "unknown link": (["--counterweights", "krank", "--over", "0deg:360deg:9deg"], 1, "unknown link 'krank'"),
+    "unknown link": (["--counterweights", "krank", "--over", "0deg:360deg:9deg"], 2, "unknown link 'krank'"),
 }
 
 

@@ -93,7 +93,7 @@ def test_operations_are_those_of_what_is_named(dalembert, tmp_path, only: str) -
 def test_inspect_refuses_a_name_that_is_none(dalembert, tmp_path) -> None:
     (tmp_path / "m.toml").write_text(FOUR_BAR)
     done = dalembert("inspect", "m.toml", "--only", "nix")
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert "no link or point is named 'nix'" in done.stderr
 
 

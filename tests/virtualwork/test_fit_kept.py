@@ -183,7 +183,7 @@ def test_bad_bounds() -> None:
         (Bound("transmission", least=2.0), "0 to 90"),
         (Bound("points.P", least=1.0), "two coordinates"),
         (Bound("points.Q.x", least=1.0), "no point"),
-        (Bound("effort.rocker", most=1.0), "the input is not named"),
+        (Bound("effort.rocker", most=1.0), "no input is named 'rocker': expected crank"),
     ):
         with pytest.raises(DescriptionError, match=said):
             Bounds(m, (), [bound])

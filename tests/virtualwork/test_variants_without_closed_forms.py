@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from importlib.resources import files
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from dalembert.arithmetic.recorded import Recorder
-from virtualwork import Guess, Input, Link, Mechanism
+from virtualwork import Guess, Guide, Input, Link, Mechanism
 from virtualwork.branch.continuation import Continuation
 from virtualwork.describe import MechanismError
 from virtualwork.describe.dimensions import dimensions, value
@@ -161,6 +162,109 @@ def test_a_group_that_another_group_drives_and_one_in_closed_form_behind_it():
     (solver,) = [s for (name, _), s in family._solvers.items() if name == motion._name]
     assert solver.together.all()
     assert compared(m, numbers, m.at[0] + np.linspace(-0.1, 0.1, 3)) == 12
+
+
+def two_inputs(slides):
+    """The same chain, the pivot of its crank on a second crank, or on a slide."""
+    m = stephenson()
+    ground = {name: z for name, z in m.ground.items() if name != "G"}
+    if slides:
+        base, guides, second = (
+            Link({"G": 0j}),
+            [Guide("G", "base", "ground", 0.15j + 0.15, np.pi / 2, 0.0)],
+            Input(slider="G"),
+        )
+    else:
+        base, guides, second = Link({"K": 0j, "G": 0.02}), [], Input("base")
+        ground["K"] = 0.15 + 0.04j
+    guess = replace(m.guess, at=(m.at[0], -0.09 if slides else np.pi / 2))
+    inputs = (*m.inputs, second)
+    return replace(
+        m, ground=ground, links={**m.links, "base": base}, guides=guides, inputs=inputs, guess=guess
+    )
+
+
+def one_by_one(m, numbers, q):
+    """Two inputs: every variant against what it does alone, with rates and forces."""
+    variants = m.vary(numbers)
+    motion = variants.motion(q, [5.0, 0.3])
+    for i in range(len(variants)):
+        alone = m.changed({path: x[i] for path, x in numbers.items()}).motion(q, [5.0, 0.3])
+        there = alone.assembled
+        np.testing.assert_array_equal(motion.assembled[i], there)
+        for order in range(3):
+            own = alone.point("E").complex(order)[there]
+            apart = np.abs(motion.point("E").complex(order)[i][there] - own)
+            known = 4e-15 * alone.condition[there] ** (order + 1) * m.size * 5.0**order
+            assert (apart <= known + 4e-15 * np.abs(own)).all(), (i, order)
+        efforts = alone.effort[there]
+        known = 4e-15 * alone.condition[there] ** 3
+        apart = np.abs(motion.effort[i][there] - efforts)
+        assert (apart <= known[:, None] * np.abs(efforts).max()).all()
+    (solver,) = [s for (name, _), s in family._solvers.items() if name == motion._name]
+    return solver.together
+
+
+def way_of(m, count, reach):
+    rng = np.random.default_rng(count)
+    second = 0.1 * m.size if m.inputs[1].is_slide else 1.0
+    return np.array(m.at) + reach * rng.uniform(-1, 1, (count, 2)) * [1.0, second]
+
+
+@pytest.mark.parametrize("slides", [False, True])
+def test_several_inputs_lead_every_pose_along_a_line_of_its_own(slides):
+    m = two_inputs(slides)
+    numbers = {"links.rod.E.x": np.linspace(0.104, 0.106, 3), "links.coupler.mass": np.linspace(1.0, 3.0, 3)}
+    assert one_by_one(m, numbers, way_of(m, 5, 0.5)).all()
+
+
+def test_of_several_inputs_what_is_out_of_reach_is_described_alone():
+    m = two_inputs(slides=False)
+    numbers = {"links.rod.E.x": np.array([0.105, 0.092])}
+    q = np.array(m.at) + np.linspace(0, 4.5, 4)[:, None] * [1.0, 0.05]
+    assert one_by_one(m, numbers, q).tolist() == [True, False]
+
+
+@pytest.mark.parametrize("slides", [False, True])
+def test_of_several_inputs_no_bit_depends_on_the_number_of_variants_or_the_thread(slides):
+    m = two_inputs(slides)
+    q, lengths = way_of(m, 4, 0.5), np.linspace(0.104, 0.106, 32)
+
+    def solved(count):
+        motion = m.vary({"links.rod.E.x": np.resize(lengths, count)}).motion(q, [5.0, 0.3])
+        return motion.point("E").acceleration, motion.effort
+
+    whole = solved(32)
+    for count in (1, 1000):
+        first = min(count, 32)
+        for some, every in zip(solved(count), whole, strict=True):
+            np.testing.assert_array_equal(some[:first], every[:first])
+    with ThreadPoolExecutor(4) as pool:
+        for each in pool.map(solved, [32] * 4):
+            for some, every in zip(each, whole, strict=True):
+                np.testing.assert_array_equal(some, every)
+
+
+def test_of_several_inputs_a_group_drives_another_one():
+    """The line of the second triad leads through poses of the first one."""
+    rng = np.random.default_rng(5)
+    m = chain(rng)
+    base = Link({"P": 0j, "X": 0.1})
+    ground = {name: z for name, z in m.ground.items() if name != "X"} | {"P": m.ground["X"] - 0.1}
+    guess = replace(m.guess, at=(*m.at, 0.0))
+    m = replace(
+        m, ground=ground, links={**m.links, "base": base}, inputs=(*m.inputs, Input("base")), guess=guess
+    )
+    numbers = drawn(m, rng, 3, 1e-4)
+    q = np.array(m.at) + np.linspace(-0.05, 0.05, 3)[:, None] * [1.0, 0.5]
+    motion = m.vary(numbers).motion(q)
+    places = motion.point("M").position
+    (solver,) = [s for (name, _), s in family._solvers.items() if name == motion._name]
+    assert solver.together.all()
+    for i in range(3):
+        alone = m.changed({path: x[i] for path, x in numbers.items()}).motion(q)
+        known = 4e-15 * alone.condition.max() * m.size
+        assert np.abs(places[i] - alone.point("M").position).max() <= known
 
 
 def test_refusals_and_limits_are_those_of_each_variant_alone():

@@ -20,7 +20,7 @@ from virtualwork.branch.guess import BESIDE, informed
 from virtualwork.branch.sampling import TURNED
 from virtualwork.describe.description import Description
 from virtualwork.family.varied_formulas import CHOICE, CLOSE, DIP, TOLD, VariedFormulas
-from virtualwork.family.ways import Ways, nodes_of
+from virtualwork.family.ways import AlongInput, AlongLines, Ways, nodes_of
 from virtualwork.formulas.kinematics import Angle
 from virtualwork.formulas.loops import Margin
 from virtualwork.formulas.numbers import Reals
@@ -90,28 +90,35 @@ def followed(
     low: Reals,
     high: Reals,
 ) -> tuple[dict[str, Reals], dict[str, Reals], Mask]:
-    """The same where groups have no closed form; and their unknowns at inputs (n or 1, k), (n, k, u) by the group's name."""
+    """The same where groups have no closed form; and their unknowns at inputs (n or 1, k, inputs), (n, k, u) by the group's name."""
     k = inputs.shape[1]
     sizes = {group.name: len(group.angles) + len(group.slides) for group in written.iterated}
     signs_of = {group.name: np.ones(n) for group in written.closed}
     unknowns = {name: np.full((n, k, u), np.nan) for name, u in sizes.items()}
     decided, m = np.zeros(n, dtype=bool), own.mechanism
-    nodes = nodes_of(own, float(low.min()), float(high.max()))
-    if not nodes:
+    one = len(m.inputs) == 1
+    nodes = nodes_of(own, float(low.min()), float(high.max())) if one else {}
+    if one and not nodes:
         return signs_of, unknowns, decided
-    each = max(1, LANES // max(k, *(len(q) for q, _ in nodes.values())))
+    each = max(1, LANES // max(k, 1, *(len(q) for q, _ in nodes.values())))
     for a in range(0, n, each):
         here = slice(a, min(a + each, n))
         ends, some = _ends(here, low, high), _of(numbers, here)
-        ways = Ways(written, own, nodes, some, here.stop - a, *ends)
+        count = here.stop - a
+        ways: Ways = (
+            AlongInput(written, own, nodes, some, count, *ends)
+            if one
+            else AlongLines(written, own, some, count)
+        )
         chosen, fine = signs(written, m, some | ways.starts, ways.n)
         ways.given |= with_signs({}, chosen)
         fine &= ways.followed
         margins = at_guess(written, m, some | ways.starts, ways.n)
         fine &= np.logical_and.reduce([margin > 0 for margin in margins.values()], initial=True)
-        left = np.flatnonzero(fine)
-        way = ways.of(left)
-        fine[left] = ~meet_on_the_way(written, m, way.given | {WAYS: way}, way.n, *_ends(left, *ends))
+        if one:
+            left = np.flatnonzero(fine)
+            way = ways.of(left)
+            fine[left] = ~meet_on_the_way(written, m, way.given | {WAYS: way}, way.n, *_ends(left, *ends))
         for group in written.iterated:
             x = ways.unknowns(group, inputs[here] if len(inputs) > 1 else inputs)
             unknowns[group.name][here] = x
@@ -284,7 +291,7 @@ def _across(entering: Mapping[str, Any]) -> dict[str, Any]:
 
 def _over(tape: Tape, entering: Mapping[str, Any], q: Reals) -> dict[str, Any]:
     """What enters a tape over a grid of variants and inputs (samples, n or 1)."""
-    unknowns = entering[WAYS].entering(tape.inputs, q.T) if WAYS in entering else {}
+    unknowns = entering[WAYS].entering(tape.inputs, q.T[..., None]) if WAYS in entering else {}
     return _across(entering) | {"q0": q.T} | unknowns
 
 

@@ -16,16 +16,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.engines import Repeated, run
-from dalembert.hints import nearest
+from dalembert.hints import choices
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, by_path, changed
 from virtualwork.family.branches import meet_on_the_way, samples, signs, with_signs
-from virtualwork.family.part import Part, Solver, assembled, parts
+from virtualwork.family.part import Part, Solver, assembled
 from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.formulas.forces import Effort
-from virtualwork.formulas.kinematics import Angle, Point, Slide
+from virtualwork.formulas.kinematics import Angle, Coordinate, Slide
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.loops import Transmission
 from virtualwork.formulas.numbers import Reals
@@ -33,6 +33,9 @@ from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.recording import NAMES
 
 REST = (0.0, 0.0, 0.0)
+# the first word of a name, and what is named there
+ROOMS = {"points": "point", "links": "link", "slides": "slot or slider", "effort": "input"}
+AXES = ("x", "y")
 
 
 class Design:
@@ -44,7 +47,7 @@ class Design:
         With one input.
     dimensions : tuple of Dimension
     keys : tuple
-        The requested quantities: points, angles of links, slides, the effort.
+        The requested numbers: coordinates of points, angles of links, slides, the effort.
     rates : tuple of float
         Speed, acceleration and jerk of the input: those of the description where the effort is requested, else none.
     evaluations : int
@@ -81,11 +84,6 @@ class Design:
 
     def __repr__(self) -> str:
         return f"Design({self.mechanism.name!r}: {', '.join(self._paths)})"
-
-    @property
-    def rows(self) -> int:
-        """The number of rows of a table: two for each point, x and y, one for an angle or a slide."""
-        return sum(len(key.names) for key in self.keys)
 
     @property
     def _written(self) -> VariedFormulas | None:
@@ -149,7 +147,7 @@ class Design:
         if self._written is not None and self._chosen != (x.tobytes(), None):
             slopes, fine = self._evaluated(x, q, enters)
             if fine or self._known(x) is not None:
-                return slopes.reshape(self.rows, len(enters), len(q)).transpose(0, 2, 1)
+                return slopes.reshape(len(self.keys), len(enters), len(q)).transpose(0, 2, 1)
         if self._alone.written is not None:
             return self._alone.slopes(x, q, enters)
         return self._differences(x, q, inputs_alone)
@@ -223,7 +221,7 @@ class Design:
             rows += [x + apart, x - apart]
             along += [q, q]
         table = self.table(np.array(rows), np.array(along))
-        angles = np.array([key.is_angle for key in self.keys for _ in key.names])[:, None]
+        angles = np.array([key.is_angle for key in self.keys])[:, None]
         columns = []
         for i, h in enumerate((turn, *step)):
             apart = table[:, 2 * i] - table[:, 2 * i + 1]
@@ -234,7 +232,7 @@ class Design:
     def table(self, numbers: Reals, inputs: Reals) -> Reals:
         """The requested quantities of designs (v, d) at their inputs (v or 1, n): (rows, v, n)."""
         self.evaluations += len(numbers)
-        return table(self.solved(numbers, inputs, self.keys))
+        return np.stack(self.solved(numbers, inputs, self.keys))
 
     def solved(self, numbers: Reals, inputs: Reals, keys: Sequence[Quantity]) -> list[NDArray[Any]]:
         """Any quantities of designs (v, d) at their inputs (v or 1, n), (v, n) each."""
@@ -291,28 +289,26 @@ class Alone:
         """The requested quantities of one design, (rows, n); NaN where it cannot be assembled."""
         poses = self._poses(x, q)
         if poses is None:
-            return np.full((sum(len(key.names) for key in self.keys), len(q)), np.nan)
+            return np.full((len(self.keys), len(q)), np.nan)
         if any(isinstance(key, Transmission) for key in self.keys):
             # sines that are on the tape alone
             return self._rows(self.written, x, poses)
-        return table(poses.values(self.keys))
+        return np.stack(poses.values(self.keys))
 
     def _rows(self, written: VariedFormulas | None, x: Reals, poses: Lanes) -> Reals:
         """The requested quantities, from the tape."""
-        of = [name for key in self.keys for name in key.names]
         if written is None:
-            return np.full((len(of), poses.n), np.nan)
+            return np.full((len(self.keys), poses.n), np.nan)
         tape = written.tape(self.keys)
         numbers = by_path(self.dimensions, x.tolist())
         rest = [name for name in tape.inputs if name not in numbers]
         with np.errstate(all="ignore"):
             outputs = run(tape, numbers | poses.entering(rest))
-        return np.array([np.broadcast_to(outputs[name], poses.n) for name in of])
+        return np.array([key.of_rows(outputs, poses.n) for key in self.keys])
 
     def slopes(self, x: Reals, q: Reals, enters: tuple[str, ...]) -> Reals:
         """Its derivatives to dimensions by their paths, and to the input `q0`, (rows, n, len(enters))."""
-        of = [name for key in self.keys for name in key.names]
-        out = np.full((len(of), len(q), len(enters)), np.nan)
+        out = np.full((len(self.keys), len(q), len(enters)), np.nan)
         poses = self._poses(x, q)
         if poses is None:
             return out
@@ -324,10 +320,9 @@ class Alone:
         assert self._last[1] is not None
         with np.errstate(all="ignore"):
             outputs = run(tape, numbers | poses.entering(rest))
-        for row, name in enumerate(of):
+        for row, key in enumerate(self.keys):
             for column, to in enumerate(enters):
-                # what does not depend on it has no row
-                out[row, :, column] = outputs.get(f"d({name})/d({to})", 0.0)
+                out[row, :, column] = key.of_rows(outputs, poses.n, to)
         out[:, ~poses.assembled] = np.nan
         return out
 
@@ -345,37 +340,41 @@ class Alone:
         return None if self._last[1] is None else Lanes(self._last[1], q, *self.rates)
 
 
-def table(quantities: Iterable[NDArray[Any]]) -> Reals:
-    """Quantities as rows of real numbers, (rows, ...): two of what is complex."""
-    return np.stack([row for quantity in quantities for row in parts(quantity)])
+def numbers_of(m: Description, name: str) -> tuple[Quantity, ...]:
+    """The numbers that a name stands for: `points.H.x` (or `H.x`), `links.rocker`, `slides.B`, the input's `effort.crank`.
 
-
-def place_key(m: Description, name: str) -> Quantity:
-    """The key of a place: `points.H` (or `H`), `links.rocker`, `slides.B`; of the input's effort: `effort.crank`.
+    `points.H` (or `H`) stands for both coordinates.
 
     Raises
     ------
     DescriptionError
-        With the known quantities in place of the unknown ones.
+        With the nearest name in place of the unknown one.
     """
-    kind, _, of = name.rpartition(".")
-    if kind == "effort":
-        if of != m.inputs[0].name:
-            raise DescriptionError(f"the input is not named '{of}': expected effort.{m.inputs[0].name}")
-        return Effort(0)
+    room, _, of = name.partition(".")
+    if room not in ROOMS or not of:
+        room, of = "points", name
     points = {point: body for body, named in m.bodies.items() for point in named}
     guides = {guide.point: i for i, guide in enumerate(m.guides)}
-    for word, what, names in (
-        ("points", "point", points),
-        ("links", "link", m.links),
-        ("slides", "slot or slider", guides),
-    ):
-        if kind == word or (not kind and word == "points"):
-            if of not in names:
-                raise DescriptionError(f"no {what} is named '{of}'{nearest(of, names)}")
-            if word == "points":
-                return Point(points[of], 0j, of, 0)
-            return Angle(of, 0) if word == "links" else Slide(guides[of], 0)
-    raise DescriptionError(
-        f"'{name}': expected points.NAME, links.NAME, slides.NAME or effort.{m.inputs[0].name}"
-    )
+    owner, _, axis = of.rpartition(".")
+    if room == "points" and of in points:
+        return tuple(Coordinate(points[of], 0j, of, i) for i in (0, 1))
+    if room == "points" and owner in points and axis in AXES:
+        return (Coordinate(points[owner], 0j, owner, AXES.index(axis)),)
+    if room == "links" and of in m.links:
+        return (Angle(of, 0),)
+    if room == "slides" and of in guides:
+        return (Slide(guides[of], 0),)
+    if room == "effort" and of == m.inputs[0].name:
+        return (Effort(0),)
+    every = {"points": points, "links": m.links, "slides": guides, "effort": (str(m.inputs[0].name),)}[room]
+    raise DescriptionError(f"no {ROOMS[room]} is named '{of}'{choices(of, every)}")
+
+
+def numbers_of_each(m: Description, names: Iterable[str]) -> dict[str, tuple[Quantity, ...]]:
+    """The numbers of each name; ValueError where two names share one."""
+    result = {name: numbers_of(m, name) for name in names}
+    every = [key for of in result.values() for key in of]
+    shared = [name for name, of in result.items() if any(every.count(key) > 1 for key in of)]
+    if shared:
+        raise ValueError(f"{' and '.join(shared)} name the same number: expected each once")
+    return result

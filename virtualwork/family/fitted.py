@@ -9,7 +9,7 @@ import numpy as np
 
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, by_path, number_of
-from virtualwork.family.design import Design, place_key
+from virtualwork.family.design import Design, numbers_of
 from virtualwork.family.keep import Kept
 from virtualwork.family.target import Reached
 from virtualwork.formulas.numbers import Complexes, Reals
@@ -72,17 +72,17 @@ class Fit(Generic[D]):
 
     @property
     def positions(self) -> Complexes:
-        """The positions of the (first) point, (n,), x + iy, m."""
+        """The values of the (first) quantity, (n,): x + iy of a point, m."""
         return self.reached[0].values
 
     @property
     def target(self) -> Complexes:
-        """The target positions, (n,)."""
+        """Its target, (n,)."""
         return self.reached[0].target
 
     @property
     def distances(self) -> Reals:
-        """The distance at each row, (n,), m; rad for the angle of a link."""
+        """Its distance at each row, (n,), m; rad for the angle of a link."""
         return self.reached[0].distances
 
     @property
@@ -97,11 +97,14 @@ class Fit(Generic[D]):
 
     @property
     def _all(self) -> Reals:
-        for kinds in (("point", "slide"), ("angle",), ("effort",)):
-            distances = [each.distances for each in self.reached if each.kind in kinds]
-            if distances:
-                break
-        return np.concatenate(distances)
+        return np.concatenate([each.distances for each in self.reached if each.dimension == self._dimension])
+
+    @property
+    def _dimension(self) -> str:
+        """Lengths count before angles, angles before efforts."""
+        return next(
+            of for of in ("length", "angle", "") if any(each.dimension == of for each in self.reached)
+        )
 
     def plot(self, figure: FigureBase | None = None) -> list[Axes]:
         """Draw the targets and the motion of the mechanism over their range: a panel for each point, link and slide.
@@ -117,16 +120,15 @@ class Fit(Generic[D]):
         turning = not self.before.inputs[0].is_slide
         panels = []
         for each in self.reached:
-            design = Design(self.before, self.dimensions, [place_key(self.before, each.name)])
+            design = Design(self.before, self.dimensions, numbers_of(self.before, each.name))
             q = np.linspace(each.inputs.min(), each.inputs.max(), FINE)
             lines = [design(numbers, q) for numbers in (self.values, own)]
             after, before = (t[0] + 1j * t[1] if each.kind == "point" else t[0] for t in lines)
-            name = each.name.rpartition(".")[2]
-            panels.append(Fitted(name, each.kind, turning, q, after, before, each.inputs, each.target))
+            panels.append(Fitted(each.label, each.kind, turning, q, after, before, each.inputs, each.target))
         return fitted(panels, figure)
 
     def __repr__(self) -> str:
         result = ", ".join(f"{path}={number:.6g}" for path, number in self.parameters.items())
-        kinds, slide = {each.kind for each in self.reached}, self.before.inputs[0].is_slide
-        unit = "m" if kinds & {"point", "slide"} else "rad" if "angle" in kinds else "N" if slide else "N·m"
+        effort = "N" if self.before.inputs[0].is_slide else "N·m"
+        unit = {"length": "m", "angle": "rad"}.get(self._dimension, effort)
         return f"Fit({result}; rms {self.rms:.3g} {unit})"

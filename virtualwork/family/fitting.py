@@ -337,6 +337,11 @@ class _Problem(Generic[D]):
             if min(number - low, high - number) < 1e-6 * (high - low):
                 lines.append(f"fit: {d.path} ends at its bound")
         for aim, q in zip(self.aims, inputs, strict=True):
+            if aim.inputs is None and len(aim.keys) == 1:
+                lines.append(
+                    "fit: with free inputs one number a row is met by every mechanism that reaches it: expected an input "
+                    "for each row"
+                )
             order = np.diff(q) * np.sign(q[-1] - q[0])
             if aim.inputs is None and (order < 0).any():
                 k = int(np.argmin(order))

@@ -16,7 +16,7 @@ import numpy as np
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension
-from virtualwork.family.design import Design, place_key
+from virtualwork.family.design import Design, numbers_of
 from virtualwork.formulas.loops import Transmission
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.quantity import Quantity
@@ -79,11 +79,10 @@ class Bounds:
 
     def __init__(self, m: Description, dimensions: Sequence[Dimension], bounds: Sequence[Bound]) -> None:
         self.m, self.bounds = m, tuple(bounds)
-        quantities = [_rows(m, bound) for bound in self.bounds]
-        keys = list(dict.fromkeys(key for rows in quantities for key, _ in rows))
-        first = {key: sum(len(k.names) for k in keys[:n]) for n, key in enumerate(keys)}
+        quantities = [_numbers(m, bound) for bound in self.bounds]
+        keys = list(dict.fromkeys(key for of in quantities for key in of))
         # of each bound the keys of its quantity and their rows in the design's one table
-        self._rows = [[(key, first[key] + row) for key, row in rows] for rows in quantities]
+        self._rows = [[(key, keys.index(key)) for key in of] for of in quantities]
         self._design = Design(m, dimensions, keys)
         # transmissions are judged by their sines, so that they have derivatives where they are largest
         self._limits = [self.limit(i, bound.value) for i, bound in enumerate(self.bounds)]
@@ -161,8 +160,8 @@ class Bounds:
         return math.asin(math.sqrt(min(max(number, 0.0), 1.0)))
 
 
-def _rows(m: Description, bound: Bound) -> list[tuple[Quantity, int]]:
-    """The keys of a bound's quantity, each with the row of its table."""
+def _numbers(m: Description, bound: Bound) -> tuple[Quantity, ...]:
+    """The numbers that a bound is of."""
     _ = bound.value
     if bound.name == "transmission":
         from virtualwork.plan.order import plan
@@ -174,14 +173,11 @@ def _rows(m: Description, bound: Bound) -> list[tuple[Quantity, int]]:
         groups = [g for g in plan(m).groups if g.kind != "Newton"]
         if not groups:
             raise DescriptionError("transmission: the mechanism has no group of two links")
-        return [(Transmission(g.name), 0) for g in groups]
-    of, _, part = bound.name.rpartition(".")
-    if part in ("x", "y") and of.startswith("points."):
-        return [(place_key(m, of), "xy".index(part))]
-    key = place_key(m, bound.name)
-    if key.is_vector:
+        return tuple(Transmission(g.name) for g in groups)
+    numbers = numbers_of(m, bound.name)
+    if len(numbers) == 2:
         raise DescriptionError(f"{bound.name}: a point has two coordinates: expected {bound.name}.x or .y")
-    return [(key, 0)]
+    return numbers
 
 
 class Held:

@@ -169,7 +169,7 @@ class Solver:
         if written is None or self.assembly is None:
             return {}, {}, np.zeros(v, dtype=bool)
         if written.iterated:
-            return followed(written, self.assembly, self._given, v, part.inputs[:, :, 0], *self._span)
+            return followed(written, self.assembly, self._given, v, part.inputs, *self._span)
         signs, together = chosen(written, part.mechanism, self._given, v, *self._span)
         return signs, {}, together
 

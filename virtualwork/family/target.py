@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
-from virtualwork.family.design import place_key
+from virtualwork.family.design import ROOMS, numbers_of_each
 from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.kinematics import Coordinate
 from virtualwork.formulas.lanes import Lanes
-from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.numbers import PARTS, Reals
 from virtualwork.formulas.quantity import Quantity
 
 # of the mechanism's size, rad or of the largest effort: how far a pose that cannot be assembled counts as away, at least
@@ -28,9 +29,9 @@ class Target:
     Attributes
     ----------
     places : mapping of name to array
-        `points.H` or `H`: (n, 2) or complex (n,), m. `links.rocker`: angles (n,), rad, compared modulo 2π.
-        `slides.B`: travels (n,), m. `effort.crank`: the input's torque (n,), N·m, or force, N, at the description's own
-        speed and acceleration.
+        `points.H` or `H`: (n, 2) or complex (n,), m; `points.H.y` or `H.y`: one coordinate, (n,), m. `links.rocker`:
+        angles (n,), rad, compared modulo 2π. `slides.B`: travels (n,), m. `effort.crank`: the input's torque (n,), N·m,
+        or force, N, at the description's own speed and acceleration.
     inputs : array (n,), optional
         Rad or m; without it the input at each row is free, in the order of the rows.
     weights : mapping of name to number, or array (n,)
@@ -55,24 +56,32 @@ class Reached:
     Attributes
     ----------
     name : str
-    kind : "point", "angle", "slide" or "effort"
+    kind : "point", "coordinate", "angle", "slide" or "effort"
+    dimension : "length", "angle", or "" of an effort
     inputs : array (n,)
         Rad or m.
     values, target : array (n,)
-        x + iy in m of a point, rad of a link's angle, m of a slide, N·m or N of an effort.
+        x + iy in m of a point, m of a coordinate or a slide, rad of a link's angle, N·m or N of an effort.
     """
 
     name: str
     kind: str
+    dimension: str
     inputs: Reals
     values: NDArray[Any]
     target: NDArray[Any]
 
     @property
+    def label(self) -> str:
+        """Its name without the word `points`, `links`, `slides` or `effort`."""
+        room, _, of = self.name.partition(".")
+        return of if room in ROOMS and of else self.name
+
+    @property
     def distances(self) -> Reals:
         """(n,) m, rad, N·m or N."""
         apart = self.values - self.target
-        return np.abs(_round_turn(apart) if self.kind == "angle" else apart)
+        return np.abs(_round_turn(apart) if self.dimension == "angle" else apart)
 
     @property
     def rms(self) -> float:
@@ -92,9 +101,10 @@ class Aim:
     Attributes
     ----------
     keys : tuple
-    names : tuple of str
+        The numbers of all quantities, one a row: x and y of a point are two.
+    counts : dict of name to int
+        The number of rows of each quantity.
     wanted : array (rows, n)
-        x and y of a point are two rows.
     scale : array (rows, n)
         Roots of the weights, over the size for lengths.
     angle : array (rows, 1) of bool
@@ -104,7 +114,7 @@ class Aim:
     """
 
     keys: tuple[Quantity, ...]
-    names: tuple[str, ...]
+    counts: Mapping[str, int]
     wanted: Reals
     scale: Reals
     angle: NDArray[np.bool_]
@@ -122,13 +132,14 @@ class Aim:
         ValueError
             Fewer than two rows, rows that do not go together, numbers that are not finite, a weight below 0.
         """
-        keys = {name: place_key(m, name) for name in target.places}
+        keys = numbers_of_each(m, target.places)
+        every = [key for of in keys.values() for key in of]
         if not keys:
             raise ValueError("target: expected a point, a link or a slide")
-        wanted, scale, angle, away = [], [], [], []
+        wanted, scale, away = [], [], []
         n = None
-        for name, key in keys.items():
-            rows = _rows(name, key.is_vector, target.places[name], n)
+        for name, of in keys.items():
+            rows, key = _rows(name, len(of) == 2, target.places[name], n), of[0]
             n = rows.shape[1]
             weight = np.asarray(target.weights.get(name, 1.0), dtype=float)
             if weight.shape not in ((), (n,)) or not (np.isfinite(weight) & (weight >= 0)).all():
@@ -139,18 +150,18 @@ class Aim:
                 unit = 1.0 / _largest(m, rows, target.inputs)
             scale.append(np.broadcast_to(np.sqrt(weight) * unit, rows.shape))
             # farther than any pose that can be: a target may lie far from the mechanism
-            far = AWAY if key.dimension != "length" else max(AWAY, 2 * unit * _distance(m, rows))
+            far = AWAY if key.dimension != "length" else max(AWAY, 2 * unit * _distance(m, of, rows))
             away.append(np.broadcast_to(far * np.sqrt(np.where(weight > 0, weight, 1.0)), rows.shape))
-            angle += [key.is_angle] * len(rows)
         strange = [name for name in target.weights if name not in keys]
         if strange:
             raise ValueError(f"weights: '{strange[0]}' is not in the target")
         q = None if target.inputs is None else np.asarray(target.inputs, dtype=float)
         if q is not None and (q.shape != (n,) or not np.isfinite(q).all()):
             raise ValueError(f"inputs: expected {n} finite numbers, one for each row of the target")
-        flags = np.array(angle)[:, None]
+        flags = np.array([key.is_angle for key in every])[:, None]
         whole, scales, lost = (np.vstack(each) for each in (wanted, scale, away))
-        return cls(tuple(keys.values()), tuple(keys), whole, scales, flags, q, lost)
+        counts = {name: len(of) for name, of in keys.items()}
+        return cls(tuple(every), counts, whole, scales, flags, q, lost)
 
     def __len__(self) -> int:
         return int(self.wanted.shape[1])
@@ -193,21 +204,21 @@ class Aim:
     def reached(self, rows: Reals, inputs: Reals) -> tuple[Reached, ...]:
         """Return the quantities of a design, (rows, n)."""
         out, row = [], 0
-        for name, key in zip(self.names, self.keys, strict=True):
-            if key.is_vector:
-                values, target = (each[row] + 1j * each[row + 1] for each in (rows, self.wanted))
-            else:
-                values, target = rows[row], self.wanted[row]
-            out.append(Reached(name, key.kind, inputs, values, target))
-            row += 2 if key.is_vector else 1
+        for name, count in self.counts.items():
+            key, kind = self.keys[row], "point" if count == 2 else self.keys[row].kind
+            values, target = (
+                each[row] + 1j * each[row + 1] if count == 2 else each[row] for each in (rows, self.wanted)
+            )
+            out.append(Reached(name, kind, key.dimension, inputs, values, target))
+            row += count
         return tuple(out)
 
 
-def _distance(m: Description, wanted: Reals) -> float:
+def _distance(m: Description, keys: Sequence[Quantity], wanted: Reals) -> float:
     """How far a target of lengths goes from the middle of the ground's points, or from the beginning of a guide, m."""
-    points = np.array(list(m.ground.values()) or [0j]).mean()
-    middle = np.array([[points.real], [points.imag]]) if len(wanted) == 2 else 0.0
-    return float(np.abs(wanted - middle).max())
+    middle = np.array(list(m.ground.values()) or [0j]).mean()
+    begins = [PARTS[key.axis](middle) if isinstance(key, Coordinate) else 0.0 for key in keys]
+    return float(np.abs(wanted - np.array(begins)[:, None]).max())
 
 
 def _largest(m: Description, wanted: Reals, inputs: ArrayLike | None) -> float:

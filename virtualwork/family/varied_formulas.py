@@ -109,14 +109,14 @@ class VariedFormulas:
 
     @property
     def follows(self) -> bool:
-        """Whether the groups without a closed form can be followed along the one input, for all variants at once.
+        """Whether the groups without a closed form can be followed along the inputs, for all variants at once.
 
         The guess has to say all their angles, and the ratios of what is tied to them are those of all variants.
         """
         angles, _ = known_by_guess(self.mechanism)
         tied = [tie.angle for group in self.iterated for tie in group.ties]
         factors = [r for angle in tied for _, r in (*angle.inputs, *angle.bases)]
-        return len(self.mechanism.inputs) == 1 and not (
+        return not (
             any(isinstance(r, Varied) for r in factors)
             or any(angle.cams for angle in tied)
             or any(body not in angles for group in self.iterated for body in group.angles)
@@ -213,14 +213,17 @@ class VariedFormulas:
         return of.recorder.tape({str(i): x for i, x in enumerate((*entering, of.value(Size())))})
 
     def rates(self, group: str) -> Tape:
-        """The tape of how fast its unknowns change with the input, and of how far it is from singular."""
+        """The tape of how fast its unknowns change with each input, and of how far it is from singular."""
         return self._once(self._rates, group)
 
     def _rates(self, group: str) -> Tape:
         of, g = self.recording, self.recording.solved(group)
         of.solve(self.plan.writes(g), 1)
-        (rates,) = of.by
-        firsts = [*(rates.angle[body][0] for body in g.angles), *(rates.slide[i][0] for i in g.slides)]
+        firsts = [
+            rate[0]
+            for by in of.by
+            for rate in (*(by.angle[body] for body in g.angles), *(by.slide[i] for i in g.slides))
+        ]
         values = {str(i): 0.0 if rate is None else bare(rate) for i, rate in enumerate(firsts)}
         return of.recorder.tape({**values, "regularity": of.value(Regularity(group))})
 

@@ -1,7 +1,8 @@
-"""Groups without a closed form along the input, of all variants at once, as `branch.continuation` follows them for one.
+"""Groups without a closed form along the inputs, of all variants at once, as `branch` follows them for one.
 
-Each variant starts from its own guess, and its nodes are those that the nominal mechanism's lead to. Where they do not go on
-from one to the next as steps of a continuation do, the variant is left to be described alone.
+Each variant starts from its own guess. Along one input its nodes are those that the nominal mechanism's lead to
+(`branch.continuation`); with several inputs every pose has a straight line from the guess (`branch.lines`). Where the steps
+are too long for a continuation, the variant is left to be described alone.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from virtualwork.family.varied_formulas import VariedFormulas
 from virtualwork.formulas.group_loops import Loops
 from virtualwork.formulas.newton import newton
 from virtualwork.formulas.numbers import SINGULAR, Number, Reals
+from virtualwork.formulas.winding import NODES
 from virtualwork.plan.steps import Group
 
 # of how far its Jacobian is from singular anywhere on the way: a group that comes nearer is described alone
@@ -30,7 +32,7 @@ EMPTY: Mapping[str, Any] = MappingProxyType({})
 
 
 class Ways:
-    """How the groups without a closed form of some variants stand, wherever their input goes.
+    """How the groups without a closed form of some variants stand, wherever their inputs go.
 
     Parameters
     ----------
@@ -38,42 +40,26 @@ class Ways:
         With the signs as inputs.
     own : Assembly
         Of the nominal mechanism.
-    nodes : mapping of a group's name to inputs (m,) and unknowns (m, u)
-        Its own.
     numbers : mapping of path to array (n,)
     n : int
-    low, high : array (n,), or (1,) where they are the same of all
-        The least and the largest input.
 
     Attributes
     ----------
     starts : dict
         What enters a tape at the guess, by name, (n,): the unknowns there.
     followed : array (n,) of bool
-        Which variants go on from node to node over their inputs.
+        Which variants are closed at the guess, and go on as steps of a continuation do.
     """
 
-    def __init__(
-        self,
-        written: VariedFormulas,
-        own: Assembly,
-        nodes: Nodes,
-        numbers: Mapping[str, Reals],
-        n: int,
-        low: Reals,
-        high: Reals,
-    ) -> None:
+    def __init__(self, written: VariedFormulas, own: Assembly, numbers: Mapping[str, Reals], n: int) -> None:
         self.written, self.own, self.n = written, own, n
         self.followed = np.ones(n, dtype=bool)
         self.starts = dict[str, Reals]()
         # the dimensions, and the sign of each closed form at the guess
         self.given: dict[str, Any] = dict(numbers)
         self._loops = {group.name: _Loops(group) for group in written.iterated}
-        self._nodes: dict[str, tuple[Reals, Reals, Reals]] = {}
         with np.errstate(all="ignore"):
             self._begin()
-            for group in written.iterated:
-                self._follow(group, *nodes[group.name], low, high)
 
     def of(self, rows: Any) -> Self:
         """Some of the variants."""
@@ -82,7 +68,7 @@ class Ways:
         result.given = {
             name: values[rows] if np.ndim(values) else values for name, values in self.given.items()
         }
-        result._nodes = {name: (q, x[rows], rate[rows]) for name, (q, x, rate) in self._nodes.items()}
+        result.starts = {name: values[rows] for name, values in self.starts.items()}
         result.followed = self.followed[rows]
         result.n = len(result.followed)
         return result
@@ -90,14 +76,14 @@ class Ways:
     def _begin(self) -> None:
         """Close every group at the guess, as `guess.choose` does, from the unknowns that the guess says."""
         written, m = self.written, self.own.mechanism
-        given = {**self.given, "q0": m.at[0]}
+        given = {**self.given, **{f"q{j}": at for j, at in enumerate(m.at)}}
         self.starts = {name: np.full(self.n, np.nan) for group in written.iterated for name in group.unknowns}
         for group in written.iterated:
             choice = run(written.choice, given | self.starts)
             self.given |= {f"sign {g.name}": choice[f"sign {g.name}"] + 0.0 for g in written.closed}
             start = self._guessed(group, run(written.guessed, given | self.given | self.starts))
             there = {name: values[:, None] for name, values in self.starts.items()}
-            fixed, size = self._fixed(group, np.full((1, 1), m.at[0]), there)
+            fixed, size = self._fixed(group, np.array(m.at)[None, None], there)
             solution, closed = newton(self._loops[group.name], fixed, start, size)
             self.followed &= closed
             self.starts |= zip(group.unknowns, solution.T, strict=True)
@@ -118,6 +104,64 @@ class Ways:
             x[np.ix_(there, np.array(free))] = -(np.linalg.pinv(along[there]) @ gap[there][..., None])[..., 0]
         return x
 
+    def unknowns(self, group: Group, q: Reals) -> Reals:
+        """The unknowns of a group at inputs (n or 1, k, inputs), (n, k, u); NaN where it is not closed there."""
+        raise NotImplementedError
+
+    def entering(self, names: Iterable[str], q: Reals) -> dict[str, Reals]:
+        """The unknowns among what enters a tape, (n, k), at inputs (n or 1, k, inputs)."""
+        names, result = set(names), dict[str, Reals]()
+        for group in self.written.iterated:
+            if not names.isdisjoint(group.unknowns):
+                result |= zip(group.unknowns, np.moveaxis(self.unknowns(group, q), 2, 0), strict=True)
+        return result
+
+    def _entering(self, names: Iterable[str], q: Reals, unknowns: Mapping[str, Reals]) -> dict[str, Any]:
+        """All that enters a tape over a grid, with the unknowns that are known."""
+        across = {name: values[:, None] if np.ndim(values) else values for name, values in self.given.items()}
+        return {**across, **_inputs(q), **unknowns, **self.entering(set(names) - unknowns.keys(), q)}
+
+    def _fixed(self, group: Group, q: Reals, unknowns: Mapping[str, Reals] = EMPTY) -> tuple[Any, Reals]:
+        """What enters the loops of a group at inputs (n or 1, k, inputs), and the mechanism's size, (n k,) each."""
+        tape = self.written.enters(group.name)
+        rows = run_grid(tape, self._entering(tape.inputs, q, unknowns), (self.n, q.shape[1]))
+        *fixed, size = (np.reshape(row, -1) for row in rows)
+        return fixed, size
+
+
+class AlongInput(Ways):
+    """Along the one input, over nodes.
+
+    Parameters
+    ----------
+    nodes : mapping of a group's name to inputs (m,) and unknowns (m, u)
+        Those of the nominal mechanism.
+    low, high : array (n,), or (1,) where they are the same of all
+        The least and the largest input.
+    """
+
+    def __init__(
+        self,
+        written: VariedFormulas,
+        own: Assembly,
+        nodes: Nodes,
+        numbers: Mapping[str, Reals],
+        n: int,
+        low: Reals,
+        high: Reals,
+    ) -> None:
+        super().__init__(written, own, numbers, n)
+        self._nodes: dict[str, tuple[Reals, Reals, Reals]] = {}
+        with np.errstate(all="ignore"):
+            for group in written.iterated:
+                self._follow(group, *nodes[group.name], low, high)
+
+    def of(self, rows: Any) -> Self:
+        """Some of the variants."""
+        result = super().of(rows)
+        result._nodes = {name: (q, x[rows], rate[rows]) for name, (q, x, rate) in self._nodes.items()}
+        return result
+
     def _follow(self, group: Group, q: Reals, nominal: Reals, low: Reals, high: Reals) -> None:
         """Lay down the nodes of a group, all at once, and see in which variants they are the steps of a continuation."""
         name, at = group.name, self.own.mechanism.at[0]
@@ -126,7 +170,7 @@ class Ways:
         some = slice(max(int(first.min()) - 1, 0), int(last.max()) + 1)
         q, nominal, first, last = q[some], nominal[some], first - 1 - some.start, last - some.start
         m, u = nominal.shape
-        loops, (fixed, size) = self._loops[name], self._fixed(group, q[None])
+        loops, (fixed, size) = self._loops[name], self._fixed(group, q[None, :, None])
         start = np.broadcast_to(nominal, (self.n, m, u)).reshape(-1, u)
         solution, closed = newton(loops, fixed, start, size, limit=8)
         det = np.sign(np.linalg.det(loops.over(fixed)(solution)[1])).reshape(self.n, m)
@@ -135,7 +179,7 @@ class Ways:
         x[:, here] = np.stack([self.starts[each] for each in group.unknowns], axis=-1)
         entering = {each: x[..., i] for i, each in enumerate(group.unknowns)}
         tape = self.written.rates(name)
-        *rates, regular = run_grid(tape, self._entering(tape.inputs, q[None], entering), (self.n, m))
+        *rates, regular = run_grid(tape, self._entering(tape.inputs, q[None, :, None], entering), (self.n, m))
         rate = np.stack(rates, axis=-1)
         place = np.arange(m)
         needed = (place >= first[:, None]) & (place <= last[:, None])
@@ -157,13 +201,12 @@ class Ways:
         self.followed &= (sound | ~needed).all(axis=1) & (fine | ~(needed[:, a] & needed[:, b])).all(axis=1)
         self._nodes[name] = q, x, rate
 
-    # --- anywhere on the way ----------------------------------------------------------------------------------------
     def unknowns(self, group: Group, q: Reals) -> Reals:
-        """The unknowns of a group at inputs (n or 1, k), (n, k, u); NaN where it is not closed there."""
-        nodes, x, rate = self._nodes[group.name]
-        i = np.clip(np.searchsorted(nodes, q) - 1, 0, len(nodes) - 2)
+        """The unknowns of a group at inputs (n or 1, k, 1), (n, k, u); NaN where it is not closed there."""
+        (nodes, x, rate), at = self._nodes[group.name], q[..., 0]
+        i = np.clip(np.searchsorted(nodes, at) - 1, 0, len(nodes) - 2)
         h, rows = nodes[i + 1] - nodes[i], np.arange(self.n)[:, None]
-        t = ((q - nodes[i]) / h)[..., None]
+        t = ((at - nodes[i]) / h)[..., None]
         start = cubic(h[..., None], t, x[rows, i], x[rows, i + 1], rate[rows, i], rate[rows, i + 1])
         fixed, size = self._fixed(group, q)
         with np.errstate(all="ignore"):
@@ -173,25 +216,51 @@ class Ways:
         solution[~closed] = np.nan
         return solution.reshape(start.shape)
 
-    def entering(self, names: Iterable[str], q: Reals) -> dict[str, Reals]:
-        """The unknowns among what enters a tape, (n, k), at inputs (n or 1, k)."""
-        names, result = set(names), dict[str, Reals]()
-        for group in self.written.iterated:
-            if not names.isdisjoint(group.unknowns):
-                result |= zip(group.unknowns, np.moveaxis(self.unknowns(group, q), 2, 0), strict=True)
+
+class AlongLines(Ways):
+    """With several inputs: every pose on its own straight line from the guess, in equal steps."""
+
+    def unknowns(self, group: Group, q: Reals) -> Reals:
+        """The unknowns of a group at inputs (n or 1, k, inputs), (n, k, u); NaN where a step is too long for it."""
+        k, u = q.shape[1], len(group.angles) + len(group.slides)
+        lanes = self.of(np.repeat(np.arange(self.n), k))
+        with np.errstate(all="ignore"):
+            x = lanes._walked(group, np.broadcast_to(q, (self.n, *q.shape[1:])).reshape(self.n * k, -1))
+        return x.reshape(self.n, k, u)
+
+    def _walked(self, group: Group, q: Reals) -> Reals:
+        """The unknowns (n, u) of variants that have one pose each, (n, inputs)."""
+        m, result = self.own.mechanism, np.full((self.n, len(group.unknowns)), np.nan)
+        at = np.broadcast_to(m.at, q.shape)
+        _, size = self._fixed(group, at[:, None])
+        unit = np.stack([size if of.is_slide else np.full(self.n, 2 * np.pi) for of in m.inputs], axis=1)
+        steps = np.maximum(1.0, np.ceil(np.abs((q - at) / unit).max(axis=1) * NODES))
+        x = np.stack([self.starts[name] for name in group.unknowns], axis=1)
+        rows = np.flatnonzero(np.isfinite(steps) & np.isfinite(x).all(axis=1))
+        some, x, ways = self.of(rows), x[rows], (q - at)[rows]
+        slope, taken = some._slope(group, at[rows], ways, x), 0
+        while len(rows):
+            taken += 1
+            last, step = steps[rows] == taken, 1 / steps[rows, None]
+            there = np.where(last[:, None], q[rows], at[rows] + taken * step * ways)
+            fixed, size = some._fixed(group, there[:, None])
+            new, closed = newton(some._loops[group.name], fixed, x + step * slope, size, limit=8)
+            after = some._slope(group, there, ways, new)
+            far = np.maximum(np.abs(x), size[:, None])
+            far[:, : len(group.angles)] = 1.0
+            closed &= fine_steps(step, new - x, slope, after, far)
+            result[rows[closed & last]] = new[closed & last]
+            on = closed & ~last
+            rows, x, slope, ways, some = rows[on], new[on], after[on], ways[on], some.of(on)
         return result
 
-    def _entering(self, names: Iterable[str], q: Reals, unknowns: Mapping[str, Reals]) -> dict[str, Any]:
-        """All that enters a tape over a grid, with the unknowns that are known."""
-        across = {name: values[:, None] if np.ndim(values) else values for name, values in self.given.items()}
-        return {**across, "q0": q, **unknowns, **self.entering(set(names) - unknowns.keys(), q)}
-
-    def _fixed(self, group: Group, q: Reals, unknowns: Mapping[str, Reals] = EMPTY) -> tuple[Any, Reals]:
-        """What enters the loops of a group at inputs (n or 1, k), and the mechanism's size, (n k,) each."""
-        tape = self.written.enters(group.name)
-        rows = run_grid(tape, self._entering(tape.inputs, q, unknowns), (self.n, q.shape[1]))
-        *fixed, size = (np.reshape(row, -1) for row in rows)
-        return fixed, size
+    def _slope(self, group: Group, q: Reals, ways: Reals, x: Reals) -> Reals:
+        """dx of variants with one pose each, (n, u), where every input changes by its way, (n, inputs)."""
+        tape = self.written.rates(group.name)
+        unknowns = {name: x[:, i, None] for i, name in enumerate(group.unknowns)}
+        *rates, _ = run_grid(tape, self._entering(tape.inputs, q[:, None], unknowns), (self.n, 1))
+        by = np.reshape(rates, (ways.shape[1], x.shape[1], self.n))
+        return np.asarray(sum(rate.T * way[:, None] for rate, way in zip(by, ways.T, strict=True)))
 
 
 class _Loops(Loops):
@@ -201,6 +270,11 @@ class _Loops(Loops):
 
     def fixed(self, st: Any) -> list[Number]:
         return list(st)
+
+
+def _inputs(q: Reals) -> dict[str, Reals]:
+    """Inputs (n or 1, k, inputs) by their names on a tape."""
+    return {f"q{j}": q[..., j] for j in range(q.shape[-1])}
 
 
 def nodes_of(own: Assembly, low: float, high: float) -> Nodes:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.numbers import Number, minus, times
+from virtualwork.formulas.numbers import PARTS, Number, minus, times
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.quantity import Planned, Quantity, Recording
 from virtualwork.formulas.rates import Rates
@@ -79,6 +79,17 @@ class Point(OfPoint, kind="point"):
     def every(cls, m: Description, order: int) -> Iterator[Quantity]:
         moving = ((body, name) for name, (body, _) in m.points.items() if body != GROUND)
         return (cls(body, 0j, name, order) for body, name in moving)
+
+
+class Coordinate(OfPoint, kind="coordinate"):
+    """x (0) or y (1) of a point, m."""
+
+    is_vector = False
+    dimension = "length"
+    axis: int
+
+    def place(self, of: Planned, st: State) -> Number:
+        return PARTS[self.axis](super().place(of, st))
 
 
 class PointPartial(OfPoint, Partial, kind="dpoint"):

@@ -27,7 +27,7 @@ class Fitted(NamedTuple):
     Attributes
     ----------
     name : str
-    kind : "point", "angle", "slide" or "effort"
+    kind : "point", "coordinate", "angle", "slide" or "effort"
     turning : bool
         Whether the input is an angle.
     q : array (k,)
@@ -89,7 +89,7 @@ def _path(axes: Axes, each: Fitted) -> tuple[Reals, Reals, str]:
 
 
 def _function(axes: Axes, each: Fitted) -> tuple[Reals, Reals, str]:
-    """An angle, a travel or an effort over the input."""
+    """A coordinate, an angle, a travel or an effort over the input."""
     along, of = (np.degrees(each.inputs), "deg") if each.turning else (each.inputs, "m")
     q = np.degrees(each.q) if each.turning else each.q
     if each.kind == "angle":
@@ -110,8 +110,9 @@ def _function(axes: Axes, each: Fitted) -> tuple[Reals, Reals, str]:
     axes.plot(q, before * scale, color="0.7", lw=1.0, label="before")
     axes.plot(q, after * scale, **AFTER)
     axes.set_xlabel(f"input, {of}")
-    what = {"angle": "angle", "effort": "torque" if each.turning else "force"}.get(each.kind, "travel")
-    axes.set_ylabel(f"{what}, {unit}")
+    effort = "torque" if each.turning else "force"
+    words = {"coordinate": each.name, "angle": "angle", "slide": "travel", "effort": effort}
+    axes.set_ylabel(f"{words[each.kind]}, {unit}")
     return along, target * scale, f"{unit} over the input"
 
 
