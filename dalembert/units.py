@@ -230,8 +230,8 @@ def _word(match: re.Match[str]) -> str:
 
 
 # how an amplitude is read, as instruments and people write it: `µm pk-pk`, `in/s 0-pk`, `mm/s RMS`
-_PEAK = r"p(?:ea)?k?"
-_READ_AS = {"_pp": rf"{_PEAK}[ -]*(?:to)?[ -]*{_PEAK}", "_rms": r"r\.?m\.?s\.?|eff", "_pk": rf"(?:0-)?{_PEAK}"}
+_P = r"p(?:ea)?k?"
+_READ_AS = {"_pp": rf"{_P}[ -]*(?:to)?[ -]*{_P}", "_rms": r"r\.?m\.?s\.?|eff", "_pk": rf"(?:0-)?{_P}"}
 
 
 def unit_name(written: str) -> str:

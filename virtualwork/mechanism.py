@@ -428,13 +428,13 @@ class Mechanism(Numbered):
         """Solve all loops at once by Newton-Raphson from the guess, with the table of iterates."""
         from virtualwork.study.newton_table import all_at_once
 
-        given = tuple(as_number(value, "inputs") for value in inputs) or self.at
-        if len(given) != len(self.inputs):
+        place = tuple(as_number(value, "inputs") for value in inputs) or self.at
+        if len(place) != len(self.inputs):
             raise ValueError(
-                f"inputs: found {len(given)}, expected one number for each of {len(self.inputs)}"
+                f"inputs: found {len(place)}, expected one number for each of {len(self.inputs)}"
             )
         with self.assembly.lock:
-            return all_at_once(self.assembly, given, limit)
+            return all_at_once(self.assembly, place, limit)
 
     def assemblies(self) -> tuple[Assembly, ...]:
         """Return every assembly at the input of the guess, the one that the guess chooses first."""

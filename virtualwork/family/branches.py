@@ -111,14 +111,14 @@ def followed(
             else AlongLines(written, own, some, count)
         )
         chosen, fine = signs(written, m, some | ways.starts, ways.n)
-        ways.given |= with_signs({}, chosen)
+        ways.numbers |= with_signs({}, chosen)
         fine &= ways.followed
         margins = at_guess(written, m, some | ways.starts, ways.n)
         fine &= np.logical_and.reduce([margin > 0 for margin in margins.values()], initial=True)
         if one:
             left = np.flatnonzero(fine)
             way = ways.of(left)
-            fine[left] = ~meet_on_the_way(written, m, way.given | {WAYS: way}, way.n, *_ends(left, *ends))
+            fine[left] = ~meet_on_the_way(written, m, way.numbers | {WAYS: way}, way.n, *_ends(left, *ends))
         for group in written.iterated:
             x = ways.unknowns(group, inputs[here] if len(inputs) > 1 else inputs)
             unknowns[group.name][here] = x

@@ -56,7 +56,7 @@ class Ways:
         self.followed = np.ones(n, dtype=bool)
         self.starts = dict[str, Reals]()
         # the dimensions, and the sign of each closed form at the guess
-        self.given: dict[str, Any] = dict(numbers)
+        self.numbers: dict[str, Any] = dict(numbers)
         self._loops = {group.name: _Loops(group) for group in written.iterated}
         with np.errstate(all="ignore"):
             self._begin()
@@ -65,8 +65,8 @@ class Ways:
         """Some of the variants."""
         result = object.__new__(type(self))
         vars(result).update(vars(self))
-        result.given = {
-            name: values[rows] if np.ndim(values) else values for name, values in self.given.items()
+        result.numbers = {
+            name: values[rows] if np.ndim(values) else values for name, values in self.numbers.items()
         }
         result.starts = {name: values[rows] for name, values in self.starts.items()}
         result.followed = self.followed[rows]
@@ -76,12 +76,12 @@ class Ways:
     def _begin(self) -> None:
         """Close every group at the guess, as `guess.choose` does, from the unknowns that the guess says."""
         written, m = self.written, self.own.mechanism
-        given = {**self.given, **{f"q{j}": at for j, at in enumerate(m.at)}}
+        at_guess = {**self.numbers, **{f"q{j}": at for j, at in enumerate(m.at)}}
         self.starts = {name: np.full(self.n, np.nan) for group in written.iterated for name in group.unknowns}
         for group in written.iterated:
-            choice = run(written.choice, given | self.starts)
-            self.given |= {f"sign {g.name}": choice[f"sign {g.name}"] + 0.0 for g in written.closed}
-            start = self._guessed(group, run(written.guessed, given | self.given | self.starts))
+            choice = run(written.choice, at_guess | self.starts)
+            self.numbers |= {f"sign {g.name}": choice[f"sign {g.name}"] + 0.0 for g in written.closed}
+            start = self._guessed(group, run(written.guessed, at_guess | self.numbers | self.starts))
             there = {name: values[:, None] for name, values in self.starts.items()}
             fixed, size = self._fixed(group, np.array(m.at)[None, None], there)
             solution, closed = newton(self._loops[group.name], fixed, start, size)
@@ -118,7 +118,9 @@ class Ways:
 
     def _entering(self, names: Iterable[str], q: Reals, unknowns: Mapping[str, Reals]) -> dict[str, Any]:
         """All that enters a tape over a grid, with the unknowns that are known."""
-        across = {name: values[:, None] if np.ndim(values) else values for name, values in self.given.items()}
+        across = {
+            name: values[:, None] if np.ndim(values) else values for name, values in self.numbers.items()
+        }
         return {**across, **_inputs(q), **unknowns, **self.entering(set(names) - unknowns.keys(), q)}
 
     def _fixed(self, group: Group, q: Reals, unknowns: Mapping[str, Reals] = EMPTY) -> tuple[Any, Reals]:

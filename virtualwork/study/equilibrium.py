@@ -203,19 +203,19 @@ def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int 
     [(90, False), (270, True)]
     """
     k = len(assembly.mechanism.inputs)
-    given = np.full((k, 2), np.nan) if spans is None else real_array("spans", spans)
-    if given.size != 2 * k or given.ndim > 2:
-        raise ValueError(f"spans: expected shape ({k}, 2), a range of each input, found {given.shape}")
-    for low, high in (given := given.reshape(k, 2)).tolist():
+    ends = np.full((k, 2), np.nan) if spans is None else real_array("spans", spans)
+    if ends.size != 2 * k or ends.ndim > 2:
+        raise ValueError(f"spans: expected shape ({k}, 2), a range of each input, found {ends.shape}")
+    for low, high in (ends := ends.reshape(k, 2)).tolist():
         if not (0 <= high - low < math.inf or (math.isnan(low) and math.isnan(high))):
             raise ValueError(f"spans: found {low:g} to {high:g}, expected the lower and the higher end")
     if not samples >= 1:
         raise ValueError(f"samples: found {samples}, expected one or more")
-    limited = np.asarray(~np.isnan(given).any(axis=1))
+    limited = np.asarray(~np.isnan(ends).any(axis=1))
     # at a limit, and beyond it, a loop has no rates
     with np.errstate(all="ignore"):
         turns, ranges = _searched(assembly)
-        ranges = np.where(limited[:, None], given, ranges)
+        ranges = np.where(limited[:, None], ends, ranges)
         if k == 1:
             result = _one(assembly, ranges[0], samples, turns[0])
         else:
