@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
@@ -12,7 +13,7 @@ from cli.formats.drawn import GROUND, Body, Drawing, Load, unused
 from cli.formats.values import ORIGIN, Exact, coordinates, exact
 from virtualwork import Mechanism
 from virtualwork.describe import MechanismError
-from virtualwork.describe.parts import Guess, Guide, Input, Link, Rack
+from virtualwork.describe.parts import Guess, Input, Link
 from virtualwork.describe.text import AsWritten, Table, document, written
 from virtualwork.motion import Motion
 
@@ -33,7 +34,7 @@ def text(d: Drawing, source: str, every_point: bool = False) -> str:
 def _parts(d: Drawing, origins: dict[str, complex], every_point: bool) -> dict[str, object]:
     """Return the parts of a description, their numbers in the units of the file."""
     links = {name: body for name, body in d.bodies.items() if name != GROUND}
-    guides = d.slides if every_point else [r.slide for r in d.racks]
+    guides = d.guides.values() if every_point else [d.guides[r.slider] for r in d.racks]
     pins = d.pins() if every_point else {}
     return {
         "name": d.name,
@@ -41,13 +42,13 @@ def _parts(d: Drawing, origins: dict[str, complex], every_point: bool) -> dict[s
         "ground": _places(d.bodies[GROUND].points),
         "links": {name: _link(b, origins[name]) for name, b in links.items()},
         "guides": [
-            Guide(s.point, s.link, s.on, complex(s.through - origins[s.on]), s.angle, s.turned)
-            for s in d.slides
+            replace(s, through=complex(s.through - origins[s.on]))  # type: ignore[operator]  # never a name
+            for s in d.guides.values()
         ],
         "gears": d.gears,
-        "racks": [Rack(r.gear, r.slide.point, r.radius) for r in d.racks],
+        "racks": [replace(r, slider=d.guides[r.slider].point) for r in d.racks],
         "inputs": [
-            Input(e.link, e.on, value=e.at) if e.slide is None else Input(slider=e.slide.point, value=e.at)
+            Input(e.link, e.on, None if e.slider is None else d.guides[e.slider].point, e.at)
             for e in d.drives
         ],
         "guess": Guess(
@@ -78,7 +79,7 @@ def _origin(d: Drawing, name: str, body: Body) -> complex:
     """Return where a link's axes begin: at the first of its joints."""
     if d.own_axes or name == GROUND:
         return ORIGIN
-    joints = set(d.pins()) | {s.point for s in d.slides}
+    joints = set(d.pins()) | {s.point for s in d.guides.values()}
     first = next((z for p, z in body.points.items() if p in joints), None)
     return next(iter(body.points.values()), ORIGIN) if first is None else first
 
@@ -116,7 +117,7 @@ def _named(d: Drawing) -> Drawing:
     for e in d.drives:
         if e.speed is not None and float(str(e.speed).split()[0]) == 0:
             e.speed = None
-            d.notes.append(f"the input {' against '.join(e.pair)} has the speed 0: left out")
+            d.notes.append(f"the input {' against '.join(d.pair(e))} has the speed 0: left out")
     for body in d.bodies.values():
         for p in body.points:
             if p not in points:
@@ -124,8 +125,7 @@ def _named(d: Drawing) -> Drawing:
         body.points = {points[p]: z for p, z in body.points.items()}
     d.bodies = {links[n]: b for n, b in d.bodies.items()}
     d.rename(links.__getitem__)
-    for s in d.slides:
-        s.point = points[s.point]
+    d.guides = {k: replace(s, point=points[s.point]) for k, s in d.guides.items()}
     return d
 
 
@@ -135,16 +135,16 @@ def _own_points(d: Drawing) -> None:
     It lies on the guide's line away from the pin. A pin in two slots has a shoe in the second.
     """
     guided: set[str] = set()
-    for s in d.slides:
+    for k, s in d.guides.items():
         if s.point in guided and not d.own_axes:
             z, shared = d.bodies[s.link].points[s.point], s.point
             if s.turned is None:
-                s.link, s.turned = unused(f"{shared} shoe", set(d.bodies)), -s.angle
+                s = replace(s, link=unused(f"{shared} shoe", d.bodies), turned=-s.angle)
                 d.body(s.link).points[shared] = z
             (x, y), way, far = coordinates(z), math.radians(s.angle), d.size()
-            s.through = Exact(x + exact(far * math.cos(way)), y + exact(far * math.sin(way)))
-            s.point = d.fresh(f"{shared} on {s.on}")
-            d.bodies[s.link].points[s.point] = s.through
+            at = Exact(x + exact(far * math.cos(way)), y + exact(far * math.sin(way)))
+            d.guides[k] = s = replace(s, point=d.fresh(f"{shared} on {s.on}"), through=at)
+            d.bodies[s.link].points[s.point] = at
         guided.add(s.point)
 
 
@@ -180,7 +180,7 @@ def described(d: Drawing, source: str) -> str:
             return made
         d.notes += warnings
         # a little way to one side of the drawn pose at least
-        ways = [m.size * LITTLE if e.slide is not None else LITTLE for e in d.drives]
+        ways = [m.size * LITTLE if e.slider is not None else LITTLE for e in d.drives]
         if not _motion(m, d, *([side * way for way in ways] for side in (-1, 1))).assembled.any():
             d.notes.append(
                 "its input cannot move from the drawn pose: a limit, or a pose where assemblies meet"
@@ -226,7 +226,7 @@ def _seek(d: Drawing, source: str) -> None:
     """
     why = ""
     turns = chain(
-        [0.0], (math.radians(t) for t in TRIED[1:]) if d.drives and d.drives[0].slide is None else ()
+        [0.0], (math.radians(t) for t in TRIED[1:]) if d.drives and d.drives[0].slider is None else ()
     )
     start = [e.at for e in d.drives]
     for turn in turns:

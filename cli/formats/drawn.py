@@ -11,15 +11,13 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from cli.formats.values import ORIGIN, Exact, apart, coordinates, direction, exact
 from dalembert.units import to_si
+from virtualwork.describe.parts import GROUND as GROUND
+from virtualwork.describe.parts import Gear, Guide, Rack
 
-if TYPE_CHECKING:
-    from virtualwork.describe.meshes import Gear
-
-GROUND = "ground"
 # places nearer than this share of the drawing's size are one place
 SAME = 1e-9
 Thing = TypeVar("Thing", bound=Hashable)
@@ -59,48 +57,19 @@ class Body:
 
 
 @dataclass
-class Slide:
-    """A point of `link` on the line of `on` through a place, at an angle; `turned` None is a slot, else a prism."""
-
-    point: str
-    link: str
-    on: str
-    through: complex
-    angle: float
-    turned: float | None = None
-
-
-@dataclass
-class Toothed:
-    """A wheel and a rack: the slide grows by radius·(θ_gear − θ_on), `on` the body that carries it."""
-
-    gear: str
-    slide: Slide
-    radius: float
-
-
-@dataclass
 class Drive:
-    """An input: the angle of `link` against `on`, or the way along a slide; `at` in the pose, `speed` as TOML has it."""
+    """An input: the angle of `link` against `on`, or the way along a guide; `at` in the pose, `speed` as TOML has it."""
 
     link: str | None = None
     on: str = GROUND
-    slide: Slide | None = None
+    slider: str | None = None
     at: float = 0.0
     speed: str | float | None = None
 
     @property
     def moves(self) -> object:
-        """The pair or the slide that it moves: equal for inputs that move the same."""
-        return id(self.slide) if self.slide else frozenset((self.link, self.on))
-
-    @property
-    def pair(self) -> tuple[str, str]:
-        """The two bodies that it moves against each other, that which moves first."""
-        s = self.slide
-        if s is None:
-            return str(self.link), self.on
-        return (s.link, s.on) if s.link != GROUND else (s.on, s.link)
+        """The pair or the guide that it moves: equal for inputs that move the same."""
+        return frozenset((self.link, self.on)) if self.slider is None else self.slider
 
 
 @dataclass
@@ -127,9 +96,10 @@ class Drawing:
     own_axes: bool = False
     """Each body's points are in axes of its own, which the file gives; False: in the ground's, as they are drawn."""
     bodies: dict[str, Body] = field(default_factory=lambda: {GROUND: Body()})
-    slides: list[Slide] = field(default_factory=list)
+    guides: dict[str, Guide] = field(default_factory=dict)
+    """By the names that racks and inputs have for them: guides may share a point until they are written."""
     gears: list[Gear] = field(default_factory=list)
-    racks: list[Toothed] = field(default_factory=list)
+    racks: list[Rack] = field(default_factory=list)
     drives: list[Drive] = field(default_factory=list)
     spare: list[Drive] = field(default_factory=list)
     """Further inputs, taken where `drives` leave the mechanism free: robot files may name too few or too many."""
@@ -183,16 +153,23 @@ class Drawing:
 
     def rename(self, new: Callable[[str], str]) -> None:
         """Give bodies other names, wherever joints, inputs and loads name them."""
-        for s in self.slides:
-            s.link, s.on = new(s.link), new(s.on)
+        for k, s in self.guides.items():
+            if (ends := (new(s.link), new(s.on))) != (s.link, s.on):
+                self.guides[k] = Guide(s.point, *ends, s.through, s.angle, s.turned)
         self.gears = [renamed(g, new) for g in self.gears]
-        for r in self.racks:
-            r.gear = new(r.gear)
+        self.racks = [replace(r, gear=new(r.gear)) for r in self.racks]
         for e in (*self.drives, *self.spare):
             e.link, e.on = e.link and new(e.link), new(e.on)
         for load in self.loads:
             load.ends = [(new(name), at) for name, at in load.ends]
         self.welds = [(new(p), new(q)) for p, q in self.welds]
+
+    def pair(self, e: Drive) -> tuple[str, str]:
+        """Return the two bodies that an input moves against each other, that which moves first."""
+        if e.slider is None:
+            return str(e.link), e.on
+        s = self.guides[e.slider]
+        return (s.link, s.on) if s.link != GROUND else (s.on, s.link)
 
     def ties(self) -> Iterator[tuple[tuple[str, ...], int]]:
         """Yield the bodies that each joint and input ties, and for how many joints it counts: an input holds its bodies.
@@ -201,26 +178,31 @@ class Drawing:
         """
         for names in self.pins().values():
             yield from [((GROUND, n), 1) for n in names] if GROUND in names else [(tuple(names), 1)]
-        yield from (((s.link, s.on), 1) for s in self.slides)
+        yield from (((s.link, s.on), 1) for s in self.guides.values())
         yield from (((*g.links, g.arm), 1) for g in self.gears)
-        yield from (((r.gear, r.slide.link, r.slide.on), 1) for r in self.racks)
-        yield from ((e.pair, 2) for e in self.drives)
+        rolling = ((r.gear, self.guides[r.slider]) for r in self.racks)
+        yield from (((gear, s.link, s.on), 1) for gear, s in rolling)
+        yield from ((self.pair(e), 2) for e in self.drives)
 
-    def guide(self, point: str, link: str, on: str, at: complex, angle: float, prism: bool = True) -> Slide:
+    def add(self, guide: Guide) -> str:
+        """Add a guide; return the name that racks and inputs have for it."""
+        name = unused(guide.point, self.guides)
+        self.guides[name] = guide
+        return name
+
+    def guide(self, point: str, link: str, on: str, at: complex, angle: float, prism: bool = True) -> str:
         """Add a prism or a slot between two bodies that stand at angle 0; a point that `link` has there already serves."""
         name = self.point_at(link, at, point)
         self.body(on)
-        self.slides.append(Slide(name, link, on, at, angle, -angle if prism else None))
-        return self.slides[-1]
+        return self.add(Guide(name, link, on, at, angle, -angle if prism else None))
 
-    def cylinder(self, names: tuple[str, str], ends: tuple[str, str], at: tuple[Exact, Exact]) -> Slide:
+    def cylinder(self, names: tuple[str, str], ends: tuple[str, str], at: tuple[Exact, Exact]) -> str:
         """Add a cylinder and its rod, pinned at their far ends, the one sliding in the other."""
         barrel, rod = names
         self.body(barrel).points[ends[0]] = at[0]
         self.body(rod).points[ends[1]] = at[1]
         angle = direction(*at)
-        self.slides.append(Slide(ends[1], rod, barrel, at[1], angle, -angle))
-        return self.slides[-1]
+        return self.add(Guide(ends[1], rod, barrel, at[1], angle, -angle))
 
     def point_at(self, body: str, at: complex, wanted: str) -> str:
         """Return a body's point at a place, by its name; made where it has none there."""

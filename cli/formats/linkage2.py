@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from html import unescape
 
-from cli.formats.drawn import GROUND, Drawing, Drive, Groups, Slide, centers, unused
+from cli.formats.drawn import GROUND, Drawing, Drive, Groups, centers, unused
 from cli.formats.values import MOST_PARTS, Exact, apart, check_count, damaged, direction, exact, finite
 from dalembert.errors import DataError
-from virtualwork.describe.meshes import Gear
+from virtualwork.describe.parts import Gear, Guide
 
 ATTRIBUTE = re.compile(r"""([A-Za-z_][\w.-]*)\s*=\s*("[^"<]*"|'[^'<]*')""")
 DEEPEST = 20
@@ -177,7 +177,7 @@ class _Reader:
         elif wanted:
             a, b = ids
             names = f"L{id_}", f"L{id_} rod"
-            slide = d.cylinder(names, (f"C{a}", f"C{b}"), (self.at[a], self.at[b]))
+            slider = d.cylinder(names, (f"C{a}", f"C{b}"), (self.at[a], self.at[b]))
             throw, cpm = self.number(e, "throw", 0.0), self.number(e, "cpm", DEFAULT_CPM)
             speed = None
             if throw * cpm != 0 and not yes(e, "alwaysmanual"):
@@ -186,7 +186,7 @@ class _Reader:
                     f"actuator L{id_}: its speed is the mean over a stroke (throw {throw:g}, {cpm:g} cycles a minute); "
                     "the ends of its stroke are left out"
                 )
-            d.drives.append(Drive(slide=slide, speed=speed))
+            d.drives.append(Drive(slider=slider, speed=speed))
             return
         body = d.body(f"L{id_}")
         for c in ids:
@@ -243,7 +243,7 @@ class _Reader:
             return
         z = self.at[id_]
         d.moved((a, b), z, what, "it")
-        d.slides.append(Slide(point, held[0] if GROUND in held else held[-1], on, z, direction(a, b)))
+        d.add(Guide(point, held[0] if GROUND in held else held[-1], on, z, direction(a, b)))
 
     def _motor(self, id_: str, e: Element) -> None:
         d, what = self.d, f"input C{id_}"

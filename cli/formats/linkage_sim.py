@@ -6,9 +6,10 @@ import cmath
 import math
 from typing import Any
 
-from cli.formats.drawn import GROUND, SAME, Body, Drawing, Drive, Load, Slide, pins_of, together
+from cli.formats.drawn import GROUND, SAME, Body, Drawing, Drive, Load, pins_of, together
 from cli.formats.values import Exact, apart, coordinates, damaged, exact, objects, place
 from dalembert.errors import DataError
+from virtualwork.describe.parts import Guide
 
 # type -> the table here, the keys of its bodies and of its points on them, and of its numbers
 LOADS: dict[str, tuple[str, tuple[tuple[str, str | None], ...], tuple[str, ...]]] = {
@@ -238,7 +239,7 @@ class _Reader:
         angle = cmath.phase(axis) + turn_i
         delta = self.real(where, e.get("delta_theta_0", 0.0)) + turn_i - turn_j
         point = d.point_at(j, self.points[j][q], name)
-        d.slides.append(Slide(point, j, i, self.points[i][p], angle, delta - angle))
+        d.add(Guide(point, j, i, self.points[i][p], angle, delta - angle))
 
     def _drives(self, joints: dict[str, dict[str, Any]]) -> None:
         d = self.d
@@ -277,14 +278,14 @@ class _Reader:
         speed = f"{self.real(where, e.get('velocity', 0.0))!r} m/s"
         names = f"{where} barrel", f"{where} rod"
         if d.posed:
-            d.drives.append(Drive(slide=d.cylinder(names, (p, q), (a, b)), speed=speed))
+            d.drives.append(Drive(slider=d.cylinder(names, (p, q), (a, b)), speed=speed))
             return
         # both along their own x-axes, the slide is the length
         d.body(names[0]).points[p] = place(0, 0)
         d.body(names[1]).points[q] = place(0, 0)
-        d.slides.append(Slide(q, names[1], names[0], place(0, 0), 0.0, 0.0))
+        slider = d.add(Guide(q, names[1], names[0], place(0, 0), 0.0, 0.0))
         at = self.real(where, e.get("length_0", 0.0))
-        d.drives.append(Drive(slide=d.slides[-1], at=at, speed=speed))
+        d.drives.append(Drive(slider=slider, at=at, speed=speed))
 
     def _traced(self) -> None:
         """Keep the points of interest: coupler and mount points, and attachment points that no joint uses."""

@@ -10,10 +10,10 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from cli.formats import markup as xml
-from cli.formats.drawn import GROUND
 from cli.formats.mjcf_bodies import Defaults, Frames, Masses
 from cli.formats.mjcf_ties import Ties, leading
 from cli.formats.robot import (
+    GROUND,
     LIGHT,
     WORLD,
     Array,

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from cli.formats.drawn import GROUND, Drawing, Drive, Slide
+from cli.formats.drawn import GROUND, Drawing, Drive
 from cli.formats.values import Exact, damaged, direction, exact, objects, place
 from dalembert.errors import DataError
+from virtualwork.describe.parts import Guide
 
 LENGTHS = ("mm", "cm", "m", "in", "ft")
 # what is read of a document, and what only describes it
@@ -81,11 +82,11 @@ class _Reader:
                 self.slot_of[str(slot)] = name
         for id_ in sorted(self.welded):
             d.weld(d.holders(id_))
-        self.riders: dict[str, tuple[Slide, str, str]] = {}
+        self.riders: dict[str, tuple[str, str, str]] = {}
         for k, e in enumerate(self.entries("slots"), 1):
             self._slot(k, e)
             self._limits(f"slot {k}", e)
-        self.pistons: dict[frozenset[str], Slide] = {}
+        self.pistons: dict[frozenset[str], str] = {}
         for k, e in enumerate(self.entries("cylinders"), 1):
             self._cylinder(f"cylinder {k}", self.joint_ids(f"cylinder {k}", listed(e, "joints", "jointIds")))
             self._limits(f"cylinder {k}", e)
@@ -117,21 +118,20 @@ class _Reader:
                 del d.bodies[on].points[rider]
             z = self.at[rider]
             d.moved((a, b), z, where, rider)
-            d.slides.append(Slide(rider, held[-1], on, z, angle))
-            self.riders[rider] = (d.slides[-1], ends[0], ends[1])
+            self.riders[rider] = (d.add(Guide(rider, held[-1], on, z, angle)), ends[0], ends[1])
 
-    def _cylinder(self, where: str, ends: list[str]) -> Slide:
+    def _cylinder(self, where: str, ends: list[str]) -> str:
         if len(ends) != 2 or self.at[ends[0]] == self.at[ends[1]]:
             raise damaged(self.file, where, ends, "two joints at different places")
         d, (a, b) = self.d, ends
         names = f"{where} barrel", f"{where} rod"
-        slide = d.cylinder(names, (a, b), (self.at[a], self.at[b]))
-        self.pistons[frozenset(ends)] = slide
+        slider = d.cylinder(names, (a, b), (self.at[a], self.at[b]))
+        self.pistons[frozenset(ends)] = slider
         for end, name in zip(ends, names, strict=True):
             if end in self.welded:
                 held = [n for n in d.holders(end) if n not in names]
                 d.welds.append((name, held[0] if held and GROUND not in held else GROUND))
-        return slide
+        return slider
 
     def _limits(self, where: str, e: dict[str, Any]) -> None:
         """Name the limits of a stroke or a turn; a whole turn is none."""
@@ -154,14 +154,14 @@ class _Reader:
         except ValueError:
             raise damaged(self.file, where, velocity, "a velocity") from None
         if e.get("type") == "linear" or e.get("to") is None:
-            slide, sense = self.pistons.get(frozenset((at, start))), 1.0
-            if slide is None and at in self.riders and start in self.riders[at][1:]:
-                slide = self.riders[at][0]
+            slider, sense = self.pistons.get(frozenset((at, start))), 1.0
+            if slider is None and at in self.riders and start in self.riders[at][1:]:
+                slider = self.riders[at][0]
                 sense = 1.0 if start == self.riders[at][1] else -1.0
-            if slide is None:
-                slide = self._cylinder(f"{where} cylinder", [start, at])
+            if slider is None:
+                slider = self._cylinder(f"{where} cylinder", [start, at])
             d.drives.append(
-                Drive(slide=slide, speed=None if speed is None else f"{sense * speed!r} {d.length}/s")
+                Drive(slider=slider, speed=None if speed is None else f"{sense * speed!r} {d.length}/s")
             )
             return
         (to,) = self.joint_ids(where, [e["to"]])

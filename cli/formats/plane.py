@@ -18,8 +18,6 @@ from cli.formats.drawn import (
     Drive,
     Groups,
     Load,
-    Slide,
-    Toothed,
     pins_of,
     renamed,
     together,
@@ -27,7 +25,7 @@ from cli.formats.drawn import (
 )
 from cli.formats.robot import BLOCK, Motor, Robot, RobotJoint, RobotLink, Spring, plane_of
 from dalembert.errors import DataError
-from virtualwork.describe.meshes import Gear
+from virtualwork.describe.parts import Gear, Guide, Rack
 
 # two ends of a joint nearer than this share of the robot's size are one place
 SAME = 1e-6
@@ -68,7 +66,6 @@ class _Layer:
         self._groups()
         open_ = [j for j in robot.joints.values() if not self._closed(j)]
         d.posed = not any(j in moving for j in open_)
-        self.slides: dict[str, Slide] = {}
         turning = [
             (j.name, {name: self._place(z) for name, z in self._sides(j)})
             for j in moving
@@ -166,11 +163,10 @@ class _Layer:
         angle = cmath.phase(self.plane.direction(j.axis) * sense) - a.turn
         start = self._place(through - j.value * cmath.rect(1.0, angle))
         at, held = self._place(z), self.d.bodies[link].points
-        taken = {s.point for s in self.d.slides}
+        taken = {s.point for s in self.d.guides.values()}
         point = next((p for p, w in held.items() if w == at and p not in taken), None) or self.d.fresh(j.name)
         held[point] = at
-        self.slides[j.name] = Slide(point, link, on, start, _turn(angle), _turn(b.turn - a.turn - angle))
-        self.d.slides.append(self.slides[j.name])
+        self.d.guides[j.name] = Guide(point, link, on, start, _turn(angle), _turn(b.turn - a.turn - angle))
 
     def _carried_by_child(self, j: RobotJoint) -> bool:
         """Return whether a slide's line is on the child, not the parent: on the ground, under a rack's wheel, away from its point."""
@@ -191,32 +187,32 @@ class _Layer:
     def _slots(self) -> None:
         """Make slots again of the blocks that `dalembert export` made of them, each with one slide and one pin."""
         d = self.d
-        for name, s in self.slides.items():
+        for name, s in d.guides.items():
             for block, carrier in ((s.link, s.on), (s.on, s.link)):
                 pins = [label for label, ends in self.pins if block in ends]
                 if not self._is_block(block) or len(pins) != 1:
                     continue
                 riders = [n for n, body in d.bodies.items() if pins[0] in body.points and n != block]
                 if len(riders) == 1 and riders[0] != carrier:
-                    self._slot(s, self.robot.joints[name].value, block, carrier, riders[0], pins[0])
+                    self._slot(name, block, carrier, riders[0], pins[0])
                     break
 
     def _is_block(self, name: str) -> bool:
         """Return whether a body has no use but in a slot: without mass, in one slide, with no gear or spring on it."""
         body, robot = self.d.bodies[name], self.robot
-        slides = [s for s in self.slides.values() if name in (s.link, s.on)]
+        guides = [s for s in self.d.guides.values() if name in (s.link, s.on)]
         others = [link for g in robot.gears for link in (*g.links, g.arm)]
         others += [link for spring in robot.springs for link, _ in spring.ends]
         return (
             name.startswith(BLOCK)
             and body.mass == body.inertia == 0
-            and len(slides) == 1
+            and len(guides) == 1
             and name not in map(self.name, others)
         )
 
-    def _slot(self, s: Slide, value: float, block: str, carrier: str, rider: str, pin: str) -> None:
+    def _slot(self, name: str, block: str, carrier: str, rider: str, pin: str) -> None:
         """Make a slot of a slide and a pin: the line goes through the pin, in the axes of the carrier."""
-        d = self.d
+        d, s, value = self.d, self.d.guides[name], self.robot.joints[name].value
         frame, moved = d.bodies[carrier], d.bodies[block]
         # where the carrier moves along the block, the block moves against that along the carrier
         line = d.bodies[s.on].turn + s.angle + (0.0 if s.link == block else math.pi)
@@ -225,8 +221,8 @@ class _Layer:
         if s.link == carrier and s.point not in {label for label, _ in self.pins}:
             frame.points.pop(s.point)
         del d.bodies[block]
-        s.point, s.link, s.on, s.turned = pin, rider, carrier, None
-        s.through, s.angle = self._place(frame.inside(start)), _turn(line - frame.turn)
+        through, angle = self._place(frame.inside(start)), _turn(line - frame.turn)
+        d.guides[name] = Guide(pin, rider, carrier, through, angle)
 
     def _named_points(self) -> None:
         """Add the named places of the file, and the origins of links without mass that are fixed to others."""
@@ -248,7 +244,7 @@ class _Layer:
     def _turning_alike(self) -> Groups[str]:
         """Return the bodies that slides join, which turn alike. The ground stands for its own, blocks for none."""
         result = Groups([GROUND, *self.names.values()])
-        for s in self.slides.values():
+        for s in self.d.guides.values():
             pair = result.of(s.link), result.of(s.on)
             keep = min(pair, key=lambda name: (name != GROUND, name.startswith(BLOCK)))
             result.join(keep, *pair)
@@ -308,15 +304,17 @@ class _Layer:
 
     def _rack(self, terms: list[tuple[str, float]], where: str) -> bool:
         """Add a rack where one slide and the angle of a body against its guide stay in step."""
-        slides = [(self.slides[name], factor) for name, factor in terms if name in self.slides]
-        turns = self._shares([term for term in terms if term[0] not in self.slides], where)
+        guides = self.d.guides
+        slides = [term for term in terms if term[0] in guides]
+        turns = self._shares([term for term in terms if term[0] not in guides], where)
         if len(slides) != 1 or turns is None or len(turns) != 2 or abs(sum(turns.values())) > 1e-9:
             return False
-        (slide, factor), carrier = slides[0], self.alike.of(slides[0][0].on)
+        slider, factor = slides[0]
+        carrier = self.alike.of(guides[slider].on)
         wheels = [body for body in turns if self.alike.of(body) != carrier]
         if len(wheels) != 1 or factor == 0:
             return False
-        self.d.racks.append(Toothed(wheels[0], slide, -turns[wheels[0]] / factor))
+        self.d.racks.append(Rack(wheels[0], slider, -turns[wheels[0]] / factor))
         return True
 
     def _springs(self, moving: list[RobotJoint]) -> None:
@@ -403,10 +401,10 @@ class _Layer:
     def _drive(self, m: Motor) -> Drive | None:
         """Return the input that an actuator is; None where it is none."""
         d, robot = self.d, self.robot
-        if len(m.terms) == 1 and m.terms[0][0] in self.slides:
-            s = self.slides[m.terms[0][0]]
-            j = robot.joints[m.terms[0][0]]
-            return Drive(slide=s, at=j.value, speed=None if m.speed is None else f"{m.speed!r} m/s")
+        if len(m.terms) == 1 and m.terms[0][0] in d.guides:
+            slider = m.terms[0][0]
+            at = robot.joints[slider].value
+            return Drive(slider=slider, at=at, speed=None if m.speed is None else f"{m.speed!r} m/s")
         shares = self._shares(m.terms, f"actuator {m.name}", m.name)
         if shares is None or len(shares) != 2:
             return None

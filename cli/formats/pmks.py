@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import unquote
 
-from cli.formats.drawn import GROUND, Body, Drawing, Drive, Slide, Toothed, centers
+from cli.formats.drawn import GROUND, Body, Drawing, Drive, centers
 from cli.formats.values import Exact, apart, damaged, direction, finite, place
 from dalembert.errors import DataError, quote
-from virtualwork.describe.meshes import Gear
+from virtualwork.describe.parts import Gear, Rack
 
 TYPES = ("R", "P", "RP", "G")
 GROUNDS = {"gnd", "grnd", "grond", "gound", "groud", "0"}
@@ -116,7 +116,7 @@ def _drawing(file: str, d: Drawing, joints: list[Joint], speed: float) -> Drawin
             why = "another joint is the input" if driven else f"a joint of type {j.kind} cannot be driven"
             d.leave(f"input flag of {j.where}", why)
     driven = driven or [j for j in joints if len(j.links) > 1 and j.kind in ("R", "P")]
-    slides: dict[int, Slide] = {}
+    sliders: dict[int, str] = {}
     for k, j in enumerate(joints, 1):
         name = f"J{k}"
         if len(j.links) == 1 or j.kind == "R":
@@ -126,7 +126,7 @@ def _drawing(file: str, d: Drawing, joints: list[Joint], speed: float) -> Drawin
             a, b = j.links[:2]
             # the block is the link that moves
             link, on = (a, b) if b == GROUND else (b, a)
-            slides[k] = d.guide(name, link, on, j.at, j.angle)
+            sliders[k] = d.guide(name, link, on, j.at, j.angle)
             _more(d, j, k)
         elif j.kind == "RP":
             _slot(d, j, name, joints)
@@ -137,7 +137,7 @@ def _drawing(file: str, d: Drawing, joints: list[Joint], speed: float) -> Drawin
     if driven:
         j = driven[0]
         if j.kind == "P":
-            d.drives.append(Drive(slide=slides[joints.index(j) + 1]))
+            d.drives.append(Drive(slider=sliders[joints.index(j) + 1]))
             d.leave(f"speed {speed:g} rpm", f"the input {j.where} is a slide")
         else:
             a, b = j.links[:2]
@@ -198,7 +198,7 @@ def mesh(d: Drawing, a: str, b: str, at: Exact, what: str) -> None:
 def _rack(d: Drawing, wheel: str, rack: str, at: Exact) -> bool:
     """Add a rack that slides on a body on which a wheel turns; False where it is none."""
     pins = d.pins()
-    for s in d.slides:
+    for slider, s in d.guides.items():
         if s.turned is None or s.link != rack:
             continue
         for pin in d.bodies.get(wheel, Body()).points:
@@ -209,7 +209,7 @@ def _rack(d: Drawing, wheel: str, rack: str, at: Exact) -> bool:
                 # the pitch point lies on the right of the way that the slide takes as the wheel turns
                 radius = to.real * math.sin(along) - to.imag * math.cos(along)
                 if radius != 0:
-                    d.racks.append(Toothed(wheel, s, radius))
+                    d.racks.append(Rack(wheel, slider, radius))
                     return True
     return False
 

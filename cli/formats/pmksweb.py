@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from itertools import takewhile
 from urllib.parse import unquote
 
-from cli.formats.drawn import GROUND, Drawing, Drive, Load, Slide
+from cli.formats.drawn import GROUND, Drawing, Drive, Load
 from cli.formats.values import Exact, damaged, direction, finite, place
 from dalembert.errors import DataError
 
@@ -87,7 +87,7 @@ class Linkage:
         for id_, j in self.joints.items():
             if j.grounded and not j.prismatic:
                 d.bodies[GROUND].points[id_] = j.at
-        self.slides: dict[str, Slide] = {}
+        self.sliders: dict[str, str] = {}
         self.held = {
             id_: [link.name for link in self.links if id_ in link.joints and link.name in d.bodies]
             for id_ in self.joints
@@ -139,7 +139,7 @@ class Linkage:
         if held:
             # a link that a joint pins too turns on it, but for a piston
             prism = not j.pinned or held[0] in pistons
-            self.slides[id_] = self.d.guide(id_, held[0], on, j.at, angle, prism)
+            self.sliders[id_] = self.d.guide(id_, held[0], on, j.at, angle, prism)
 
     def _drive(self) -> None:
         for id_, j in self.joints.items():
@@ -147,8 +147,8 @@ class Linkage:
                 continue
             if self.d.drives:
                 self.d.leave(f"input {j.name}", "another joint is the input")
-            elif id_ in self.slides:
-                self.d.drives.append(Drive(slide=self.slides[id_]))
+            elif id_ in self.sliders:
+                self.d.drives.append(Drive(slider=self.sliders[id_]))
                 self.d.leave(f"speed {self.speed:g} rpm", f"the input {j.name} is a slide")
             elif self.held[id_] and not j.prismatic:
                 first, *others = self.held[id_]

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Kind = Literal["turn", "slide", "ball", "fixed", "other"]
 WORLD = "world"
+# how mechanisms call it; who reads a robot alone loads none
+GROUND = "ground"
 # of the heaviest link: the mass of a link without mass, where a format requires one
 LIGHT = 1e-6
 # how the massless bodies are called that slots become

@@ -9,8 +9,8 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from cli.formats import markup as xml
-from cli.formats.drawn import GROUND
 from cli.formats.robot import (
+    GROUND,
     LIGHT,
     ROWS,
     WORLD,

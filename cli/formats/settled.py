@@ -9,8 +9,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.formats.drawn import GROUND, SAME, Body, Drawing, Drive, Groups, Slide, together
+from cli.formats.drawn import GROUND, SAME, Body, Drawing, Drive, Groups, together
 from cli.formats.values import apart
+from virtualwork.describe.parts import Guide
 
 Rows = NDArray[np.float64]
 # below this share a row of speeds follows from others: a file's decimals are fewer than ours
@@ -37,14 +38,13 @@ def _rename_point(d: Drawing, old: str, new: str) -> None:
         if old in body.points:
             at = body.points.pop(old)
             body.points.setdefault(new, at)
-    for s in d.slides:
-        s.point = new if s.point == old else s.point
+    d.guides = {k: replace(s, point=new) if s.point == old else s for k, s in d.guides.items()}
 
 
 def _one_pin_at_a_place(d: Drawing) -> bool:
     """Join two joints of one body at the same place into one pin; return whether there were two."""
     near = SAME * d.size()
-    joints = set(d.pins()) | {s.point for s in d.slides}
+    joints = set(d.pins()) | {s.point for s in d.guides.values()}
     for name, body in d.bodies.items():
         # two shafts in one place of the ground are not pinned to each other
         held = [p for p in body.points if p in joints and name != GROUND]
@@ -104,24 +104,24 @@ def _can_move(d: Drawing, part: Drawing) -> bool:
 
 
 def _drop_what_is_rigid(d: Drawing) -> None:
-    for s in [s for s in d.slides if s.link == s.on]:
-        d.slides.remove(s)
-        d.leave(f"slide at {s.point}", "both sides are one body")
+    rigid = [k for k, s in d.guides.items() if s.link == s.on]
+    for k in rigid:
+        d.leave(f"slide at {d.guides[k].point}", "both sides are one body")
     for g in [g for g in d.gears if len({*g.links, g.arm}) < 3]:
         d.gears.remove(g)
         d.leave(f"gears {', '.join(g.links)}", "they are one body, or one of them is the arm")
-    slides = list(map(id, d.slides))
     for r in list(d.racks):
+        s = d.guides[r.slider]
         # a wheel in a slot may roll along a rack
-        held = (r.slide.on,) if r.slide.turned is None else (r.slide.on, r.slide.link)
-        if id(r.slide) in slides and r.gear not in held:
-            continue
-        d.racks.remove(r)
-        d.leave(f"rack at {r.slide.point}", "its wheel and its guide are one body")
+        if s.link == s.on or r.gear in ((s.on,) if s.turned is None else (s.on, s.link)):
+            d.racks.remove(r)
+            d.leave(f"rack at {s.point}", "its wheel and its guide are one body")
     for e in list(d.drives):
-        if (e.slide is not None and id(e.slide) not in slides) or (e.link is not None and e.link == e.on):
+        if len({*d.pair(e)}) == 1:
             d.drives.remove(e)
-            d.leave(f"input {e.link or (e.slide and e.slide.point)}", "its two sides are one body")
+            d.leave(f"input {e.link or d.guides[str(e.slider)].point}", "its two sides are one body")
+    for k in rigid:
+        del d.guides[k]
 
 
 def _drop_what_dangles(d: Drawing) -> None:
@@ -138,8 +138,8 @@ def _drop_what_dangles(d: Drawing) -> None:
             d.bodies.pop(name)
             alone = "only one joint holds it, and nothing drives it"
             d.leave(name, alone if holds[name] else "it has no joint")
-        d.slides = [s for s in d.slides if {s.link, s.on} <= d.bodies.keys()]
-        d.racks = [r for r in d.racks if {r.gear, r.slide.link, r.slide.on} <= d.bodies.keys()]
+        d.guides = {k: s for k, s in d.guides.items() if {s.link, s.on} <= d.bodies.keys()}
+        d.racks = [r for r in d.racks if r.gear in d.bodies and r.slider in d.guides]
         for g in [g for g in d.gears if not {*g.links, g.arm} <= d.bodies.keys()]:
             d.gears.remove(g)
             d.notes.append(f"gears {', '.join(g.links)}: left out with their link")
@@ -154,8 +154,9 @@ def _parts(d: Drawing) -> list[Drawing]:
     for names in (*(names for names, _ in d.ties()), *(dict(load.ends) for load in d.loads)):
         groups.join(*(name for name in names if name != GROUND))
     parts = []
+    d.spare = [e for e in d.spare if e.slider is None or e.slider in d.guides]
     for group in groups.all():
-        drives = [e for e in d.drives if e.pair[0] in group]
+        drives = [e for e in d.drives if d.pair(e)[0] in group]
         if drives:
             parts.append(_part(d, set(group), drives))
         elif group != [GROUND]:
@@ -165,17 +166,17 @@ def _parts(d: Drawing) -> list[Drawing]:
 
 def _part(d: Drawing, names: set[str], drives: list[Drive]) -> Drawing:
     bodies = {name: body for name, body in d.bodies.items() if name in names}
-    slides = [s for s in d.slides if {s.link, s.on} & names]
-    used = {p for body in bodies.values() for p in body.points} | {s.point for s in slides}
+    guides = {k: s for k, s in d.guides.items() if {s.link, s.on} & names}
+    used = {p for body in bodies.values() for p in body.points} | {s.point for s in guides.values()}
     ground = Body({p: at for p, at in d.bodies[GROUND].points.items() if p in used})
     return replace(
         d,
         bodies={GROUND: ground} | bodies,
-        slides=slides,
+        guides=guides,
         gears=[g for g in d.gears if not names.isdisjoint(g.links)],
         racks=[r for r in d.racks if r.gear in names],
         drives=drives,
-        spare=[e for e in d.spare if set(e.pair) <= {GROUND, *names}],
+        spare=[e for e in d.spare if set(d.pair(e)) <= {GROUND, *names}],
         loads=[load for load in d.loads if any(name in names for name, _ in load.ends)],
         notes=[],
     )
@@ -208,7 +209,7 @@ class _Speeds:
         row[self.columns[body] + 2] = 1.0
         return row
 
-    def along(self, s: Slide, turned: float) -> Rows:
+    def along(self, s: Guide, turned: float) -> Rows:
         """Return the velocity of a slide's point against its guide, along the line turned by `turned`."""
         way = cmath.rect(1.0, self.d.bodies[s.on].turn + s.angle + turned)
         at = self.at(s.link, self.d.bodies[s.link].points[s.point])
@@ -222,7 +223,7 @@ class _Speeds:
         for point, (first, *others) in d.pins().items():
             at = self.at(first, d.bodies[first].points[point])
             rows += [self.moves(first, at) - self.moves(other, at) for other in others]
-        for s in d.slides:
+        for s in d.guides.values():
             rows.append(self.along(s, np.pi / 2)[None])
             if s.turned is not None:
                 rows.append((self.turns(s.link) - self.turns(s.on))[None])
@@ -230,14 +231,15 @@ class _Speeds:
             a, b, arm = (self.turns(name) for name in (*g.links, g.arm))
             rows.append((b - arm - g.ratio * (a - arm))[None])
         for r in d.racks:
-            turned = self.turns(r.gear) - self.turns(r.slide.on)
-            rows.append((self.along(r.slide, 0.0) - r.radius / self.size * turned)[None])
+            s = d.guides[r.slider]
+            turned = self.turns(r.gear) - self.turns(s.on)
+            rows.append((self.along(s, 0.0) - r.radius / self.size * turned)[None])
         return np.concatenate(rows)
 
     def driven(self, e: Drive) -> Rows:
         """Return the speed that an input drives."""
-        if e.slide is not None:
-            return self.along(e.slide, 0.0)
+        if e.slider is not None:
+            return self.along(self.d.guides[e.slider], 0.0)
         return self.turns(str(e.link)) - self.turns(e.on)
 
 
@@ -250,7 +252,7 @@ def _fit_inputs(d: Drawing) -> None:
     kept: list[Drive] = []
     spare = [e for e in d.spare if all(e.moves != other.moves for other in d.drives)]
     # where the file drives too many, those at the ground stay
-    for e in (*sorted(d.drives, key=lambda e: GROUND not in e.pair), *spare):
+    for e in (*sorted(d.drives, key=lambda e: GROUND not in d.pair(e)), *spare):
         row = free @ speeds.driven(e)
         if np.linalg.norm(row) > FOLLOWS:
             # what the input holds is free no more
@@ -266,4 +268,4 @@ def _fit_inputs(d: Drawing) -> None:
 
 
 def _note(d: Drawing, drives: Iterable[Drive], what: str) -> None:
-    d.notes += [f"{e.pair[0]} against {e.pair[1]}: {what}" for e in drives]
+    d.notes += [f"{' against '.join(d.pair(e))}: {what}" for e in drives]

@@ -10,8 +10,8 @@ import numpy as np
 
 from cli.formats import markup as xml
 from cli.formats import sdf
-from cli.formats.drawn import GROUND
 from cli.formats.robot import (
+    GROUND,
     ROWS,
     Array,
     Inertial,
