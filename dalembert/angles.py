@@ -79,7 +79,7 @@ def degrees(z: complex) -> float: ...
 def degrees(z: complex | NDArray[np.complex128]) -> float | NDArray[np.float64]:
     """Return the angle of a complex number, or of each in an array, in degrees in [0, 360); 0 for zero.
 
-    An angle that is one of ten decimals but for the rounding of a vector at this angle comes out as that one.
+    An angle that is one of six decimals but for the rounding of a vector at this angle comes out as that one.
 
     >>> import numpy as np
     >>> z = phasor(2.0, 30.0, "deg")
@@ -91,7 +91,7 @@ def degrees(z: complex | NDArray[np.complex128]) -> float | NDArray[np.float64]:
     vector = np.asarray(z)
     # + 0.0: the angle of -0 is 0, not 180; and a tiny negative angle plus 360 rounds to 360 itself
     angle = np.degrees(np.arctan2(vector.imag + 0.0, vector.real + 0.0)) % 360.0
-    short = np.round(angle, 10)
+    short = np.round(angle, 6)
     # cosine and sine, and their products with a size, turn a vector by four units of the last place of its angle at most
     angle = np.where(np.abs(short - angle) <= ROUNDED * np.spacing(angle), short, angle)
     return np.where(angle >= 360.0, 0.0, angle)[()]

@@ -49,5 +49,5 @@ def test_points_with_hyphens_and_unknown_ones(dalembert: Any, tmp_path: Path) ->
     done = dalembert("mechanism", "b.toml", "--only", "tip-2-P.length", "--json")
     assert json.loads(done.stdout)["poses"][0]["vectors"]["tip-2-P"] == {"length_m": 4.0}
     done = dalembert("mechanism", "b.toml", "--only", "P-Z")
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert "P-Z" in done.stderr

@@ -109,8 +109,8 @@ def test_a_torsion_spring_between_two_arms() -> None:
         assert "no weights: gravity is zero" not in absent
 
 
-@pytest.mark.parametrize("gravity", [G, -G])
-def test_nothing_is_not_minus_nothing(gravity: float) -> None:
+@pytest.mark.parametrize("gravity", [complex(G), complex(-G)])
+def test_nothing_is_not_minus_nothing(gravity: complex) -> None:
     """Gravity along the bar: the weight acts, its point moves, and its work is zero, whose sign is never shown."""
     m = Mechanism({"O": 0j}, {"bar": Link({"O": 0j}, 1.0, 0.5)}, inputs=Input(link="bar"), gravity=gravity)
     effort = m.motion(np.array([0.0, 0.0])).effort

@@ -79,7 +79,7 @@ def test_blocks_on_springs() -> None:
         m = Mechanism(
             {"O": 0j, "W": -5.0}, {"block": Link({"B": 0j}, mass)},
             [Guide("B", "block", angle=0.0, turned=0.0)], inputs=Input(slider="B"),
-            guess=Guess(0.1, {"block": 0.0}), gravity=g,
+            guess=Guess(0.1, {"block": 0.0}), gravity=complex(g),
             springs=[Spring((("block", "B"), ("ground", "W")), stiffness, free)],
         )  # fmt: skip
         (rest,) = m.equilibria([[-4.9, 5.0]]).found

@@ -311,6 +311,7 @@ class Force(Part):
     periodic: bool = False
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         _check_rising(f"force on {self.link}", "input", self.history)
 
 
