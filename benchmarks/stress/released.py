@@ -43,7 +43,7 @@ def _linkage(rng: np.random.Generator, kind: str) -> Mechanism:
         {name: places[name] for name in ground},
         links,
         inputs=inputs,
-        guess=Guess(at, angles, {name: z for name, z in places.items() if name not in ground}),
+        guess=Guess(at, angles, {name: places[name] for bar in bars for name in bar if name not in ground}),
         gravity=-9.81j,
     )
 

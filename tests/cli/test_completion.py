@@ -67,7 +67,7 @@ def test_bash_completes(line: list[str], wanted: list[str], tmp_path: Path) -> N
         (("mechanism", "klann.toml", "--only", "A,crank.al"), {"A,crank.alpha"}, {"crank.alpha"}),
         (("forces", "klann.toml", "--only", "crank.t"), {"crank.torque"}, set()),
         (("inspect", "klann.toml", "--only", "crank.t"), {"crank.torque"}, set()),
-        (("fit", "klann.toml", "t.csv", "--want", "H"), {"H"}, {"H.x"}),
+        (("fit", "klann.toml", "t.csv", "--want", "H"), {"H", "H.x"}, {"H.vx"}),
         (("fit", "klann.toml", "t.csv", "--want", "c"), {"coupler.angle", "crank.torque"}, {"crank.omega"}),
         (("mechanism", "klann.toml", "--set", "links.crank."), {"links.crank.B.x="}, {"ground.A.x="}),
         (("mechanism", "klann.toml", "--set", "cra"), set(), {"crank="}),

@@ -70,7 +70,7 @@ def test_a_column_in_another_dimension_is_refused(dalembert: Dalembert, folder: 
     [
         ('title = "A rotor"', 'titel = "A rotor"', ["key titel", "did you mean 'title'"]),
         ("quantity = \"angle_deg\"", "quantity = \"angel_deg\"", ["[[ask]] 2", "'angel_deg'", "did you mean 'angle_deg'"]),
-        ("figures = 3", "figures = 0", ["[[ask]] 1", "figures", "'0'", "a whole number from 1"]),
+        ("figures = 3", "figures = 0", ["[[ask]] 1", "figures", "found 0", "a whole number from 1"]),
         ('plane = "B" }\nfigures', 'plane = "C" }\nfigures', ["[[ask]] 1", "where", "plane C"]),
         ('"60N:120N:5N"', '"60N:120N"', ["[draw]", "FROM:TO:STEP"]),
         ('"60N:120N:5N"', '"60kg:120kg:5kg"', ["[draw]", "weight_N"]),

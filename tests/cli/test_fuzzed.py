@@ -33,7 +33,7 @@ MECHANISMS = {
     "a table for a name": (f"name = {{ a = 1 }}\n{CRANK}{INPUT}", "name: found .*expected text"),
     "a table for a link": (
         CRANK + INPUT + '[[torsion_springs]]\nlinks = [{ a = 1 }, "crank"]\n',
-        "unknown link",
+        "expected text",
     ),
     "a list for a point": (
         CRANK.replace("[1, 0]", "{ from = [1], length = 1, angle = 0 }") + INPUT,

@@ -31,13 +31,13 @@ UNKNOWN = 0.1
 TRIES = 4
 
 
-def first_tolerance(accuracy: float) -> float:
-    """That of a step of the first solution.
+def first_tolerance(accuracy: float, crosses: bool = False) -> float:
+    """That of a step of the first solution; where it crosses change points halves gain less anyhow, and their distance counts whole.
 
     >>> [f"{first_tolerance(accuracy):.0e}" for accuracy in (1e-3, 1e-9, 1e-20)]
     ['1e-08', '1e-10', '1e-15']
     """
-    return max(LEAST, FIRST * min(accuracy, COARSE))
+    return max(LEAST, FIRST * (accuracy if crosses else min(accuracy, COARSE)))
 
 
 def share(tolerance: float) -> float:

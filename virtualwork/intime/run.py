@@ -276,7 +276,7 @@ def _simulated(
     equations.refuse(float(t[0]), q, v)
     scale = np.array(equations.scale)
     levels = levels_of(m.inputs, until)
-    tolerance, end = first_tolerance(accuracy), float(t[-1])
+    tolerance, end = first_tolerance(accuracy, equations.crosses), float(t[-1])
     start, solutions = (float(t[0]), q, v), count(1)
 
     def reports() -> Callable[[float], None] | None:
