@@ -240,7 +240,8 @@ def unit_name(written: str) -> str:
     >>> unit_name("µm pk-pk"), unit_name("mm/s RMS"), unit_name("um_pp"), unit_name("oz-in")
     ('um_pp', 'mm_s_rms', 'um_pp', 'oz_in')
     """
-    for tag, words in _READ_AS.items():
+    last = written.strip().replace("_", " ").rpartition(" ")[2]
+    for tag, words in _READ_AS.items() if last[:1] in "0pPrReE" else ():
         if match := re.fullmatch(rf"(.*[^\s_])[\s_]+(?:{words})", written.strip(), re.IGNORECASE):
             return unit_name(match[1]) + tag
     text = _spelled(written).replace("^", "")

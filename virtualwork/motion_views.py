@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -137,6 +136,8 @@ class MotionViews:
         return page_of(self.poses, self.drawing, self.dynamics if forces else None)
 
     def _repr_html_(self) -> str:
+        from html import escape
+
         from pandas import DataFrame
 
         from virtualwork.doubts import warnings_of

@@ -11,7 +11,7 @@ import numpy as np
 
 from cli.cases.inputs import Axis, Driven, Grid, Varied, with_numbers
 from cli.cases.written import DEGREES, ROWS, Range, Written, in_degrees
-from cli.read import exact, options
+from cli.read import options
 from dalembert.errors import DataError
 from dalembert.hints import nearest
 from dalembert.quantities import decimals, exactly, is_number, option_digits
@@ -283,14 +283,18 @@ def _shown_and_si(column: Numbers) -> tuple[Reals, Reals]:
     if column.unit == "deg":
         return column.values, np.radians(column.values)
     if column.dimension == "angle":
-        return exact.as_written(column).value, column.si
+        from cli.read.exact import as_written
+
+        return as_written(column).value, column.si
     return column.si, column.si
 
 
 def _rest_of_columns(columns: Sequence[Numbers]) -> Reals:
     """Return the exact numbers of columns less their floats, SI, (n, columns)."""
+    from cli.read.exact import column
+
     each = range(len(columns[0].values))
-    return np.array([(exact.column(c, each) - _shown_and_si(c)[1]).value for c in columns]).T
+    return np.array([(column(c, each) - _shown_and_si(c)[1]).value for c in columns]).T
 
 
 def _headers(of: Driven) -> str:

@@ -93,8 +93,10 @@ def real_array(name: str, value: ArrayLike, once: bool = False) -> Reals:
             if value.dtype.kind in "cmM":
                 # numpy takes the real part of complex numbers, and nanoseconds of times
                 raise TypeError
-            if isinstance(value, np.ma.MaskedArray):
-                value = np.ma.filled(value.astype(float), np.nan)
+            # those that mask values have them loaded; `numpy.ma` takes its time
+            masked: Any = value
+            if isinstance(getattr(masked, "mask", None), (np.ndarray, np.bool_)):
+                value = np.ma.filled(masked.astype(float), np.nan)
         return np.asarray(value, dtype=float) if once else np.array(value, dtype=float)
     except (TypeError, ValueError):
         text = " ".join(repr(value).split())
