@@ -53,7 +53,7 @@ class Reach:
         if EACH * self.held >= cells:
             raise DataError(f"{file}:{of} {cells} cells: expected at most {MOST_CELLS}: save it as CSV")
         raise DataError(
-            f"{file}:{of} its cells reach to {corner}, though it holds {self.held}: delete the stray or repeated ones"
+            f"{file}:{of} {self.held} cells reach as far as {corner}: delete stray and repeated cells"
         )
 
 

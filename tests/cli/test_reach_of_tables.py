@@ -82,7 +82,7 @@ REACHING = {
 @pytest.mark.parametrize("case", REACHING)
 def test_a_sheet_that_reaches_far_is_refused_with_its_last_cell(case: str) -> None:
     rows, corner, held = REACHING[case]
-    message = f"file: sheet 'Massen': its cells reach to {corner}, though it holds {held}: delete the stray or repeated ones"
+    message = f"file: sheet 'Massen': {held} cells reach as far as {corner}: delete stray and repeated cells"
     with pytest.raises(DataError, match=f"^{re.escape(message)}$"):
         read_sheet("file", open_document(rows), "")
 
@@ -90,7 +90,7 @@ def test_a_sheet_that_reaches_far_is_refused_with_its_last_cell(case: str) -> No
 @pytest.mark.parametrize("cell", ["A1048576", "AU1048576", "XFD1048576"])
 def test_a_stray_cell_far_below_is_refused(cell: str) -> None:
     corner = cell if cell != "A1048576" else "C1048576"
-    with pytest.raises(DataError, match=f"sheet 'Sheet': its cells reach to {corner}, though it holds 10"):
+    with pytest.raises(DataError, match=f"sheet 'Sheet': 10 cells reach as far as {corner}"):
         read_sheet("file", office_open(cell), "")
 
 
@@ -125,7 +125,7 @@ def test_a_stray_cell_of_an_old_workbook_is_refused() -> None:
     at = data.index(pack("<HHHH", 0xBD, 24, 2, 0))
     assert len(read_sheet("file", data, "").rows) == 3
     far = pack("<HH", 0xFFFF, 0xFD) + data[at + 8 : at + 26] + pack("<H", 0xFF)
-    with pytest.raises(DataError, match="its cells reach to IV65536, though it holds 9"):
+    with pytest.raises(DataError, match="9 cells reach as far as IV65536"):
         read_sheet("file", data[: at + 4] + far + data[at + 28 :], "")
 
 
