@@ -172,7 +172,7 @@ def main(front: Callable[[str | None], Callable[..., object]] = build) -> None:
     # Small matrices only: a pool of BLAS threads costs more to start than it gives. The user's word goes first.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # the command says on standard error what is doubtful of a guess
-    warnings.filterwarnings("ignore", r"\[guess\]", UserWarning)
+    warnings.filterwarnings("ignore", r"\[(guess|input)\]", UserWarning)
     called = next((word for word in _words() if not word.startswith("-")), None)
     if called is not None:
         from dalembert.tables.files import forget

@@ -275,6 +275,10 @@ def test_a_guess_in_degrees_that_is_read_in_radians_is_named(mirrored, unit):
     assert named == [f"[guess] {text.format(sign)}" for text in expected] * (unit != 1.0)
     two = Mechanism(m.ground, m.links, inputs=m.inputs, guess=Guess(mirrored * 4 * math.pi, m.guess.angles))
     assert not any("at crank" in w for w in two.assembly.warnings)
+    own = Mechanism(
+        m.ground, m.links, inputs=Input("crank", value=mirrored * 60.0), guess=Guess(angles=m.guess.angles)
+    )
+    assert any(w.startswith(f"[input] crank: {sign}60 rad is 9.55 turns") for w in own.assembly.warnings)
 
 
 @pytest.mark.parametrize(("coupler", "rocker"), [(0.7, 0.299), (1.9, 0.902)])

@@ -228,14 +228,18 @@ class _Chooser:
 
     def _warn_of_large_angles(self) -> None:
         """Warn of each angle of the guess that is more than two turns: mostly it is in degrees, but was read in radians."""
+        of_guess = self.m.guess.at is not None
         every = [
-            (f"at {e.name}", at) for e, at in zip(self.m.inputs, self.m.at, strict=True) if not e.is_slide
+            (f"[guess] at {e.name}" if of_guess else f"[input] {e.name}", at)
+            for e, at in zip(self.m.inputs, self.m.at, strict=True)
+            if not e.is_slide
         ]
-        for name, angle in (*every, *self.m.guess.angles.items()):
+        every += [(f"[guess] {link}", angle) for link, angle in self.m.guess.angles.items()]
+        for name, angle in every:
             if abs(angle) > LARGE:
                 self.warnings.append(
-                    f"[guess] {name}: {angle:.4g} rad is {abs(angle) / (2 * np.pi):.3g} turns: an angle without a unit is "
-                    'in radians, unless [units] has angle = "deg"'
+                    f"{name}: {angle:.4g} rad is {abs(angle) / (2 * np.pi):.3g} turns: an angle without a unit is in radians, "
+                    'unless [units] has angle = "deg"'
                 )
 
     def _warn_of_contradictions(
