@@ -81,6 +81,15 @@ def exactly(number: str, factor: Factor) -> Fraction:
     return Fraction(number) * exact(factor[0]) / exact(factor[1]) if float(number) else Fraction(0)
 
 
+def exactly_in_degrees(angle: Fraction) -> Fraction:
+    """An angle, rad, in degrees: exact where it is written in degrees or turns.
+
+    >>> exactly_in_degrees(exactly("0.25", (2 * math.pi, 1)))
+    Fraction(90, 1)
+    """
+    return angle * 180 / type(angle)(*PI)
+
+
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.ASCII | re.DOTALL)
 
 

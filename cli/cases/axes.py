@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.cases.inputs import Axis, Driven, Grid, Varied, with_numbers
-from cli.cases.written import DEGREES, ROWS, Range, Written, in_degrees
+from cli.cases.written import DEGREES, ROWS, Range, Written
 from cli.read import options
 from dalembert.errors import DataError
 from dalembert.hints import nearest
-from dalembert.quantities import decimals, exactly, is_number, option_digits
+from dalembert.quantities import decimals, exactly, exactly_in_degrees, is_number, option_digits
 from dalembert.units import UNITS, Factor
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.units import Units
@@ -207,7 +207,7 @@ def _in_one_unit(parts: list[tuple[str, Factor]]) -> tuple[list[Fraction], Facto
         return numbers, only
     exact = [exactly(*part) for part in parts]
     if DEGREES in factors:
-        return [in_degrees(x) for x in exact], DEGREES
+        return [exactly_in_degrees(x) for x in exact], DEGREES
     return exact, (1, 1)
 
 

@@ -94,7 +94,7 @@ def cells_of(
         finite = np.isfinite(value)
         if each.link:
             set_by_hand = each.link in driven
-            part = exact_degrees(driven[each.link]) if set_by_hand else degrees(np.exp(1j * value))
+            part = in_one_turn(driven[each.link]) if set_by_hand else degrees(np.exp(1j * value))
         else:
             part = each.of(value)
             finite = finite & np.isfinite(part)
@@ -102,7 +102,7 @@ def cells_of(
     return shown
 
 
-def exact_degrees(angle: Reals) -> Reals:
+def in_one_turn(angle: Reals) -> Reals:
     """Return angles in [0, 360) degrees."""
     reduced = np.mod(angle, 360.0)
     return np.where(reduced >= 360.0, 0.0, reduced)

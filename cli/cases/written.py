@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from dalembert.quantities import PI, decimal_to_si, exactly
-from dalembert.units import Factor
+from dalembert.quantities import decimal_to_si, exactly, exactly_in_degrees
+from dalembert.units import UNITS, Factor
 
 if TYPE_CHECKING:
-    from fractions import Fraction
-
     from numpy.typing import NDArray
 
     from cli.read.options import Steps
@@ -20,7 +17,7 @@ if TYPE_CHECKING:
 
     Reals = NDArray[np.float64]
 
-DEGREES: Factor = (math.pi, 180)
+DEGREES = UNITS["angle"]["deg"]
 ROWS = np.dtype([("shown", float), ("si", float), ("rest", float)])
 """Numbers of many rows, with the fields of `Written`."""
 
@@ -52,22 +49,13 @@ class Written(NamedTuple):
         si, exact = decimal_to_si(digits, factor) + 0.0, exactly(digits, factor)
         shown = si
         if is_angle:
-            shown = float(digits) + 0.0 if factor == DEGREES else float(in_degrees(exact))
+            shown = float(digits) + 0.0 if factor == DEGREES else float(exactly_in_degrees(exact))
         return cls(shown, si, float(exact - type(exact)(si)))
 
 
 def written(row: NDArray[Any]) -> list[Written]:
     """Return the numbers of a row."""
     return [Written(*each) for each in row.tolist()]
-
-
-def in_degrees(exact: Fraction) -> Fraction:
-    """Return an angle in degrees, exact where it is written in degrees or turns.
-
-    >>> in_degrees(exactly("0.25", (2 * math.pi, 1)))
-    Fraction(90, 1)
-    """
-    return exact * 180 / type(exact)(*PI)
 
 
 class Range(NamedTuple):

@@ -220,11 +220,9 @@ def exact_degrees(text: str) -> Fraction:
     >>> exact_degrees("292.5deg")
     Fraction(585, 2)
     """
-    from fractions import Fraction
+    from dalembert.quantities import exactly, exactly_in_degrees, option_digits
 
-    from dalembert.quantities import PI, exactly, option_digits
-
-    return exactly(*option_digits(text, "angle")) * 180 / Fraction(*PI)
+    return exactly_in_degrees(exactly(*option_digits(text, "angle")))
 
 
 def exact_places(
