@@ -131,15 +131,22 @@ def dalembert(forks: Forks, tmp_path: Path) -> Dalembert:
     return run
 
 
+@pytest.fixture
+def browser(chromium: Any) -> Iterator[Any]:
+    """A headless Chromium, driven by selenium; a page that plays does not go on beside later tests."""
+    yield chromium
+    chromium.get("about:blank")
+
+
 @pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
-    """A headless Chromium, driven by selenium."""
+def chromium() -> Iterator[Any]:
+    """The browser of all tests of one process."""
     webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is missing: pip install selenium")
-    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
-    if chromium is None or driver is None:
+    program, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    if program is None or driver is None:
         pytest.skip("no browser: apt-get install chromium chromium-driver")
     options = webdriver.ChromeOptions()
-    options.binary_location = chromium
+    options.binary_location = program
     for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--window-size=1200,900"):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
