@@ -27,15 +27,13 @@ GROUND = "ground"
 NAMED = 10
 
 
-def _on_branch(analysis: Analysis, assembly: Assembly, inputs: list[float], digits: int) -> list[float]:
+def _on_branch(analysis: Analysis, assembly: Assembly, inputs: Iterable[float]) -> list[float]:
     """Return inputs as they are shown, each once, deg in [0, period of the branch) or m."""
-    if analysis.mechanism.inputs[0].is_slide:
-        return sorted({round(v, digits) for v in inputs})
-    turns = assembly.reach.turns
-    if turns is None:
-        return sorted({round(math.degrees(v), digits) for v in inputs})
-    full = 360.0 * turns
-    return sorted({round(math.degrees(v) % full, digits) % full for v in inputs})
+    distinct = assembly.reach.distinct(inputs)
+    # 0 is no 1e-17
+    return [
+        round(v if analysis.mechanism.inputs[0].is_slide else math.degrees(v), 11) + 0.0 for v in distinct
+    ]
 
 
 def _listed(values: list[float], digits: int) -> str:
@@ -60,7 +58,7 @@ def limits(analysis: Analysis, gaps: Sequence[tuple[int, int]]) -> list[str]:
         if missing:
             text = f"{missing} of {analysis.inputs.n} poses cannot be assembled"
             if track.active:
-                shown = _on_branch(analysis, assembly, [v.input for v in assembly.reach.limits()], 12)
+                shown = _on_branch(analysis, assembly, (v.input for v in assembly.reach.limits()))
                 if shown:
                     several = "s" * (len(shown) > 1)
                     text += f": the input {name} has the limit{several} {_listed(shown, 13)} {analysis.unit}"
@@ -103,7 +101,7 @@ def _branch_lines(analysis: Analysis, assembly: Assembly) -> list[str]:
             if low - 1e-12 <= c.input <= high + 1e-12:
                 alike.setdefault(_crossing(analysis, assembly, c), []).append(c.input)
         for text, inputs in alike.items():
-            at = _listed(_on_branch(analysis, assembly, inputs, 9), 10)
+            at = _listed(_on_branch(analysis, assembly, inputs), 10)
             lines.append(f"change point at {at} {analysis.unit}: {text}")
     return lines
 
