@@ -120,21 +120,28 @@ def _crossing(analysis: Analysis, assembly: Assembly, change: ChangePoint) -> st
     return text if change.other is None else f"{text}, the other branch would have {rates(change.other)}"
 
 
-def of_forces(analysis: Analysis) -> list[str]:
-    """Return the warnings of forces without a value: dead points, change points, locked friction, redundant joints."""
+def of_poses(analysis: Analysis) -> list[str]:
+    """Return the warnings of rates and forces without a value: dead points, change points, locked friction, redundant joints."""
     result = [at_places(analysis, what, places, len(places)) for what, places in troubles(analysis)]
     return list(dict.fromkeys([*result, *statements(analysis)]))
 
 
 def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
-    """Return the reasons why forces have no value, with the inputs where."""
+    """Return the reasons why rates and forces have no value, with the inputs where."""
     troubles: list[tuple[str, list[float]]] = []
 
     def note(bad: NDArray[np.bool_], what: str) -> None:
         if bad.any():
             troubles.append((what, analysis.inputs.whole.shown[bad, 0].tolist()))
 
+    rates = [each.key for each in analysis.places if each.order]
     for motion in analysis.motions:
+        if not analysis.forces:
+            if rates and not motion.assembly.track.folded:
+                known = np.isfinite(motion.values(rates)).all(axis=0)
+                what = "the pose is singular: the speed of the input does not determine the other rates, which have no value"
+                note(analysis.assembled(motion) & ~known, what)
+            continue
         d = motion.dynamics
         whole = motion.assembled
         for number, meet in d.without_length.items():
@@ -183,6 +190,8 @@ def contact_lost(motion: Motion, drive: CamDrive) -> str:
 def statements(analysis: Analysis) -> list[str]:
     """Return the warnings of the forces that hold for all poses."""
     result: list[str] = []
+    if not analysis.forces:
+        return result
     for motion in analysis.motions:
         d = motion.dynamics
         if d.statics is not None:
