@@ -293,3 +293,21 @@ def test_links_that_turn_about_one_place_have_no_dips(coupler, rocker, monkeypat
     assert np.abs(np.diff(np.unwrap(motion.link("rocker").angle - TWO_TURNS))).max() < 1e-13
     assert np.abs(motion.link("coupler").omega - 1).max() < 1e-12
     assert len(Check(m.assembly).change_points) == 0
+
+
+@pytest.mark.parametrize(
+    ("lengths", "angles"),
+    [
+        (
+            (0.1, 0.2, 0.2, 0.3),
+            (60, 180),
+        ),  # crank and ground stretch coupler and rocker: 0.1 + 0.3 = 0.2 + 0.2
+        ((0.3, 0.1, 0.2, 0.4), (0, 180)),  # and fold them: 0.4 − 0.3 = 0.2 − 0.1
+        ((0.3, 0.3, 0.3, 0.3), (0, 180)),
+        ((0.4, 1.2, 0.8, 1.0), (math.degrees(math.acos(1.72 / 1.92)), math.degrees(math.acos(0.12 / 1.92)))),
+    ],
+)
+def test_transmission_angles_of_decimals_that_are_equal_in_sum(lengths, angles):
+    """In floats 0.1 + 0.3 is not 0.2 + 0.2: by the root of the difference the angle was 2e-6° off."""
+    (found,) = four_bar(*lengths, 0.3, 0.5, 1.5).check.four_bars
+    assert np.degrees(found.transmission) == pytest.approx(angles, abs=1e-12)

@@ -258,8 +258,11 @@ class Check:
         ground, crank, coupler, rocker = lengths
         links = bodies[1:] if bodies[0] == GROUND else bodies
         if bodies[0] == GROUND and any(e.link == bodies[1] and e.on == GROUND for e in self.mechanism.inputs):
-            reach = [abs(ground - crank), ground + crank]
-            ends = [min(max(r, abs(coupler - rocker)), coupler + rocker) for r in reach]
+            low, high = abs(coupler - rocker), coupler + rocker
+            # in line where the sums of lengths are equal, as in the class: the angle has the root of a difference
+            same = EQUAL * max(lengths)
+            reach = (abs(ground - crank), ground + crank)
+            ends = [low if r < low + same else high if r > high - same else r for r in reach]
             angles = sorted(_angle(coupler, rocker, r) for r in ends)
         else:
             angles = self._seen(bodies, corners)
