@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from virtualwork.branch.change_point import ChangePoint
     from virtualwork.describe.cams import CamDrive
     from virtualwork.describe.description import Description
+    from virtualwork.formulas.loads import Tabled
     from virtualwork.motion import Motion
 
 GROUND = "ground"
@@ -151,6 +152,9 @@ def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
                 "on it have no value",
             )
             whole = whole & ~meet
+        for load, bad in d.beyond_tables:
+            note(whole & bad, _beyond(analysis, load))
+            whole = whole & ~bad
         for values, what in (
             (
                 d.effort,
@@ -172,6 +176,19 @@ def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
         if d.scene.friction:
             note(whole & d.locked, "friction locks the mechanism: no reaction balances its own friction")
     return troubles
+
+
+def _beyond(analysis: Analysis, load: Tabled) -> str:
+    """Return the warning of a load outside the rows of its table."""
+    over, unit, factor = {
+        "input": ("input", analysis.unit, 1.0 if analysis.unit == "m" else 180 / math.pi),
+        "speed": ("speed", "rad/s", 1.0),
+    }.get(load.axis, ("angle", "deg", 180 / math.pi))
+    low, high = (f"{load.table[i][0] * factor:.6g}" for i in (0, -1))
+    return (
+        f"the {load.kind} on {load.body} has no value: its table over the {over} has rows from {low} to {high} {unit}; the forces "
+        "that depend on it have none"
+    )
 
 
 def contact_lost(motion: Motion, drive: CamDrive) -> str:
