@@ -407,6 +407,11 @@ class Mechanism(Numbered):
         samples : int
             The number of samples of a turn of one input, or of a shorter range.
 
+        Raises
+        ------
+        AssemblyError
+            The mechanism cannot be assembled anywhere in the range.
+
         Notes
         -----
         Q = Σ F·K + Σ T κ = 0 (J. A. Riul, Dinâmica das Máquinas, unit II, eq. 3); stable where V″ > 0 (Lagrange, Dirichlet).

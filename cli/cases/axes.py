@@ -271,6 +271,11 @@ def cases_axis(m: Mechanism, path: str, elsewhere: set[int], remarks: list[str])
         order = [*order, *(order[i].rate(1) for i in here), *(order[i].rate(2) for i in here)]  # type: ignore[union-attr]
         shown = [*shown, *speed.T, *acceleration.T]
         values = np.concatenate([values, speed, acceleration], axis=1)
+    elif time is not None:
+        remarks.append(
+            f"{table.file}: the column {time.header} has no effect: rates follow from it where a column names an input, such as "
+            f"{_headers(Driven.of(m, 0))}"
+        )
     seconds = None if time is None else time.si
     rows = np.zeros(values.shape, dtype=ROWS)
     rows["shown"], rows["si"] = np.array(shown).T, values

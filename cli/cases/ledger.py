@@ -96,7 +96,8 @@ def entries_of(motion: Motion, unit: int | None = None) -> list[list[Entry]]:
 
 
 def _entry(item: Item, i: int, fastest: float, field: str) -> Entry:
-    load, rate, power = item.load[i], item.rate[i], float(item.power[i])
+    # no −0
+    load, rate, power = item.load[i] + 0.0, item.rate[i] + 0.0, float(item.power[i]) + 0.0
     at_rest = abs(rate) <= TINY * fastest
     if item.workless:
         why: str | None = REST if at_rest and item.workless == PERPENDICULAR else item.workless

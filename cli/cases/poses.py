@@ -90,14 +90,14 @@ def cells_of(
             # where neither has a finite value, there is no difference
             with np.errstate(invalid="ignore"):
                 value = value - computed[each.less]
-        # a vector is known where both its components are
-        finite = np.isfinite(value)
         if each.link:
             set_by_hand = each.link in driven
             part = in_one_turn(driven[each.link]) if set_by_hand else degrees(np.exp(1j * value))
+            finite = np.isfinite(value)
         else:
+            # statics may determine one component of a force alone
             part = each.of(value)
-            finite = finite & np.isfinite(part)
+            finite = np.isfinite(part)
         shown[each] = cells(part, finite if where is None else finite & where)
     return shown
 

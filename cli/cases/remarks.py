@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from virtualwork.branch.change_point import ChangePoint
     from virtualwork.describe.cams import CamDrive
     from virtualwork.describe.description import Description
+    from virtualwork.formulas.loads import Tabled
     from virtualwork.motion import Motion
 
 GROUND = "ground"
@@ -27,15 +28,13 @@ GROUND = "ground"
 NAMED = 10
 
 
-def _on_branch(analysis: Analysis, assembly: Assembly, inputs: list[float], digits: int) -> list[float]:
+def _on_branch(analysis: Analysis, assembly: Assembly, inputs: Iterable[float]) -> list[float]:
     """Return inputs as they are shown, each once, deg in [0, period of the branch) or m."""
-    if analysis.mechanism.inputs[0].is_slide:
-        return sorted({round(v, digits) for v in inputs})
-    turns = assembly.reach.turns
-    if turns is None:
-        return sorted({round(math.degrees(v), digits) for v in inputs})
-    full = 360.0 * turns
-    return sorted({round(math.degrees(v) % full, digits) % full for v in inputs})
+    distinct = assembly.reach.distinct(inputs)
+    # 0 is no 1e-17
+    return [
+        round(v if analysis.mechanism.inputs[0].is_slide else math.degrees(v), 11) + 0.0 for v in distinct
+    ]
 
 
 def _listed(values: list[float], digits: int) -> str:
@@ -60,7 +59,7 @@ def limits(analysis: Analysis, gaps: Sequence[tuple[int, int]]) -> list[str]:
         if missing:
             text = f"{missing} of {analysis.inputs.n} poses cannot be assembled"
             if track.active:
-                shown = _on_branch(analysis, assembly, [v.input for v in assembly.reach.limits()], 12)
+                shown = _on_branch(analysis, assembly, (v.input for v in assembly.reach.limits()))
                 if shown:
                     several = "s" * (len(shown) > 1)
                     text += f": the input {name} has the limit{several} {_listed(shown, 13)} {analysis.unit}"
@@ -103,7 +102,7 @@ def _branch_lines(analysis: Analysis, assembly: Assembly) -> list[str]:
             if low - 1e-12 <= c.input <= high + 1e-12:
                 alike.setdefault(_crossing(analysis, assembly, c), []).append(c.input)
         for text, inputs in alike.items():
-            at = _listed(_on_branch(analysis, assembly, inputs, 9), 10)
+            at = _listed(_on_branch(analysis, assembly, inputs), 10)
             lines.append(f"change point at {at} {analysis.unit}: {text}")
     return lines
 
@@ -122,21 +121,28 @@ def _crossing(analysis: Analysis, assembly: Assembly, change: ChangePoint) -> st
     return text if change.other is None else f"{text}, the other branch would have {rates(change.other)}"
 
 
-def of_forces(analysis: Analysis) -> list[str]:
-    """Return the warnings of forces without a value: dead points, change points, locked friction, redundant joints."""
+def of_poses(analysis: Analysis) -> list[str]:
+    """Return the warnings of rates and forces without a value: dead points, change points, locked friction, redundant joints."""
     result = [at_places(analysis, what, places, len(places)) for what, places in troubles(analysis)]
     return list(dict.fromkeys([*result, *statements(analysis)]))
 
 
 def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
-    """Return the reasons why forces have no value, with the inputs where."""
+    """Return the reasons why rates and forces have no value, with the inputs where."""
     troubles: list[tuple[str, list[float]]] = []
 
     def note(bad: NDArray[np.bool_], what: str) -> None:
         if bad.any():
             troubles.append((what, analysis.inputs.whole.shown[bad, 0].tolist()))
 
+    rates = [each.key for each in analysis.places if each.order]
     for motion in analysis.motions:
+        if not analysis.forces:
+            if rates and not motion.assembly.track.folded:
+                known = np.isfinite(motion.values(rates)).all(axis=0)
+                what = "the pose is singular: the speed of the input does not determine the other rates, which have no value"
+                note(analysis.assembled(motion) & ~known, what)
+            continue
         d = motion.dynamics
         whole = motion.assembled
         for number, meet in d.without_length.items():
@@ -146,6 +152,9 @@ def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
                 "on it have no value",
             )
             whole = whole & ~meet
+        for load, bad in d.beyond_tables:
+            note(whole & bad, _beyond(analysis, load))
+            whole = whole & ~bad
         for values, what in (
             (
                 d.effort,
@@ -169,6 +178,19 @@ def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
     return troubles
 
 
+def _beyond(analysis: Analysis, load: Tabled) -> str:
+    """Return the warning of a load outside the rows of its table."""
+    over, unit, factor = {
+        "input": ("input", analysis.unit, 1.0 if analysis.unit == "m" else 180 / math.pi),
+        "speed": ("speed", "rad/s", 1.0),
+    }.get(load.axis, ("angle", "deg", 180 / math.pi))
+    low, high = (f"{load.table[i][0] * factor:.6g}" for i in (0, -1))
+    return (
+        f"the {load.kind} on {load.body} has no value: its table over the {over} has rows from {low} to {high} {unit}; the forces "
+        "that depend on it have none"
+    )
+
+
 def contact_lost(motion: Motion, drive: CamDrive) -> str:
     """Return the warning of a cam that would have to pull its follower."""
     from virtualwork.study.cams import lift_off
@@ -185,6 +207,8 @@ def contact_lost(motion: Motion, drive: CamDrive) -> str:
 def statements(analysis: Analysis) -> list[str]:
     """Return the warnings of the forces that hold for all poses."""
     result: list[str] = []
+    if not analysis.forces:
+        return result
     for motion in analysis.motions:
         d = motion.dynamics
         if d.statics is not None:

@@ -54,7 +54,7 @@ class PoseCase(Case):
     gaps : list of (int, int)
         For each assembly the number of poses that cannot be assembled, and the first of them; filled by `tables`.
     troubles : dict
-        Forces that have no value -> the first inputs where, and the number of poses.
+        Rates and forces that have no value -> the first inputs where, and the number of poses.
     statements : dict
         Warnings of the forces that hold for all poses.
     whole : list of array
@@ -114,11 +114,10 @@ class PoseCase(Case):
             if self.study.cases.names:
                 # each row of a variant says whether its pose is assembled
                 self.whole.append(~gap)
-            if a.request.forces and a.forces:
-                for what, places in remarks.troubles(block):
-                    listed, number = self.troubles.get(what, ([], 0))
-                    self.troubles[what] = [*listed, *places[: 5 - len(listed)]], number + len(places)
-                self.statements |= dict.fromkeys(remarks.statements(block))
+            for what, places in remarks.troubles(block):
+                listed, number = self.troubles.get(what, ([], 0))
+                self.troubles[what] = [*listed, *places[: 5 - len(listed)]], number + len(places)
+            self.statements |= dict.fromkeys(remarks.statements(block))
 
     @cached_property
     def extra(self) -> dict[str, Table]:
@@ -152,16 +151,14 @@ class PoseCase(Case):
         return any(mask.any() for mask in masks)
 
     def warnings(self) -> list[str]:
-        """Return the warnings of limits, branches, and forces that have no value."""
-        a, request = self.analysis, self.study.cases.request
+        """Return the warnings of limits, branches, rates and forces that have no value."""
+        a = self.analysis
         gaps = self.gaps or [(int((~mask).sum()), int(np.argmax(~mask))) for mask in self.masks]
         lines = [*a.warnings, *remarks.limits(a, gaps)]
-        if not request.forces or not a.forces:
-            return lines
         if self.gaps:
             troubles = [remarks.at_places(a, what, *at) for what, at in self.troubles.items()]
             return [*lines, *troubles, *self.statements]
-        return [*lines, *remarks.of_forces(a)]
+        return [*lines, *remarks.of_poses(a)]
 
     def result(self) -> Result:
         """Return the result of this mechanism alone, in every form."""
@@ -338,8 +335,7 @@ class PoseFamily:
         for key, lanes in zip(self.keys, values, strict=True):
             if self.json and isinstance(key, Margin):
                 alone |= (np.abs(lanes) < MARKED).any(axis=1)
-            if forces:
-                alone |= (assembled & ~np.isfinite(lanes)).any(axis=1)
+            alone |= (assembled & ~np.isfinite(lanes)).any(axis=1)
         flat = {key: lanes.ravel() for key, lanes in zip(self.keys, values, strict=True)}
         analysis = self.analysis.at(self._inputs(part, shown))
         whole = assembled.ravel()

@@ -161,9 +161,11 @@ class Equilibria(Study):
     def case(self, analysis: Analysis) -> Rest:
         """Return the positions of rest of one mechanism."""
         moved = self.cases.moved
-        _ = analysis.mechanism.assembly
         names = () if moved is None or moved.axes[0].option == "[input] law" else moved.names
-        return Rest(self, analysis, {name.j for name in names if isinstance(name, Driven) and not name.order})
+        rest = Rest(self, analysis, {name.j for name in names if isinstance(name, Driven) and not name.order})
+        # one that cannot be assembled is an error here, and no case
+        _ = rest.equilibria
+        return rest
 
 
 def way(a: Analysis, positions: Sequence[Equilibrium], shown: Sequence[Sequence[float]]) -> list[Topic]:

@@ -16,6 +16,7 @@ from dalembert.hints import nearest
 from dalembert.quantities import is_number, parse_number
 from dalembert.results.columns import Column, Table
 from dalembert.results.text import printed
+from dalembert.tables.headers import plain
 from dalembert.tables.table import read
 from dalembert.units import column_dimensions, common_dimension, find_unit, to_si
 from dalembert.units import from_si as to_unit
@@ -112,11 +113,12 @@ def compare(tables: Sequence[Table], file: str, rtol: float) -> Comparison:
 def _partner(header: str, table: Table) -> tuple[str, str] | None:
     """Return the column that a header of the file means, and the header's unit; None if there is none."""
     for column in table.columns:
-        if column.header.lower() == header.lower():
+        if plain(column.header).lower() == header.lower():
             return column.header, column.unit
     for column in table.columns:
-        base, unit = header[: len(column.name) + 1], header[len(column.name) + 1 :]
-        if base.lower() == f"{column.name.lower()}_" and common_dimension(unit, column.unit) is not None:
+        name = f"{plain(column.name)}_"
+        base, unit = header[: len(name)], header[len(name) :]
+        if base.lower() == name.lower() and common_dimension(unit, column.unit) is not None:
             return column.header, unit
     return None
 

@@ -58,6 +58,7 @@ def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
         check_renamed()
         unknown = stream(result, form, options)
         _warn([*result.warnings, *result.late_warnings(), *_unknown(unknown)], options)
+        _note(result, options)
         if result.failed():
             raise typer.Exit(1)
         return
@@ -158,15 +159,17 @@ def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> 
 
         sys.stdout.write(way_text(result, options.units, sys.stdout.isatty()))
     sys.stdout.flush()
-    shown = (
-        options.json or options.text or (checked is None and options.output is None and sys.stdout.isatty())
-    )
-    if not shown and options.form != ".json":
-        requested = (
-            _in_words(name, result.tables[name]()) for name in result.requested if name in result.tables
-        )
-        for line in chain(*requested, result.aside()):
-            print(f"note: {one_line(line)}", file=sys.stderr)
+    if checked is not None or options.output is not None or not sys.stdout.isatty():
+        _note(result, options)
+
+
+def _note(result: Result, options: ShowOptions) -> None:
+    """Say what a table alone does not show."""
+    if options.json or options.text or options.form == ".json":
+        return
+    requested = (_in_words(name, result.tables[name]()) for name in result.requested if name in result.tables)
+    for line in chain(*requested, result.aside()):
+        print(f"note: {one_line(line)}", file=sys.stderr)
 
 
 def _in_words(name: str, table: Table) -> list[str]:

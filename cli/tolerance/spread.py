@@ -146,7 +146,7 @@ class Tolerances(Case):
         lines = [
             *a.warnings,
             *remarks.limits(a, [(int(gap.sum()), int(np.argmax(gap)))]),
-            *(remarks.of_forces(a) if a.forces else []),
+            *(remarks.of_poses(a) if a.forces else []),
         ]
         return [*lines, *self.apart()]
 

@@ -6,6 +6,7 @@ Terminal, report and JSON walk the same topics; a command forms them with --step
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from dalembert.dataclass import dataclass, field
@@ -57,7 +58,11 @@ def figures(value: float) -> str:
 
     >>> figures(-2500000.0), figures(0.05), figures(-1e-9)
     ('−2 500 000', '0.05', '−1e−09')
+    >>> figures(float("nan"))
+    '–'
     """
+    if not isfinite(value):
+        return "–"
     text = f"{value + 0.0:.6g}"
     if "e" in text and 1e6 <= abs(value) < 1e9:
         text = f"{float(text):.0f}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError, toml_text
@@ -35,7 +36,7 @@ class Heading:
 
     def of(self, quantity: str) -> str | None:
         """Return the suffix behind a quantity's name, if the column is called by it, in any case."""
-        name, quantity = self.name.lower(), quantity.lower()
+        name, quantity = self.name.lower(), plain(quantity).lower()
         if name == quantity:
             return ""
         return self.name[len(quantity) + 1 :] if name.startswith(f"{quantity}_") else None
@@ -75,8 +76,17 @@ def _parted(written: str) -> tuple[str, str]:
         base, unit = match.group(1), match.group(2) or match.group(3) or ""
     elif re.search(r"[,\s]", written) and (match := re.match(_PARTED, written)) and is_unit(match.group(2)):
         base, unit = match.groups()
-    base = re.sub(r"\s+", "_", base.strip().replace("°", "deg")).translate(str.maketrans("µμ", "uu"))
-    return base, "" if unit.strip() in NO_UNIT else unit_name(unit)
+    return plain(base), "" if unit.strip() in NO_UNIT else unit_name(unit)
+
+
+@cache
+def plain(name: str) -> str:
+    """A name as headers are compared: names of links and points may have blanks, ° and µ too.
+
+    >>> plain("µ arm_x")
+    'u_arm_x'
+    """
+    return re.sub(r"\s+", "_", name.strip().replace("°", "deg")).translate(str.maketrans("µμ", "uu"))
 
 
 def is_unit(text: str) -> bool:
@@ -147,20 +157,20 @@ def find_columns(
     result: dict[str, tuple[int, str]] = {}
     lower = [each.name.lower() for each in headings]
     for name in texts:
-        places = [index for index, header in enumerate(lower) if header == name.lower()]
+        places = [index for index, header in enumerate(lower) if header == plain(name).lower()]
         if len(places) > 1:
             raise DataError(f"{file}: the column {name} stands twice: expected it once")
         if places:
             result[name] = (places[0], "")
     alike: dict[str, list[str]] = {}
     for name in dimensions:
-        alike.setdefault(name.lower(), []).append(name)
+        alike.setdefault(plain(name).lower(), []).append(name)
     for name, dimension in dimensions.items():
         good: list[tuple[int, str]] = []
         bad: list[tuple[int, str]] = []
         for index, each in enumerate(headings):
             suffix = each.of(name)
-            if suffix is None or not _is_of(file, each, name, alike[name.lower()]):
+            if suffix is None or not _is_of(file, each, name, alike[plain(name).lower()]):
                 continue
             unit = find_unit(dimension, suffix)
             (bad if unit is None else good).append((index, unit or suffix))
@@ -173,7 +183,11 @@ def find_columns(
             result[name] = good[0]
         elif bad:
             # a column that another quantity claims (`z_rotation` beside `z`) is not an unknown unit
-            others = [o for o in map(str.lower, (*dimensions, *texts)) if o.startswith(f"{name}_".lower())]
+            others = [
+                o
+                for o in (plain(other).lower() for other in (*dimensions, *texts))
+                if o.startswith(f"{plain(name)}_".lower())
+            ]
             strays = [
                 (i, suffix)
                 for i, suffix in bad
@@ -191,9 +205,10 @@ def find_columns(
 
 
 def _is_of(file: str, each: Heading, name: str, alike: Sequence[str]) -> bool:
-    """Return whether a column is that of this name, of names that differ in case alone."""
-    spelt = [other for other in alike if each.name.startswith(other)]
-    if len(alike) > 1 and not spelt:
+    """Return whether a column is that of this name, of names that differ in case, or in blanks and _, alone."""
+    spelt = [other for other in alike if each.written.startswith(other)]
+    spelt = spelt or [other for other in alike if each.name.startswith(plain(other))]
+    if len(alike) > 1 and len(spelt) != 1:
         raise DataError(
             f"{file}: column {each.written}: expected {' or '.join(alike)}, in upper and lower case as here"
         )
@@ -202,7 +217,7 @@ def _is_of(file: str, each: Heading, name: str, alike: Sequence[str]) -> bool:
 
 def likeness(headings: Iterable[Heading], dimensions: Mapping[str, str], texts: Sequence[str]) -> int:
     """Count the columns that a command knows, or may be meant to know: this distinguishes a header from a title."""
-    names = {name.lower() for name in texts}
+    names = {plain(name).lower() for name in texts}
     return sum(
         each.name.lower() in names
         or any(each.of(quantity) is not None for quantity in dimensions)

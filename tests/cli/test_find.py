@@ -170,3 +170,17 @@ def test_what_a_body_cannot_be_asked_for(
     assert done.returncode == 2
     assert done.stdout == ""
     assert expected in " ".join(done.stderr.split())
+
+
+def test_a_table_alone_has_the_number_beside_it(dalembert: Any, tmp_path: Path) -> None:
+    """CSV has the quantity, which is as it was to be; what was found stands on standard error, once."""
+    (tmp_path / "c.toml").write_text(CRANK.format(angle=0, speed=1))
+    words = ("c.toml", "--find", "input.speed", "--so-that", "P.vy=5")
+    said = "note: found: input.speed = 2.5 rad/s gives P.vy = 5 m/s\n"
+    for form in ((), ("-o", "out.csv"), ("-o", "out.md")):
+        done = dalembert("mechanism", *words, *form)
+        assert (done.returncode, done.stderr) == (0, said)
+    for form in (("--text",), ("--json",), ("-o", "out.json")):
+        assert dalembert("mechanism", *words, *form).stderr == ""
+    expected = dalembert("mechanism", *words, "--expect", "out.csv")
+    assert (expected.returncode, expected.stderr.splitlines()[-1]) == (0, said.strip())

@@ -183,3 +183,20 @@ def test_a_short_law_of_motion_names_the_mechanism(dalembert: Dalembert, tmp_pat
     done = dalembert("mechanism", "m.toml")
     assert done.returncode == 1
     assert done.stderr.startswith("dalembert: m.toml: [input] law: expected at least 4 rows")
+
+
+def test_a_column_of_time_beside_no_input_is_said_to_do_nothing(dalembert: Dalembert, tmp_path: Path) -> None:
+    (tmp_path / "arm.toml").write_text(
+        '[ground]\nO = [0, 0]\n[links.arm]\npoints = { O = [0, 0], B = [1, 0] }\n[input]\nlink = "arm"\nangle = 0\nspeed = 2\n'
+    )
+
+    def said(header: str, *rows: str) -> str:
+        (tmp_path / "c.csv").write_text("\n".join([header, *rows]) + "\n")
+        found = dalembert("mechanism", "arm.toml", "--cases", "c.csv", "--only", "arm.omega")
+        assert found.returncode == 0
+        return found.stderr
+
+    rows = ("0,1", "1,2", "2,4", "3,7")
+    assert "the column t_s has no effect" in said("t_s,links.arm.B.x_m", *rows)
+    assert said("t_s,arm_rad", *rows) == ""
+    assert said("t_s,arm_rad,links.arm.B.x_m", *(f"{row},1" for row in rows)) == ""

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from virtualwork import Guess, Guide, Input, Link, Mechanism
+from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
 from virtualwork.branch.track import Track
+from virtualwork.motion import Motion
 from virtualwork.study.check import Check
 
 TWO_TURNS = np.radians(np.arange(0.0, 721.0))
@@ -293,3 +294,49 @@ def test_links_that_turn_about_one_place_have_no_dips(coupler, rocker, monkeypat
     assert np.abs(np.diff(np.unwrap(motion.link("rocker").angle - TWO_TURNS))).max() < 1e-13
     assert np.abs(motion.link("coupler").omega - 1).max() < 1e-12
     assert len(Check(m.assembly).change_points) == 0
+
+
+@pytest.mark.parametrize(
+    ("lengths", "angles"),
+    [
+        (
+            (0.1, 0.2, 0.2, 0.3),
+            (60, 180),
+        ),  # crank and ground stretch coupler and rocker: 0.1 + 0.3 = 0.2 + 0.2
+        ((0.3, 0.1, 0.2, 0.4), (0, 180)),  # and fold them: 0.4 − 0.3 = 0.2 − 0.1
+        ((0.3, 0.3, 0.3, 0.3), (0, 180)),
+        ((0.4, 1.2, 0.8, 1.0), (math.degrees(math.acos(1.72 / 1.92)), math.degrees(math.acos(0.12 / 1.92)))),
+    ],
+)
+def test_transmission_angles_of_decimals_that_are_equal_in_sum(lengths, angles):
+    """In floats 0.1 + 0.3 is not 0.2 + 0.2: by the root of the difference the angle was 2e-6° off."""
+    (found,) = four_bar(*lengths, 0.3, 0.5, 1.5).check.four_bars
+    assert np.degrees(found.transmission) == pytest.approx(angles, abs=1e-12)
+
+
+@pytest.mark.parametrize("ratio", [-1.5, 2.0, 1 / 3])
+def test_every_assembly_of_a_loop_that_drives_a_gear(ratio):
+    """A quick return whose bar turns a wheel, whose pin pulls a rod: the bar's other assembly is half a turn on."""
+    m = Mechanism(
+        {"O": (0, 0), "Q": (0, -0.06), "G": (0.2, 0)},
+        {
+            "crank": Link({"O": (0, 0), "A": (0.1, 0)}),
+            "bar": Link({"Q": (0, 0)}),
+            "wheel": Link({"G": (0, 0), "W": (0.03, 0)}),
+            "rod": Link({"W": (0, 0), "B": (0.3, 0)}),
+        },
+        [Guide("A", "crank", "bar", "Q"), Guide("B", "rod", through=(0, 0.05))],
+        gears=[Gear(("bar", "wheel"), ratio)],
+        inputs=Input("crank"),
+        guess=Guess(0.7, {"bar": 1.0, "wheel": 0.2, "rod": 3.0}),
+    )
+    all_ = m.assemblies()
+    assert len(all_) == 4
+    first, *others = [Motion(each, np.array([0.7, 1.1])) for each in all_]
+    assert first.link("wheel").angle[0] == pytest.approx(0.2, abs=1e-14)
+    for motion in (first, *others):
+        assert motion.assembled.all()
+        assert motion.point("B").position[:, 1] == pytest.approx(0.05, abs=1e-14)
+        bar, wheel = motion.link("bar").angle, motion.link("wheel").angle
+        turned = np.exp(1j * (wheel - wheel[0])) / np.exp(1j * ratio * (bar - bar[0]))
+        assert np.abs(turned - 1).max() < 1e-13

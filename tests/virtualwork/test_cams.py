@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from virtualwork import Cam, Guide, Input, Link, Mechanism, Segment, Spring
-from virtualwork.formulas.kinematics import PressureAngle, Slide
+from virtualwork.formulas.kinematics import CurvatureRadius, PressureAngle, Slide
 
 RNG = np.random.default_rng
 MOTIONS = ["simple harmonic", "cycloidal", "3-4-5", "4-5-6-7", "modified sine", "modified trapezoid"]
@@ -391,3 +391,35 @@ def test_every_link_is_in_balance(name: str, make: Any) -> None:
         force, moment = body.resultant()
         assert np.abs(force).max() < 1e-13 * largest, (name, body.link)
         assert np.abs(moment).max() < 1e-13 * largest, (name, body.link)
+
+
+@pytest.mark.parametrize(("face", "roller"), [("knife", None), ("roller", 0.01)])
+@pytest.mark.parametrize("sense", [1, -1])
+def test_a_profile_that_is_straight_at_a_point(face: str, roller: float | None, sense: int) -> None:
+    """A rise of 25 mm in 90° by simple harmonic motion begins with h″ = h/2·(π/β)² = 50 mm: the pitch radius of 50 mm is undone."""
+    m = Mechanism(
+        {"O": 0j},
+        {"cam": Link({"O": 0j}), "rod": Link({"F": 0j})},
+        [Guide("F", "rod", angle=sense * math.pi / 2, turned=0.0)],
+        inputs=Input("cam", value=0.0),
+        cams=[
+            Cam(
+                "cam",
+                0.05 - (roller or 0.0),
+                slider="F",
+                face=face,
+                roller_radius=roller,
+                law=(
+                    Segment(end=math.pi / 2, rise=0.025, motion="simple harmonic"),
+                    Segment(motion="3-4-5"),
+                ),
+            )
+        ],
+    )
+    (found,) = m.check.cams
+    assert not found.undercut
+    assert 0 < found.curvature_radius < 0.06
+    for at in ([0.0], [0.0, 0.1]):
+        radius = m.motion(np.array(at)).value(CurvatureRadius(0))
+        assert not np.isfinite(radius[0])
+        assert np.isfinite(radius[1:]).all()

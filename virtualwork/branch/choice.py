@@ -116,7 +116,10 @@ class Choice(Record):
         run(steps, st, self._close)
 
     def _close(self, group: Group, st: State) -> None:
-        sign = self.signs[group.name]
+        self.close_with(group, st, self.signs[group.name])
+
+    def close_with(self, group: Group, st: State, sign: int) -> None:
+        """Close a group in one of its two assemblies; angles that gears need lie within half a turn of 0."""
         self.case(group).solve(st, sign, self.mechanism.size)
         for body in self.geared.intersection(group.members):
             st.angle[body] = principal(np.angle(st.turn[body]))

@@ -5,7 +5,7 @@ And why a pose cannot be assembled: the group that does not close, by how much, 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 from functools import cached_property, partial
 from math import isfinite, lcm
@@ -16,6 +16,7 @@ from dalembert.arithmetic.guard import guarded
 from dalembert.dataclass import dataclass, replace
 from virtualwork.branch.noted import SAME
 from virtualwork.branch.track import Track
+from virtualwork.describe import AssemblyError
 from virtualwork.formulas.closed_forms import Gap
 from virtualwork.formulas.newton import newton
 from virtualwork.formulas.numbers import EPS, Complexes, Reals
@@ -151,6 +152,14 @@ class Reach:
         # an input of −1e-15 is 0, not a whole period
         return 0.0 if period - q < 1e-9 or q < 1e-9 else q
 
+    def distinct(self, inputs: Iterable[float]) -> tuple[float, ...]:
+        """Inputs in their order in [0, period of the branch), each once."""
+        unique: list[float] = []
+        for q in sorted(map(self.in_period, inputs)):
+            if self.period is None or not unique or q - unique[-1] > 1e-8:
+                unique.append(q)
+        return tuple(unique)
+
     def apart(self, q: Reals, from_: float) -> Reals:
         """How far inputs are from one, by the nearest way round the branch."""
         d = np.asarray(q - from_)
@@ -158,7 +167,7 @@ class Reach:
 
     @cached_property
     def range(self) -> tuple[float, float]:
-        """The ends of the input's range around the guess, rad or m; infinite where none was met."""
+        """The ends of the input's range around the guess, or next to it, rad or m; infinite where none was met."""
         track = self.track
         low, high = -np.inf, np.inf
         within = [n for n in TURNED if n <= (self.repetition or TURNS)]
@@ -166,12 +175,19 @@ class Reach:
             back = 0 if track.repeats else reach
             track.cover(track.start - back * track.length, track.start + reach * track.length)
             ends = self._around()
-            low = max((v.input for v in ends if v.side > 0 and v.input < track.start), default=-np.inf)
-            high = min((v.input for v in ends if v.side < 0 and v.input > track.start), default=np.inf)
+            start = self._inside(ends)
+            low = max((v.input for v in ends if v.side > 0 and v.input < start), default=-np.inf)
+            high = min((v.input for v in ends if v.side < 0 and v.input > start), default=np.inf)
             # a slide: on, until every range that was met has both of its ends
             if np.isfinite(high - low) and not (track.slides and (ends[0].side < 0 or ends[-1].side > 0)):
                 break
         return low, high
+
+    def _inside(self, ends: list[Limit]) -> float:
+        """The guess's own input; if it cannot be assembled there, the nearest one inside a limit."""
+        start, nudge = self.track.start, SAME * self.track.length
+        near = sorted((v.input + v.side * nudge for v in ends), key=lambda q: abs(q - start))
+        return next((q for q in (start, *near) if np.isfinite(self._stands(np.array([q]))).all()), start)
 
     def limits(self) -> list[Limit]:
         """Where the input can go no further, over one period of the branch or what was covered, to full precision.
@@ -259,6 +275,12 @@ class Reach:
                         return Shortfall(step.name, gap, self._nearest(inputs[0]))
                 track.run([step], st)
         return None
+
+    def nowhere(self, of: str = "") -> AssemblyError:
+        """The error of a mechanism that cannot be assembled at any input that was looked at."""
+        gap = self.shortfall(self.track.assembly.mechanism.at)
+        why = f"; at the guess {gap.text()}" if gap else ""
+        return AssemblyError(f"the mechanism cannot be assembled at any input{of}{why}")
 
     def _nearest(self, q: float) -> float | None:
         """The limit of the input next to q, on q's own turn; of two as near, the one towards the guess."""

@@ -146,7 +146,7 @@ def _combinations(chosen: Choice) -> list[tuple[dict[str, int], dict[str, Any]]]
                 for sign in (1,) if step.kind == "PRP" else (1, -1):
                     trial = st.copy()
                     try:
-                        chosen.case(step).solve(trial, sign, m.size)
+                        chosen.close_with(step, trial, sign)
                     except ZeroDivisionError:
                         continue
                     if trial.margin[step.name] >= 0:

@@ -48,18 +48,18 @@ class File:
             return self.load(self.folder / split_sheet(str(name))[0])
 
     def point_of(self, name: Any, where: str) -> tuple[str, str]:
-        """`crank.B`, or the plain name of a point that one body alone has: the body and the point."""
-        link, dot, point = str(name).rpartition(".")
-        if dot:
-            return link, point
-        owners = [body for body, points in self.bodies.items() if str(name) in points]
-        if len(owners) != 1:
-            names = {p for points in self.bodies.values() for p in points}
-            expected = " or ".join(f'"{body}.{name}"' for body in owners)
-            raise wrong(
-                where, name, expected or f'a link and its point such as "crank.B"{nearest(str(name), names)}'
-            )
-        return owners[0], str(name)
+        """`crank.B`, or the plain name of a point that one body alone has: the body and the point. Names may have dots."""
+        text = str(name)
+        parted = [(text[:i], text[i + 1 :]) for i, letter in enumerate(text) if letter == "."]
+        owners = [body for body, points in self.bodies.items() if text in points]
+        there = [(body, point) for body, point in parted if point in self.bodies.get(body, ())]
+        if there or (parted and not owners):
+            return (there or parted)[-1]
+        if len(owners) == 1:
+            return owners[0], text
+        names = {p for points in self.bodies.values() for p in points}
+        expected = " or ".join(f'"{body}.{name}"' for body in owners)
+        raise wrong(where, name, expected or f'a link and its point such as "crank.B"{nearest(text, names)}')
 
 
 @dataclass(frozen=True)

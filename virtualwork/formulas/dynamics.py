@@ -24,6 +24,7 @@ from virtualwork.formulas.forces import (
     Shaking,
     ShakingMoment,
 )
+from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import FAST, TOGETHER, Complexes, Reals, leave_out, xy
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.reactions import JointForces
@@ -113,6 +114,13 @@ class Dynamics:
                 if meet.any():
                     result[number] = meet
         return result
+
+    @cached_property
+    def beyond_tables(self) -> list[tuple[Tabled, NDArray[np.bool_]]]:
+        """Of the loads that tables give: the poses outside their rows, (n,)."""
+        tables = self.scene.case.tables
+        beyond = [(load, ~np.isfinite(load.over(self.poses.place(load)))) for load in tables]
+        return [(load, np.broadcast_to(bad, self.poses.n)) for load, bad in beyond if bad.any()]
 
     @cached_property
     def effort(self) -> Reals:

@@ -356,6 +356,10 @@ class Poses:
         """All equilibrium equations at once, where the constraints are redundant."""
         raise NotImplementedError
 
+    def place(self, table: Any) -> Reals:
+        """What the table of a load is over, (n,)."""
+        raise NotImplementedError
+
     def formed(
         self,
         forms: Sequence[Callable[[Any], Number]],

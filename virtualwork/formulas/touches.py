@@ -16,6 +16,8 @@ face from the axis (R. L. Norton, Design of Machinery, 5th ed., §8.6, eqs. 8.31
 
 from __future__ import annotations
 
+import math
+
 from dalembert.dataclass import dataclass
 from virtualwork.describe.cams import Cam, CamDrive
 from virtualwork.describe.description import Description
@@ -115,14 +117,14 @@ class Touching:
         return self.pitch_radius() - self.cam.roller
 
     def pitch_radius(self) -> Number:
-        """The radius of curvature of the pitch curve, m, positive where it is convex."""
+        """The radius of curvature of the pitch curve, m, positive where it is convex; NaN where it is straight."""
         first, second = self.rates
         way = first * self.e - 1j * self.r
         bend = second * self.e - 2j * (first * self.e) - self.r
         if self.arm is not None:
             bend = bend + (first * first) * (1j * self.e)
-        length = abs(way)
-        return length * length * length / -cross(way, bend)
+        length, bent = abs(way), -cross(way, bend)
+        return length * length * length / self.kind.select(abs(bent), bent, math.nan)
 
 
 class Touch:

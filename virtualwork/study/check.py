@@ -20,6 +20,8 @@ from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.positions import State
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from virtualwork.study.cams import CamCheck, LiftOff
     from virtualwork.study.strokes import Stroke
 
@@ -132,8 +134,11 @@ class Check:
             condition = float(Lanes(self.assembly, np.array([inputs])).condition[0])
             if condition < best or (chosen is None and condition == np.inf):
                 best, chosen = condition, inputs
+        if chosen is None and track.active and not np.isnan(self._sampled.condition).all():
+            # the guess lies beyond a limit
+            chosen = (float(self._along[np.nanargmin(self._sampled.condition)]),)
         if chosen is None:
-            raise AssemblyError("check: the mechanism cannot be assembled near its guess")
+            raise self.assembly.reach.nowhere()
         return self.assembly.state(chosen)
 
     # --- along the input ------------------------------------------------------------------------------------
@@ -144,6 +149,11 @@ class Check:
         if self.mechanism.inputs[0].is_slide:
             return track.start - track.length, track.start + track.length
         return track.start, track.start + (self.assembly.reach.period or track.length)
+
+    @property
+    def _along(self) -> NDArray[np.float64]:
+        """Inputs over the whole span."""
+        return np.linspace(*self._span(), 1441)
 
     @cached_property
     def input_limits(self) -> tuple[float, float] | None:
@@ -166,7 +176,7 @@ class Check:
         same angle a turn later is another pose (`virtualwork.branch.limits.Reach.turns`).
         """
         reach = self.assembly.reach
-        return self._distinct([limit.input for limit in reach.limits()] if reach.track.active else [])
+        return reach.distinct(limit.input for limit in reach.limits()) if reach.track.active else ()
 
     @cached_property
     def change_points(self) -> tuple[float, ...]:
@@ -175,7 +185,7 @@ class Check:
         if not track.active:
             return ()
         track.cover(*self._span())
-        return self._distinct(track.crossings)
+        return self.assembly.reach.distinct(track.crossings)
 
     @property
     def printed_limits(self) -> tuple[float, ...] | None:
@@ -188,15 +198,6 @@ class Check:
             if self.input_limits is None
             else tuple(map(self.assembly.reach.in_period, self.input_limits))
         )
-
-    def _distinct(self, inputs: list[float]) -> tuple[float, ...]:
-        if self.assembly.reach.period is None:
-            return tuple(sorted(inputs))
-        unique: list[float] = []
-        for q in sorted(map(self.assembly.reach.in_period, inputs)):
-            if not unique or q - unique[-1] > 1e-8:
-                unique.append(q)
-        return tuple(unique)
 
     @property
     def singular(self) -> tuple[str, ...]:
@@ -257,8 +258,11 @@ class Check:
         ground, crank, coupler, rocker = lengths
         links = bodies[1:] if bodies[0] == GROUND else bodies
         if bodies[0] == GROUND and any(e.link == bodies[1] and e.on == GROUND for e in self.mechanism.inputs):
-            reach = [abs(ground - crank), ground + crank]
-            ends = [min(max(r, abs(coupler - rocker)), coupler + rocker) for r in reach]
+            low, high = abs(coupler - rocker), coupler + rocker
+            # in line where the sums of lengths are equal, as in the class: the angle has the root of a difference
+            same = EQUAL * max(lengths)
+            reach = (abs(ground - crank), ground + crank)
+            ends = [low if r < low + same else high if r > high - same else r for r in reach]
             angles = sorted(_angle(coupler, rocker, r) for r in ends)
         else:
             angles = self._seen(bodies, corners)
@@ -267,9 +271,9 @@ class Check:
     @cached_property
     def _sampled(self) -> Lanes:
         """Poses over the whole span, for every four-bar the same."""
-        low, high = self._span()
-        q = np.linspace(low, high, 1441)
-        return Lanes(self.assembly, q if self.assembly.track.active else np.array([self.mechanism.at]))
+        return Lanes(
+            self.assembly, self._along if self.assembly.track.active else np.array([self.mechanism.at])
+        )
 
     def _seen(self, bodies: tuple[str, ...], corners: list[str]) -> list[float]:
         """The transmission angle over the motion, sampled, for chains that are not driven at their own crank."""

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from virtualwork.branch.assembly import Assembly
 from virtualwork.digits.balance import Balance
 from virtualwork.formulas.numbers import EPS, Reals, real_array
-from virtualwork.study.loads_at_rest import AROUND, Rest, goes_round, turns_of_loads
+from virtualwork.study.loads_at_rest import AROUND, Rest, goes_round, turns_of_loads, usual
 
 SAMPLES = 1440
 # of a turn: a range in which the loads' usual work cannot be seen
@@ -191,6 +191,8 @@ def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int 
     ------
     ValueError
         Ranges of another shape, or whose ends change places; no samples.
+    AssemblyError
+        The mechanism cannot be assembled anywhere in the range.
 
     Examples
     --------
@@ -254,14 +256,16 @@ def _one(assembly: Assembly, span: Reals, samples: int, turns: int | None) -> Eq
     force, size = (values[:, 0] for values in rest.force())
     good = np.isfinite(force)
     if not good.any():
+        if not rest.poses.assembled.any():
+            raise assembly.reach.nowhere(" of the range")
         return Equilibria(())
     # beside a limit the loads' work grows without bound: that is no measure of it elsewhere
-    largest, scale = float(size[good].max()), _usual(size[good])
+    largest, scale = float(size[good].max()), usual(size[good])
     turn = assembly.track.length
     if width < NARROW * turn:
         # nor is it about a position of rest, where all terms may vanish
         beside = q.mean() + turn * np.linspace(-0.5, 0.5, AROUND + 1)
-        scale = max(scale, _usual(Rest(assembly, beside[:, None]).force()[1][:, 0]))
+        scale = max(scale, usual(Rest(assembly, beside[:, None]).force()[1][:, 0]))
     if len(q) > 1 and _vanishes(assembly, force[good], largest, scale):
         return Equilibria((), everywhere=True, loaded=scale > 0)
     ends = _towards_limits(assembly, q, good)
@@ -303,16 +307,6 @@ def _one(assembly: Assembly, span: Reals, samples: int, turns: int | None) -> Eq
         if all(abs(math.remainder(root - other, period)) > 1e-8 * unit for other in distinct):
             distinct.append(root)
     return _judged(assembly, np.array(distinct)[:, None], scale)
-
-
-def _usual(size: Reals) -> float:
-    """The middle one of the sizes that are not zero; 0 where none is.
-
-    >>> _usual(np.array([0.0, 1.0, 2.0, 1e14]))
-    2.0
-    """
-    some = size[(size > 0) & np.isfinite(size)]
-    return float(np.median(some)) if len(some) else 0.0
 
 
 def _vanishes(assembly: Assembly, force: Reals, largest: float, scale: float) -> bool:
@@ -398,12 +392,15 @@ def _many(
         for low, high in ranges
     ]
     x = np.array(list(product(*axes)))
-    force, size = Rest(assembly, x).force()
+    rest = Rest(assembly, x)
+    force, size = rest.force()
     good = np.isfinite(force).all(axis=1)
     if not good.any():
+        if not rest.poses.assembled.any():
+            raise assembly.reach.nowhere(" of the range")
         return Equilibria(())
     x = x[good]
-    largest, scale = float(size[good].max()), _usual(size[good])
+    largest, scale = float(size[good].max()), usual(size[good])
     if _vanishes(assembly, force[good], largest, scale):
         return Equilibria((), everywhere=True, loaded=scale > 0)
     # the most promising starts: where no neighbour is nearer to balance would do; a few hundred suffice

@@ -156,3 +156,13 @@ def goes_round(assembly: Assembly, j: int) -> bool:
     ways = np.tile(np.asarray(assembly.mechanism.at, dtype=float), (AROUND + 1, 1))
     ways[:, j] += np.linspace(-np.pi, np.pi, AROUND + 1)
     return bool(Rest(assembly, ways).poses.assembled.all())
+
+
+def usual(size: Reals) -> float:
+    """The middle one of the sizes of loads that are not zero; 0 where none is.
+
+    >>> usual(np.array([0.0, 1.0, 2.0, 1e14]))
+    2.0
+    """
+    some = size[(size > 0) & np.isfinite(size)]
+    return float(np.median(some)) if len(some) else 0.0

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, isnan, nan, sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -98,12 +99,14 @@ def newton(
     Raises
     ------
     ValueError
-        A first guess that is not finite; an f whose derivative cannot be taken from it, without `derivative`.
+        A first guess that is not finite; a negative limit or accuracy; an f whose derivative cannot be taken from it, without
+        `derivative`.
 
     Notes
     -----
     R. Nicoletti, SEM 104, lecture 7 (the method of Newton and Raphson). The imaginary step loses no digit: Im f(x + ih)/h
-    with h = 10⁻¹⁰⁰ (W. Squire, G. Trapp, SIAM Rev. 40 (1998) 110).
+    with h = 10⁻¹⁰⁰ (W. Squire, G. Trapp, SIAM Rev. 40 (1998) 110). A small step alone is no proof: beside a pole f/f′ is as
+    small as beside a root. What counts as a root has |f| grow on both sides of it.
 
     Examples
     --------
@@ -120,38 +123,71 @@ def newton(
     x = float(x0)
     if not isfinite(x):
         raise ValueError(f"x0 = {x0!r}: expected a finite number")
+    for name, bound in (("limit", limit), ("accuracy", accuracy)):
+        if not bound >= 0:
+            raise ValueError(f"{name} = {bound}: expected 0 or more")
     rows: list[Row] = []
-    size = abs(x)
+    first = abs(x) or 1.0
     for k in range(1, limit + 2):
-        value = float(np.real(f(x)))
-        slope = float(derivative(x)) if derivative is not None else _slope(f, x)
-        if not (isfinite(value) and isfinite(slope)):
-            rows.append(Row(k, x, value, slope, float("nan")))
-            return NewtonTable(tuple(rows), False, f"f or f′ is not finite at x{k} = {x:.6g}")
-        if value == 0:
-            rows.append(Row(k, x, value, slope, 0.0))
-            return NewtonTable(tuple(rows), True)
-        if slope == 0:
-            rows.append(Row(k, x, value, slope, float("nan")))
-            return NewtonTable(tuple(rows), False, f"f′({x:.6g}) = 0 at x{k}: the tangent meets no axis")
-        step = -value / slope
+        value, slope, fault, size = nan, nan, "", abs(x) or first
+        try:
+            value = _value(f, x)
+            slope = nan if derivative is None else float(derivative(x))
+        except (ArithmeticError, ValueError) as error:
+            fault = str(error)
+        if derivative is None and isfinite(value):
+            slope = _slope(f, x, value, size)
+        step = 0.0 if value == 0 else -value / slope if isfinite(slope) and slope else nan
         rows.append(Row(k, x, value, slope, step))
-        if abs(step) <= accuracy * (abs(x) or size or 1.0):
-            return NewtonTable(tuple(rows), True)
-        x += step
+        if fault:
+            reason = f"f or f′ cannot be computed at x{k} = {x:.6g}: {fault}"
+        elif slope == 0 and value != 0:
+            reason = f"f′({x:.6g}) = 0 at x{k}: the tangent meets no axis"
+        elif not isfinite(step):
+            reason = f"f or f′ is not finite at x{k} = {x:.6g}"
+        elif abs(step) > accuracy * size:
+            x += step
+            continue
+        elif not _crosses(f, x, value, sqrt(max(accuracy, EPS)) * size):
+            reason = f"the step is small at x{k} = {x:.6g}, but |f| does not grow on both sides: a pole, or f is zero all around"
+        else:
+            reason = ""
+        return NewtonTable(tuple(rows), not reason, reason)
     return NewtonTable(tuple(rows), False, f"after {limit} steps the last one is still {rows[-1].step:.3g}")
 
 
-def _slope(f: Callable[[Any], Any], x: float) -> float:
+def _value(f: Callable[[Any], Any], x: float) -> float:
+    with np.errstate(all="ignore"):
+        value = f(x)
+    if np.imag(value):
+        raise ValueError("f is not real there")
+    return float(np.real(value))
+
+
+def _crosses(f: Callable[[Any], Any], x: float, value: float, apart: float) -> bool:
+    """Whether |f| grows from x to both sides, or to the one where it has a number."""
+    beside = []
+    for near in (x - apart, x + apart):
+        with suppress(ArithmeticError, ValueError):
+            beside.append(abs(_value(f, near)))
+    numbers = [v for v in beside if not isnan(v)]
+    return any(numbers) and min(numbers) >= 2 * abs(value)
+
+
+def _slope(f: Callable[[Any], Any], x: float, value: float, size: float) -> float:
     try:
-        moved: Any = f(complex(x, STEP))
+        with np.errstate(all="ignore"):
+            moved: Any = f(complex(x, STEP))
     except TypeError:
         moved = None
-    value = float(np.real(f(x)))
+    if np.iscomplexobj(moved):
+        slope = float(np.imag(moved)) / STEP
+        # at a root f is rounding alone, and its scale is what it reaches over the size of x; a slope goes with h
+        reach = abs(slope) * size if abs(np.imag(moved)) < sqrt(STEP) * abs(value) else 0.0
     # |x|, and a root beyond its cut, are no functions of a complex number near x
-    if not np.iscomplexobj(moved) or (np.isfinite(moved) and abs(np.real(moved) - value) > 1e-9 * abs(value)):
+    if not np.iscomplexobj(moved) or (value and abs(np.real(moved) - value) > 1e-9 * max(abs(value), reach)):
         raise ValueError(
             "f′ cannot be taken from f (it has math.sin in place of numpy.sin, |x|, or a root of a negative number): "
             "expected derivative= too"
         )
-    return float(np.imag(moved)) / STEP
+    return slope
