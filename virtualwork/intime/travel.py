@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -18,6 +19,7 @@ from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.gains import gains
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.path import Method, Path, followed
+from virtualwork.intime.sticking import holding, rests
 from virtualwork.intime.walk import MOST, Walk
 from virtualwork.intime.watch import Floats, noise
 
@@ -174,13 +176,13 @@ class Travel:
                 whole[rows] = part
         return out[0], out[1], out[2], work
 
-    def rests(self, times: Reals) -> NDArray[np.bool_]:
-        """Whether a joint that rubs is at rest, at times, (n,): what friction keeps it there, no joint force tells."""
+    def undetermined(self, times: Reals) -> NDArray[np.bool_]:
+        """Whether friction holds joints that rub, and statics does not determine it, at times, (n,)."""
         out = np.zeros(len(times), dtype=bool)
         for leg, rows in self._parts(times):
-            if isinstance(leg.equations, Rubbing) and any(leg.equations.arms):
-                still = (leg.at(times[rows])[1] == 0.0).all(axis=1)
-                out[rows] = still | (leg.equations.k > 1 and not all(leg.equations.mode))
+            if isinstance(leg.equations, Rubbing):
+                t, (q, v, *_) = times[rows], leg.at(times[rows])
+                out[rows] = rests(leg.equations, v) & np.isnan(holding(leg.equations, t, q, v)).any(axis=0)
         return out
 
     def energy(self, times: Reals, moved: Moved | None = None) -> Reals:
@@ -202,7 +204,10 @@ class Travel:
                 # other coordinates may be as wrong as the inputs
                 q, v = q + moved[0][rows], v + moved[1][rows]
                 a = leg.equations.many(times[rows], q, v)[:, :-1]
-            parts.append((rows, leg.coordinates.motion(q, v, a, times[rows])))
+            part = leg.coordinates.motion(q, v, a, times[rows])
+            if isinstance(leg.equations, Rubbing) and rests(leg.equations, v).any():
+                part.poses.held = partial(holding, leg.equations, times[rows], q, v)
+            parts.append((rows, part))
         return parts[0][1] if len(parts) == 1 else Joined(parts, len(times))
 
     def link_angle(self, name: str, times: Reals, moved: Moved | None = None) -> Reals:
