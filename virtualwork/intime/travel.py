@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any
 
@@ -138,16 +138,25 @@ class Travel:
         return np.stack([np.interp(times, nodes, of) for of in whole.T], axis=1)
 
     def grown(self, times: Reals) -> Reals:
-        """What the motion makes of the rounding of all steps before, the largest so far, at times between nodes too, (n, k).
+        """What the motion makes of the rounding of all steps before, the largest so far, at times between nodes too, (n, k)."""
+        t, largest = (self.coarse or self)._growth
+        return np.stack([np.interp(times, t, of) for of in largest.T], axis=1)
 
-        Through several sets of coordinates it is not followed: 0.
-        """
-        legs = (self.coarse or self).legs
-        leg = legs[0]
-        if len(legs) > 1:
-            return np.zeros((len(times), leg.equations.k))
-        largest = np.maximum.accumulate(leg.grown, axis=0)
-        return np.stack([np.interp(times, leg.nodes.t, of) for of in largest.T], axis=1)
+    @cached_property
+    def _growth(self) -> tuple[Reals, Reals]:
+        """The times of all nodes, and what the motion makes of rounding up to each, (n, k), through all sets of coordinates."""
+        sizes, spread = [], None
+        for before, leg in zip([None, *self.legs], self.legs, strict=False):
+            if before is not None and spread is not None:
+                _, q, v, *_ = before.last
+                onto = before.coordinates.onto(leg.coordinates, q, v)
+                spread = onto @ spread @ onto.T
+            size, spread = leg.grown(spread)
+            sizes.append(size)
+        largest = np.maximum.accumulate(np.concatenate(sizes), axis=0)
+        return np.concatenate([leg.nodes.t for leg in self.legs]), np.minimum(
+            largest, self.legs[0].equations.scale
+        )
 
     @property
     def halves(self) -> Floats:

@@ -384,7 +384,8 @@ class _Lanes:
                 return self._run(self.rates, np.tile(of, len(t)), *flat)[:, : self.k].T.reshape(q.shape)
 
             q, v, a = (np.moveaxis(x, -1, 0) for x in (part.q, part.v, part.rates[..., :-1]))
-            size = grown(rates, scale[lanes].T, part.t, q, v, a)
+            size, _ = grown(rates, scale[lanes].T, part.t, q, v, a)
+            size = np.minimum(size, scale[lanes].T[:, None])
             result[lanes] = np.maximum.accumulate(size, axis=1).T
         return result
 
