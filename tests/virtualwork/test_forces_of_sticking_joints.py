@@ -12,6 +12,7 @@ import pytest
 
 from tests.virtualwork.released import G, block, double_pendulum, four_bar
 from virtualwork import Force, Friction, Guide, Input, Link, Mechanism
+from virtualwork.describe.dimensions import changed
 from virtualwork.formulas.forces import Effort, JointMoment, Shaking
 from virtualwork.intime.run import Run
 
@@ -129,3 +130,29 @@ def test_two_pins_that_hold_one_motion_are_not_determined() -> None:
 def test_without_friction_nothing_is_held() -> None:
     run = block().simulate([0, 1])
     assert not run.fine.undetermined(run.t).any()
+
+
+def test_variants_have_the_forces_of_each_alone() -> None:
+    """Three coefficients: two blocks are held on their way, one slides on; and one that has already met its end."""
+    mu = np.array([0.5, 0.2, 0.9])
+    m = Mechanism(
+        {"O": 0j},
+        {"block": Link({"P": 0j}, mass=3)},
+        guides=[Guide("P", "block", angle=0.3, turned=0.0)],
+        inputs=Input(slider="P", value=0.0),
+        gravity=-1j * G,
+        friction=[Friction("P", 0.5)],
+    )
+    t = [0.0, 0.1, 2.0]
+    runs = m.vary({"friction.1.coefficient": mu}).simulate(t, speed=1.0)
+    force = runs.motion.reaction("P", on="block")
+    for i, coefficient in enumerate(mu.tolist()):
+        one = changed(m, {"friction.1.coefficient": coefficient}).simulate(t, speed=1.0)
+        assert force[i] == pytest.approx(one.motion.reaction("P", on="block"), abs=1e-13)
+    assert np.abs(runs.motion.effort).max() < 1e-13
+    assert (runs.speed[:, -1, 0] == 0).tolist() == [True, False, True]
+    ends = m.vary({"friction.1.coefficient": mu}).simulate(t, speed=1.0, until={"P": -0.5})
+    force = ends.motion.reaction("P", on="block")
+    assert force[0, -1] == pytest.approx([0.0, 3 * G], abs=1e-13)
+    assert np.isfinite(force[1]).all()
+    assert ends.angle[1, -1, 0] == -0.5

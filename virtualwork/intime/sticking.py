@@ -7,6 +7,8 @@ the joints hold (`sliding.Values`). Where S has full rank they determine φ, and
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,6 +36,18 @@ def holding(equations: Rubbing, t: Reals, q: Reals, v: Reals) -> Reals:
             result[:, i] = _held(equations, float(t[i]), q[i].tolist(), v[i].tolist())
         except Lost:
             continue
+    return result
+
+
+def of_variants(holding: Mapping[int, Callable[[Reals], Reals]], times: Reals) -> Reals | None:
+    """The friction of each contact (c, v, n) at the times (v, n) of variants, some of which rub; None where none does."""
+    result = None
+    for i, of in holding.items():
+        there = np.isfinite(times[i])
+        held = of(times[i, there])
+        if result is None:
+            result = np.full((len(held), *times.shape), np.nan)
+        result[:, i, there] = held
     return result
 
 

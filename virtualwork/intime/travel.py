@@ -187,12 +187,24 @@ class Travel:
 
     def undetermined(self, times: Reals) -> NDArray[np.bool_]:
         """Whether friction holds joints that rub, and statics does not determine it, at times, (n,)."""
-        out = np.zeros(len(times), dtype=bool)
+        out = np.isnan(self.holding(times)).all(axis=0)
         for leg, rows in self._parts(times):
-            if isinstance(leg.equations, Rubbing):
-                t, (q, v, *_) = times[rows], leg.at(times[rows])
-                out[rows] = rests(leg.equations, v) & np.isnan(holding(leg.equations, t, q, v)).any(axis=0)
+            rubs = isinstance(leg.equations, Rubbing)
+            out[rows] &= rubs and rests(leg.equations, leg.at(times[rows])[1])
         return out
+
+    def holding(self, times: Reals) -> Reals:
+        """The friction of each contact (c, n) at times, NaN where none holds a joint or statics does not determine it."""
+        parts = []
+        for leg, rows in self._parts(times):
+            held = np.full((1, len(rows)), np.nan)
+            if isinstance(leg.equations, Rubbing):
+                held = holding(leg.equations, times[rows], *leg.at(times[rows])[:2])
+            parts.append((rows, held))
+        result = np.empty((len(parts[0][1]), len(times)))
+        for rows, held in parts:
+            result[:, rows] = held
+        return result
 
     def energy(self, times: Reals, moved: Moved | None = None) -> Reals:
         """Kinetic energy and that of gravity and springs, (n,) J; `moved`: with other inputs and speeds, by so much."""
