@@ -187,11 +187,11 @@ class Travel:
 
     def undetermined(self, times: Reals) -> NDArray[np.bool_]:
         """Whether friction holds joints that rub, and statics does not determine it, at times, (n,)."""
-        out = np.isnan(self.holding(times)).all(axis=0)
+        still = np.zeros(len(times), dtype=bool)
         for leg, rows in self._parts(times):
-            rubs = isinstance(leg.equations, Rubbing)
-            out[rows] &= rubs and rests(leg.equations, leg.at(times[rows])[1])
-        return out
+            if isinstance(leg.equations, Rubbing):
+                still[rows] = rests(leg.equations, leg.at(times[rows])[1])
+        return still & np.isnan(self.holding(times)).all(axis=0)
 
     def holding(self, times: Reals) -> Reals:
         """The friction of each contact (c, n) at times, NaN where none holds a joint or statics does not determine it."""
