@@ -91,7 +91,8 @@ class Motion(NamedParts[PointMotion, LinkMotion, SlideMotion], MotionViews):
     def __reduce__(self) -> tuple[Any, ...]:
         poses = self.poses
         own = self.inputs, poses.input_error, poses.input_rest
-        return _again, (self.assembly, own, poses.rates, poses.block_of, poses.time)
+        held = None if poses.held is None else poses.holding
+        return _again, (self.assembly, own, poses.rates, poses.block_of, poses.time, held)
 
     @property
     def lock(self) -> Lock:
@@ -409,10 +410,12 @@ def _again(
     rates: list[list[Number]],
     block_of: int | None,
     time: Reals | None = None,
+    held: Reals | None = None,
 ) -> Motion:
     """Make a motion again, as pickles and copies do; what it had solved is solved anew on request."""
     inputs, error, rest = own
     motion = Motion(assembly, inputs, block_of=block_of)
     poses = motion.poses
     poses.rates, poses.time, poses.input_error, poses.input_rest = rates, time, error, rest
+    poses.held = held
     return motion

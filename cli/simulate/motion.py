@@ -201,12 +201,13 @@ class Motion(Case):
     def warnings(self) -> list[str]:
         """Return the warnings: an early end, and doubts."""
         own = [*self.analysis.warnings, *self.run.warnings, *idle_friction(self.analysis.mechanism)]
-        rests = self.run.fine.rests(self.run.t) if self._forces else np.zeros(0, dtype=bool)
-        if rests.any():
-            more = int(rests.sum()) - 1
+        unknown = self.run.fine.undetermined(self.run.t) if self._forces else np.zeros(0, dtype=bool)
+        if unknown.any():
+            more = int(unknown.sum()) - 1
             others = f" and {more} later time{'s' if more > 1 else ''}" if more else ""
             own.append(
-                f"joint forces at {self.run.t[np.argmax(rests)]:.6g} s{others}: without the friction of joints that are at rest there"
+                f"joint forces at {self.run.t[np.argmax(unknown)]:.6g} s{others}: without the friction of joints that are at rest "
+                "there, which statics does not determine"
             )
         return own
 

@@ -115,7 +115,7 @@ class Tolerances(Case):
 
     @cached_property
     def drawn(self) -> tuple[dict[str, Drawn], float]:
-        """From drawn mechanisms, by header; and which share of them is assembled in every pose."""
+        """From drawn mechanisms, by header; and which share of them is assembled in every pose that the mechanism itself has."""
         m, motion, q = self.analysis.mechanism, self.analysis.motions[0], self.analysis.inputs.whole
         numbers = drawn_numbers(m, self.limits, self.draws, self.study.seed, self.study.distribution)
         nominal = dict(zip(self.keys, motion.sensitivities.values(self.keys), strict=True))
@@ -124,7 +124,7 @@ class Tolerances(Case):
         rates = q.speed, q.acceleration
         with processes(self.study.workers) as pool:
             for rows, values, assembled in drawn(m, numbers, motion.inputs, rates, self.keys, pool):
-                whole &= assembled.all(axis=1)
+                whole &= assembled[:, motion.assembled[rows]].all(axis=1)
                 solved = dict(zip(self.keys, values, strict=True))
                 for number in self.numbers:
                     sample, mean = number.of(solved[number.key]), number.of(nominal[number.key][rows])
@@ -137,7 +137,7 @@ class Tolerances(Case):
         for each in joined.values():
             for name in _FIELDS:
                 getattr(each, name)[..., nowhere] = np.nan
-        return joined, float(whole.mean())
+        return joined, float(whole.mean()) if motion.assembled.any() else 0.0
 
     def warnings(self) -> list[str]:
         """Return the warnings of the poses, and where the first order is not enough."""
@@ -182,8 +182,7 @@ class Tolerances(Case):
     def table(self) -> Table:
         """Return the table of poses, each number with its worst case and its standard deviation."""
         base = poses.table(self.analysis)
-        columns: list[Column] = []
-        further: list[Column] = []
+        columns, further = list[Column](), list[Column]()
         for column in base.columns:
             header = column.header
             columns.append(column)
@@ -308,8 +307,7 @@ class Spreads(Study):
 
     def check_size(self, times: int) -> None:
         """Refuse more poses than the memory holds."""
-        show = self.show
-        self.cases.nominal.check_size(json=show.as_json, table=show.needs_table, times=times)
+        self.cases.nominal.check_size(json=self.show.as_json, table=self.show.needs_table, times=times)
 
 
 def _sample(sample: Drawn) -> dict[str, Reals]:

@@ -41,15 +41,36 @@ def test_the_textbook_block_stands_where_it_should(dalembert: Dalembert, tmp_pat
     assert last["speed_m_s"] == 0
 
 
-@pytest.mark.parametrize(("speed", "warned"), [(3, "joint forces at 1.5 s and 3 later times:"), (9, "")])
-def test_joint_forces_of_a_block_at_rest(
-    dalembert: Dalembert, tmp_path: Path, speed: int, warned: str
-) -> None:
-    """It slides for v/(μ g); then friction is what the other loads need, and no joint force has it."""
+@pytest.mark.parametrize("pull", [0, 2, -2])
+def test_joint_forces_of_a_block_at_rest(dalembert: Dalembert, tmp_path: Path, pull: int) -> None:
+    """It slides for v/(μ g − F/m); then friction is what the pull needs."""
     path = tmp_path / "block.toml"
-    path.write_text(BLOCK.replace("SPEED", str(speed)))
-    done = dalembert("simulate", str(path), "--time", "0:3:0.5", "--forces")
-    assert warned in done.stderr
-    assert ("without the friction" in done.stderr) == bool(warned)
+    pulled = f"[[forces]]\nlink = 'block'\npoint = 'P'\nforce = [{pull}, 0]\n" if pull else ""
+    path.write_text(BLOCK.replace("SPEED", "3") + pulled)
+    done = dalembert("simulate", str(path), "--time", "0:3:0.5", "--forces", "--json", "--digits")
+    assert not done.stderr
+    rows = json.loads(done.stdout)["time"]
+    along = [row["reactions"][0]["fx_N"] for row in rows]
+    stops = 3 / (0.3 * 9.81 - pull / 2)
+    assert along == pytest.approx(
+        [-0.3 * 2 * 9.81 if row["t_s"] < stops else -pull for row in rows], abs=1e-13
+    )
+    assert all(row["reactions"][0]["fy_N"] == pytest.approx(2 * 9.81, rel=1e-15) for row in rows)
+
+
+@pytest.mark.parametrize("second", ["", "[[friction]]\njoint = 'D'\ncoefficient = 0.2\nradius = 10\n"])
+def test_what_statics_does_not_determine_at_rest_has_a_warning(
+    dalembert: Dalembert, tmp_path: Path, second: str
+) -> None:
+    """One pin that holds a four-bar bears what balances the weights; of two pins nobody knows which does."""
+    assert dalembert("examples", "falling-four-bar").returncode == 0
+    path = tmp_path / "falling.toml"
+    path.write_text(path.read_text().replace("coefficient = 0.2", "coefficient = 0.8") + second)
     # without --forces there is nothing to warn of
-    assert not dalembert("simulate", str(path), "--time", "0:3:0.5").stderr
+    assert not dalembert("simulate", str(path), "--time", "0:60:20").stderr
+    done = dalembert("simulate", str(path), "--time", "0:60:20", "--forces", "--json")
+    rows = json.loads(done.stdout)["time"]
+    assert rows[-1]["inputs"]["crank"]["speed_rad_s"] == 0
+    assert ("joint forces at" in done.stderr) == bool(second)
+    torque = next(r["moment_N_m"] for r in rows[-1]["reactions"] if r["joint"] == "A")
+    assert bool(torque) != bool(second)

@@ -140,6 +140,21 @@ def test_near_a_limit_the_difference_is_said(dalembert, tmp_path):
     assert "% of the drawn mechanisms cannot be assembled" in found.stderr
 
 
+def test_poses_that_the_mechanism_itself_lacks_do_not_count_as_drawn_ones(dalembert, tmp_path):
+    """Beyond the limit nothing can be assembled, drawn or not; the share is that of the other poses."""
+    text = FILE.replace("[100, 0]", "[159.98, 0]")
+    (tmp_path / "m.toml").write_text(text + '"links.coupler.C.x" = "0.05 mm"\n')
+    options = ("tolerance", "m.toml", "--only", "H", "--order", "position", "--draws", "500", "--json")
+    beyond = ("--set", "ground.D.x=161mm", "--at", "180")
+    one, both, none = (
+        dalembert(*options, *at) for at in (("--at", "60", *beyond[:2]), ("--at", "60", *beyond), beyond)
+    )
+    shares = [json.loads(of.stdout)["tolerance"]["drawn"]["assembled"] for of in (one, both, none)]
+    assert shares == [1.0, 1.0, 0.0]
+    assert [of.returncode for of in (one, both, none)] == [0, 0, 1]
+    assert "drawn mechanisms cannot be assembled" not in both.stderr
+
+
 def test_the_picture_is_written(dalembert, file, tmp_path):
     options = ("--over", "0:360:30", "--only", "H", "--plot")
     assert dalembert("tolerance", file(), *options, "t.svg").returncode == 0

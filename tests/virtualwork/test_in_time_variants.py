@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.virtualwork.test_in_time import four_bar
-from virtualwork import Friction, Input, Link, Mechanism
+from virtualwork import Friction, Input, Link, Mechanism, Torque
 from virtualwork.intime.variants import Runs, Variants
 
 G = 9.81
@@ -172,3 +172,19 @@ def test_variants_at_their_first_time_alone() -> None:
     runs = pendulum().vary({"links.bob.mass": [1.0, 2.0]}).simulate([0.5], angle=0.25, speed=2.0)
     assert runs.angle[:, 0, 0].tolist() == [0.25, 0.25]
     assert runs.acceleration[:, 0, 0] == pytest.approx([-G * math.cos(0.25)] * 2, rel=1e-14)
+
+
+def test_forces_of_variants_under_a_torque_over_time() -> None:
+    """The force that turns a point mass at 1 m with α = t/(I + m) is m α across the bar, and m ω² along it."""
+    m = Mechanism(
+        {"O": 0j},
+        {"rotor": Link({"O": 0j}, mass=1, center=1 + 0j, inertia=2)},
+        inputs=Input(link="rotor", value=0.0),
+        torques=[Torque("rotor", history=((0.0, 0.0), (10.0, 10.0)), over="time")],
+    )
+    mass, t = np.array([1.0, 2.0]), np.array([0.0, 1.0, 2.0])
+    runs = m.vary({"links.rotor.mass": mass}).simulate(t)
+    alpha = t / (2 + mass[:, None])
+    force = runs.motion.reaction("O", on="rotor") @ [1, 1j] / np.exp(1j * runs.angle[..., 0])
+    assert force == pytest.approx(mass[:, None] * (1j * alpha - (alpha * t / 2) ** 2), abs=1e-12)
+    assert runs.motion.effort == pytest.approx(np.zeros((2, 3)), abs=1e-12)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.truth.bodies_in_time import Bodies
 from tests.virtualwork.released import G, block, double_pendulum, four_bar
 from virtualwork import Force, Friction, Input, Link, Mechanism, Spring, Torque
 
@@ -85,3 +86,16 @@ def test_double_pendulum_with_friction_comes_to_rest_one_joint_at_a_time() -> No
     assert modes[-1] == (0, 0)
     assert (run.speed[-1] == 0).all()
     assert np.abs(run.energy_drift).max() < 1e-5
+
+
+@pytest.mark.parametrize("speed", [0.5, -0.5, 0.05, -0.05])
+@pytest.mark.parametrize("end", [1.6709640388852773, 2.498090777658394])
+def test_a_start_close_to_a_limit_of_the_input(end: float, speed: float) -> None:
+    """The rocker moves off near its dead point, where friction by far outweighs the inertia: every body's own coordinates agree."""
+    m = four_bar("rocker", friction=[Friction(j, 0.3, 0.02) for j in "ABCD"])
+    start = end + math.copysign(1e-4, 2.0 - end)
+    run = m.simulate([0, 0.02, 0.05], angle=start, speed=speed, accuracy=1e-8)
+    turned = Bodies(m).angles([start], [speed], run.t)["rocker"]
+    error = np.abs(run.angle[:, 0] - run.angle[0, 0] - (turned - turned[0]))
+    assert (error <= run.error_estimate[:, 0] + 1e-10).all()
+    assert not run.warnings

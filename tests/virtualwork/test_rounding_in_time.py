@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import mpmath as mp
 import numpy as np
 import pytest
 
+from benchmarks.stress import released
 from benchmarks.stress.random_linkages import four_bar
 from benchmarks.truth.mechanism import Exact
 from tests.virtualwork.released import G
+from tests.virtualwork.released import four_bar as swinging
 from virtualwork import Friction, Guide, Input, Link, Mechanism, Spring
 from virtualwork.formulas.kinematics import Angle
 
@@ -110,3 +113,37 @@ def test_a_pendulum_that_comes_by_its_upper_rest_again_and_again(short: float, s
     assert (off <= run.error_estimate[:, 0]).all()
     # an error of the start grows by 1/short² each time it comes by the rest: they add up, and do not multiply
     assert run.error_estimate.max() < 2e4 * np.finfo(float).eps / short**2
+
+
+@pytest.mark.parametrize(
+    "seed", [3, pytest.param(1, marks=pytest.mark.slow), pytest.param(18, marks=pytest.mark.slow)]
+)
+def test_rounding_grows_through_changes_of_coordinates(seed: int) -> None:
+    """A five-bar that passes dead points of its inputs, started at other times: only rounding differs, and the estimates cover it."""
+    m = released._linkage(np.random.default_rng(seed), "five-bar")
+    t = np.linspace(0, 3, 4)
+    runs = [m.simulate(t + later, accuracy=1e-11) for later in (0.0, 64.0, 512.0)]
+    assert all(len(run.fine.legs) > 2 for run in runs)
+    for one, other in itertools.combinations(runs, 2):
+        # the times themselves are rounded
+        off = 512 * np.finfo(float).eps * np.abs(one.speed)
+        apart = np.abs(one.angle - other.angle)
+        assert (apart <= one.error_estimate + other.error_estimate + off).all()
+
+
+def test_small_changes_go_from_one_set_of_coordinates_to_another_and_back() -> None:
+    """The derivatives of states undo each other, and take (q̇, q̈) with them."""
+    run = swinging("rocker").simulate([0, 2.5])
+    assert len(run.fine.legs) > 1
+    for before, after in itertools.pairwise(run.fine.legs):
+        _, q, v, rates, _ = before.last
+        _, p, w, others, _ = after.parted(after.rows[0])
+        there = before.coordinates.onto(after.coordinates, q, v)
+        back = after.coordinates.onto(before.coordinates, p, w)
+        size = np.abs(there) @ np.abs(back)
+        # by differences over 2⁻²⁴: half of all digits
+        assert (np.abs(there @ back - np.eye(2)) <= 1e-8 * size.max()).all()
+        moved = there @ [v[0], rates[0]]
+        assert moved == pytest.approx([w[0], others[0]], rel=1e-6)
+        # the same coordinates change nothing
+        assert (before.coordinates.onto(before.coordinates, q, v) == np.eye(2)).all()

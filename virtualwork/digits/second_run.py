@@ -286,12 +286,17 @@ class SecondRun:
         return self._solutions[name]
 
     def _unfit(self, names: Sequence[str], changed: Mapping[str, Doubled] | None = None) -> list[Doubled]:
-        """By how much the forces of the contacts ask for other friction than enters, (n,) each."""
+        """By how much the forces of the contacts ask for other friction than enters, (n,) each; 0 where joints stick."""
         keys: list[Quantity] = [Rub(int(of.removeprefix("friction "))) for of in names]
         results = self.doubled(keys, changed)
         enters = {of: self._solutions[of] for of in names} | dict(changed or {})
-        zero = np.zeros(self.n)
-        return [results[key][0] - enters[of] + zero for key, of in zip(keys, names, strict=True)]
+        slides = self._slides + np.zeros(self.n)
+        return [(results[key][0] - enters[of]) * slides for key, of in zip(keys, names, strict=True)]
+
+    @property
+    def _slides(self) -> NDArray[np.bool_]:
+        """Whether the friction of a pose follows from the forces of its contacts, (n,) or (1,)."""
+        return np.asarray(np.isnan(self.poses.holding[0]))
 
     def _slopes(self, names: Sequence[str]) -> Reals:
         """How what does not fit falls with each friction, (n, contacts, contacts), for Newton's method."""
@@ -302,8 +307,8 @@ class SecondRun:
         for k, of in enumerate(names):
             other = self._unfit(names, {of: self._solutions[of] + by})
             slopes[:, :, k] = np.array([(x - y).value / by for x, y in zip(rest, other, strict=True)]).T
-        # what locks has no friction to look for
-        there = np.isfinite(slopes).all(axis=(1, 2))
+        # what locks or sticks has no friction to look for
+        there = np.isfinite(slopes).all(axis=(1, 2)) & self._slides
         slopes[~there] = np.eye(len(names))
         return slopes
 

@@ -58,6 +58,10 @@ class Part:
     inputs : array (v or 1, n, k)
     rates : speed, acceleration, jerk of each input
         A number, or an array that broadcasts to (v, n).
+    time : array (v, n), optional
+        s, where the poses are those of motions in time.
+    held : array (c, v, n), optional
+        The friction of each contact where joints of such motions stick, else NaN.
     """
 
     mechanism: Description
@@ -65,6 +69,8 @@ class Part:
     values: Reals
     inputs: Reals
     rates: list[list[Number]]
+    time: Reals | None = None
+    held: Reals | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -78,7 +84,13 @@ class Part:
             return x[rows] if np.ndim(x) and len(x) > 1 else x
 
         rates = [[of(rate) for rate in order] for order in self.rates]
-        return replace(self, values=self.values[rows], inputs=of(self.inputs), rates=rates)
+        time, held = (
+            None if self.time is None else self.time[rows],
+            None if self.held is None else self.held[:, rows],
+        )
+        return replace(
+            self, values=self.values[rows], inputs=of(self.inputs), rates=rates, time=time, held=held
+        )
 
     def described(self, i: int) -> Description:
         """The i-th variant."""
@@ -99,6 +111,8 @@ class Part:
             [float(np.ravel(r)[0]) if np.size(r) == 1 else np.broadcast_to(r, (1, len(q)))[0] for r in order]
             for order in one.rates
         ]
+        result.time = None if one.time is None else one.time[0]
+        result.held = None if one.held is None else one.held[:, 0]
         return result
 
 
@@ -240,6 +254,8 @@ class Solver:
             return True
         if any(table.axis != "input" for table in written.recording.tables):
             # what a table gives is known beforehand where it is over the input
+            return False
+        if self.part.held is not None:
             return False
         if m.friction:
             # where nothing moves, each has a warning

@@ -108,6 +108,8 @@ class Poses:
         self.input_rest: ArrayLike | Callable[[], Reals] | None = None
         # (n,) s, where the poses are those of a motion in time
         self.time: Reals | None = None
+        # (c, n), or a function that gives it: the friction of each contact where joints of such a motion stick, else NaN
+        self.held: Reals | Callable[[], Reals] | None = None
         # whether nothing moves: the rates are those of virtual displacements
         self.at_rest = False
         self._solved: list[tuple[Step, int]] = []
@@ -151,6 +153,8 @@ class Poses:
         some = self.again(self.inputs[which], [[of(rate) for rate in rates] for rates in self.rates])
         some.time = None if self.time is None else np.asarray(self.time)[which]
         some.at_rest = self.at_rest
+        if self.held is not None:
+            some.held = self.holding[:, which]
         return some
 
     @cached_property
@@ -191,8 +195,17 @@ class Poses:
     @property
     def moves(self) -> tuple[bool, ...]:
         """Whether the inputs have a speed, an acceleration, a jerk that is not zero everywhere."""
+        moves = [any(np.any(rate) if np.ndim(rate) else rate for rate in rates) for rates in self.rates]
+        # what friction holds at rest bears forces as what slides does
+        moves[0] = moves[0] or self.held is not None
+        return tuple(moves)
 
-        return tuple([any(np.any(rate) if np.ndim(rate) else rate for rate in rates) for rates in self.rates])
+    @cached_property
+    def holding(self) -> Reals:
+        """The friction of each contact that is known beforehand, (c, n) or (c, 1); NaN where it is not."""
+        if self.held is None:
+            return np.full((1, 1), np.nan)
+        return self.held() if callable(self.held) else self.held
 
     # --- solving ----------------------------------------------------------------------------------------------
     @property

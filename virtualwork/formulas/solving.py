@@ -205,7 +205,8 @@ class Solving(Poses):
         if apart is not None:
             friction[:, apart[0]], more = apart[1]._settled
             count = max(count, more)
-        return friction, count
+        holding = self.holding
+        return np.where(np.isnan(holding), friction, holding), count
 
     @property
     def friction(self) -> Reals:

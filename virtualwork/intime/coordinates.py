@@ -28,6 +28,7 @@ from virtualwork.formulas.loops import Margin, Regularity
 from virtualwork.formulas.numbers import PARTS, Reals
 from virtualwork.formulas.positions import columns, unwound
 from virtualwork.intime.equations import Equations
+from virtualwork.intime.growth import BESIDE
 from virtualwork.intime.watch import Floats, Watch
 from virtualwork.motion import Motion
 
@@ -85,6 +86,24 @@ class Coordinates:
             if not entry.is_slide:
                 result[0, :, j] = unwound(result[0, :, j], near[:, j])
         return result[0], result[1], result[2]
+
+    # --- small changes ------------------------------------------------------------------------------------------
+    def seen(self, q: Reals) -> Reals:
+        """The derivatives of the inputs to the coordinates at many places (n, k), (inputs, coordinates, n)."""
+        at_rest = np.zeros_like(q)
+        rates = [self.states(q, at_rest + unit, at_rest, at_rest)[1].T for unit in np.eye(q.shape[1])]
+        return np.stack(rates, axis=1)
+
+    def onto(self, other: Coordinates, q: Floats, v: Floats) -> Reals:
+        """The derivatives of a state (q, q̇) in other coordinates to that in these, (2k, 2k)."""
+        k, entries = self.equations.k, other.equations.mechanism.inputs
+        if entries == self.equations.mechanism.inputs:
+            return np.eye(2 * k)
+        by = BESIDE * np.array(self.equations.scale)
+        places = np.concatenate([q + np.diag(by), q - np.diag(by), np.tile(q, (k, 1))])
+        motion = self.motion(places, np.concatenate([np.tile(v, (2 * k, 1)), np.eye(k)]))
+        after, before, own = np.split(np.array([measured(motion, entry, 1) for entry in entries]), 3, axis=1)
+        return np.block([[own, np.zeros((k, k))], [(after - before) / (2 * by), own]])
 
     # --- how far from folding -----------------------------------------------------------------------------------
     @cached_property

@@ -124,7 +124,7 @@ class Equations:
         if (t, *q, *v) in self._begun:
             return
         names = [e.name for e in self.mechanism.inputs]
-        mass, rest = self._by_poses(t, q, v)
+        mass, rest = self._by_poses(t, q)
         if not (np.isfinite(mass).all() and np.isfinite(rest).all()):
             raise MechanismError("it cannot be assembled at the start, or stands at a limit of its input")
         # how much of each input's own inertia is left when the others are free to follow
@@ -164,12 +164,12 @@ class Equations:
             careful |= np.array([self._crossing(x) is not None for x in q[:, 0].tolist()], dtype=bool)
         return careful
 
-    def _by_poses(self, t: float, q: Floats, v: Floats) -> tuple[Reals, Reals]:
-        """M (k, k) and h (k,) at a state, from the effort of k + 1 motions through its pose."""
+    def _by_poses(self, t: float, q: Floats) -> tuple[Reals, Reals]:
+        """M (k, k) and h (k,) at rest in a pose, from the effort of k + 1 motions through it: at rest nothing slides."""
         k = self.k
         with np.errstate(all="ignore"):
             unit = np.vstack([np.zeros(k), np.eye(k)])
-            poses = Lanes(self.assembly, np.tile(q, (k + 1, 1)), np.tile(v, (k + 1, 1)), unit)
+            poses = Lanes(self.assembly, np.tile(q, (k + 1, 1)), 0.0, unit)
             poses.time = np.full(k + 1, t)
             result = np.stack(poses.taped([Effort(j) for j in range(k)]), axis=1)
         return (result[1:] - result[0]).T, result[0]

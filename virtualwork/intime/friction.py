@@ -185,6 +185,14 @@ class Rubbing(Equations):
         """False: friction jumps where a joint comes to rest."""
         return False
 
+    @property
+    def stuck(self) -> list[int]:
+        """The joints that friction holds; where one input moves, those of mode 0 do not move with it, and nothing rubs."""
+        holds = self.k > 1 or self.locked
+        return [
+            n for n, (s, arm) in enumerate(zip(self.mode, self.arms, strict=True)) if holds and arm and not s
+        ]
+
     # --- friction at a state --------------------------------------------------------------------------------------
     def __call__(self, t: float, q: Floats, v: Floats) -> Floats:
         """The accelerations at a state in this mode, and the power."""
@@ -210,9 +218,7 @@ class Rubbing(Equations):
             not settle by putting it in again: without it the joint forces grow beyond any bound there, with too few digits
             left for what it takes from them.
         """
-        c, mode = len(self.arms), self.mode
-        # where one input moves a joint of mode 0 does not move with it: nothing rubs
-        stuck = [n for n in range(c) if not mode[n]] if self.k > 1 else []
+        c, mode, stuck = len(self.arms), self.mode, self.stuck
         inverse = np.linalg.pinv([[values.slips[n][m] for m in stuck] for n in stuck]) if stuck else None
         phi, first = [0.0] * c, 0.0
         for _ in range(LIMIT):

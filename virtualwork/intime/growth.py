@@ -42,10 +42,13 @@ def grown(
     a: Reals,
     noise: Reals | float = 0.0,
     steady: bool = True,
-) -> Reals:
+    start: Reals | None = None,
+    seen: Reals | None = None,
+) -> tuple[Reals, Reals]:
     """The standard deviation of the inputs at the nodes of a way, (k, n, …), as rounding in all steps before leaves it.
 
-    At most the `scale`.
+    And the covariance of the state (q, q̇) at the last node, (2k, 2k, …). Beyond the `scale` the equation is not linear: two
+    solutions lie as far apart as they can.
 
     Parameters
     ----------
@@ -59,6 +62,10 @@ def grown(
         What rounding of the accelerations makes of the speeds over each step, in addition to that of their arguments.
     steady : bool
         Whether the accelerations depend on the inputs and their speeds alone, and not on the time.
+    start : array (2k, 2k, …), optional
+        The covariance of the state at the first node, in addition to its rounding there.
+    seen : array (k, k, n, …), optional
+        Where the way has other coordinates: the derivatives of the inputs to these.
 
     Examples
     --------
@@ -66,7 +73,7 @@ def grown(
 
     >>> t = np.linspace(0, 20, 41)
     >>> q, v = np.cosh(t)[None], np.sinh(t)[None]
-    >>> size = grown(lambda t, q, v: q, np.ones(1), t, q, v, q)[0, -1] / (EPS * np.cosh(20))
+    >>> size = grown(lambda t, q, v: q, np.ones(1), t, q, v, q)[0][0, -1] / (EPS * np.cosh(20))
     >>> bool(0.5 < size < 20)
     True
     """
@@ -79,13 +86,16 @@ def grown(
     rounds = np.hypot(noise, ROUNDINGS * EPS * h * np.maximum(*np.split(stirred, 2, axis=1)))
     turning = math.sqrt(3) / 12 * h * h * (_times(last, first) - _times(first, last))
     flow = _exponential(0.5 * h * (first + last) + turning)
-    start = 0.5 * EPS * np.abs(np.concatenate([q[:, 0], v[:, 0]]))
+    begin = _diagonal(np.square(0.5 * EPS * np.concatenate([q[:, 0], v[:, 0]])))
+    if start is not None:
+        begin = begin + start
     with np.errstate(all="ignore"):
         if steady:
             flow = _along_itself(flow, np.concatenate([v, a]), h, scale)
-        variances = _along(flow, np.concatenate([0.0 * rounds, rounds]) ** 2, start**2)
-    # beyond it the equation is not linear, and two solutions lie as far apart as they can
-    return np.minimum(np.sqrt(variances[:k]), scale[:, None])
+        unit = np.broadcast_to(np.eye(k).reshape(k, k, *[1] * t.ndim), (k, k, *t.shape))
+        seen = unit if seen is None else seen
+        variances, last = _along(flow, np.concatenate([0.0 * rounds, rounds]) ** 2, begin, seen)
+    return np.sqrt(variances), last
 
 
 def _inside(share: float, t: Reals, q: Reals, v: Reals, a: Reals) -> tuple[Reals, Reals, Reals]:
@@ -148,37 +158,45 @@ def _exponential(a: Reals) -> Reals:
     return np.asarray(part)
 
 
-def _along(flow: Reals, rounds: Reals, start: Reals) -> Reals:
-    """The variances (m, n, …) of P → Φ P Φᵀ + R from the start (m, …) on, of the flows (m, m, n − 1, …).
+def _along(flow: Reals, rounds: Reals, start: Reals, seen: Reals) -> tuple[Reals, Reals]:
+    """The variances of the inputs (k, n, …) by P → Φ P Φᵀ + R from the start (m, m, …) on, of the flows (m, m, n − 1, …); P at the end.
 
-    Steps are taken side by side in as many runs as there are steps in each, from nothing; what each run begins with follows.
+    `seen` (k, k, n, …) are the derivatives of the inputs to the coordinates. Steps are taken side by side in as many runs as there
+    are steps in each, from nothing; what each run begins with follows.
     """
-    m, n, *lanes = flow.shape[1:]
+    n, *lanes = flow.shape[2:]
     length = max(1, math.isqrt(n))
     runs = -(-n // length)
-    padding = [(0, 0)] * len(lanes)
-    rest = (0, runs * length - n), *padding
-    flow = np.pad(flow, ((0, 0), (0, 0), *rest)).reshape(m, m, runs, length, *lanes)
-    rounds = np.pad(rounds, ((0, 0), *rest)).reshape(m, runs, length, *lanes)
+    rest = (0, runs * length - n), *[(0, 0)] * len(lanes)
+
+    def parted(x: Reals, axes: int) -> Reals:
+        return np.pad(x, (*[(0, 0)] * axes, *rest)).reshape(*x.shape[:axes], runs, length, *lanes)
+
+    flow, rounds, rows = parted(flow, 2), parted(rounds, 1), parted(seen[:, :, 1:], 2)
     through, spread = [flow[:, :, :, 0]], [_diagonal(rounds[:, :, 0])]
     for i in range(1, length):
         through.append(_times(flow[:, :, :, i], through[-1]))
         spread.append(_moved(flow[:, :, :, i], spread[-1]) + _diagonal(rounds[:, :, i]))
-    begin = [_diagonal(start)]
+    begin = [start]
     for j in range(runs - 1):
         begin.append(_moved(through[-1][:, :, j], begin[-1]) + spread[-1][:, :, j])
-    begins = np.stack(begin, axis=2)
-    variances = np.stack(
-        [
-            np.einsum("ij...,jk...,ik...->i...", phi, begins, phi) + p[range(m), range(m)]
-            for phi, p in zip(through, spread, strict=True)
-        ],
-        axis=2,
-    )
-    variances = variances.reshape(m, runs * length, *lanes)[:, :n]
+    begins, k = np.stack(begin, axis=2), len(seen)
+    variances = [_variances(seen[:, :, 0], start[:k, :k])[:, None]]
+    inside = [
+        _variances(_times(row, phi[:k]), begins) + _variances(row, p[:k, :k])
+        for row, phi, p in zip(np.moveaxis(rows, 3, 0), through, spread, strict=True)
+    ]
+    variances.append(np.stack(inside, axis=2).reshape(k, runs * length, *lanes)[:, :n])
+    run, i = divmod(n - 1, length)
+    last = _moved(through[i][:, :, run], begin[run]) + spread[i][:, :, run]
+    whole = np.concatenate(variances, axis=1)
     # beyond all numbers it is infinite
-    variances = np.where(np.isnan(variances), np.inf, np.maximum(variances, 0.0))
-    return np.concatenate([start[:, None], variances], axis=1)
+    return np.where(np.isnan(whole), np.inf, np.maximum(whole, 0.0)), last
+
+
+def _variances(row: Reals, spread: Reals) -> Reals:
+    """The diagonal of W P Wᵀ."""
+    return np.asarray(np.einsum("ij...,jk...,ik...->i...", row, spread, row))
 
 
 def _diagonal(x: Reals) -> Reals:

@@ -89,9 +89,8 @@ class Path:
     def cut(self, node: int) -> None:
         """Take away a node and all after it, but for the first."""
         del self.rows[max(1, node) :]
-        # they are those of every step
-        for name in ("noise", "grown"):
-            self.__dict__.pop(name, None)
+        # it is that of every step
+        self.__dict__.pop("noise", None)
 
     def back(self, stops: Sequence[float]) -> None:
         """Take away the nodes that lie beyond the last of some times by no more than rounding of it."""
@@ -187,22 +186,24 @@ class Path:
         h = np.diff(self.nodes.t)[:, None]
         return np.asarray(DEVIATIONS * self.noise * float(np.linalg.norm(self.method.stages[1])) * h)
 
-    @cached_property
-    def grown(self) -> Reals:
-        """What the motion makes of the rounding of all steps before, (n, k); 0 where it is not smooth, or steps are implicit.
+    def grown(self, start: Reals | None) -> tuple[Reals, Reals | None]:
+        """What the motion makes of the rounding of all steps before, (n, k) of the inputs, and the covariance of the last state.
 
-        Friction and change points: see `Equations.smooth`.
+        It is not followed, 0 and None, where the motion is not smooth (friction and change points: see `Equations.smooth`), or steps are
+        implicit. `start` is the covariance at the beginning.
         """
         nodes, k = self.nodes, self.equations.k
         if self.method.stable == np.inf or not self.equations.smooth or not self.steps:
-            return np.zeros_like(nodes.q)
+            return np.zeros_like(nodes.q), None if self.steps else start
 
         def rates(t: Reals, q: Reals, v: Reals) -> Reals:
             return self.equations.many(t, q.T, v.T)[:, :k].T
 
         scale = np.array(self.equations.scale)
         q, v, a, noise = (x.T for x in (nodes.q, nodes.v, nodes.rates[:, :k], self.noise_of_speeds))
-        return grown(rates, scale, nodes.t, q, v, a, noise, not self.equations.stops).T
+        seen = None if self.coordinates.own else self.coordinates.seen(nodes.q)
+        size, last = grown(rates, scale, nodes.t, q, v, a, noise, not self.equations.stops, start, seen)
+        return size.T, last
 
     # --- the inputs -----------------------------------------------------------------------------------------------
     @cached_property

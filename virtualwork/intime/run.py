@@ -147,12 +147,11 @@ class Run:
     def rounding(self, key: Quantity) -> Reals:
         """What the evaluation of a quantity at the states rounds, (n,): computed twice.
 
-        Friction at rest is no force by the formula, and redundant statics is solved in another way: of forces with these, 0.
+        Redundant statics is solved in another way: of forces with it, 0.
         """
-        m, motion = self.assembly.mechanism, self.motion
-        if key.is_force and (m.friction or self.first_motion.dynamics.statics is not None):
+        if key.is_force and self.first_motion.dynamics.statics is not None:
             return np.zeros(len(self.t))
-        return np.asarray(motion.rounding.of(key))
+        return np.asarray(self.motion.rounding.of(key))
 
     @cached_property
     def motion(self) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any
 
@@ -18,6 +19,7 @@ from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.gains import gains
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.path import Method, Path, followed
+from virtualwork.intime.sticking import holding, rests
 from virtualwork.intime.walk import MOST, Walk
 from virtualwork.intime.watch import Floats, noise
 
@@ -136,16 +138,25 @@ class Travel:
         return np.stack([np.interp(times, nodes, of) for of in whole.T], axis=1)
 
     def grown(self, times: Reals) -> Reals:
-        """What the motion makes of the rounding of all steps before, the largest so far, at times between nodes too, (n, k).
+        """What the motion makes of the rounding of all steps before, the largest so far, at times between nodes too, (n, k)."""
+        t, largest = (self.coarse or self)._growth
+        return np.stack([np.interp(times, t, of) for of in largest.T], axis=1)
 
-        Through several sets of coordinates it is not followed: 0.
-        """
-        legs = (self.coarse or self).legs
-        leg = legs[0]
-        if len(legs) > 1:
-            return np.zeros((len(times), leg.equations.k))
-        largest = np.maximum.accumulate(leg.grown, axis=0)
-        return np.stack([np.interp(times, leg.nodes.t, of) for of in largest.T], axis=1)
+    @cached_property
+    def _growth(self) -> tuple[Reals, Reals]:
+        """The times of all nodes, and what the motion makes of rounding up to each, (n, k), through all sets of coordinates."""
+        sizes, spread = [], None
+        for before, leg in zip([None, *self.legs], self.legs, strict=False):
+            if before is not None and spread is not None:
+                _, q, v, *_ = before.last
+                onto = before.coordinates.onto(leg.coordinates, q, v)
+                spread = onto @ spread @ onto.T
+            size, spread = leg.grown(spread)
+            sizes.append(size)
+        largest = np.maximum.accumulate(np.concatenate(sizes), axis=0)
+        return np.concatenate([leg.nodes.t for leg in self.legs]), np.minimum(
+            largest, self.legs[0].equations.scale
+        )
 
     @property
     def halves(self) -> Floats:
@@ -174,14 +185,26 @@ class Travel:
                 whole[rows] = part
         return out[0], out[1], out[2], work
 
-    def rests(self, times: Reals) -> NDArray[np.bool_]:
-        """Whether a joint that rubs is at rest, at times, (n,): what friction keeps it there, no joint force tells."""
-        out = np.zeros(len(times), dtype=bool)
+    def undetermined(self, times: Reals) -> NDArray[np.bool_]:
+        """Whether friction holds joints that rub, and statics does not determine it, at times, (n,)."""
+        still = np.zeros(len(times), dtype=bool)
         for leg, rows in self._parts(times):
-            if isinstance(leg.equations, Rubbing) and any(leg.equations.arms):
-                still = (leg.at(times[rows])[1] == 0.0).all(axis=1)
-                out[rows] = still | (leg.equations.k > 1 and not all(leg.equations.mode))
-        return out
+            if isinstance(leg.equations, Rubbing):
+                still[rows] = rests(leg.equations, leg.at(times[rows])[1])
+        return still & np.isnan(self.holding(times)).all(axis=0)
+
+    def holding(self, times: Reals) -> Reals:
+        """The friction of each contact (c, n) at times, NaN where none holds a joint or statics does not determine it."""
+        parts = []
+        for leg, rows in self._parts(times):
+            held = np.full((1, len(rows)), np.nan)
+            if isinstance(leg.equations, Rubbing):
+                held = holding(leg.equations, times[rows], *leg.at(times[rows])[:2])
+            parts.append((rows, held))
+        result = np.empty((len(parts[0][1]), len(times)))
+        for rows, held in parts:
+            result[:, rows] = held
+        return result
 
     def energy(self, times: Reals, moved: Moved | None = None) -> Reals:
         """Kinetic energy and that of gravity and springs, (n,) J; `moved`: with other inputs and speeds, by so much."""
@@ -202,7 +225,10 @@ class Travel:
                 # other coordinates may be as wrong as the inputs
                 q, v = q + moved[0][rows], v + moved[1][rows]
                 a = leg.equations.many(times[rows], q, v)[:, :-1]
-            parts.append((rows, leg.coordinates.motion(q, v, a, times[rows])))
+            part = leg.coordinates.motion(q, v, a, times[rows])
+            if isinstance(leg.equations, Rubbing) and rests(leg.equations, v).any():
+                part.poses.held = partial(holding, leg.equations, times[rows], q, v)
+            parts.append((rows, part))
         return parts[0][1] if len(parts) == 1 else Joined(parts, len(times))
 
     def link_angle(self, name: str, times: Reals, moved: Moved | None = None) -> Reals:

@@ -7,7 +7,7 @@ whose branch no comparison decides.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -32,6 +32,7 @@ from virtualwork.intime.growth import grown
 from virtualwork.intime.marching import Nodes, beginning, follow, march, over
 from virtualwork.intime.powers import motion_of, names
 from virtualwork.intime.run import drift, levels_of, not_met, reached, rising, simulate
+from virtualwork.intime.sticking import of_variants
 from virtualwork.intime.watch import Levels
 
 Mask = NDArray[np.bool_]
@@ -79,6 +80,8 @@ class Runs:
     work: Reals = field(repr=False)
     unknown: Mask = field(repr=False)
     warnings: dict[int, tuple[str, ...]] = field(default_factory=dict)
+    # of variants with friction: what holds joints at rest, (c, n) at times (n,)
+    holding: dict[int, Callable[[Reals], Reals]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, family: Family, t: Reals) -> Runs:
@@ -99,9 +102,9 @@ class Runs:
         """The motion of every variant through all times: points, links, slides, joint forces."""
         f = self.family
         rates = [list(np.moveaxis(of, 2, 0)) for of in (self.speed, self.acceleration)]
-        return FamilyMotion(
-            Part(f.mechanism, f.dimensions, f.values, self.angle, [*rates, [0.0] * len(rates[0])])
-        )
+        rates.append([0.0] * len(rates[0]))
+        held = of_variants(self.holding, self.times)
+        return FamilyMotion(Part(f.mechanism, f.dimensions, f.values, self.angle, rates, self.times, held))
 
     def put(self, rows: Any, times: Reals, **columns: Reals) -> None:
         """Keep the results of some variants at their times (…, n), which may be fewer than the requested ones."""
@@ -187,6 +190,8 @@ class Variants(Family):
                 continue
             runs.put(int(i), own.t, **{name: getattr(own, name) for name in FOUND})
             runs.unknown[i, : len(own.t)] = own.unknown
+            if self.mechanism.friction:
+                runs.holding[int(i)] = own.fine.holding
             if own.warnings:
                 runs.warnings[int(i)] = own.warnings
         return runs
@@ -384,7 +389,8 @@ class _Lanes:
                 return self._run(self.rates, np.tile(of, len(t)), *flat)[:, : self.k].T.reshape(q.shape)
 
             q, v, a = (np.moveaxis(x, -1, 0) for x in (part.q, part.v, part.rates[..., :-1]))
-            size = grown(rates, scale[lanes].T, part.t, q, v, a)
+            size, _ = grown(rates, scale[lanes].T, part.t, q, v, a)
+            size = np.minimum(size, scale[lanes].T[:, None])
             result[lanes] = np.maximum.accumulate(size, axis=1).T
         return result
 
