@@ -272,6 +272,7 @@ def way(recording: Recording) -> list[Topic]:
 
     from dalembert.angles import degrees
     from dalembert.results.way import Topic, figures
+    from dalembert.units import written
 
     of = recording.vectors
     text = [
@@ -283,7 +284,7 @@ def way(recording: Recording) -> list[Topic]:
     for sensor, v in zip(recording.sensors, of.vector.tolist(), strict=True):
         angle = float(degrees(np.array([v]))[0])
         text.append(
-            f"  {sensor}: ({figures(v.real)}, {figures(v.imag)}) = {figures(abs(v))} ∠ {figures(angle)}° {recording.unit}"
+            f"  {sensor}: ({figures(v.real)}, {figures(v.imag)}) = {figures(abs(v))} ∠ {figures(angle)}° {written(recording.unit)}"
         )
         entries.append({"sensor": sensor, "x": v.real, "y": v.imag, "amplitude": abs(v), "phase_deg": angle})
     head = {"turns": int(of.turns), "speed_rad_s": float(of.speed), "sensors": entries}

@@ -57,6 +57,15 @@ class Typed:
             for k in range(len(digits) - len("".join(map(str, digits)).rstrip("0"))):
                 yield Decimal((0, (5,), exponent + k))
 
+    def half_unit_at(self, figures: int) -> Decimal:
+        """Half a unit of its last figure; of a whole number zeros behind its first `figures` may come from rounding.
+
+        >>> [str(one.half_unit_at(3)) for text in ("5470", "54.70", "500", "5") for one in typed(text)]
+        ['5', '0.005', '0.5', '0.5']
+        """
+        most = Decimal((0, (5,), self.value.adjusted() - figures))
+        return max((half for half in self.half_units if half <= most), default=self.half_unit)
+
 
 def typed(text: str) -> list[Typed]:
     """Read a number as people type it; several readings where a comma may stand for thousands.

@@ -342,7 +342,7 @@ def written(unit: str) -> str:
     """Return a unit as people write it: `g·mm`, `mm/s²`, `µm pk-pk`, `°`; the other way round than `unit_name`."""
     tag = _tag(unit)
     bare = unit.removesuffix(tag).replace("um", "µm").replace("deg", "°").replace("_per_", "/")
-    for per in ("_s3", "_s2", "_s", "_m3", "_cm3"):
+    for per in ("_s3", "_s2", "_s", "_min", "_h", "_m3", "_cm3"):
         if bare.endswith(per) and "/" not in bare:
             bare = f"{bare.removesuffix(per)}/{per[1:]}"
             break

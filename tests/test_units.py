@@ -151,3 +151,11 @@ def test_a_unit_as_people_write_it_is_read_again() -> None:
     for dimension in ("length", "unbalance", "amplitude", "speed", "torque", "density"):
         for unit in UNITS[dimension]:
             assert unit_name(written(unit)) == unit
+
+
+@pytest.mark.parametrize(
+    "unit", ["km/h", "m/min", "mm/s", "m/s²", "rad/s²", "N·m", "kg·m²", "kg·m²/s", "g·mm", "°/s"]
+)
+def test_what_stands_below_a_stroke_stays_there(unit: str) -> None:
+    """A sheet asked for km·h."""
+    assert written(unit_name(unit)) == unit

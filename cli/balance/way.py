@@ -109,7 +109,8 @@ def _components(b: Balancing, rotor: int, about: float | None, plane: str, scale
     lever = z - about if about is not None else np.full(len(mine), np.nan)
     unit, length = rotors.unbalance_unit, b.length_unit
     angle = degrees(u)
-    values = {"x": u.real, "y": u.imag, "zx": lever * u.real, "zy": lever * u.imag}
+    # no −0 of a lever below zero
+    values = {"x": u.real, "y": u.imag, "zx": lever * u.real + 0.0, "zy": lever * u.imag + 0.0}
 
     def component(name: str, amount: Any) -> Column:
         if len(name) == 1:
@@ -148,11 +149,15 @@ def _components(b: Balancing, rotor: int, about: float | None, plane: str, scale
 def _sum_of(scale: Scale, vectors: list[complex], axis: str, levers: list[float] | None = None) -> str:
     """A sum with its numbers: `(20·1 350 + 65·(−2 598.08))`; of many its first terms."""
     terms = []
-    for k, v in enumerate(vectors[:6]):
-        value = scale.of(v.real if axis == "x" else v.imag)
-        value = f"({value})" if value.startswith("−") else value
-        terms.append(value if levers is None else f"{figures(levers[k] * scale.reach)}·{value}")
-    return f"({' + '.join(terms)}{' + …' if len(vectors) > 6 else ''})"
+    for k, v in enumerate(vectors[:SHOWN]):
+        value = bracketed(scale.of(v.real if axis == "x" else v.imag))
+        terms.append(value if levers is None else f"{bracketed(figures(levers[k] * scale.reach))}·{value}")
+    return f"({' + '.join(terms)}{' + …' if len(vectors) > SHOWN else ''})"
+
+
+def bracketed(number: str) -> str:
+    """A number as a term or factor of a formula: a negative one in brackets."""
+    return f"({number})" if number.startswith("−") else number
 
 
 def _two_planes(
@@ -250,7 +255,10 @@ def _plane_topic(
         signs = (
             f"x {'<' if x < 0 else '>' if x > 0 else '='} 0, y {'<' if y < 0 else '>' if y > 0 else '='} 0"
         )
-        lines.append(f"  tan θ = y/x; {signs}: quadrant {q}, θ = {figures(angle)}°")
+        # an angle on an axis is in no quadrant
+        along = f"{'−' if x + y < 0 else ''}{'x' if x else 'y'}"
+        place = f"tan θ = y/x; {signs}: quadrant {q}" if x and y else f"{signs}: along {along}"
+        lines.append(f"  {place}, θ = {figures(angle)}°")
     if b.request.remove:
         lines.append(f"  to remove instead: on the other side, at {figures(in_turn(angle + 180.0))}°")
     unit = b.rotors.unbalance_unit

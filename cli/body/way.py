@@ -157,9 +157,7 @@ def _principal(b: MovingBody) -> Topic:
         "principal_axes": listed(axes),
         "free": free,
     }
-    text = [
-        "det(I − λ·E) = 0: the principal moments and, for each, the axis with (I − λ·E)·n = 0 (Riul, eqs. 45 to 47)."
-    ]
+    text = ["det(I − λ·E) = 0: the principal moments and, for each, the axis with (I − λ·E)·n = 0."]
     if free:
         text.append(
             "Two moments are equal: any axes across the third will do; those shown lie along the body's own where they can."
@@ -176,7 +174,7 @@ def _principal(b: MovingBody) -> Topic:
             number("omega", "speed", w, place=None),
             number("momentum", "angular momentum", h, place=None),
         ]
-        text.append("In principal axes H′ = (I1·ω1, I2·ω2, I3·ω3).")
+        text.append("In principal axes H′ = (I1·ω1, I2·ω2, I3·ω3) (Riul, eqs. 45, 46).")
     return Topic("principal axes", [*text, Table(columns, ("axis",))], "Principal axes", head)
 
 

@@ -129,10 +129,11 @@ def _students(text: str, exercise: Exercise) -> list[Student]:
             raise bad("--students", f"'{text}': expected a whole number from 1 to {MOST}, or a file")
         return [Student(str(k), {}) for k in range(1, int(text) + 1)]
     table = read(text, texts=None)
-    named = {name.strip().lower(): name for name in table.texts}
+    columns = table.as_written
+    named = {name.lower(): name for name in columns}
     if "student" not in named:
-        raise DataError(f"{text}: no column student: expected one, found {', '.join(table.texts)}")
-    column = table.texts[named["student"]]
+        raise DataError(f"{text}: no column student: expected one, found {', '.join(columns)}")
+    column = columns[named["student"]]
     seen: dict[str, int] = {}
     for row, name in enumerate(column):
         if not name:
@@ -142,16 +143,14 @@ def _students(text: str, exercise: Exercise) -> list[Student]:
                 row, named["student"], name, f"each student once (row {seen[name] + 1} has it too)"
             )
         seen[name] = row
-    others = [name for name in table.texts if name != named["student"]]
+    others = [name for name in columns if name != named["student"]]
     own = {*MARKED, *exercise.keys.values(), *(draw.name for draw in exercise.draws)}
     for name in others:
-        if name.strip().lower() in map(str.lower, own):
+        if name.lower() in map(str.lower, own):
             raise DataError(
                 f"{text}: column {name}: the tables of answers have one of that name: expected another, such as {name} 2"
             )
-    people = [
-        Student(name, {each: table.texts[each][row] for each in others}) for row, name in enumerate(column)
-    ]
+    people = [Student(name, {each: columns[each][row] for each in others}) for row, name in enumerate(column)]
     files: dict[str, str] = {}
     for person in people:
         twin = files.setdefault(person.sheet.lower(), person.name)

@@ -170,19 +170,20 @@ def _varied(variant: Variant) -> Mechanism:
 
 
 def _inputs(variant: Variant, m: Mechanism) -> Any:
-    """The inputs of the first pose that is solved, SI."""
-    poses = variant.solved.document.get("poses")
-    first: Any = poses[0] if isinstance(poses, list) and poses else {}
-    if "input_deg" in first:
-        return radians(first["input_deg"])
-    if "input_m" in first:
-        return first["input_m"]
-    inputs = first.get("inputs")
-    if isinstance(inputs, dict) and len(inputs) == len(m.inputs):
-        return [
-            radians(each["input_deg"]) if "input_deg" in each else each["input_m"] for each in inputs.values()
-        ]
-    return m.at[0] if len(m.inputs) == 1 else list(m.at)
+    """The inputs of the first pose or instant that is solved, SI; the guess's where there is none."""
+    document = variant.solved.document
+    listed: Any = document.get("poses") or document.get("time") or [{}]
+    first = listed[0] if isinstance(listed, list) else {}
+    each = first.get("inputs") or {"": first}
+    places = [
+        radians(entry[key]) if key.endswith("_deg") else entry[key]
+        for entry in each.values()
+        for key in ("input_deg", "angle_deg", "input_m", "position_m")
+        if key in entry
+    ]
+    if len(places) != len(m.inputs):
+        places = list(m.at)
+    return places[0] if len(places) == 1 else places
 
 
 # --- rotors -------------------------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ import numpy as np
 
 from cli.exercise.description import Solved, Value
 from cli.exercise.slips import (
+    WEIGHTS,
     Candidates,
     Pairs,
     Slip,
@@ -160,11 +161,16 @@ class Recomputed:
     @cached_property
     def _others(self) -> Solved | None:
         """The result in every assembly; None where there is no other."""
-        words = self.variant.problem.command
-        if self.variant.problem.exercise.command[0] not in ("mechanism", "forces") or "--branch" in words:
+        problem = self.variant.problem
+        if problem.exercise.command[0] not in ("mechanism", "forces"):
             return None
+        words = list(problem.words or problem.exercise.command)
+        if "--branch" in words:
+            # the assembly that the command names is one of all
+            at = words.index("--branch")
+            problem = replace(problem, words=[*words[:at], *words[at + 2 :]])
         try:
-            return replace_further(self.variant.problem, "--branch", "all").result()
+            return replace_further(problem, "--branch", "all").result()
         except DataError:
             return None
 
@@ -222,7 +228,7 @@ class Recomputed:
         g = problem.gravity
         if g and "gravity.y" in shop.dimensions:
             field = complex(shop.described.mechanism.gravity)
-            for text, share in of_gravity(g):
+            for text, share in (*of_gravity(g), *WEIGHTS):
                 x, y = (Value(Decimal(repr(part * share)), "") for part in (field.real, field.imag))
                 yield drawn(text, {"gravity.x": x, "gravity.y": y})
 
@@ -254,7 +260,7 @@ def _options(problem: Problem) -> Iterator[Edit]:
     for k, word in enumerate(words):
         option = words[k - 1]
         if option == "--gravity" and (g := problem.gravity):
-            for text, share in of_gravity(g):
+            for text, share in (*of_gravity(g), *WEIGHTS):
                 yield put(text, k, _times(word, share))
         if option in RANGES:
             continue

@@ -17,6 +17,7 @@ from cli.show.report import html_part, report
 from dalembert.errors import DataError, quote
 from dalembert.figures import written
 from dalembert.results.columns import Table, names
+from dalembert.units import parted
 from dalembert.units import written as unit_written
 
 STYLE = """
@@ -115,11 +116,19 @@ def label(ask: Ask) -> str:
     if ask.label:
         return ask.label
     name = ask.name.replace("_", " ")
-    where = ", ".join(
-        f"{key.removesuffix('_deg')} {text}{'°' if key.endswith('_deg') else ''}"
-        for key, text in ask.where.items()
-    )
+    where = ", ".join(_key_text(key, text) for key, text in ask.where.items())
     return f"{name} ({where})" if where else name
+
+
+def _key_text(key: str, text: str) -> str:
+    """Return a key of a row in words.
+
+    >>> _key_text("plane", "B"), _key_text("input_deg", "60"), _key_text("t_s", "0.5")
+    ('plane B', 'input 60°', 't 0.5 s')
+    """
+    name, unit = parted(key)
+    shown = unit_text(unit)
+    return f"{name} {text}{'' if shown == '°' else ' '}{shown}".strip()
 
 
 def figures_text(figures: int) -> str:
@@ -147,10 +156,10 @@ def problem_html(variant: Variant, drawing: str) -> str:
 def table_html(table: DataTable) -> str:
     """Return a table of data."""
 
-    def head(column: int) -> str:
-        name, unit = table.quantity(column)
-        text = f"{name} [{unit_written(unit)}]" if unit else table.header[column]
-        return html.escape(text.replace("_", " "))
+    def head(title: str) -> str:
+        # a header with its unit behind a bracket or a comma stands as the file has it
+        name, unit = parted(title.strip(), further=("kg_m2", "kg_m2_s"))
+        return html.escape((f"{name} [{unit_written(unit)}]" if unit else title).replace("_", " "))
 
     def cell(text: str) -> str:
         number = re.fullmatch(r"\s*[-−]?[\d.,]+(?:[eE][-+]?\d+)?\s*", text) is not None
@@ -161,7 +170,7 @@ def table_html(table: DataTable) -> str:
         )
 
     rows = "".join(f"<tr>{''.join(map(cell, row))}</tr>\n" for row in table.rows)
-    header = "".join(f"<th>{head(k)}</th>" for k in range(len(table.header)))
+    header = "".join(f"<th>{head(title)}</th>" for title in table.header)
     dense = ' class="dense"' if len(table.header) > 8 else ""
     return f'<div class="wide"><table{dense}><thead><tr>{header}</tr></thead><tbody>{rows}</tbody></table></div>\n'
 

@@ -184,6 +184,10 @@ class Candidates:
         return None
 
 
+ALONE = -1
+"""The term of a change that goes together with no other."""
+
+
 @dataclass(frozen=True)
 class Change:
     """A change of one term of a sum."""
@@ -220,7 +224,7 @@ def of_sum(
             return None
         i, j = np.triu_indices(len(by), 1)
         term = np.array([change.term for change in changes])
-        apart = (term[i] != term[j]) & (term[i] >= 0) & (term[j] >= 0)
+        apart = (term[i] != term[j]) & (term[i] != ALONE) & (term[j] != ALONE)
         i, j = i[apart], j[apart]
         if not len(i):
             return None
@@ -301,6 +305,10 @@ def of_gravity(g: float) -> Iterator[tuple[str, float]]:
     """Yield the slips in weights, and what each is multiplied by: 9.81 for 10 or the reverse, the mass for the weight."""
     yield "the mass in place of the weight", 1 / g
     yield from other_gravities(g)
+
+
+WEIGHTS = (("the weights are left out", 0.0), ("the weights have the wrong sign", -1.0))
+"""Slips in all weights together, and what each is multiplied by."""
 
 
 def other_gravities(g: float) -> Iterator[tuple[str, float]]:

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from balancing import correct
 from cli.exercise.description import Answer, Value, same
 from cli.exercise.slips import (
+    ALONE,
     GRAVITIES,
+    WEIGHTS,
     Candidates,
     Change,
     Slip,
@@ -271,11 +273,13 @@ def _instant(listed: Any, where: Mapping[str, str]) -> Mapping[str, Any]:
 
 
 def _gravity(variant: Variant, terms: Sequence[Part]) -> Iterator[Change]:
-    """Another g in all weights; their masses in place of the weights. It is no term of its own: it goes together with any."""
+    """Another g in all weights, which goes together with a slip in any term; their masses in place of the weights; no weights."""
     weight = sum(term.value for term in terms if term.name.startswith("weight of"))
     if weight and variant.problem.gravity:
         for text, share in of_gravity(variant.problem.gravity):
             yield Change(len(terms), text, weight * (share - 1))
+        for text, share in WEIGHTS:
+            yield Change(ALONE, text, weight * (share - 1), is_sign=share < 0)
 
 
 # --- a correction is a sum over the masses -------------------------------------------------------------------------

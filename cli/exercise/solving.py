@@ -214,6 +214,11 @@ class Workshop:
             columns = named(self.described.mechanism, ask.quantity)
         except DescriptionError:
             return ask
+        if columns[0].reverse and "--only" not in self.exercise.command:
+            raise DataError(
+                f"{self.exercise.file}: [[ask]], key quantity: found {quote(ask.quantity)}, the force on the other link, which is no "
+                f"column of the command: expected --only {ask.quantity} with the other quantities in the command"
+            )
         return replace(ask, quantity=columns[0].header) if len(columns) == 1 else ask
 
     def entered(self, name: str, value: Value) -> tuple[str, int, int, str]:

@@ -141,6 +141,7 @@ def variants(workshop: Workshop, count: int, seed: int, warnings: list[str]) -> 
         return [one] * count
     result: list[Variant] = []
     reason: str = ""
+    reasons: set[str] = set()
     tried = refused = 0
     for drawn in _orders(exercise, Random(seed)):
         tried += 1
@@ -150,10 +151,14 @@ def variants(workshop: Workshop, count: int, seed: int, warnings: list[str]) -> 
             if len(result) == count:
                 break
         else:
-            refused, reason = refused + 1, why
+            refused, reason = refused + 1, f"{_in_words(drawn)}: {why}"
+            reasons.add(why)
         if tried >= TRIES * (len(result) + 1):
             break
     if not result:
+        if tried > 1 and len(reasons) == 1 and why.startswith("key command"):
+            # the command itself is wrong, whatever is drawn
+            raise DataError(f"{exercise.file}: {why}")
         raise DataError(
             f"{exercise.file}: [draw]: none of {tried} drawn variants can be used; the last: {reason}; expected other values to draw from"
         )
@@ -163,6 +168,10 @@ def variants(workshop: Workshop, count: int, seed: int, warnings: list[str]) -> 
             + (f" ({several(refused, 'variant')} cannot be used; the last: {reason})" if refused else "")
         )
     return [result[k % len(result)] for k in range(count)]
+
+
+def _in_words(drawn: Mapping[str, Value]) -> str:
+    return ", ".join(f"{name} {value}" for name, value in drawn.items())
 
 
 def several(count: int, noun: str) -> str:
@@ -202,15 +211,14 @@ def _without_repeats(random: Random, every: int) -> Iterator[int]:
 def _usable(workshop: Workshop, drawn: dict[str, Value]) -> tuple[Variant | None, str]:
     """Return the variant, or why it cannot be used."""
     problem = workshop.problem(drawn)
-    numbers = ", ".join(f"{name} {value}" for name, value in drawn.items())
     try:
         solved = problem.result()
     except DataError as error:
-        return None, f"{numbers}: {str(error).removeprefix(f'{workshop.exercise.file}: ')}"
+        return None, str(error).removeprefix(f"{workshop.exercise.file}: ")
     why = _pose_trouble(solved.document)
     answers = solved.answers
     why = why or next(filter(None, map(_trouble, answers)), "") or _growth(workshop, drawn, answers)
-    return (None, f"{numbers}: {why}") if why else (Variant(problem, solved), "")
+    return (None, why) if why else (Variant(problem, solved), "")
 
 
 def _pose_trouble(document: Mapping[str, Any]) -> str:

@@ -63,10 +63,12 @@ def read_students(exercise: Exercise, answers: str, key: str | None) -> list[Stu
 def _columns(table: ReadTable, exercise: Exercise, needed: Sequence[str]) -> dict[str, list[str]]:
     """Return the columns; those that mean something under their own names, whatever their case."""
     known = {name.lower(): name for name in (*MARKED, *exercise.keys.values())}
-    columns = {known.get(name.strip().lower(), name): cells for name, cells in table.texts.items()}
+    columns = {known.get(name.lower(), name): cells for name, cells in table.as_written.items()}
     for name in needed:
         if name not in columns:
-            raise DataError(f"{table.file}: no column {name}: expected one, found {', '.join(table.texts)}")
+            raise DataError(
+                f"{table.file}: no column {name}: expected one, found {', '.join(table.as_written)}"
+            )
     return columns
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
@@ -53,6 +53,8 @@ class _Reading:
     scale: Fraction
     """Its unit in the unit of the question."""
     verdict: str
+    figures: int
+    """The figures of the question."""
 
     @property
     def value(self) -> float:
@@ -62,7 +64,7 @@ class _Reading:
     @property
     def half(self) -> float:
         """Half a unit of its last figure, in the unit of the question."""
-        return float(Fraction(self.number.half_unit) * abs(self.scale))
+        return float(Fraction(self.number.half_unit_at(self.figures)) * abs(self.scale))
 
 
 @dataclass(eq=False, repr=False)
@@ -94,11 +96,7 @@ class Judge:
             mark, reading = self._mark(student, k, answer, text.strip(), unit.strip(), earlier)
             marks.append(mark)
             if reading is not None:
-                earlier[k] = (
-                    reading
-                    if reading.verdict == mark.verdict
-                    else _Reading(reading.number, reading.scale, mark.verdict)
-                )
+                earlier[k] = replace(reading, verdict=mark.verdict)
         return marks
 
     def _mark(
@@ -123,7 +121,7 @@ class Judge:
                     else f"the unit {quote(number.unit or unit)} does not fit"
                 )
                 return Mark(student, answer, text, "wrong", trouble), None
-            readings.append(_Reading(number, scale, judge(answer, number, scale)))
+            readings.append(_Reading(number, scale, judge(answer, number, scale), answer.ask.figures))
         best = min(readings, key=lambda reading: RANK.index(reading.verdict))
         if best.verdict == "right":
             return Mark(student, answer, text, "right"), best

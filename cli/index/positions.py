@@ -228,7 +228,7 @@ def way(p: Positions) -> list[Topic]:
     """The worked solution."""
     read = p.shown(p.readings)
     rotor, mandrel = complex(p.shown(p.parts.rotor)), complex(p.shown(p.parts.mounting))
-    e = np.exp(1j * np.radians(p.turned))
+    e = phasor(np.ones(len(p.turned)), p.turned, "deg")
     mean, turn = complex(read.mean()), complex(e.mean())
     spread = float((np.abs(e - turn) ** 2).sum())
     unit = p.unit

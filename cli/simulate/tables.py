@@ -98,7 +98,7 @@ def way(run: Run, inputs: Sequence[Input]) -> list[Topic]:
     """Return the equation of motion at the start, and the balance of energy."""
     q, v, a = (np.asarray(each, dtype=float) for each in (run.angle[0], run.speed[0], run.acceleration[0]))
     law = [
-        "The inputs are free: by d'Alembert's principle M(q)·q̈ + h(q, q̇, t) = 0, the effort at every input being nothing "
+        "The inputs are free: by d'Alembert's principle M(q)·q̈ + h(q, q̇, t) = 0, with no effort at any input "
         "(Riul, unit II, eq. 5, solved for the accelerations).",
     ]
     for entry, place, speed, rate in zip(inputs, q.tolist(), v.tolist(), a.tolist(), strict=True):

@@ -157,6 +157,11 @@ class Table:
         if bad.any():
             raise self.wrong(int(np.argmax(bad)), quantity, expected)
 
+    @property
+    def as_written(self) -> dict[str, list[str]]:
+        """Columns of a table of texts alone, by the headers as the file has them: `Group (A)`."""
+        return dict(zip(map(str.strip, self.header), self.texts.values(), strict=True))
+
     def needed(self, name: str) -> list[str]:
         """Return a column of texts, or say that the table lacks it."""
         if name not in self.texts:

@@ -106,6 +106,92 @@ def test_slips_in_a_mechanism(
     assert named is None if said is None else named is not None and said in named
 
 
+def test_the_other_assembly_of_one_that_the_command_names(dalembert: Dalembert, tmp_path: Path) -> None:
+    """With its fixed points on the x-axis the mirrored input and angle make the same number: one slip goes before two."""
+    (tmp_path / "bar.toml").write_text(BAR)
+    other = solved(dalembert, "mechanism", "bar.toml", "--at", "60deg", "--branch", "2")[0]
+    exercise = (
+        'command = "mechanism bar.toml --at 60deg --branch 1"\n'
+        '[[ask]]\nquantity = "bar_angle_deg"\nfigures = 4\n[[ask]]\nquantity = "rocker_omega_rad_s"\n'
+    )
+    rows = "student,quantity,answer\n"
+    rows += f"1,bar_angle_deg,{float(other['bar_angle_deg']):.4g}\n"
+    rows += f"1,rocker_omega_rad_s,{float(other['rocker_omega_rad_s']):.3g}\n"
+    assert mistakes(dalembert, tmp_path, exercise, rows) == ["the other assembly", None]
+
+
+@pytest.mark.parametrize(("speed", "verdict"), [("100rad_s", "carried"), ("103rad_s", "wrong")])
+def test_zeros_that_rounding_leaves_carry_as_other_figures_do(
+    dalembert: Dalembert, tmp_path: Path, speed: str, verdict: str
+) -> None:
+    """To three figures −5468.7 mm/s is −5470, as −5.47 m/s: an earlier answer with the same rpm for rad/s carries it."""
+    (tmp_path / "bar.toml").write_text(BAR.replace("300 rpm", "100 rpm"))
+    turned = ("mechanism", "bar.toml", "--at", "60deg")
+    first = solved(dalembert, *turned, "--set", "input.speed=100rad_s")[0]
+    later = solved(dalembert, *turned, "--set", f"input.speed={speed}")[0]
+    (tmp_path / "e.toml").write_text(
+        'command = "mechanism bar.toml --at 60deg"\ntext = "{input.speed}, {links.crank.B.x}"\n'
+        '[[ask]]\nquantity = "bar_omega_rad_s"\n[[ask]]\nquantity = "C_vx_m_s"\nunit = "mm/s"\n'
+    )
+    typed = float(f"{1000 * float(later['C_vx_m_s']):.3g}")
+    (tmp_path / "a.csv").write_text(
+        f"student,quantity,answer\n1,bar_omega_rad_s,{float(first['bar_omega_rad_s']):.3g}\n1,C_vx_m_s,{typed:.0f}\n"
+    )
+    done = dalembert("grade", "e.toml", "a.csv", "--json")
+    assert [mark["verdict"] for mark in json.loads(done.stdout)["marks"]] == ["wrong", verdict]
+
+
+WEIGHTS = """
+gravity = [0, -10]
+[ground]
+O = [0, 0]
+[links.crank]
+points = { O = [0, 0], A = [0.1, 0] }
+mass = 2
+center = [0.04, 0.01]
+[links.rod]
+points = { A = [0, 0], B = [0.4, 0] }
+mass = 1.5
+center = [0.15, 0]
+[links.piston]
+points = { B = [0, 0] }
+mass = 1
+[[sliders]]
+point = "B"
+link = "piston"
+on = "ground"
+through = [0, 0]
+angle = 0
+[[forces]]
+link = "piston"
+point = "B"
+force = [-30, 0]
+[input]
+link = "crank"
+angle = "60 deg"
+[guess]
+at = "60 deg"
+B = [0.4, 0]
+"""
+
+
+@pytest.mark.parametrize(
+    ("g", "mistake"),
+    [
+        ("0", "the weights are left out"),
+        ("10", "the weights have the wrong sign"),
+        ("-9.81", "g = 9.81 in place of 10"),
+    ],
+)
+def test_all_weights_together(dalembert: Dalembert, tmp_path: Path, g: str, mistake: str) -> None:
+    """The torque without any weight, with weights upwards, and with another g; of several links."""
+    (tmp_path / "w.toml").write_text(WEIGHTS)
+    slipped = solved(dalembert, "forces", "w.toml", "--at", "60deg", "--set", f"gravity.y={g}")[0]
+    exercise = 'command = "forces w.toml --at 60deg"\n[[ask]]\nquantity = "input_torque_N_m"\nfigures = 5\n'
+    rows = f"student,quantity,answer\n1,input_torque_N_m,{float(slipped['input_torque_N_m']):.5g}\n"
+    assert mistakes(dalembert, tmp_path, exercise, rows) == [mistake]
+
+
 def test_files_are_relative_to_the_exercise(dalembert: Dalembert, tmp_path: Path) -> None:
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "bar.toml").write_text(BAR)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from math import atan2, cos, degrees, hypot, radians, sin
 from pathlib import Path
 from random import Random
@@ -87,6 +88,31 @@ def test_one_mass_in_one_plane_and_its_mirror_images(dalembert: Any, tmp_path: P
         assert whole["way"][1]["quadrant"] == expected
         assert whole["way"][0]["sum"]["zx_kg_m2"] is None
         check(whole["way"], whole["rotors"][0])
+
+
+@pytest.mark.parametrize(
+    ("angle", "text"),
+    [
+        (0, "x < 0, y = 0: along −x, θ = 180°"),
+        (90, "x = 0, y < 0: along −y, θ = 270°"),
+        (180, "x > 0, y = 0: along x, θ = 0°"),
+        (270, "x = 0, y > 0: along y, θ = 90°"),
+        (10, "tan θ = y/x; x < 0, y < 0: quadrant 3, θ = 190°"),
+    ],
+)
+def test_on_an_axis_there_is_no_quadrant(dalembert: Any, tmp_path: Path, angle: int, text: str) -> None:
+    (tmp_path / "r.csv").write_text(f"mass_kg,radius_mm,angle_deg\n2,30,{angle}\n")
+    done = dalembert("balance", "r.csv", "--plane", "P:60mm", "--steps", "--text")
+    assert done.stdout.splitlines()[-1].strip() == text
+
+
+def test_levers_below_zero_stand_in_brackets(dalembert: Any, tmp_path: Path) -> None:
+    """Two signs beside each other are none of a formula; a component that is zero has none."""
+    (tmp_path / "r.csv").write_text("mass_kg,radius_mm,angle_deg,z_mm\n1,10,90,20\n2,30,0,-40\n")
+    done = dalembert("balance", "r.csv", *PLANES, "--steps", "--text")
+    assert "20·0 + (−40)·60 000" in done.stdout
+    assert "+ −" not in done.stdout
+    assert re.search(r"(?m) -0( |$)", done.stdout) is None
 
 
 def test_many_rotors_and_planes(dalembert: Any, tmp_path: Path) -> None:

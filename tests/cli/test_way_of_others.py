@@ -88,6 +88,18 @@ def test_a_torque_that_falls_stores_a_quarter_of_its_work(dalembert: Any, tmp_pa
     assert way["inertia"]["flywheel_inertia_kg_m2"] == pytest.approx(0.314159, rel=1e-6)
 
 
+def test_even_positions_have_no_mean(dalembert: Any, tmp_path: Path) -> None:
+    """Four quarter turns add up to nothing, without rounding; a unit is written as people write it."""
+    (tmp_path / "i.csv").write_text(
+        "turned_deg,amplitude_mm_s,phase_deg\n0,5,0\n90,3,10\n180,1,0\n270,2,200\n"
+    )
+    done = dalembert("index", "i.csv", "--steps", "--text")
+    assert "ē = (0, 0), D = 4" in done.stdout
+    dalembert("examples", "fan-signal")
+    done = dalembert("signal", "recording.csv", "--steps", "--text")
+    assert "= 3.4 ∠ 116° mm/s\n" in done.stdout
+
+
 def test_half_the_sum_and_half_the_difference(dalembert: Any, tmp_path: Path) -> None:
     (tmp_path / "i.csv").write_text("turned_deg,unbalance_g_mm,angle_deg\n0,5,0\n180,1,0\n")
     way = topics(dalembert, "index", "i.csv")
