@@ -37,7 +37,7 @@ function enter(last) {
 }
 let standing = [];
 // a reading is an amplitude with its phase, a mass stands at an angle: what is missing of them
-const halves = () => sheet.runs.flatMap((run, k) => [
+const missingHalves = () => sheet.runs.flatMap((run, k) => [
   ...sheet.sensors.map((sensor, s) => [sensor, reading(k, s, "amplitude"), TEXTS.amplitude, reading(k, s, "phase"), TEXTS.phase]),
   ...(k ? sheet.planes.map((plane, p) => [plane, onRotor(k, p, word), TEXTS[word], onRotor(k, p, "angle"), TEXTS.angle]) : []),
 ].filter(([, size, , angle]) => has(size) !== has(angle)).map(([of, size, sizeWord, , angleWord]) => TEXTS.half(run, of, has(size) ? angleWord : sizeWord)));
@@ -47,7 +47,7 @@ const usedIn = (k) => readIn(k) || [...wrong.keys()].some((name) => name.startsW
 
 solveSheet = () => {
   [doubts, idle, beyond, standing] = [[], [], [], []];
-  idle.push(...halves());
+  idle.push(...missingHalves());
   if (idle.length) return;
   let out = null;
   let last = 0;
@@ -236,7 +236,7 @@ drawSheet = () => {
 
 function csv() {
   // a half of a reading or of a mass is no row
-  if (wrong.size || halves().length) return "";
+  if (wrong.size || missingHalves().length) return "";
   const speeds = sheet.channels.some(([, speed]) => speed !== null);
   const lines = [["run", "sensor", ...(speeds ? [`speed_${sheet.speedUnit}`] : []), `amplitude_${sheet.amplitude.header}`, "phase_deg", "trial_plane", `trial_${word}_${sheet.mass.header}`, "trial_angle_deg"].join(",")];
   for (const [k, run] of sheet.runs.entries()) {
