@@ -54,7 +54,11 @@ function fillHeld(cell, k, i, every) {
   const once = k !== null && (whole.columns[k].si ?? 1) !== 1 ? Math.abs(x) * Number.EPSILON : 0;
   const error = k === null ? 0 : errorAt(whole.columns[k], i) + once;
   // of what is interpolated beside a change point there is no second computation
-  if (Number.isNaN(error) && Math.abs(x) < noiseOf(whole.columns[k])) x = 0;
+  if (Number.isNaN(error)) {
+    const { turns, si = 1 } = whole.columns[k];
+    const rest = turns ? x - (TAU / si) * Math.round((x * si) / TAU) : x;
+    if (Math.abs(rest) < noiseOf(whole.columns[k])) x = 0;
+  }
   if (k === null) cell.textContent = "";
   else if (!every) cell.textContent = short(Number(held(x, error) === "–" ? NaN : held(x, error)));
   else if (error === 0) fill(cell, exact(x));
