@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -173,11 +174,9 @@ def sheet(b: Balancing) -> Page:
                 "permissible": [float(v.permissible) for v in verdicts],
             }
         documents.append(document)
-        mine: list[str] = []
-        for i in b.masses_of(r).tolist():
-            name = named[i] if named else ""
-            name = name if name and name not in mine else str(len(mine) + 1)
-            mine.append(name)
+        masses = b.masses_of(r).tolist()
+        mine = _different([named[i] if named else "" for i in masses])
+        for i, name in zip(masses, mine, strict=True):
             for column in columns:
                 key = f"{rotor}/{name}.{column}" if several else f"{name}.{column}"
                 # as the page reads what is typed
@@ -223,6 +222,15 @@ def sheet(b: Balancing) -> Page:
         },
     }
     return sheet_page("Balancing of known masses", "balance", script, whole)
+
+
+def _different(names: list[str]) -> list[str]:
+    """Names that differ: a row without a name, or with that of a row before it, has its number or the next free one."""
+    different: list[str] = []
+    for k, name in enumerate(names, 1):
+        free = (str(n) for n in count(k) if str(n) not in different and str(n) not in names)
+        different.append(name if name and name not in different else next(free))
+    return different
 
 
 def _steps(b: Balancing) -> dict[str, list[float]]:

@@ -98,7 +98,7 @@ function build() {
   for (const [r, rotor] of sheet.rotors.entries()) {
     const caption = sheet.rotors.length > 1 ? TEXTS.massesOf(rotor.name) : TEXTS.masses;
     const table = grid($("entries"), caption, ["", ...sheet.columns.map((c) => `${TEXTS[c.name]}, ${c.unit}`), ""], { class: "cells" });
-    for (const row of sheet.rows[r]) {
+    for (const [k, row] of sheet.rows[r].entries()) {
       const line = table.row(row);
       for (const { name, kind, unit } of sheet.columns) cell(put(line, "td"), cellName(rotor, row, name), kind, unit, rulesOf(name));
       const away = put(put(line, "td"), "button", { type: "button", "aria-label": TEXTS.removeRow(row), title: TEXTS.removeRow(row) }, "×");
@@ -110,6 +110,7 @@ function build() {
           delete values[cellName(rotor, row, name)];
         }
         build();
+        focusRow(r, Math.min(k, sheet.rows[r].length - 1), "button");
       });
     }
     const add = put(table.box, "button", { type: "button", class: "add" }, TEXTS.addRow);
@@ -121,9 +122,16 @@ function build() {
       sheet.rows[r].push(`${named}${k}`);
       for (const { name } of sheet.columns) values[cellName(rotor, `${named}${k}`, name)] = name === "z" && along ? Math.max(along[0], Math.min(along[1], 0)) : 0;
       build();
+      focusRow(r, sheet.rows[r].length - 1, "input");
     });
   }
   update();
+}
+
+// the keyboard goes on where it was: in a row of a rotor's table, or at the button below a table without rows
+function focusRow(r, k, what) {
+  const box = $("entries").querySelectorAll(".scroll")[r];
+  (box.querySelectorAll("tbody tr")[k]?.querySelector(what) ?? box.querySelector(".add")).focus({ preventScroll: true });
 }
 
 drawSheet = () => {
@@ -190,7 +198,7 @@ window.dalembert = {
       say(TEXTS.unknown(unknown));
       return false;
     }
-    for (const [name, x] of Object.entries(changed)) check(name, x, String(x), inputs.get(name).rules);
+    asOne(() => Object.entries(changed).forEach(([name, x]) => check(name, x, String(x), inputs.get(name).rules)));
     update();
     return !wrong.size;
   },

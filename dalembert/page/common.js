@@ -13,8 +13,8 @@ function make(name, attributes = {}, text) {
 function put(parent, ...rest) {
   return parent.appendChild(make(...rest));
 }
-function svgIn(host) {
-  return put(host, "svg", { role: "img" });
+function svgIn(host, label) {
+  return put(host, "svg", { role: "img", ...(label && { "aria-label": label }) });
 }
 // a table with its heads, in a box of its own that scrolls; `row` of it is a row with its name
 function grid(host, caption, heads, attributes = {}) {

@@ -49,10 +49,16 @@ function errorAt(column, i) {
   return (rows[column.row] + (column.less === undefined ? 0 : rows[column.less])) / (column.si ?? 1);
 }
 function fillHeld(cell, k, i, every) {
-  const x = k === null ? NaN : whole.columns[k].values[i];
+  let x = k === null ? NaN : whole.columns[k].values[i];
   // a number in another unit than SI is rounded once more
   const once = k !== null && (whole.columns[k].si ?? 1) !== 1 ? Math.abs(x) * Number.EPSILON : 0;
   const error = k === null ? 0 : errorAt(whole.columns[k], i) + once;
+  // of what is interpolated beside a change point there is no second computation
+  if (Number.isNaN(error)) {
+    const { turns, si = 1 } = whole.columns[k];
+    const rest = turns ? x - (TAU / si) * Math.round((x * si) / TAU) : x;
+    if (Math.abs(rest) < noiseOf(whole.columns[k])) x = 0;
+  }
   if (k === null) cell.textContent = "";
   else if (!every) cell.textContent = short(Number(held(x, error) === "–" ? NaN : held(x, error)));
   else if (error === 0) fill(cell, exact(x));
@@ -98,7 +104,8 @@ function listLimits() {
   const stands = !wrong.size && state.chosen && state.closed.some(Number.isFinite);
   const limits = stands ? machine.limits(numbers).map(([q]) => q) : [];
   const unit = unitOf(inputKind(0));
-  const shownLimits = limits.map((q) => `${short(Number(shortest(q, unit)))} ${unit}`);
+  // two loops may end at one input
+  const shownLimits = [...new Set(limits.map((q) => `${short(Number(shortest(q, unit)))} ${unit}`))];
   const none = model.inputs[0].slides ? TEXTS.noLimitsOfSlide : TEXTS.noLimits;
   $("limits").textContent = !machine.one || !stands ? "" : limits.length ? TEXTS.limits(shownLimits.join(", ")) : none;
 }
@@ -209,6 +216,7 @@ for (const [head, names] of groupsOf) {
 }
 
 // --- handles ----------------------------------------------------------------------------------------------------------------
+svg.setAttribute("role", "group"); // what is in an image is hidden from screen readers
 const handleLayer = put(svg, "g", { id: "handles" });
 const bodyIndex = (name) => whole.bodies.findIndex((b) => b.name === name);
 function local(path, body, point, origin) {

@@ -168,6 +168,12 @@ function remember() {
   past.push(snapshot());
   if (past.length > 500) past.shift();
 }
+// changes that are undone together
+function asOne(act) {
+  [byHand, begun] = [" ", ""];
+  act();
+  [byHand, begun] = ["", ""];
+}
 function undo() {
   // a wrong entry changed no number: the one before it comes back
   if (wrong.size) wrong.clear();

@@ -36,18 +36,19 @@ function enter(last) {
   return entering;
 }
 let standing = [];
+// a reading is an amplitude with its phase, a mass stands at an angle: what is missing of them
+const missingHalves = () => sheet.runs.flatMap((run, k) => [
+  ...sheet.sensors.map((sensor, s) => [sensor, reading(k, s, "amplitude"), TEXTS.amplitude, reading(k, s, "phase"), TEXTS.phase]),
+  ...(k ? sheet.planes.map((plane, p) => [plane, onRotor(k, p, word), TEXTS[word], onRotor(k, p, "angle"), TEXTS.angle]) : []),
+].filter(([, size, , angle]) => has(size) !== has(angle)).map(([of, size, sizeWord, , angleWord]) => TEXTS.half(run, of, has(size) ? angleWord : sizeWord)));
 const readIn = (k) => sheet.sensors.some((_, s) => has(reading(k, s, "amplitude")) || has(reading(k, s, "phase")));
 
 const usedIn = (k) => readIn(k) || [...wrong.keys()].some((name) => name.startsWith(`${sheet.runs[k]}/`)) || (k > 0 && sheet.planes.some((_, p) => has(onRotor(k, p, word)) || has(onRotor(k, p, "angle"))));
 
 solveSheet = () => {
   [doubts, idle, beyond, standing] = [[], [], [], []];
-  // a reading is an amplitude with its phase; each sensor is read in some run
-  for (let k = 0; k < sheet.runs.length; k++) {
-    for (let s = 0; s < sheet.sensors.length; s++) {
-      if (has(reading(k, s, "amplitude")) !== has(reading(k, s, "phase"))) return void idle.push(TEXTS.half(sheet.runs[k], sheet.sensors[s], has(reading(k, s, "phase")) ? TEXTS.amplitude : TEXTS.phase));
-    }
-  }
+  idle.push(...missingHalves());
+  if (idle.length) return;
   let out = null;
   let last = 0;
   for (let k = 0; k < sheet.runs.length; k++) {
@@ -87,7 +88,7 @@ solveSheet = () => {
     const limits = [];
     if (sheet.ceiling !== null) limits.push([stands.every((x) => x <= sheet.ceiling * (1 + 1e-9)), TEXTS.vibrationWithin]);
     if (sheet.permissible) limits.push([sheet.permissible[p] !== null && out.get(`left ${last} ${p}`)[0] <= sheet.permissible[p], TEXTS.unbalanceWithin]);
-    if (nothing(plane) && !answers.has(`fresh.${plane}.${word}`)) idle.push(TEXTS.idle(plane, TEXTS.nothingLeft));
+    if (nothing(plane) && !last) idle.push(TEXTS.idle(plane, TEXTS.nothingLeft));
     else if (sheet.errors && answer(`trim.${plane}.${word}`) < answer(`trim.${plane}.${word}_uncertainty`)) idle.push(TEXTS.idle(plane, TEXTS.belowUncertainty));
     else if (limits.length && limits.every(([met]) => met)) idle.push(TEXTS.idle(plane, limits.map(([, why]) => why).join(TEXTS.and)));
     if (sheet.limits[p] !== null && answer(`${plane}.${word}`) > sheet.limits[p] * (1 + 1e-12)) beyond.push(TEXTS.beyondLimit(plane, amount(answer(`${plane}.${word}`)), amount(sheet.limits[p])));
@@ -234,7 +235,8 @@ drawSheet = () => {
 };
 
 function csv() {
-  if (wrong.size) return "";
+  // a half of a reading or of a mass is no row
+  if (wrong.size || missingHalves().length) return "";
   const speeds = sheet.channels.some(([, speed]) => speed !== null);
   const lines = [["run", "sensor", ...(speeds ? [`speed_${sheet.speedUnit}`] : []), `amplitude_${sheet.amplitude.header}`, "phase_deg", "trial_plane", `trial_${word}_${sheet.mass.header}`, "trial_angle_deg"].join(",")];
   for (const [k, run] of sheet.runs.entries()) {
@@ -280,7 +282,7 @@ window.dalembert = {
       say(TEXTS.unknown(unknown));
       return false;
     }
-    for (const [name, x] of Object.entries(changed)) check(name, x, Number.isNaN(x) ? "" : String(x), inputs.get(name).rules);
+    asOne(() => Object.entries(changed).forEach(([name, x]) => check(name, x, Number.isNaN(x) ? "" : String(x), inputs.get(name).rules)));
     update();
     return answers.size > 0;
   },

@@ -10,8 +10,7 @@ function looseOn(on) {
   loose.panels = whole.loose.map(({ b, parts }) => {
     const box = put(loose.host, "figure");
     put(box, "figcaption", {}, whole.bodies[b].name);
-    const picture = svgIn(box);
-    picture.setAttribute("aria-label", TEXTS.freeBodyOf(whole.bodies[b].name));
+    const picture = svgIn(box, TEXTS.freeBodyOf(whole.bodies[b].name));
     return { b, parts, picture, lines: put(picture, "g"), words: texts(picture), line: put(box, "p", { class: "soft" }) };
   });
 }

@@ -1,7 +1,7 @@
 // A planar mechanism: its shapes carried along by its bodies, arrows, instant centres, the velocity polygon.
 // The drawing's own numbers are SI and radians; columns may be in other units (column.si).
 const view = $("view");
-const svg = svgIn(view);
+const svg = svgIn(view, document.title);
 const at = (series, k, i) => (k === null || k === undefined ? NaN : series.columns[k].values[i] * (series.columns[k].si ?? 1));
 const classOf = (b) => (b ? `b${(b - 1) % 8}` : "ground");
 
@@ -201,7 +201,7 @@ function centreTable(on) {
 const polygon = { svg: null };
 function polygonOn(on) {
   $("extra").replaceChildren();
-  polygon.svg = on ? svgIn($("extra")) : null;
+  polygon.svg = on ? svgIn($("extra"), TEXTS.velocityPolygon) : null;
   if (!on) return;
   polygon.lines = put(polygon.svg, "g");
   polygon.words = texts(polygon.svg);

@@ -133,6 +133,14 @@ function table(caption, heads, rows, exactly, more) {
   });
 }
 
+// what is smaller than this in a column is the rounding of zero: a share of the largest number in its unit, as in the program's pictures
+const unitIn = (header) => header.replace(/^(?:.*_)?(?:[vajf]?[xy]|[a-z]{4,})_/, "");
+function noiseOf(column) {
+  const like = whole.columns.filter(({ header }) => header && unitIn(header) === unitIn(column.header));
+  const ends = like.flatMap(({ values }) => range(values.subarray(0, n))).filter(Number.isFinite);
+  return 1e-12 * Math.max(0, ...ends.map(Math.abs));
+}
+
 // --- plots ------------------------------------------------------------------------------------------------------------
 const plots = [];
 function plot(column) {
@@ -153,7 +161,8 @@ function plot(column) {
   const x = data.x === undefined ? Float64Array.from({ length: n + 1 }, (_, i) => i + 1) : whole.columns[data.x].values;
   const margin = { left: 58, right: 18, top: 8, bottom: 30 };
   let cursor, dot, px, py;
-  let noise = 0; // what is smaller is the rounding of zero
+  let noise = 0;
+  const quiet = (y) => (Math.abs(y) < noise ? 0 : y);
   const chart = {
     draw() {
       const k = Number(choice.value);
@@ -162,9 +171,9 @@ function plot(column) {
       sized(svg, width, height);
       put(svg, "title", {}, whole.columns[k].header);
       const lines = data.series.map((s) => (s.hidden?.() ? [] : (s.columns[k]?.values.subarray(0, s.n) ?? [])));
-      let [low, high] = range(lines.flatMap((values) => range(values)).filter(Number.isFinite));
+      noise = noiseOf(whole.columns[k]);
+      let [low, high] = range(lines.flatMap((values) => range(values)).filter(Number.isFinite).map(quiet));
       if (!(low <= high)) [low, high] = [0, 1];
-      noise = 1e-12 * Math.max(Math.abs(low), Math.abs(high));
       // what varies by rounding alone is constant
       const varies = high - low > noise;
       const pad = varies ? (high - low) * 0.06 : Math.abs(high) * 0.1 || 1;
@@ -207,14 +216,14 @@ function plot(column) {
       this.at(shown);
     },
     at(i) {
-      const y = whole.columns[Number(choice.value)].values[i];
+      const y = quiet(whole.columns[Number(choice.value)].values[i]);
       for (const end of ["x1", "x2"]) cursor.setAttribute(end, px(x[i]));
       dot.style.display = Number.isFinite(y) ? "" : "none";
       if (Number.isFinite(y)) {
         dot.setAttribute("cx", px(x[i]));
         dot.setAttribute("cy", py(y));
       }
-      value.textContent = short(Math.abs(y) < noise ? 0 : y);
+      value.textContent = short(y);
     },
   };
   const seek = (event) => {

@@ -1,7 +1,7 @@
 // A body that turns in space, seen from where the reader turns the view to: the body, ω, the angular momentum, a trace.
 const view = $("view");
 view.classList.add("turns");
-const svg = svgIn(view);
+const svg = svgIn(view, document.title);
 const { solid, axis } = data;
 const at = (k, i) => whole.columns[k].values[i] * (whole.columns[k].si ?? 1);
 const three = (columns, i) => columns.map((k) => at(k, i));

@@ -150,6 +150,50 @@ def test_zero_of_exact_numbers_is_shown_as_zero(dalembert: Dalembert, tmp_path: 
     assert page.faults() == []
 
 
+def test_rounding_beside_a_change_point_is_zero(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """What is interpolated there showed six digits of its rounding, and the plot of a coupler that does not turn a scale of 1e-16."""
+    sweep = ("--over", "0deg:720deg:45deg", "--page", "p.html")
+    assert dalembert("mechanism", EXAMPLES / "parallelogram" / "parallelogram.toml", *sweep).returncode == 0
+    page = Computing(browser, tmp_path / "p.html")
+    for pose in (0, 8, 16):
+        page.set(pose)
+        assert page.table("Points")["C"][:2] == ["0.14", "0"]
+        assert page.table("Links") == {
+            "crank": ["0", "1", "0"],
+            "coupler": ["0", "0", "0"],
+            "rocker": ["0", "1", "0"],
+        }
+    ticks = (
+        "const p = document.querySelector('.plot'); const s = p.querySelector('select');"
+        "s.value = [...s.options].find((o) => o.textContent === arguments[0]).value; s.dispatchEvent(new Event('change'));"
+        "return [p.querySelector('output').textContent, ...[...p.querySelectorAll('.tick')].slice(5, -1).map((t) => t.textContent)]"
+    )
+    assert page(ticks, "coupler_omega_rad_s") == ["0", "0"]
+    assert page(ticks, "C_vy_m_s") == ["0.04", "-0.04", "-0.02", "0", "0.02", "0.04"]
+    assert page.faults() == []
+
+
+def test_a_limit_of_two_loops_stands_once(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    sweep = ("--over", "-90deg:90deg:15deg", "--page", "p.html")
+    assert dalembert("mechanism", EXAMPLES / "peaucellier" / "peaucellier.toml", *sweep).returncode == 0
+    page = Computing(browser, tmp_path / "p.html")
+    assert page.text("limits") == "Limits of the input: 120 deg, 240 deg"
+
+
+def test_a_drawing_has_a_name_and_no_image_hides_handles(
+    dalembert: Dalembert, tmp_path: Path, browser: Any
+) -> None:
+    """Screen readers leave out what is in an image."""
+    (tmp_path / "m.toml").write_text(CRANK)
+    assert dalembert("mechanism", "m.toml", "--page", "p.html").returncode == 0
+    page = Computing(browser, tmp_path / "p.html")
+    roles = "return [...document.querySelectorAll('#view svg, #extra svg')].map((e) => [e.getAttribute('role'), e.ariaLabel])"
+    assert page(roles) == [["group", page("return document.title")]]
+    page.press("p")
+    assert page(roles)[1:] == [["img", "velocity polygon"]]
+    assert page("return document.querySelectorAll('[role=img] [tabindex]').length") == 0
+
+
 @pytest.mark.slow
 def test_words_of_pictures_keep_apart(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
     """On a phone and on a screen, with all that can be drawn: velocities of many points, free bodies, polygons of unbalances."""
