@@ -6,6 +6,7 @@ import math
 import re
 from typing import TYPE_CHECKING, Any
 
+from dalembert.decimals import decimal_to_si
 from dalembert.units import (
     DIMENSIONS,
     LARGEST,
@@ -37,24 +38,6 @@ def expected(dimension: str) -> str:
         return "a number"
     more = " or '700 rpm'" if dimension == "speed" else ""
     return f"{of.article} {_SPOKEN_DIMENSION.get(dimension, dimension)} such as '{of.example}'{more}"
-
-
-def decimal_to_si(number: str, factor: Factor) -> float:
-    """A decimal number times a unit's factor, with one rounding where the factor is a ratio of whole numbers.
-
-    Examples
-    --------
-    >>> decimal_to_si("0.3", (1, 1000)), decimal_to_si("120", (1, 1000))
-    (0.0003, 0.12)
-    """
-    value, (num, den) = float(number), factor
-    if den == 1 or not value or not math.isfinite(value):
-        return value * num
-    if not (isinstance(num, int) and isinstance(den, int)):
-        return value * (num / den)
-    from fractions import Fraction
-
-    return float(Fraction(number) * Fraction(num, den))
 
 
 # to fifty digits

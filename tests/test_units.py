@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
+import numpy as np
 import pytest
 
+from dalembert.decimals import decimal_to_si, times
 from dalembert.quantities import number_in_si, parse_quantity
-from dalembert.units import LISTED, UNITS, composed, find_unit, to_si, unit_name, written
+from dalembert.units import LISTED, UNITS, composed, find_unit, from_si, to_si, unit_name, written
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.units import Units
 
@@ -159,3 +161,45 @@ def test_a_unit_as_people_write_it_is_read_again() -> None:
 def test_what_stands_below_a_stroke_stays_there(unit: str) -> None:
     """A sheet asked for km·h."""
     assert written(unit_name(unit)) == unit
+
+
+RATIOS = sorted(
+    {factor for units in UNITS.values() for factor in units.values() if isinstance(factor[0], int)}
+)
+
+
+def decimals_of(figures: int, seed: int) -> list[Fraction]:
+    import random
+
+    draw = random.Random(seed)
+    numbers = [Fraction(draw.randrange(10**figures), 10 ** draw.randrange(figures + 4)) for _ in range(400)]
+    return [*numbers, *(-x for x in numbers), Fraction(0)]
+
+
+@pytest.mark.parametrize("figures", [1, 3, 6, 12, 15])
+@pytest.mark.parametrize("ratio", [r for r in RATIOS if isinstance(r[1], int)])
+def test_a_decimal_is_converted_with_one_rounding_alone_and_in_a_column(
+    ratio: tuple[int, int], figures: int
+) -> None:
+    numbers = decimals_of(figures, seed=figures)
+    right = [float(x * Fraction(*ratio)) for x in numbers]
+    values = [float(x) for x in numbers]
+    assert times(np.array(values), *ratio).tolist() == right
+    assert [times(x, *ratio) for x in values] == right
+    assert times(np.array(values) * 1j, *ratio).imag.tolist() == right
+    assert [decimal_to_si(repr(x), ratio) for x in values] == right
+
+
+@pytest.mark.parametrize("unit", ["g", "mg", "t"])
+@pytest.mark.parametrize("figures", [1, 3, 6, 12])
+def test_a_decimal_comes_back_as_it_was_written(unit: str, figures: int) -> None:
+    values = np.array([float(x) for x in decimals_of(figures, seed=7) if abs(x) < 10**9])
+    assert from_si(to_si(values, "mass", unit), "mass", unit).tolist() == values.tolist()
+
+
+def test_numbers_of_computations_and_no_numbers_keep_their_floats() -> None:
+    third = np.array([1 / 3, -0.0, math.nan, math.inf, 1e300, 1e-300, 2.0**52 + 1])
+    for many, one in zip(times(third, 1, 1000).tolist(), third.tolist(), strict=True):
+        assert repr(many) == repr(times(one, 1, 1000)) == repr(one / 1000)
+    assert times(np.array([]), 1, 1000).shape == (0,)
+    assert times(np.array([[7.1]]), 1, 1000).tolist() == [[0.0071]]

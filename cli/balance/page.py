@@ -13,9 +13,9 @@ from balancing import correct
 from balancing.picture import MOST, KnownMasses, known_masses
 from cli.balance.rotors import DIMENSIONS, Balancing
 from cli.show.picture import blank
+from dalembert.decimals import decimal_to_si
 from dalembert.errors import DataError
 from dalembert.page import spelled
-from dalembert.quantities import decimal_to_si
 from dalembert.units import UNITS, from_si, to_si
 
 if TYPE_CHECKING:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from dalembert.quantities import decimal_to_si, exactly, exactly_in_degrees
+from dalembert.decimals import decimal_to_si, times
+from dalembert.quantities import exactly, exactly_in_degrees
 from dalembert.units import UNITS, Factor
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ class Range(NamedTuple):
     def at(self, i: NDArray[np.intp]) -> tuple[Reals, Reals]:
         """Return the numbers at some places as they are shown, and in SI."""
         numbers, (num, den) = self.steps.at(i), self.factor
-        si = numbers if self.factor == (1, 1) else numbers * (num if den == 1 else num / den)
+        si = times(numbers, num, den) if isinstance(num, int) else numbers * (num / den)
         if not self.is_angle or self.factor == DEGREES:
             return (numbers if self.is_angle else si), si
         from dalembert.arithmetic.doubled import PI

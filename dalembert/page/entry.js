@@ -68,7 +68,6 @@ function typed(text, unit, into) {
   const minus = sign === "-" || sign === "−" ? -1 : 1;
   const decimal = `${digits.replace(",", ".")}e${power}`;
   const [by, over] = factor;
-  if (over === 1n || over === 1) return minus * Number(decimal) * Number(by);
   if (typeof by !== "bigint" || typeof over !== "bigint") return minus * Number(decimal) * (Number(by) / Number(over));
   return minus * scaled(decimal, by, over);
 }

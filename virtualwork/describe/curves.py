@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 from dalembert.dataclass import dataclass
+from dalembert.decimals import decimal_to_si
 from dalembert.errors import DataError
 from dalembert.quantities import number_expected, parse_number
 from dalembert.tables.files import split_sheet
@@ -176,21 +177,19 @@ def _numbers(
 ) -> list[float]:
     """The numbers of a column in SI; what is left out of a component of a force is 0."""
     dimension = QUANTITIES[quantity]
-    num, den = factor = UNITS[dimension][unit]
-    texts, numbers = [], []
+    factor = UNITS[dimension][unit]
+    texts = []
     for i, cell in enumerate(cells):
         text = cell.strip().replace(MINUS, "-") or ("0" if quantity in FORCE else "")
         # 2.500 beside 1,5 may be 2500: it is no number
         point = text.replace(".", "'").replace(",", ".") if comma else text
         try:
-            numbers.append(parse_number(point))
+            parse_number(point)
         except ValueError:
             expected = "a number with a decimal comma" if comma else number_expected(text)
             raise source.error(i, source.header[place], cell, expected) from None
         texts.append(point)
-    whole = isinstance(num, int) and isinstance(den, int)
-    # a decimal unit keeps whole numbers: 20/1000 is the nearest float to 0.02
-    si = [x * num / den for x in numbers] if whole else [x * (num / den) for x in numbers]
+    si = [decimal_to_si(text, factor) for text in texts]
     entry.file.units.decimals.note_column(dimension, factor, texts, si)
     return si
 

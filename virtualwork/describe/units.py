@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
+from dalembert.decimals import times
 from dalembert.errors import toml_text
 from dalembert.quantities import decimals, exactly, expected, number_in_si
 from dalembert.units import DIMENSIONS, LARGEST, Factor, composed
@@ -132,7 +133,7 @@ class Units:
     def bare(self, si: float, dimension: str) -> float:
         """A number in SI as the file writes it without a unit."""
         numerator, denominator = self.factors.get(dimension, (1, 1))
-        return si * denominator / numerator
+        return times(si, denominator, numerator)
 
     def pair(self, value: Any, dimension: str, where: str) -> complex:
         """Two of them, [x, y], as x + iy."""
