@@ -211,7 +211,7 @@ def _has_column(analysis: Analysis, each: Component, values: Numbers) -> bool:
     return any(
         load.path is None and (load.joint, load.body) == (each.key.joint, each.key.body)
         for motion in analysis.motions
-        for load in motion.dynamics.scene.friction
+        for load in motion.dynamics.case.friction
     )
 
 

@@ -67,7 +67,7 @@ class ForceErrors:
 
     def _holds(self, joint: Joint) -> bool:
         """Whether a joint has a moment: it keeps its bodies from turning against each other, or it rubs."""
-        if any(load.path is None and load.joint == joint.key for load in self.dynamics.scene.friction):
+        if any(load.path is None and load.joint == joint.key for load in self.dynamics.case.friction):
             return True
         return joint.guide is not None and self.mechanism.guides[joint.guide].is_slider
 

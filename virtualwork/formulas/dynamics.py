@@ -1,8 +1,8 @@
-"""Forces of a mechanism in motion or at rest, on demand: effort, reactions, shaking force and moment."""
+"""Loads and forces of a mechanism in motion or at rest, on demand: effort, reactions, shaking force and moment."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -24,33 +24,128 @@ from virtualwork.formulas.forces import (
     Shaking,
     ShakingMoment,
 )
-from virtualwork.formulas.numbers import FAST, TOGETHER, Complexes, Reals, leave_out, xy
+from virtualwork.formulas.load_case import LoadCase
+from virtualwork.formulas.load_paths import LoadPaths
+from virtualwork.formulas.loaded_pose import LoadedPose, Setting
+from virtualwork.formulas.numbers import FAST, ONE, TOGETHER, Complexes, Number, Reals, leave_out, xy
+from virtualwork.formulas.pose_forces import PoseForces
 from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.reactions import JointForces
-from virtualwork.formulas.scene import Scene
 from virtualwork.formulas.statics import Statics
 from virtualwork.plan.steps import Joint
 
 
 @guarded
 class Dynamics:
-    """The forces of poses; each is formed on the first request. `Motion.dynamics` is one.
+    """The loads and forces of poses; each is formed on the first request. `Motion.dynamics` is one.
 
     Attributes
     ----------
-    scene : Scene
-        The loads.
+    poses : Poses
+    case : LoadCase
+        What acts, the same for all motions of an assembly.
+    moves : bool
+        Whether anything moves at all.
 
     Parameters
     ----------
-    poses : Poses
+    at_rest : bool
+        Whether nothing moves, whatever the rates of the inputs.
     """
 
-    def __init__(self, poses: Poses) -> None:
+    def __init__(self, poses: Poses, *, at_rest: bool = False) -> None:
         self.poses, self.lock = poses, poses.lock
-        self.scene = Scene(poses)
+        self.setting = Setting(poses, at_rest)
+        self.moves = self.setting.moves
         self._known: dict[Force, Any] = {}
+        prepared = poses.branch.prepared
+        with self.lock:
+            if self.moves not in prepared:
+                prepared[self.moves] = LoadCase(poses.mechanism, poses.plan, self.moves)
+        self.case: LoadCase = prepared[self.moves]
 
+    # --- the loads ----------------------------------------------------------------------------------------------
+    @cached_property
+    def paths(self) -> LoadPaths:
+        """How the loads bear on what moves, and how joint forces follow; made once for an assembly."""
+        load_paths = self.poses.branch.load_paths
+        if self.moves not in load_paths:
+            load_paths[self.moves] = LoadPaths(self.case)
+        result: LoadPaths = load_paths[self.moves]
+        return result
+
+    @property
+    def on_tape(self) -> bool:
+        """Whether forces come from the tape: of many poses, and where there is friction to solve."""
+        return self.poses.many or bool(self.case.contacts)
+
+    @cached_property
+    def forces(self) -> PoseForces:
+        """The forces of the one pose, by the formulas as they stand.
+
+        Raises
+        ------
+        ZeroDivisionError
+            At a singular pose, whose forces come from the tape.
+        """
+        k = len(self.poses.mechanism.inputs)
+        by = [self.poses.along(j if k > 1 else -1) for j in range(k)]
+        pose = LoadedPose(self.setting, by[0].st, self.poses.along() if k > 1 and self.moves else None, by)
+        return PoseForces(self.paths, pose, self._solve, ONE.system, _outside)
+
+    @property
+    def pose(self) -> LoadedPose:
+        """The pose as the loads see it: of floats, or written down."""
+        pose: LoadedPose = (self.poses.recording.forces if self.on_tape else self.forces).pose
+        return pose
+
+    def along(self, targets: Iterable[str]) -> Rates | None:
+        """The derivatives of one pose to the second order along its rates; None at a singular pose."""
+        try:
+            self.poses.advance(tuple(targets), 2)
+        except (ZeroDivisionError, OverflowError):
+            return None
+        return self.poses.along()
+
+    def _solve(self, targets: Iterable[str], order: int) -> None:
+        k, wanted = len(self.poses.mechanism.inputs), tuple(targets)
+        for j in range(k) if k > 1 else ():
+            self.poses.advance(wanted, 1, j)
+        if k == 1 or self.moves:
+            self.poses.advance(wanted, order)
+
+    def over(
+        self,
+        forms: Sequence[Callable[[LoadedPose], Number]],
+        kind: type,
+        targets: Iterable[str] = (),
+        order: int = 1,
+        name: str = "",
+    ) -> list[Any]:
+        """What forms make of the pose as the loads see it, (n,) each; NaN where a pose is not assembled.
+
+        `targets`: what they depend on beyond the loads and the places of all joints, with derivatives up to an order.
+        `name`: under which the tape of forms that are the same for all poses is kept.
+        """
+        wanted = tuple(targets)
+        if self.on_tape:
+            return self.poses.formed(forms, kind, wanted, order, name)
+        try:
+            self.forces.solve_places()
+            self._solve(wanted, order)
+            values = [form(self.forces.pose) for form in forms]
+        except (ZeroDivisionError, OverflowError):
+            return self.poses.formed(forms, kind, wanted, order, name)
+        return [self._there(np.array([0.0 if value is None else value], kind)) for value in values]
+
+    def _there(self, value: Any) -> Any:
+        """A value of one pose, NaN where that is not assembled."""
+        if not self.poses.assembled.all():
+            leave_out(value, ~self.poses.assembled)
+        return value
+
+    # --- the forces ---------------------------------------------------------------------------------------------
     def values(self, keys: Sequence[Force]) -> list[Any]:
         """Forces (n,) each: of many poses from the tape, of one by the formulas on floats."""
         new = [key for key in keys if key not in self._known]
@@ -66,24 +161,21 @@ class Dynamics:
         return self.values([key])[0]
 
     def _on_tape(self, key: Force) -> bool:
-        return self.scene.on_tape or (key.is_joint_force and self.reactions.redundant)
+        return self.on_tape or (key.is_joint_force and self.reactions.redundant)
 
     def _alone(self, key: Force) -> Any:
         """A force of one pose."""
         try:
-            value = key.value(self.scene.forces)
+            value = key.value(self.forces)
             if isinstance(key, Effort | Generalized) and self._too_fast(key.input):
                 value = np.nan
         except (ZeroDivisionError, OverflowError):
             return self.poses.taped([key])[0]
         # no −0
-        result = np.array([value], complex if key.is_vector else float) + 0.0
-        if not self.poses.assembled.all():
-            leave_out(result, ~self.poses.assembled)
-        return result
+        return self._there(np.array([value], complex if key.is_vector else float) + 0.0)
 
     def _too_fast(self, j: int) -> bool:
-        m, by = self.poses.mechanism, self.scene.forces.pose.by[j]
+        m, by = self.poses.mechanism, self.forces.pose.by[j]
         reach = m.size if m.inputs[j].is_slide else 1.0
         rates = (by.angle.get(body) for group in self.poses.plan.groups for body in group.angles)
         return any(rate and rate[0] is not None and not abs(rate[0]) * reach < FAST for rate in rates)
@@ -95,19 +187,19 @@ class Dynamics:
     @property
     def friction_iterations(self) -> int:
         """How often friction and reactions were exchanged until they agreed; 0 without friction."""
-        return self.poses.friction_iterations if self.scene.friction else 0
+        return self.poses.friction_iterations if self.case.friction else 0
 
     @property
     def locked(self) -> NDArray[np.bool_]:
         """(n,): poses in which friction locks the mechanism: no reaction balances its own friction."""
-        return self.poses.locked if self.scene.friction else np.zeros(self.poses.n, dtype=bool)
+        return self.poses.locked if self.case.friction else np.zeros(self.poses.n, dtype=bool)
 
     @cached_property
     def without_length(self) -> dict[int, NDArray[np.bool_]]:
         """Of the springs whose pull needs a direction, by number: the poses in which their ends meet, (n,)."""
         m, result = self.poses.mechanism, {}
         for number, spring in enumerate(m.springs, 1):
-            if (spring.stiffness and spring.free_length) or (spring.damping and self.scene.moves):
+            if (spring.stiffness and spring.free_length) or (spring.damping and self.moves):
                 a, b = (self.poses.point(link, m.place(link, p)) for link, p in spring.between)
                 meet = np.broadcast_to(np.abs(a - b) <= TOGETHER * m.size, self.poses.n)
                 if meet.any():
@@ -122,7 +214,7 @@ class Dynamics:
     @cached_property
     def reactions(self) -> JointForces:
         """The joints, and how their forces follow from each other."""
-        return JointForces(self.scene.paths)
+        return JointForces(self.paths)
 
     @property
     def by_key(self) -> Mapping[str, Joint]:
@@ -178,3 +270,7 @@ class Moving(Protocol):
     @property
     def dynamics(self) -> Dynamics:
         """Its forces, which hold its poses."""
+
+
+def _outside(name: str) -> Number:
+    raise LookupError(name)

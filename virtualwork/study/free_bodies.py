@@ -177,7 +177,7 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
         )
         for body, link in m.links.items()
     }
-    for body, every in parts(dynamics.scene.case, of).items():
+    for body, every in parts(dynamics.case, of).items():
         for part in every:
             load, at, along = (_value(dynamics, key) for key in (part.key, part.at, part.along))
             load = part.sign * load if along is None else part.sign * load * along
@@ -187,7 +187,7 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
                 result[body].torques.append(Torque(part.name, part.kind, load))
     for number, touch in enumerate(of.paths.touches.every):
         forms = partial(_normal, touch=touch), partial(_touching, touch=touch)
-        way, at = dynamics.scene.over(forms, complex, touch.targets)
+        way, at = dynamics.over(forms, complex, touch.targets)
         force = dynamics.contact(number) * way
         cam = touch.drive.cam.cam
         for body, other, sign in ((touch.body, cam, 1.0), (cam, touch.body, -1.0)):
