@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.guard import guarded
+from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.formulas.forces import (
     Applied,
     AppliedMoment,
@@ -37,7 +37,72 @@ from virtualwork.plan.steps import Joint
 
 
 @guarded
-class Dynamics:
+class NamedForces:
+    """Forces by the names under which they are handed out, from their values by their keys; each is formed on its first request."""
+
+    poses: Poses
+    lock: Lock
+
+    def values(self, keys: Sequence[Force]) -> list[Any]:
+        """Forces (n,) each; of estimates of their errors the length of a vector's."""
+        raise NotImplementedError
+
+    def value(self, key: Force) -> Any:
+        """A force by its key, (n,)."""
+        return self.values([key])[0]
+
+    def _shown(self, vector: Any) -> Any:
+        """A vector as it is handed out; of estimates the length."""
+        return vector
+
+    def _each(self, kind: type[Effort | NewtonEuler]) -> Reals:
+        """A quantity of every input, (n, k)."""
+        return np.stack(self.values([kind(j) for j in range(len(self.poses.mechanism.inputs))]), axis=1)
+
+    @cached_property
+    def effort(self) -> Reals:
+        """The effort at each input by virtual work, (n, k)."""
+        return self._each(Effort)
+
+    @cached_property
+    def newton_euler(self) -> Reals:
+        """The effort at each input by Newton and Euler, (n, k): ΣM = 0 of the driven link with its joint forces."""
+        return self._each(NewtonEuler)
+
+    def joint_force(self, joint: Joint, body: str) -> Complexes:
+        """The force of a joint on one of its bodies, (n,) complex; NaN where statics does not determine it."""
+        return np.asarray(self.value(JointForce(joint.key, body)))
+
+    def joint_moment(self, joint: Joint, body: str) -> Reals:
+        """The moment of a joint on one of its bodies about the joint's point, (n,): a guide's, or a pin's friction."""
+        return np.asarray(self.value(JointMoment(joint.key, body)))
+
+    def contact(self, cam: int) -> Reals:
+        """How hard a cam (from 0) presses on its follower along the normal, (n,); below zero it would have to pull."""
+        return np.asarray(self.value(Contact(cam)))
+
+    def reaction(self, joint: str, on: str) -> Reals:
+        """The force of all others on a link at a joint, (n, 2): of a pin and of a guide, where both are of that name."""
+        return self._shown(np.asarray(self.value(Reaction(joint, on))))  # type: ignore[no-any-return]
+
+    @cached_property
+    def shaking(self) -> tuple[Reals, Reals]:
+        """Shaking force (n, 2) and shaking moment (n,) on the ground, about its origin.
+
+        All that the moving links do to the ground through joints, springs and the drive's own reaction: by
+        d'Alembert the sum of their weights, applied loads and inertia loads. No reaction is formed for it.
+        """
+        force, moment = self.values([Shaking(), ShakingMoment()])
+        return self._shown(force), moment
+
+    def applied(self, link: str) -> tuple[Complexes, Reals]:
+        """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""
+        force, moment = self.values([Applied(link), AppliedMoment(link)])
+        return force, moment
+
+
+@guarded
+class Dynamics(NamedForces):
     """The loads and forces of poses; each is formed on the first request. `Motion.dynamics` is one.
 
     Attributes
@@ -59,20 +124,20 @@ class Dynamics:
         self.setting = Setting(poses, at_rest)
         self.moves = self.setting.moves
         self._known: dict[Force, Any] = {}
-        prepared = poses.branch.prepared
+        recordings, key = poses.branch.recordings, ("loads", self.moves)
         with self.lock:
-            if self.moves not in prepared:
-                prepared[self.moves] = LoadCase(poses.mechanism, poses.plan, self.moves)
-        self.case: LoadCase = prepared[self.moves]
+            if key not in recordings:
+                recordings[key] = LoadCase(poses.mechanism, poses.plan, self.moves)
+        self.case: LoadCase = recordings[key]
 
     # --- the loads ----------------------------------------------------------------------------------------------
     @cached_property
     def paths(self) -> LoadPaths:
         """How the loads bear on what moves, and how joint forces follow; made once for an assembly."""
-        load_paths = self.poses.branch.load_paths
-        if self.moves not in load_paths:
-            load_paths[self.moves] = LoadPaths(self.case)
-        result: LoadPaths = load_paths[self.moves]
+        recordings, key = self.poses.branch.recordings, ("load paths", self.moves)
+        if key not in recordings:
+            recordings[key] = LoadPaths(self.case)
+        result: LoadPaths = recordings[key]
         return result
 
     @property
@@ -146,6 +211,9 @@ class Dynamics:
         return value
 
     # --- the forces ---------------------------------------------------------------------------------------------
+    def _shown(self, vector: Complexes) -> Reals:
+        return xy(vector)
+
     def values(self, keys: Sequence[Force]) -> list[Any]:
         """Forces (n,) each: of many poses from the tape, of one by the formulas on floats."""
         new = [key for key in keys if key not in self._known]
@@ -155,10 +223,6 @@ class Dynamics:
             if key not in self._known:
                 self._known[key] = self._alone(key)
         return [self._known[key] for key in keys]
-
-    def value(self, key: Force) -> Any:
-        """A force by its key, (n,)."""
-        return self.values([key])[0]
 
     def _on_tape(self, key: Force) -> bool:
         return self.on_tape or (key.is_joint_force and self.reactions.redundant)
@@ -179,10 +243,6 @@ class Dynamics:
         reach = m.size if m.inputs[j].is_slide else 1.0
         rates = (by.angle.get(body) for group in self.poses.plan.groups for body in group.angles)
         return any(rate and rate[0] is not None and not abs(rate[0]) * reach < FAST for rate in rates)
-
-    def _each(self, kind: type[Effort | NewtonEuler]) -> Reals:
-        """A quantity of every input, (n, k)."""
-        return np.stack(self.values([kind(j) for j in range(len(self.poses.mechanism.inputs))]), axis=1)
 
     @property
     def friction_iterations(self) -> int:
@@ -207,11 +267,6 @@ class Dynamics:
         return result
 
     @cached_property
-    def effort(self) -> Reals:
-        """The effort at each input by virtual work, (n, k)."""
-        return self._each(Effort)
-
-    @cached_property
     def reactions(self) -> JointForces:
         """The joints, and how their forces follow from each other."""
         return JointForces(self.paths)
@@ -226,42 +281,6 @@ class Dynamics:
         """All equilibrium equations at once, where the constraints are redundant; else None."""
         result: Statics | None = self.poses.statics if self.reactions.redundant else None
         return result
-
-    @cached_property
-    def newton_euler(self) -> Reals:
-        """The effort at each input by Newton and Euler, (n, k): ΣM = 0 of the driven link with its joint forces."""
-        return self._each(NewtonEuler)
-
-    def joint_force(self, joint: Joint, body: str) -> Complexes:
-        """The force of a joint on one of its bodies, (n,) complex; NaN where statics does not determine it."""
-        return np.asarray(self.value(JointForce(joint.key, body)))
-
-    def joint_moment(self, joint: Joint, body: str) -> Reals:
-        """The moment of a joint on one of its bodies about the joint's point, (n,): a guide's, or a pin's friction."""
-        return np.asarray(self.value(JointMoment(joint.key, body)))
-
-    def contact(self, cam: int) -> Reals:
-        """How hard a cam (from 0) presses on its follower along the normal, (n,); below zero it would have to pull."""
-        return np.asarray(self.value(Contact(cam)))
-
-    def reaction(self, joint: str, on: str) -> Reals:
-        """The force of all others on a link at a joint, (n, 2): of a pin and of a guide, where both are of that name."""
-        return xy(np.asarray(self.value(Reaction(joint, on))))
-
-    @cached_property
-    def shaking(self) -> tuple[Reals, Reals]:
-        """Shaking force (n, 2) and shaking moment (n,) on the ground, about its origin.
-
-        All that the moving links do to the ground through joints, springs and the drive's own reaction: by
-        d'Alembert the sum of their weights, applied loads and inertia loads. No reaction is formed for it.
-        """
-        force, moment = self.values([Shaking(), ShakingMoment()])
-        return xy(force), moment
-
-    def applied(self, link: str) -> tuple[Complexes, Reals]:
-        """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""
-        force, moment = self.values([Applied(link), AppliedMoment(link)])
-        return force, moment
 
 
 class Moving(Protocol):
