@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
 import numpy as np
@@ -43,9 +43,8 @@ class Branch(Protocol):
     def recordings(self) -> dict[Any, Any]:
         """What has been made of it once for all poses: what is written down, loads, what a first request brings (`one_pose`)."""
 
-    @property
-    def known_steps(self) -> dict[tuple[str, ...], tuple[Step, ...]]:
-        """The steps that targets depend on, as far as requested."""
+    def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
+        """The steps that targets depend on; worked out once for each set of targets."""
 
     @property
     def plain(self) -> dict[str, Callable[[State], None]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -270,11 +270,6 @@ class Dynamics(NamedForces):
     def reactions(self) -> JointForces:
         """The joints, and how their forces follow from each other."""
         return JointForces(self.paths)
-
-    @property
-    def by_key(self) -> Mapping[str, Joint]:
-        """The joints by their keys."""
-        return self.reactions.by_key
 
     @property
     def statics(self) -> Statics | None:
