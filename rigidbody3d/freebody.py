@@ -14,7 +14,7 @@ from dalembert.arithmetic.shapes import as_array, as_numbers, common_shape, in_3
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.free_rotation import FreeRotation
 from rigidbody3d.inertia import check, principal
-from rigidbody3d.states import STATE, AtTimes, PictureData, difference, from_start, in_blocks, require
+from rigidbody3d.states import InClosedForm, PictureData, from_start, in_blocks, require
 
 Array = NDArray[np.float64]
 
@@ -154,7 +154,7 @@ def _check(moments: Array) -> None:
 
 @record
 @dataclass(frozen=True, eq=False, repr=False)
-class FreeState(AtTimes):
+class FreeState(InClosedForm):
     """The state of a free body at given times; each quantity is computed on the first request."""
 
     body: FreeBody
@@ -197,26 +197,6 @@ class FreeState(AtTimes):
     @property
     def _picture_data(self) -> PictureData:
         return PictureData(self.body.inertia, free=True, top=False)
-
-    def error_estimate(self, of: str = "attitude", exact: FreeState | None = None) -> Array:
-        """Return an estimate of the error of a quantity: computed twice, with 16 and with 32 digits.
-
-        Parameters
-        ----------
-        of
-            "attitude", as an angle (..., n), rad, or "quaternion", its components (..., n, 4); "omega" or "momentum",
-            (..., n, 3); "energy", (..., n).
-        exact
-            The state in doubled numbers, if there are more digits than floats; default: the data count as exact.
-
-        Examples
-        --------
-        >>> late = FreeBody([1, 2, 3], [1.0, 0.1, 0.5]).at([1.0, 1e6])
-        >>> late.error_estimate() < 1e-14
-        array([ True, False])
-        """
-        require(of, *STATE)
-        return difference(exact or self.in_32_digits, self, of)
 
     @cached_property
     def in_32_digits(self) -> FreeState:

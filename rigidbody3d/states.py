@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -133,6 +133,36 @@ class AtTimes:
         _one_body(self)
         shown = {name: Shown(values, name) for name, values in _columns(self).items()}
         return turning_page("", self._picture_data.inertia, self.omega[0], shown, self._picture_data.top)
+
+
+class InClosedForm(AtTimes):
+    """Base of states that a formula gives at any time: it runs in 32 digits too."""
+
+    @property
+    def in_32_digits(self) -> State:
+        """This state in doubled numbers."""
+        raise NotImplementedError
+
+    def error_estimate(self, of: str = "attitude", exact: State | None = None) -> Array:
+        """Return an estimate of the error of a quantity: computed twice, with 16 and with 32 digits.
+
+        Parameters
+        ----------
+        of
+            "attitude", as an angle (..., n), rad, or "quaternion", its components (..., n, 4); "omega" or "momentum",
+            (..., n, 3); "energy", (..., n).
+        exact
+            The state in doubled numbers, if there are more digits than floats; default: the data count as exact.
+
+        Examples
+        --------
+        >>> from rigidbody3d import FreeBody
+        >>> late = FreeBody([1, 2, 3], [1.0, 0.1, 0.5]).at([1.0, 1e6])
+        >>> late.error_estimate() < 1e-14
+        array([ True, False])
+        """
+        require(of, *STATE)
+        return difference(exact or self.in_32_digits, cast("State", self), of)
 
 
 def _one_body(state: StateInTime) -> None:

@@ -30,7 +30,7 @@ from dalembert.arithmetic.records import record
 from dalembert.arithmetic.shapes import as_array, as_numbers, common_shape, filled, in_32_digits, is_doubled
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
-from rigidbody3d.states import STATE, AtTimes, PictureData, difference, from_start, in_blocks, require
+from rigidbody3d.states import InClosedForm, PictureData, from_start, in_blocks
 from rigidbody3d.top_roots import constants
 
 Array = NDArray[np.float64]
@@ -142,7 +142,7 @@ class Top:
 
 @record
 @dataclass(frozen=True, eq=False, repr=False)
-class TopState(AtTimes):
+class TopState(InClosedForm):
     """The state of a top at given times; each quantity is computed on the first request."""
 
     top: Top
@@ -178,20 +178,6 @@ class TopState(AtTimes):
     @property
     def _picture_data(self) -> PictureData:
         return PictureData(self.top.inertia, free=False, top=True)
-
-    def error_estimate(self, of: str = "attitude", exact: TopState | None = None) -> Array:
-        """Return an estimate of the error of a quantity: computed twice, with 16 and with 32 digits.
-
-        Parameters
-        ----------
-        of
-            "attitude", as an angle (..., n), rad, or "quaternion", its components (..., n, 4); "omega" or "momentum",
-            (..., n, 3); "energy", (..., n).
-        exact
-            The state in doubled numbers, if there are more digits than floats; default: the data count as exact.
-        """
-        require(of, *STATE)
-        return difference(exact or self.in_32_digits, self, of)
 
     @cached_property
     def in_32_digits(self) -> TopState:

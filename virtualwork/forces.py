@@ -58,4 +58,4 @@ class Forces(Dynamics):
         return forces(self, figure=figure)
 
     def __repr__(self) -> str:
-        return f"Forces({self.poses.n} poses, {len(self.scene.loads)} loads)"
+        return f"Forces({self.poses.n} poses, {len(self.case.loads)} loads)"

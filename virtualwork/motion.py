@@ -249,7 +249,7 @@ class Motion(NamedParts[PointMotion, LinkMotion, SlideMotion], MotionViews):
         if joints:
             errors = self.dynamics.error_estimate()
             errors.together(joints.values())
-            estimates |= {name: errors.of(key) for name, key in joints.items()}
+            estimates |= {name: errors.value(key) for name, key in joints.items()}
         return {name: estimates[name] for name in keys}
 
     # --- forces -----------------------------------------------------------------------------------------------

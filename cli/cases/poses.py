@@ -123,7 +123,7 @@ def form_bounds(motion: Motion, wanted: Iterable[Component], driven: Mapping[str
 def bound(motion: Motion, key: Quantity, driven: Mapping[str, Reals]) -> Reals:
     """Bound the error of a quantity, as it is shown."""
     if isinstance(key, Force):
-        return motion.dynamics.error_estimate().of(key)
+        return np.asarray(motion.dynamics.error_estimate().value(key))
     if not key.is_angle:
         return motion.rounding.of(key)
     if not isinstance(key, Angle):
@@ -211,7 +211,7 @@ def _has_column(analysis: Analysis, each: Component, values: Numbers) -> bool:
     return any(
         load.path is None and (load.joint, load.body) == (each.key.joint, each.key.body)
         for motion in analysis.motions
-        for load in motion.dynamics.scene.friction
+        for load in motion.dynamics.case.friction
     )
 
 

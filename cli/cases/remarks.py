@@ -173,7 +173,7 @@ def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
                 pulls = press < -1e-12 * np.nanmax(np.abs(press), initial=0.0)
             if (whole & pulls).any():
                 note(whole & pulls, contact_lost(motion, drive))
-        if d.scene.friction:
+        if d.case.friction:
             note(whole & d.locked, "friction locks the mechanism: no reaction balances its own friction")
     return troubles
 
@@ -218,13 +218,13 @@ def statements(analysis: Analysis) -> list[str]:
             if (
                 r.inertia
                 and not r.mass
-                and motion.dynamics.scene.moves
+                and motion.dynamics.moves
                 and not pinned(analysis.mechanism, body, r.center)
             ):
                 result.append(
                     f"[links.{body}]: an inertia and no mass, but its centre moves: its inertia force is missing; add mass"
                 )
-    if analysis.mechanism.friction and not any(motion.dynamics.scene.moves for motion in analysis.motions):
+    if analysis.mechanism.friction and not any(motion.dynamics.moves for motion in analysis.motions):
         result.append("friction is left out: at speed zero its direction and size are not determined")
     return list(dict.fromkeys([*result, *idle_friction(analysis.mechanism)]))
 

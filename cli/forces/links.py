@@ -237,7 +237,7 @@ def _velocity(motion: Motion, link: str, point: complex | str, field: int | None
 def _rail(motion: Motion, guide: int) -> NDArray[np.complex128]:
     """Return the direction of a guide."""
     forces = motion.dynamics
-    (rail,) = forces.scene.over([partial(forces.reactions.rail, guide=guide)], complex)
+    (rail,) = forces.over([partial(forces.reactions.rail, guide=guide)], complex)
     return np.asarray(rail)
 
 
@@ -267,7 +267,7 @@ def way(analysis: Analysis) -> list[Topic]:
     instants: list[tuple[list[Column], list[Entry]]] = []
     equations: list[str] = []
     for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
-        moves = motion.dynamics.scene.moves and any(np.any(rate) for rate in motion.poses.rates[0])
+        moves = motion.dynamics.moves and any(np.any(rate) for rate in motion.poses.rates[0])
         # at rest the displacements are virtual: of a unit speed of each input alone
         units = [None] if moves else list(range(len(analysis.mechanism.inputs)))
         entries = [entries_of(motion, unit) for unit in units]

@@ -302,7 +302,7 @@ def working(analysis: Analysis) -> Table:
     motion = analysis.motions[0]
     rows: list[tuple[Cell, ...]] = []
     for j, entry in enumerate(analysis.mechanism.inputs if motion.assembled.all() else ()):
-        works, workless, _ = ledger(motion.dynamics.scene, j)
+        works, workless, _ = ledger(motion.dynamics, j)
         rows += [(entry.name, load, "works") for load in works]
         rows += [(entry.name, load, "does no work") for load in workless]
     below = "joint forces (action and reaction) do no work: the effort does not depend on them"
@@ -314,7 +314,7 @@ def absent(analysis: Analysis) -> Table:
     from virtualwork.study.ledger import ledger
 
     motion = analysis.motions[0]
-    *_, lines = ledger(motion.dynamics.scene, 0) if motion.assembled.all() else [()]
+    *_, lines = ledger(motion.dynamics, 0) if motion.assembled.all() else [()]
     return Table([Column("load", "", lines)] if lines else [], place="")
 
 

@@ -76,7 +76,7 @@ def test_springs_may_be_named_from_either_end(swap: bool) -> None:
     exact = -k * (s - s0) * h * np.cos(theta) / s + kt * (theta - free)
     motion = m.motion(theta)
     assert motion.effort == pytest.approx(exact, rel=1e-13)
-    works, workless, absent = ledger(motion.dynamics.scene)
+    works, workless, absent = ledger(motion.dynamics)
     assert sum(works.values()) == pytest.approx(-exact, rel=1e-13)
     assert workless == []
     assert absent == [
@@ -103,7 +103,7 @@ def test_a_torsion_spring_between_two_arms() -> None:
         weight = 2 * G * 0.5 * math.cos(0.2)
         assert motion.dynamics.effort[0] == pytest.approx([weight - spring, spring], rel=1e-14)
         assert motion.dynamics.newton_euler[0] == pytest.approx([weight - spring, spring], rel=1e-14)
-        _, _, absent = ledger(motion.dynamics.scene)
+        _, _, absent = ledger(motion.dynamics)
         assert absent[0] == "lower: no weight and no inertia force, for there is no mass"
         assert absent[1] == "upper: no inertia torque, for there is no inertia"
         assert "no weights: gravity is zero" not in absent

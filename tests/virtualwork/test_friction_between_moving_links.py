@@ -75,7 +75,7 @@ def test_a_slot_that_turns_and_rubs(speed: float) -> None:
         exact = -cross(pin, normal * 1j * rail + rub * rail)
         assert motion.effort[i] == pytest.approx(exact, rel=1e-13)
         assert motion.dynamics.newton_euler[i, 0] == pytest.approx(exact, rel=1e-13)
-        works, workless, _ = ledger(motion.dynamics.scene)
+        works, workless, _ = ledger(motion.dynamics)
         assert sum(works.values())[i] == pytest.approx(-exact, rel=1e-13)
         assert workless == []
         (guide,) = (j for j in motion.dynamics.reactions.joints if j.name == "B")

@@ -68,7 +68,7 @@ def test_virtual_work_is_newton_euler() -> None:
             torsion_springs=[TorsionSpring(("ground", "rocker"), 2.0, 0.4, 0.1)],
         )
         motion = m.motion(SWEEP, float(rng.normal() * 30), float(rng.normal() * 100))
-        works, _, _ = ledger(motion.dynamics.scene)
+        works, _, _ = ledger(motion.dynamics)
         largest = np.max([np.abs(work) for work in works.values()], axis=0)
         gap = np.abs(motion.dynamics.newton_euler[:, 0] - motion.effort) / largest
         worst = max(worst, float(gap.max()))
@@ -96,7 +96,7 @@ def test_only_what_is_asked_for_is_formed() -> None:
     _ = motion.effort
     assert motion.dynamics.__dict__.get("reactions") is None  # the effort forms no reaction
     motion.reaction("C", on="rocker")
-    formed = motion.dynamics.scene.forces.pose.names
+    formed = motion.dynamics.forces.pose.names
     assert not any("A on" in name or "D on" in name for name in formed)
     motion.reaction("A", on="crank")
     assert "pin:A on crank" in formed
@@ -129,11 +129,11 @@ def test_loads_that_do_no_work_are_never_evaluated() -> None:
     )
     motion = m.motion(SWEEP, 10.0)
     assert (motion.effort == 0).all()
-    scene = motion.dynamics.scene
+    dynamics = motion.dynamics
     # no load was evaluated, each acts where nothing moves or its rate is zero; nor anything made of loads
-    kept = scene.pose.kept.values()
+    kept = dynamics.pose.kept.values()
     assert all(value is None or value[1] is None for value in kept)
-    works, workless, _ = ledger(scene)
+    works, workless, _ = ledger(dynamics)
     assert "crank: weight" in workless
     assert "rocker: applied force" in workless
     assert [name for name in works if "rocker" in name or "coupler" in name] == []

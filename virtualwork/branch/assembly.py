@@ -43,23 +43,8 @@ class Assembly(Choice):
         return choose(m, cls)
 
     @cached_property
-    def prepared(self) -> dict[bool, Any]:
-        """What acts at rest (False) and in motion (True), made once for all motions."""
-        return {}
-
-    @cached_property
-    def load_paths(self) -> dict[bool, Any]:
-        """How that bears on joints and inputs."""
-        return {}
-
-    @cached_property
     def recordings(self) -> dict[Any, Any]:
-        """What has been written down of it on tapes."""
-        return {}
-
-    @cached_property
-    def together(self) -> dict[Any, Any]:
-        """What one pose brings with a first request, by that request."""
+        """What has been made of it once for all motions: what is written down on tapes, what acts at rest and in motion."""
         return {}
 
     # --- along the input ------------------------------------------------------------------------------------------

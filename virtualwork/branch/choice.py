@@ -7,7 +7,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from dalembert.arithmetic.guard import Lock, guarded, own_lock
+from dalembert.arithmetic.guard import Lock, guarded, own_lock, unlocked
 from dalembert.arithmetic.records import Record, record
 from dalembert.dataclass import dataclass, field
 from virtualwork.branch.sampling import depths, vanishes
@@ -100,6 +100,7 @@ class Choice(Record):
         """What targets depend on, as far as requested."""
         return {}
 
+    @unlocked
     def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
         """The steps that targets depend on; worked out once for each set of targets."""
         key = tuple(targets)

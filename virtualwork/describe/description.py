@@ -6,7 +6,7 @@ of solution, the formulas and the studies work on this.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from numbers import Real
 from types import MappingProxyType
@@ -38,7 +38,7 @@ from virtualwork.describe.parts import (
     Torque,
     TorsionSpring,
 )
-from virtualwork.describe.points import as_points, by_name
+from virtualwork.describe.points import as_points, by_name, several
 from virtualwork.describe.units import Decimals
 from virtualwork.describe.values import Point, as_point
 
@@ -104,21 +104,21 @@ class Description(Record):
         values = {
             "ground": as_points(ground, "ground"),
             "links": MappingProxyType(dict(by_name("links", links))),
-            "guides": _several("guides", guides),
-            "gears": _several("gears", gears),
-            "inputs": (inputs,) if isinstance(inputs, Input) else _several("inputs", inputs),
+            "guides": several("guides", guides),
+            "gears": several("gears", gears),
+            "inputs": (inputs,) if isinstance(inputs, Input) else several("inputs", inputs),
             "guess": guess or Guess(),
             "name": name,
             "gravity": _gravity(gravity),
-            "forces": _several("forces", forces),
-            "torques": _several("torques", torques),
-            "springs": _several("springs", springs),
-            "torsion_springs": _several("torsion_springs", torsion_springs),
-            "motors": _several("motors", motors),
-            "friction": _several("friction", friction),
-            "belts": _several("belts", belts),
-            "racks": _several("racks", racks),
-            "cams": _several("cams", cams),
+            "forces": several("forces", forces),
+            "torques": several("torques", torques),
+            "springs": several("springs", springs),
+            "torsion_springs": several("torsion_springs", torsion_springs),
+            "motors": several("motors", motors),
+            "friction": several("friction", friction),
+            "belts": several("belts", belts),
+            "racks": several("racks", racks),
+            "cams": several("cams", cams),
             "tolerances": MappingProxyType(dict(tolerances or {})),
             "decimals": decimals,
         }
@@ -432,15 +432,6 @@ def _gravity(value: Point) -> complex:
     if isinstance(value, Real) and value != 0:
         raise DescriptionError(f"gravity: found {value!r}, expected its two components, such as (0, -9.81)")
     return as_point(value, "gravity")
-
-
-def _several(what: str, entries: object) -> tuple[Any, ...]:
-    """Return the entries of a list as a tuple."""
-    if not isinstance(entries, Iterable) or isinstance(entries, str | Mapping):
-        raise DescriptionError(
-            f"{what}: expected a list, found {type(entries).__name__}: write [...] around it"
-        )
-    return tuple(entries)
 
 
 def joints_apart(m: Description) -> Iterator[tuple[str, str, str]]:

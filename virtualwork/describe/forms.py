@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence, Set
 from numbers import Real
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from dalembert.dataclass import dataclass
 from dalembert.hints import nearest
@@ -48,15 +48,8 @@ class Names(Protocol):
 class Form:
     """A form of values; one that holds numbers names their dimension, a key of `dalembert.units.DIMENSIONS`."""
 
-    @property
-    def is_pair(self) -> bool:
-        """Whether it holds two numbers, x and y."""
-        return False
-
-    @property
-    def parts(self) -> tuple[str | int, ...]:
-        """The numbers that it holds: "x" and "y" of a pair, places in a list; empty where it is one number."""
-        return ("x", "y") if self.is_pair else ()
+    parts: ClassVar[tuple[str | int, ...]] = ()
+    """The numbers that it holds: "x" and "y" of a pair, places in a list; empty where it is one number."""
 
     @property
     def restricts(self) -> bool:
@@ -153,10 +146,7 @@ class Pair(Form):
     """Two numbers [x, y] of one dimension."""
 
     of: str
-
-    @property
-    def is_pair(self) -> bool:
-        return True
+    parts = "x", "y"
 
     def dimension(self, slides: bool) -> str:
         return self.of
@@ -180,9 +170,8 @@ class Lengths(Form):
 
     count: int
 
-    @property
-    def parts(self) -> tuple[str | int, ...]:
-        return tuple(range(self.count))
+    def __post_init__(self) -> None:
+        self.parts = tuple(range(self.count))  # type: ignore[misc]
 
     def dimension(self, slides: bool) -> str:
         return "length"
@@ -292,10 +281,7 @@ class Place(Form):
     """A point of the body that another field names: its name, or [x, y] in the axes of that body."""
 
     of: str
-
-    @property
-    def is_pair(self) -> bool:
-        return True
+    parts = "x", "y"
 
     def dimension(self, slides: bool) -> str:
         return "length"

@@ -212,11 +212,6 @@ class Input(Part):
         Law(), "a table in the file's folder: time_s and the angle or position", default=None, name="law"
     )
 
-    @property
-    def slides(self) -> bool:
-        """Whether the input is a slide."""
-        return self.is_slide
-
     def check(self, where: str) -> None:
         if (self.link is None) == (self.slider is None):
             raise DescriptionError(f"{where}: expected either a link or a slider")
@@ -235,6 +230,8 @@ class Input(Part):
     def is_slide(self) -> bool:
         """True where the input is a position along a guide, m, instead of an angle, rad."""
         return self.slider is not None
+
+    slides = is_slide
 
 
 @record

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any
 
@@ -22,6 +22,15 @@ def by_name(what: str, entries: Mapping[str, Any]) -> Mapping[str, Any]:
         if not isinstance(name, str):
             raise DescriptionError(f"{what}: found the name {name!r}, expected a text such as '{name}'")
     return entries
+
+
+def several(what: str, entries: object) -> tuple[Any, ...]:
+    """Return the entries of a list as a tuple."""
+    if not isinstance(entries, Iterable) or isinstance(entries, str | Mapping):
+        raise DescriptionError(
+            f"{what}: expected a list, found {type(entries).__name__}: write [...] around it"
+        )
+    return tuple(entries)
 
 
 def as_points(points: Mapping[str, Point], what: str = "points") -> Mapping[str, complex]:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from dalembert.arithmetic.doubled import Doubled
 from dalembert.arithmetic.engines.doubled import OWN, estimated
 from dalembert.arithmetic.guard import guarded
-from virtualwork.digits.second_run import Results, SecondRun, answer, apart, parts
+from virtualwork.digits.second_run import Results, SecondRun, apart, parts
 from virtualwork.formulas.kinematics import Angle, Point, Slide, Turn
 from virtualwork.formulas.lanes import MANY_POSES, Lanes
 from virtualwork.formulas.loops import Margin
@@ -162,7 +162,7 @@ class Estimates:
         meet = np.max(gaps, axis=0) * root < MEETING
         for key, value in values.items():
             answered = parts(key, value[rows])
-            smooth = np.maximum(*(estimated(each[key], answered, answer(key).turning) for each in beside))
+            smooth = np.maximum(*(estimated(each[key], answered, key.is_angle) for each in beside))
             estimates[key][rows] = np.where(meet, smooth, estimates[key][rows])
 
     def _interpolated(self, keys: Sequence[Quantity], rows: NDArray[np.bool_]) -> list[Results]:

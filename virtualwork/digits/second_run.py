@@ -126,7 +126,7 @@ class SecondRun:
         tape = taped(self.branch, self.exact, (*values, *others))
         changed = dict(changed or {})
         entering = self.entering(tape.inputs, changed)
-        answers = {answer(key): parts(key, value) for key, value in values.items()}
+        answers = {Answer(key.names, key.is_angle): parts(key, value) for key, value in values.items()}
         estimates, results = compared(tape, entering, answers)
         zero = Doubled(0.0)
         return (
@@ -269,10 +269,10 @@ class SecondRun:
     def _rubbing(self, name: str) -> Doubled:
         """The friction of a contact and which way it slips, from the first run on until the friction fits its force."""
         if name not in self._solutions:
-            for n, size in enumerate(self._first_friction):
+            for n, size in enumerate(self.poses.friction):
                 self._solutions |= {f"friction {n}": Doubled(size), f"slip {n}": Doubled(-np.sign(size))}
             # where statics does not determine what a contact bears, nothing determines its friction
-            names = [f"friction {n}" for n, x in enumerate(self._first_friction) if not np.isnan(x).all()]
+            names = [f"friction {n}" for n, x in enumerate(self.poses.friction) if not np.isnan(x).all()]
             slopes = self._slopes(names) if names else np.empty(0)
             for _ in range(STEPS if names else 0):
                 rest = self._unfit(names)
@@ -311,11 +311,6 @@ class SecondRun:
         there = np.isfinite(slopes).all(axis=(1, 2)) & self._slides
         slopes[~there] = np.eye(len(names))
         return slopes
-
-    @cached_property
-    def _first_friction(self) -> Reals:
-        """The friction of each contact in the first run, (c, n)."""
-        return self.poses.friction
 
     def _table(self, number: int) -> tuple[Doubled, Doubled]:
         """What a table gives, linear between its rows."""
@@ -379,11 +374,6 @@ def _shortest(group: Group, size: float) -> float:
     terms = (t for closure in group.closures for t in closure.terms)
     arms = (abs(complex(t.z)) for t in terms if t.body in group.members and t.slide is None)
     return min((arm for arm in arms if arm), default=size)
-
-
-def answer(key: Quantity) -> Answer:
-    """What a quantity is called on a tape, and whether it is an angle without its whole turns."""
-    return Answer(key.names, key.is_angle)
 
 
 def parts(key: Quantity, value: Any) -> list[Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
 import numpy as np
@@ -32,14 +32,6 @@ class Branch(Protocol):
         """The order of solution."""
 
     @property
-    def prepared(self) -> dict[bool, Any]:
-        """What acts at rest (False) and in motion (True), made once for all poses."""
-
-    @property
-    def load_paths(self) -> dict[bool, Any]:
-        """How the loads bear on joints and inputs, at rest (False) and in motion (True)."""
-
-    @property
     def merged(self) -> tuple[Plan, Group | None]:
         """All loops at once."""
 
@@ -49,15 +41,10 @@ class Branch(Protocol):
 
     @property
     def recordings(self) -> dict[Any, Any]:
-        """What has been written down of it."""
+        """What has been made of it once for all poses: what is written down, loads, what a first request brings (`one_pose`)."""
 
-    @property
-    def together(self) -> dict[Any, Any]:
-        """What one pose that is requested again and again brings with a first request (`one_pose`)."""
-
-    @property
-    def known_steps(self) -> dict[tuple[str, ...], tuple[Step, ...]]:
-        """The steps that targets depend on, as far as requested."""
+    def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
+        """The steps that targets depend on; worked out once for each set of targets."""
 
     @property
     def plain(self) -> dict[str, Callable[[State], None]]:

@@ -244,34 +244,25 @@ def in_order(term: ForceTerm, formed: Container[Any]) -> list[ForceTerm]:
 
 
 @dataclass(frozen=True, eq=False)
-class Lifted(ForceTerm):
+class Lifted(Total):
     """What bears on the coordinate of a follower, as it bears on its cam's angle: times y′."""
 
     touch: Touch
-    of: Combination
 
     def form(self, pose: LoadedPose) -> tuple[float, Number]:
         value = self.of.value(pose)
         return 1.0, None if value is None else self.touch.rate(pose.st, 1) * value
 
-    def reads(self) -> Iterable[ForceTerm | None]:
-        return self.of
-
 
 @dataclass(frozen=True, eq=False)
-class ContactForce(ForceTerm):
+class ContactForce(Transmitted):
     """The contact force on the follower: what balances all that bears on its coordinate, along the normal."""
 
     touch: Touch
-    of: Combination
-    lasts = True
 
     def form(self, pose: LoadedPose) -> tuple[float, Number]:
         value = self.of.value(pose)
         return 1.0, None if value is None else value * self.touch.at(pose.st).unit()
-
-    def reads(self) -> Iterable[ForceTerm | None]:
-        return self.of
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from dalembert.arithmetic.recorded import RECORDED, bare
 from virtualwork.describe.description import Description
 from virtualwork.formulas.kinematics import Angle
-from virtualwork.formulas.numbers import Number
+from virtualwork.formulas.numbers import Number, times
 from virtualwork.formulas.quantity import Quantity, Recording
 from virtualwork.plan.steps import joints, joints_at
 
@@ -61,7 +61,7 @@ class Effort(Force, kind="effort"):
     input: int
 
     def form(self, forces: PoseForces) -> Number:
-        return forces.effort(self.input)
+        return forces.efforts[self.input]
 
 
 class Generalized(Force, kind="generalized"):
@@ -145,7 +145,7 @@ class MeshTorque(Force, kind="mesh torque"):
     body: str
 
     def form(self, forces: PoseForces) -> Number:
-        return forces.mesh_torque(self.mesh, self.body)
+        return times(forces.mechanism.meshes[self.mesh].torques[self.body], forces.mesh(self.mesh))
 
 
 class ToothPlace(Force, kind="teeth at"):

@@ -170,7 +170,7 @@ class LoadPaths:
         for touch, sign in self.touches.turned_by(key):
             lifted = self.with_ties(touch.coordinate, without)
             if lifted:
-                total.add(Combination({self.force_terms(Lifted, touch, lifted): sign}))
+                total.add(Combination({self.force_terms(Lifted, lifted, touch): sign}))
         return total
 
     def push(self, touch: Touch) -> Combination:
@@ -181,7 +181,7 @@ class LoadPaths:
         """The contact force of a cam on its follower."""
         key = "contact", touch.drive.number
         if key not in self._known:
-            of = self.force_terms(ContactForce, touch, self.push(touch))
+            of = self.force_terms(ContactForce, self.push(touch), touch)
             self._known[key] = Combination({of: 1.0})
         return next(iter(self._known[key]))  # type: ignore[return-value]
 

@@ -81,14 +81,14 @@ class OnePose:
         _, speed, acceleration, jerk = numbers
         moves = speed != 0.0, acceleration != 0.0, jerk != 0.0
         first = self._first
-        together = branch.together.get((moves, keys)) if first is None else None
+        together = branch.recordings.get(("together", moves, keys)) if first is None else None
         if together is None:
             made: Ready | None = branch.recordings.get(("ready", moves, keys))
             if made is None:
                 return False
             function: Ready = made
             if first is None:
-                together = branch.together.setdefault((moves, keys), Together((function, keys)))
+                together = branch.recordings.setdefault(("together", moves, keys), Together((function, keys)))
             else:
                 self._note(first, moves, keys)
         if together is not None:

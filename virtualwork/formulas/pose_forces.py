@@ -64,7 +64,7 @@ class PoseForces:
         self.joints = JointForces(paths)
         self.formed: dict[Quantity, Number] = {}
         self._placed = False
-        pose.drive = self.effort
+        pose.drive = lambda j: self.efforts[j]
         solve(*self.case.targets())
         if self.case.contacts:
             self.solve_places()
@@ -108,9 +108,6 @@ class PoseForces:
         rate = driven - carried
         least = AT_REST * (abs(driven) + abs(carried))
         return self.pose.kind.select(abs(rate) - least, rate, 0.0)
-
-    def effort(self, j: int) -> Number:
-        return self.efforts[j]
 
     def generalized(self, j: int) -> Number:
         value = generalized_force(self.paths, self.pose, j)
@@ -185,9 +182,6 @@ class PoseForces:
         if of.guide is not None:
             return self.joints.tooth(self.pose, mesh)
         return self.paths.value(self.pose, self.paths.couple(of.kind, mesh))
-
-    def mesh_torque(self, mesh: int, body: str) -> Number:
-        return times(self.mechanism.meshes[mesh].torques[body], self.mesh(mesh))
 
     def tooth_place(self, mesh: int) -> Number:
         self.solve_places()

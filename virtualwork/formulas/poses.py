@@ -90,7 +90,7 @@ class Poses:
         once: bool = False,
     ) -> None:
         self.block_of, self.once = block_of, once
-        self._known_steps, self._plain, self._close = branch.known_steps, branch.plain, branch.close
+        self._plain, self._close = branch.plain, branch.close
         self.branch, self.plan, self.lock = branch, branch.plan, branch.lock
         self.mechanism = m = branch.mechanism
         k = len(m.inputs)
@@ -245,14 +245,6 @@ class Poses:
         for i, st in enumerate(self.states()):
             yield slice(i * BLOCK, min((i + 1) * BLOCK, self.n)), st
 
-    def _steps(self, targets: Iterable[str]) -> tuple[Step, ...]:
-        """The steps that targets depend on."""
-        wanted = tuple(targets)
-        steps = self._known_steps.get(wanted)
-        if steps is None:
-            steps = self._known_steps[wanted] = self.plan.needed(wanted)
-        return steps
-
     def _new(self, steps: Sequence[Step], k: int, which: int) -> list[Step]:
         """The steps that are not yet carried on to an order."""
         done = self._done[k, which]
@@ -264,7 +256,7 @@ class Poses:
 
     def solve(self, targets: Iterable[str]) -> None:
         """Work out the targets' positions."""
-        new = self._new(self._steps(targets), 0, -2)
+        new = self._new(self.branch.needed(targets), 0, -2)
         if not new:
             return
         # a part of a sweep has the digits of the whole
@@ -295,7 +287,7 @@ class Poses:
         ZeroDivisionError
             At a singular pose, whose derivatives come from the tape.
         """
-        steps = self._steps(targets)
+        steps = self.branch.needed(targets)
         self.solve(targets)
         if self.states()[0].many:
             raise ZeroDivisionError

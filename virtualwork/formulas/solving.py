@@ -376,10 +376,10 @@ class Solving(Poses):
 
     def twist(self, number: int) -> Reals:
         """A torsion spring's twist with its whole turns, (n,)."""
-        from virtualwork.formulas.scene import Scene
+        from virtualwork.formulas.loaded_pose import Setting
 
         spring = self.branch.mechanism.torsion_springs[number]
-        setting = Scene(self).setting
+        setting = Setting(self, at_rest=False)
         self.solve(tuple(f"angle:{body}" for body in spring.links if body != "ground"))
         return self.over(lambda st: setting.twist(st, spring))  # type: ignore[no-any-return]
 

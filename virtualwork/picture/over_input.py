@@ -138,10 +138,8 @@ def forces(d: Dynamics, rows: Sequence[Row] | None = None, figure: FigureBase | 
     array of axes
         Effort, joint forces; where something moves also the hodograph of the shaking force, the shaking moment.
     """
-    m, shakes = (
-        d.poses.mechanism,
-        d.scene.moves,
-    )  # at rest the ground carries a constant load, which is no picture
+    # at rest the ground carries a constant load, which is no picture
+    m, shakes = d.poses.mechanism, d.moves
     x, label = _input(d.poses)
     shown = [
         (row, size)

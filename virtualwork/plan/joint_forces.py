@@ -42,12 +42,9 @@ class Order:
     @cached_property
     def multipliers(self) -> dict[Side, tuple[Group, int]]:
         """Which joint forces are multipliers of a loop: (joint, body) -> (group, loop)."""
-        multipliers: dict[Side, tuple[Group, int]] = {}
-        for group in self.plan.groups:
-            for c, closure in enumerate(group.closures):
-                key = f"pin:{closure.joint}" if closure.guide is None else f"guide:{closure.guide}"
-                multipliers[key, closure.body] = group, c
-        return multipliers
+        return {
+            closure.cut: (group, c) for group in self.plan.groups for c, closure in enumerate(group.closures)
+        }
 
     @cached_property
     def sides(self) -> dict[str, list[Side]]:

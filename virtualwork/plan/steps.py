@@ -158,6 +158,11 @@ class Closure:
     body: str
     guide: int | None = None
 
+    @property
+    def cut(self) -> tuple[str, str]:
+        """The key of the joint that is cut, and the link."""
+        return f"pin:{self.joint}" if self.guide is None else f"guide:{self.guide}", self.body
+
 
 Kind = Literal["RRR", "RRP", "RPR", "PRP", "Newton"]
 

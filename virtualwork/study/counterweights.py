@@ -59,10 +59,10 @@ def least_squares(motion: Moving, links: Sequence[str]) -> tuple[dict[str, compl
     """
     if isinstance(links, str) or not links:
         raise DescriptionError(f"counterweights: found {links!r}, expected a list of links")
-    scene, poses = motion.dynamics.scene, motion.dynamics.poses
-    if not scene.moves:
+    dynamics, poses = motion.dynamics, motion.dynamics.poses
+    if not dynamics.moves:
         raise DescriptionError("counterweights: the speed is zero: expected a motion that shakes")
-    inertia = [load for load in scene.loads if load.kind == "inertia force"]
+    inertia = [load for load in dynamics.case.loads if load.kind == "inertia force"]
 
     def shaken(pose: LoadedPose) -> Number:
         total: Number = None
@@ -70,7 +70,7 @@ def least_squares(motion: Moving, links: Sequence[str]) -> tuple[dict[str, compl
             total = plus(total, pose.formed(load))
         return total
 
-    (before,) = scene.over([shaken], complex)
+    (before,) = dynamics.over([shaken], complex)
     columns = []
     for link in links:
         z = pivot(poses.mechanism, link)

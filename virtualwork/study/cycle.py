@@ -257,23 +257,24 @@ class Cycle(Sweep):
     @cached_property
     def energy(self) -> tuple[Reals, Reals]:
         """Kinetic energy and potential of weights and springs at each pose, (n,) J."""
-        scene = self.motion.dynamics.scene
-        centers = {body: scene.case.path(body, r.center) for body, r in scene.rigid.items() if r.mass}
+        dynamics = self.motion.dynamics
+        rigid = self.poses.mechanism.rigid
+        centers = {body: dynamics.case.path(body, r.center) for body, r in rigid.items() if r.mass}
         keys: set[str] = set()
         for path in centers.values():
             keys |= path_reads(path)
 
         def kinetic(pose: LoadedPose) -> Number:
             total: Number = None
-            for body, r in scene.rigid.items():
+            for body, r in rigid.items():
                 if body in centers and (v := pose.velocity(centers[body])) is not None:
                     total = plus(total, 0.5 * r.mass * (v.real * v.real + v.imag * v.imag))
                 if r.inertia and (w := pose.omega(body)) is not None:
                     total = plus(total, 0.5 * r.inertia * w * w)
             return total
 
-        stored = partial(potential, [load for load in scene.loads if load.stores])
-        moving, held = scene.over([kinetic, stored], float, sorted(keys))
+        stored = partial(potential, [load for load in dynamics.case.loads if load.stores])
+        moving, held = dynamics.over([kinetic, stored], float, sorted(keys))
         return moving, held
 
     @property
@@ -286,16 +287,16 @@ class Cycle(Sweep):
         speed, acceleration, _ = (rates[0] for rates in self.poses.rates)
         if not self.timed and (np.any(acceleration) or np.ndim(speed)):
             return None
-        scene = self.motion.dynamics.scene
+        dynamics = self.motion.dynamics
 
         def work(pose: LoadedPose) -> Number:
             total: Number = None
-            for load in scene.case.everything:
+            for load in dynamics.case.everything:
                 if load.kind not in OWN:
                     total = plus(total, minus(load.power(pose, 0), load.elastic(pose)))
             return total
 
-        total = self.effort + scene.over([work], float)[0]
+        total = self.effort + dynamics.over([work], float)[0]
         kinetic, potential = self.energy
         gain = (kinetic[-1] - kinetic[0]) + (potential[-1] - potential[0])
         return self.integral(np.asarray(total * self._pace)) - float(gain)

@@ -78,47 +78,53 @@ class Part(NamedTuple):
 
 
 def parts(case: LoadCase, of: JointForces) -> dict[str, list[Part]]:
-    """Return what acts on every link, as `free_bodies` has it over poses, for tapes."""
-    m = of.mechanism
-    rubbing = {joint.key for joint, *_ in case.contacts if joint.guide is None}
-    result: dict[str, list[Part]] = {body: [] for body in m.links}
-    for i, load in enumerate(case.loads):
-        if load.body != GROUND:
-            name = SHORT.get(load.kind, load.kind)
-            torque = load.path is None
-            key: Quantity = LoadTorque(i) if torque else Load(i)
-            result[load.body].append(Part(name, load.kind, key, None if torque else LoadPlace(i), 1.0))
-    for joint in of.joints:
-        for body in joint.bodies:
-            if body == GROUND:
-                continue
-            guide = joint.guide
-            at: Quantity | None = Point(body, 0j, joint.name, 0) if guide is None else _block_key(m, guide)
-            name = f"{joint.name}: {_other(joint, body)}"
-            result[body].append(Part(name, "joint force", JointForce(joint.key, body), at, 1.0))
-            if joint.key in rubbing or (guide is not None and m.guides[guide].is_slider):
-                result[body].append(Part(name, "joint moment", JointMoment(joint.key, body), None, 1.0))
-    for body, part in _meshes(of):
+    """Return what acts on every link by the keys of its quantities, but for the contact forces of cams."""
+    result: dict[str, list[Part]] = {body: [] for body in of.mechanism.links}
+    for body, part in (*_loads(case), *_joints(case, of), *_meshes(of), *_drives(of.mechanism)):
         if body != GROUND:
             result[body].append(part)
-    for j, entry in enumerate(m.inputs):
-        guide = m.guide_of(entry) if entry.is_slide else None
-        ends = (
-            (str(entry.link), m.carrier(j)) if guide is None else (m.guides[guide].link, m.guides[guide].on)
-        )
-        for body, sign in zip(ends, (1.0, -1.0), strict=True):
-            if body == GROUND:
-                continue
-            at, along = (None, None) if guide is None else (_block_key(m, guide), Rail(guide))
-            letter = "T" if guide is None else "F"
-            name = letter if sign > 0 else f"−{letter}"
-            result[body].append(Part(name, "drive", Effort(j), at, sign, along))
     return result
 
 
-def _block_key(m: Description, guide: int) -> Quantity:
-    g = m.guides[guide]
-    return Point(g.link, 0j, g.point, 0)
+def _loads(case: LoadCase) -> Iterator[tuple[str, Part]]:
+    for i, load in enumerate(case.loads):
+        name = SHORT.get(load.kind, load.kind)
+        if load.path is None:
+            yield load.body, Part(name, load.kind, LoadTorque(i), None, 1.0)
+        else:
+            yield load.body, Part(name, load.kind, Load(i), LoadPlace(i), 1.0)
+
+
+def _joints(case: LoadCase, of: JointForces) -> Iterator[tuple[str, Part]]:
+    m = of.mechanism
+    rubbing = {joint.key for joint, *_ in case.contacts if joint.guide is None}
+    for joint in of.joints:
+        guide = joint.guide
+        for body in joint.bodies:
+            if body == GROUND:
+                continue
+            at = Point(body, 0j, joint.name, 0) if guide is None else _block(m, guide)
+            name = f"{joint.name}: {_other(joint, body)}"
+            yield body, Part(name, "joint force", JointForce(joint.key, body), at, 1.0)
+            if joint.key in rubbing or (guide is not None and m.guides[guide].is_slider):
+                yield body, Part(name, "joint moment", JointMoment(joint.key, body), None, 1.0)
+
+
+def _drives(m: Description) -> Iterator[tuple[str, Part]]:
+    for j, entry in enumerate(m.inputs):
+        if entry.is_slide:
+            guide = m.guide_of(entry)
+            g = m.guides[guide]
+            for body, name, sign in ((g.link, "F", 1.0), (g.on, "−F", -1.0)):
+                yield body, Part(name, "drive", Effort(j), _block(m, guide), sign, Rail(guide))
+        else:
+            for body, name, sign in ((str(entry.link), "T", 1.0), (m.carrier(j), "−T", -1.0)):
+                yield body, Part(name, "drive", Effort(j), None, sign)
+
+
+def _block(m: Description, guide: int) -> Point:
+    """Where a guide's block stands."""
+    return Point(m.guides[guide].link, 0j, m.guides[guide].point, 0)
 
 
 def _other(joint: Joint, body: str) -> str:
@@ -160,9 +166,7 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
     >>> [(f.name, complex(f.force[0])) for f in body.forces], [(t.name, float(t.torque[0])) for t in body.torques]
     ([('W', -19.62j), ('O: ground', 19.62j)], [('T', 9.81)])
     """
-    m, poses = dynamics.poses.mechanism, dynamics.poses
-    effort = dynamics.effort
-    over = dynamics.scene.over
+    m, poses, of = dynamics.poses.mechanism, dynamics.poses, dynamics.reactions
     result = {
         body: FreeBody(
             body,
@@ -173,71 +177,29 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
         )
         for body, link in m.links.items()
     }
-    for load in dynamics.scene.case.everything:
-        if load.body == GROUND or load.kind == "friction":
-            # the friction of a joint is in its force and moment
-            continue
-        name = SHORT.get(load.kind, load.kind)
-        if load.path is None:
-            (torque,) = over([load.form], float)
-            result[load.body].torques.append(Torque(name, load.kind, torque))
-        else:
-            (force,) = over([load.form], complex)
-            at = poses.point(load.body, load.place)
-            result[load.body].forces.append(Force(name, load.kind, at, force))
-    for joint in dynamics.reactions.joints:
-        for body in joint.bodies:
-            if body == GROUND:
-                continue
-            if joint.guide is None:
-                at = poses.point(body, 0j, 0, joint.name)
-            else:
-                at = _block(dynamics, joint.guide)
-            name = f"{joint.name}: {_other(joint, body)}"
-            result[body].forces.append(Force(name, "joint force", at, dynamics.joint_force(joint, body)))
-            moment = dynamics.joint_moment(joint, body)
-            if np.any(np.nan_to_num(moment)):
-                result[body].torques.append(Torque(name, "joint moment", moment))
-    for number, touch in enumerate(dynamics.reactions.paths.touches.every):
+    for body, every in parts(dynamics.case, of).items():
+        for part in every:
+            load, at, along = (_value(dynamics, key) for key in (part.key, part.at, part.along))
+            load = part.sign * load if along is None else part.sign * load * along
+            if at is not None:
+                result[body].forces.append(Force(part.name, part.kind, at, load))
+            elif part.kind != "joint moment" or np.any(np.nan_to_num(load)):
+                result[body].torques.append(Torque(part.name, part.kind, load))
+    for number, touch in enumerate(of.paths.touches.every):
         forms = partial(_normal, touch=touch), partial(_touching, touch=touch)
-        way, at = over(forms, complex, touch.targets)
+        way, at = dynamics.over(forms, complex, touch.targets)
         force = dynamics.contact(number) * way
-        for body, other, sign in (
-            (touch.body, touch.drive.cam.cam, 1.0),
-            (touch.drive.cam.cam, touch.body, -1.0),
-        ):
+        cam = touch.drive.cam.cam
+        for body, other, sign in ((touch.body, cam, 1.0), (cam, touch.body, -1.0)):
             if body != GROUND:
                 result[body].forces.append(Force(f"N: {other}", "contact force", at, sign * force))
-    for body, part in _meshes(dynamics.reactions):
-        if body == GROUND:
-            continue
-        force, at, along = (_value(dynamics, key) for key in (part.key, part.at, part.along))
-        if at is None:
-            result[body].torques.append(Torque(part.name, part.kind, part.sign * force))
-        else:
-            result[body].forces.append(Force(part.name, part.kind, at, part.sign * force * along))
-    for j, entry in enumerate(m.inputs):
-        if not entry.is_slide:
-            for body, sign in ((str(entry.link), 1.0), (m.carrier(j), -1.0)):
-                if body != GROUND:
-                    result[body].torques.append(
-                        Torque("T" if sign > 0 else "−T", "drive", sign * effort[:, j])
-                    )
-            continue
-        i = m.guide_of(entry)
-        g = m.guides[i]
-        (rail,) = over([partial(dynamics.reactions.rail, guide=i)], complex)
-        at = _block(dynamics, i)
-        for body, sign in ((g.link, 1.0), (g.on, -1.0)):
-            if body != GROUND:
-                result[body].forces.append(
-                    Force("F" if sign > 0 else "−F", "drive", at, sign * effort[:, j] * rail)
-                )
     return list(result.values())
 
 
 def _value(dynamics: Dynamics, key: Any) -> Any:
-    return None if key is None else np.asarray(dynamics.value(key))
+    if key is None:
+        return None
+    return np.asarray(dynamics.value(key) if key.is_force else dynamics.poses.values((key,))[0])
 
 
 def _meshes(of: JointForces) -> Iterator[tuple[str, Part]]:
@@ -264,11 +226,3 @@ def _normal(pose: LoadedPose, touch: Touch) -> Number:
 def _touching(pose: LoadedPose, touch: Touch) -> Number:
     """Where a cam and its follower touch."""
     return touch.axis(pose.st) + touch.at(pose.st).touch()
-
-
-def _block(dynamics: Dynamics, guide: int) -> Complexes:
-    """Where a guide's block stands, (n,)."""
-    m, poses = dynamics.poses.mechanism, dynamics.poses
-    g = m.guides[guide]
-    z = m.bodies[g.link][g.point]
-    return np.full(poses.n, z) if g.link == GROUND else poses.point(g.link, z)

@@ -7,15 +7,14 @@ in fixed bearings none, and those normal to the displacement none (what follows 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.dynamics import Dynamics
-from virtualwork.formulas.loads import FrictionLoad
 from virtualwork.formulas.numbers import minus, times
 from virtualwork.plan.joint_forces import pairs
 
@@ -23,7 +22,8 @@ if TYPE_CHECKING:
     from virtualwork.formulas.loaded_pose import LoadedPose
     from virtualwork.formulas.loads import Load
     from virtualwork.formulas.numbers import Complexes, Number, Reals
-    from virtualwork.formulas.scene import Scene
+    from virtualwork.formulas.reactions import JointForces
+    from virtualwork.plan.steps import Path
 
 
 class Item(NamedTuple):
@@ -71,106 +71,92 @@ def items(dynamics: Dynamics, unit: int | None = None) -> list[Item]:
     unknown [9.81] works
     joint force [0.] at rest
     """
-    effort = dynamics.effort
-    result = [_applied(dynamics, load, unit) for load in dynamics.scene.case.everything]
-    return [*result, *_drives(dynamics, effort, unit), *_joints(dynamics, unit)]
-
-
-def _over(dynamics: Dynamics, kind: type, *forms: Callable[[LoadedPose], Number]) -> list[Any]:
-    """Arrays (n,) of what forms make of a pose; zero where it is identically zero."""
-    return dynamics.scene.over(forms, kind)
+    result = [_applied(dynamics, load, unit) for load in dynamics.case.everything]
+    return [*result, *_drives(dynamics, unit), *_joints(dynamics, unit)]
 
 
 def _turning(pose: LoadedPose, body: str, unit: int | None) -> Number:
     return pose.omega(body) if unit is None else pose.turning(body, unit)
 
 
+def _velocity(
+    pose: LoadedPose, path: Path, unit: int | None, of: JointForces, rail: int | None = None
+) -> Number:
+    """The velocity of a point; on the `rail` of a guide of the material point under the slide, without the slide's own speed."""
+    result = pose.velocity(path) if unit is None else pose.coefficient(path, unit)
+    if rail is None:
+        return result
+    s = pose.slide_rate(rail) if unit is None else pose.by[unit].slide[rail][0]
+    return minus(result, times(s, of.rail(pose, rail)))
+
+
 def _applied(dynamics: Dynamics, load: Load, unit: int | None) -> Item:
     if load.path is None:
         turning = partial(_turning, body=load.body, unit=unit)
-        value, rate = _over(dynamics, float, load.form, turning)
+        value, rate = dynamics.over([load.form, turning], float)
         return Item(load.body, load.kind, value, rate, turns=True)
-    path = load.path
-
-    def velocity(pose: LoadedPose) -> Number:
-        result = pose.velocity(path) if unit is None else pose.coefficient(path, unit)
-        if load.rail is None:
-            return result
-        # on a rail the material point under the slide: without the slide's own speed along it
-        s = pose.slide_rate(load.rail) if unit is None else pose.by[unit].slide[load.rail][0]
-        return minus(result, times(s, dynamics.reactions.rail(pose, load.rail)))
-
-    value, rate = _over(dynamics, complex, load.form, velocity)
-    kind = "friction" if isinstance(load, FrictionLoad) else load.kind
-    return Item(load.body, kind, value, rate, turns=False)
+    velocity = partial(_velocity, path=load.path, unit=unit, of=dynamics.reactions, rail=load.rail)
+    value, rate = dynamics.over([load.form, velocity], complex)
+    return Item(load.body, load.kind, value, rate, turns=False)
 
 
-def _drives(dynamics: Dynamics, effort: Reals, unit: int | None) -> Iterator[Item]:
+def _drives(dynamics: Dynamics, unit: int | None) -> Iterator[Item]:
     """The efforts: on the driven link, and their reaction on a link that carries the drive (Ibrahim §2.3)."""
-    m, reactions = dynamics.poses.mechanism, dynamics.reactions
+    m, effort = dynamics.poses.mechanism, dynamics.effort
     for j, entry in enumerate(m.inputs):
         if not entry.is_slide:
             for body, sign in ((str(entry.link), 1.0), (m.carrier(j), -1.0)):
                 if body != GROUND:
-                    (rate,) = _over(dynamics, float, partial(_turning, body=body, unit=unit))
+                    (rate,) = dynamics.over([partial(_turning, body=body, unit=unit)], float)
                     yield Item(body, "unknown", sign * effort[:, j], rate, turns=True)
             continue
         guide = m.guide_of(entry)
-        (rail,) = _over(dynamics, complex, partial(reactions.rail, guide=guide))
+        (rail,) = dynamics.over([partial(dynamics.reactions.rail, guide=guide)], complex)
         g = m.guides[guide]
         for body, sign in ((g.link, 1.0), (g.on, -1.0)):
             if body != GROUND:
-                rate = _joint_velocity(dynamics, m.bodies, guide, body, unit)
+                rate = _at_guide(dynamics, guide, body, unit)
                 yield Item(body, "unknown", sign * effort[:, j] * rail, rate, turns=False)
 
 
-def _joint_velocity(dynamics: Dynamics, bodies: Any, guide: int, body: str, unit: int | None) -> Complexes:
+def _at_guide(dynamics: Dynamics, guide: int, body: str, unit: int | None) -> Complexes:
     """The velocity of a link's own point at a guide."""
-    g, case = dynamics.poses.mechanism.guides[guide], dynamics.scene.case
-    path = case.path(g.link, bodies[g.link][g.point])
-
-    def velocity(pose: LoadedPose) -> Number:
-        result = pose.velocity(path) if unit is None else pose.coefficient(path, unit)
-        if body == g.link:
-            return result
-        s = pose.slide_rate(guide) if unit is None else pose.by[unit].slide[guide][0]
-        return minus(result, times(s, dynamics.reactions.rail(pose, guide)))
-
-    (rate,) = _over(dynamics, complex, velocity)
+    m = dynamics.poses.mechanism
+    g = m.guides[guide]
+    path, rail = dynamics.case.path(g.link, m.bodies[g.link][g.point]), None if body == g.link else guide
+    (rate,) = dynamics.over(
+        [partial(_velocity, path=path, unit=unit, of=dynamics.reactions, rail=rail)], complex
+    )
     return np.asarray(rate)
 
 
 def _joints(dynamics: Dynamics, unit: int | None) -> Iterator[Item]:
     """Every joint force once, and the moment of a slider: none of them does work."""
-    m, case = dynamics.poses.mechanism, dynamics.scene.case
-    for joint, on, _ in pairs(dynamics.reactions.joints):
+    m, of = dynamics.poses.mechanism, dynamics.reactions
+    for joint, on, _ in pairs(of.joints):
         force = dynamics.joint_force(joint, on)
         if joint.guide is not None:
-            rate = _joint_velocity(dynamics, m.bodies, joint.guide, on, unit)
+            rate = _at_guide(dynamics, joint.guide, on, unit)
         else:
-            path = case.path(on, m.bodies[on][joint.name])
-
-            def velocity(pose: LoadedPose, path: Any = path) -> Number:
-                return pose.velocity(path) if unit is None else pose.coefficient(path, unit)
-
-            (rate,) = _over(dynamics, complex, velocity)
+            path = dynamics.case.path(on, m.bodies[on][joint.name])
+            (rate,) = dynamics.over([partial(_velocity, path=path, unit=unit, of=of)], complex)
         workless = "pair"
         if GROUND in joint.bodies:
             workless = "at rest" if joint.guide is None else "perpendicular to the displacement"
-        if joint.guide is not None and any(load.joint == joint.key for load in dynamics.scene.friction):
+        if joint.guide is not None and any(load.joint == joint.key for load in dynamics.case.friction):
             # its friction stands among the loads
-            (rail,) = _over(dynamics, complex, partial(dynamics.reactions.rail, guide=joint.guide))
+            (rail,) = dynamics.over([partial(of.rail, guide=joint.guide)], complex)
             force = force - (force * np.conj(rail)).real * rail
         yield Item(on, "joint force", force, rate, False, joint.name, workless)
 
 
-def ledger(scene: Scene, j: int = 0) -> tuple[dict[str, Reals], list[str], list[str]]:
+def ledger(dynamics: Dynamics, j: int = 0) -> tuple[dict[str, Reals], list[str], list[str]]:
     """Return the virtual work of each load for a unit of input j, the workless loads and the absent kinds.
 
     Parameters
     ----------
-    scene : Scene
-        The poses and loads of a motion: `motion.dynamics.scene`.
+    dynamics : Dynamics
+        The loads of a motion.
     j : int
         The number of the input, from 0.
 
@@ -180,7 +166,7 @@ def ledger(scene: Scene, j: int = 0) -> tuple[dict[str, Reals], list[str], list[
     workless : list of str
         Loads on parts that cannot move.
     absent : list of str
-        Kinds of loads that the scene does not have, with the reason.
+        Kinds of loads that there are none of, with the reason.
 
     Notes
     -----
@@ -193,36 +179,36 @@ def ledger(scene: Scene, j: int = 0) -> tuple[dict[str, Reals], list[str], list[
     >>> from virtualwork import Input, Link, Mechanism
     >>> bob = Link({"O": 0j}, mass=2, center=0.5)
     >>> m = Mechanism({"O": 0j}, {"bob": bob}, inputs=Input(link="bob"), gravity=-9.81j)
-    >>> works, _, _ = ledger(m.motion(0.0).dynamics.scene)
+    >>> works, _, _ = ledger(m.motion(0.0).dynamics)
     >>> works
     {'bob: weight': array([-9.81])}
     """
     done: dict[str, Reals] = {}
     workless: list[str] = []
-    pose, working = scene.pose, list["Load"]()
-    for load in scene.case.everything:
+    pose, working = dynamics.pose, list["Load"]()
+    for load in dynamics.case.everything:
         if load.power(pose, j) is not None:
             working.append(load)
         elif load.displacement(pose, j) is None and load.name not in workless and load.carries:
             workless.append(load.name)
-    each = scene.over([partial(load.power, j=j) for load in working], float)
+    each = dynamics.over([partial(load.power, j=j) for load in working], float)
     for load, value in zip(working, each, strict=True):
         done[load.name] = done.get(load.name, 0.0) + value
-    return done, [name for name in workless if name not in done], absent(scene)
+    return done, [name for name in workless if name not in done], absent(dynamics)
 
 
-def absent(scene: Scene) -> list[str]:
-    """Which terms of eq. (5) the scene does not have, and why: they are never formed."""
-    m, remarks = scene.mechanism, []
-    massless = [body for body, r in scene.rigid.items() if not r.mass]
+def absent(dynamics: Dynamics) -> list[str]:
+    """Which terms of eq. (5) there are none of, and why: they are never formed."""
+    m, remarks = dynamics.poses.mechanism, []
+    massless = [body for body, r in m.rigid.items() if not r.mass]
     if massless:
         remarks.append(f"{', '.join(massless)}: no weight and no inertia force, for there is no mass")
-    flat = [body for body, r in scene.rigid.items() if r.mass and not r.inertia]
+    flat = [body for body, r in m.rigid.items() if r.mass and not r.inertia]
     if flat:
         remarks.append(f"{', '.join(flat)}: no inertia torque, for there is no inertia")
     if not m.gravity:
         remarks.append("no weights: gravity is zero")
-    if not scene.moves:
+    if not dynamics.moves:
         remarks.append("no inertia loads, no damping, no friction: speed and acceleration are zero")
     for what, entries in (
         ("applied forces", m.forces),

@@ -17,10 +17,10 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.limits import TURNED
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.at_rest import mass, mass_reads, potential, second_variation
+from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.loaded_pose import LoadedPose
 from virtualwork.formulas.numbers import EPS, Number, Reals, plus
-from virtualwork.formulas.scene import Scene
 from virtualwork.plan.steps import path_reads
 
 # steps of a turn in which usual loads are looked at
@@ -35,7 +35,7 @@ class Rest:
     def __init__(self, assembly: Assembly, inputs: Reals) -> None:
         self.assembly, self.inputs, self.k = assembly, inputs, inputs.shape[1]
         self.poses = Lanes(assembly, inputs if self.k > 1 else inputs[:, 0], 0.0, 0.0)
-        self.scene = Scene(self.poses, at_rest=True)
+        self.loaded = Dynamics(self.poses, at_rest=True)
 
     def force(self) -> tuple[Reals, Reals]:
         """Q and the sum of the sizes of its terms, each (n, k)."""
@@ -49,7 +49,7 @@ class Rest:
         def of(j: int, sized: bool) -> Callable[[LoadedPose], Number]:
             def form(pose: LoadedPose) -> Number:
                 total: Number = None
-                for load in self.scene.loads:
+                for load in self.loaded.case.loads:
                     value = load.power(pose, j)
                     total = plus(total, value if value is None or not sized else abs(value))
                 return total
@@ -59,22 +59,22 @@ class Rest:
         forms = [of(j, sized) for sized in (False, True) for j in range(self.k)]
         if self._together:
             more = self._bent, self._stored
-            each = self.scene.over([*forms, *more], float, self._reads(), 2, name="rest")
+            each = self.loaded.over([*forms, *more], float, self._reads(), 2, name="rest")
         else:
-            each = self.scene.over(forms, float, name="rest")
+            each = self.loaded.over(forms, float, name="rest")
         return [*(np.stack(each[i : i + self.k], axis=1) for i in (0, self.k)), *each[2 * self.k :]]
 
     @property
     def _together(self) -> bool:
-        return self.k == 1 and self.scene.on_tape
+        return self.k == 1 and self.loaded.on_tape
 
     def _reads(self) -> list[str]:
         """What the loads depend on."""
-        return sorted(set().union(*(load.reads() for load in self.scene.loads)) - {f"angle:{GROUND}"})
+        return sorted(set().union(*(load.reads() for load in self.loaded.case.loads)) - {f"angle:{GROUND}"})
 
     def _bent(self, pose: LoadedPose) -> Number:
         """The second variation of the work, along the direction of the rates."""
-        return second_variation(self.scene.loads, pose, pose.along or pose.by[0])
+        return second_variation(self.loaded.case.loads, pose, pose.along or pose.by[0])
 
     def along(self, direction: Reals) -> Reals:
         """∂Q/∂q along a direction in the inputs, times the direction: d²(work), (n,)."""
@@ -84,19 +84,19 @@ class Rest:
         way = [direction.tolist(), still, still] if self.k > 1 else None
         poses = self.poses.again(self.inputs, way)
         poses.at_rest = True
-        scene = Scene(poses, at_rest=True)
-        if scene.on_tape:
-            (total,) = scene.over([self._bent], float, self._reads(), 2, name="rest, second")
+        loaded = Dynamics(poses, at_rest=True)
+        if loaded.on_tape:
+            (total,) = loaded.over([self._bent], float, self._reads(), 2, name="rest, second")
         else:
-            total = np.array([self._along(scene, self._reads())])
+            total = np.array([self._along(loaded, self._reads())])
         return np.asarray(total * (direction[0] ** 2 if self.k == 1 else 1.0))
 
-    def _along(self, scene: Scene, reads: list[str]) -> float:
+    def _along(self, loaded: Dynamics, reads: list[str]) -> float:
         """The derivative of one pose along its rates; NaN at a singular pose."""
-        rates = scene.along(reads)
+        rates = loaded.along(reads)
         if rates is None:
             return math.nan
-        return float(second_variation(scene.loads, scene.pose, rates) or 0.0)
+        return float(second_variation(loaded.case.loads, loaded.pose, rates) or 0.0)
 
     def hessian(self) -> Reals:
         """V″, (n, k, k), by polarization of exact second derivatives along the inputs and their pairs."""
@@ -113,9 +113,9 @@ class Rest:
     def mass(self) -> Reals:
         """The generalized mass, (n, k, k)."""
         pairs = list(combinations_with_replacement(range(self.k), 2))
-        case, out = self.scene.case, np.zeros((len(self.inputs), self.k, self.k))
+        case, out = self.loaded.case, np.zeros((len(self.inputs), self.k, self.k))
         forms = [partial(mass, case, i=i, j=j) for i, j in pairs]
-        values = self.scene.over(forms, float, mass_reads(case), name="rest, mass")
+        values = self.loaded.over(forms, float, mass_reads(case), name="rest, mass")
         for (i, j), value in zip(pairs, values, strict=True):
             out[:, i, j] = out[:, j, i] = value
         return out
@@ -124,12 +124,14 @@ class Rest:
         """V, (n,) J; NaN where a load has no potential."""
         if self._together:
             return self._values[3]
-        keys = {key for load in self.scene.loads if load.path is not None for key in path_reads(load.path)}
-        (result,) = self.scene.over([self._stored], float, sorted(keys), name="rest, potential")
+        keys = {
+            key for load in self.loaded.case.loads if load.path is not None for key in path_reads(load.path)
+        }
+        (result,) = self.loaded.over([self._stored], float, sorted(keys), name="rest, potential")
         return np.asarray(result)
 
     def _stored(self, pose: LoadedPose) -> Number:
-        return potential(self.scene.loads, pose)
+        return potential(self.loaded.case.loads, pose)
 
 
 def turns_of_loads(assembly: Assembly, j: int) -> int | None:

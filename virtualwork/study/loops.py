@@ -52,11 +52,7 @@ def loops(m: Description, plan: Plan) -> list[Loop]:
     """
     names = {joint.key: joint.name for joint in joints(m)}
     edges = {(joint.key, body) for joint in joints(m) for body in joint.bodies}
-    cuts = [
-        (f"pin:{c.joint}" if c.guide is None else f"guide:{c.guide}", c.body)
-        for group in plan.groups
-        for c in group.closures
-    ]
+    cuts = [closure.cut for group in plan.groups for closure in group.closures]
     left = edges - set(cuts)
     order = [*m.ground]
     loops = []

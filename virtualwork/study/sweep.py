@@ -222,7 +222,7 @@ class Sweep:
                     f"the law of motion does not end where it begins ({self._shown(self.input[0])}, then "
                     f"{self._shown(self.input[-1])}): a cycle over time ends in its first pose"
                 )
-        elif not self._one_way:
+        elif not ((steps := np.diff(self.input)) > 0).all() and not (steps < 0).all():
             return (
                 f"the input {entry.name} does not rise or fall throughout: a cycle that dwells or returns needs a "
                 "column time_s with a time for each row"
@@ -237,11 +237,6 @@ class Sweep:
         if self.timed and self.turns == 0:
             return None
         return self._turns_needed()
-
-    @property
-    def _one_way(self) -> bool:
-        steps = np.diff(self.input)
-        return bool((steps > 0).all() or (steps < 0).all())
 
     def _shown(self, q: float) -> str:
         slide = self.poses.mechanism.inputs[0].is_slide
@@ -259,7 +254,7 @@ class Sweep:
                 "there and back as a table over time (--cases with a column time_s)"
             )
         for turns in range(1, TURNS + 1):
-            if self._alike(self._after(sense * turns)):
+            if self._repeats(sense * turns):
                 start = float(np.degrees(self.input[0]))
                 end = start + sense * 360 * turns
                 return (
@@ -269,7 +264,9 @@ class Sweep:
         return f"the loads do not repeat within {TURNS} turns of the input {name}"
 
     def _repeats(self, turns: int) -> bool:
-        return self._alike(self._after(turns))
+        """Whether the effort some turns later is the same."""
+        after, size = self._steady(self._compared + 2 * np.pi * turns), float(np.abs(self._before).max())
+        return bool(np.abs(after - self._before).max() <= SAME * size)
 
     @cached_property
     def _compared(self) -> Reals:
@@ -290,11 +287,3 @@ class Sweep:
     @cached_property
     def _before(self) -> Reals:
         return self._steady(self._compared)
-
-    def _after(self, turns: int) -> Reals:
-        """The effort some turns later."""
-        return self._steady(self._compared + 2 * np.pi * turns)
-
-    def _alike(self, after: Reals) -> bool:
-        size = float(np.abs(self._before).max())
-        return bool(np.abs(after - self._before).max() <= SAME * size)

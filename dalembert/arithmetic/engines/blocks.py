@@ -50,14 +50,14 @@ SIMPLE = {*UFUNCS, "const", "input", "select", "binade"}
 
 
 class Blocks:
-    """A tape prepared for lanes; `uniform` names the inputs that are one number for all lanes."""
+    """A tape prepared for lanes: what its inputs depend `on`, as bits, and all of these, which an operation of lanes has."""
 
-    def __init__(self, tape: Tape, uniform: frozenset[str]) -> None:
+    def __init__(self, tape: Tape, on: Mapping[str, int], every: int = 1) -> None:
         whole, tape = tape, split(tape)
         self.tape = tape
-        self.varying = [name for name in tape.inputs if name not in uniform]
+        self.varying = [name for name in tape.inputs if on[name] == every]
         operations = tape.operations
-        self.of_lanes = lanes = self.lanes_of(tape, uniform)
+        self.of_lanes = lanes = [bits == every for bits in tape.dependence(on)]
         body = [n for n, op in enumerate(operations) if lanes[n] and op[0] != "input"]
         last = {a: n for n in body for a in operations[n][1:]}
         outputs: dict[int, str] = {}
@@ -121,16 +121,6 @@ class Blocks:
         self.block = min(most, max(LEAST, room // (8 * max(slots, 1)) // LEAST * LEAST))
         self.parts = self._compiled(lines)
         self._own = threading.local()
-
-    def lanes_of(self, tape: Tape, uniform: frozenset[str]) -> list[bool]:
-        """Which operations are not the same for all lanes."""
-        lanes: list[bool] = []
-        for kind, *arguments in tape.operations:
-            if kind == "input":
-                lanes.append(arguments[0] not in uniform)
-            else:
-                lanes.append(kind != "const" and any(lanes[a] for a in arguments))
-        return lanes
 
     def _compiled(self, lines: list[str]) -> list[Callable[..., None]]:
         names = [f"x{k}" for k in range(len(self.varying))] + [f"c{n}" for n in self.read]
@@ -231,8 +221,8 @@ def split(tape: Tape) -> Tape:
 
 @lru_cache(maxsize=128)
 def compiled(tape: Tape, uniform: frozenset[str]) -> Blocks:
-    """The tape prepared for lanes, once."""
-    return Blocks(tape, uniform)
+    """The tape prepared for lanes, once; `uniform` names the inputs that are one number for all of them."""
+    return Blocks(tape, {name: int(name not in uniform) for name in tape.inputs})
 
 
 def run(tape: Tape, columns: Sequence[Reals], out: Sequence[Reals] | Reals) -> None:

@@ -22,15 +22,7 @@ WIDE, BLOCK = 16384, 8192
 
 
 class Grid(Blocks):
-    """A tape prepared for a grid; `rows` and `columns` name the inputs that depend on them, or on both."""
-
-    def __init__(self, tape: Tape, rows: frozenset[str], columns: frozenset[str]) -> None:
-        self.by = {name: (name in rows) + 2 * (name in columns) for name in tape.inputs}
-        super().__init__(tape, frozenset(name for name, on in self.by.items() if on < 3))
-
-    def lanes_of(self, tape: Tape, uniform: frozenset[str]) -> list[bool]:
-        """Which operations depend on the row and on the column."""
-        return [on == 3 for on in tape.dependence(self.by)]
+    """A tape prepared for a grid, on whose row (1) or column (2) what is not of lanes depends, or on neither."""
 
     def over(self, inputs: Mapping[str, Any], out: Sequence[NDArray[Any]], shape: tuple[int, int]) -> None:
         """Run: inputs are numbers, (r, 1), (1, c) or (r, c); of each output (r, c), or for a test (r,)."""
@@ -84,8 +76,8 @@ def _cut(x: Reals, rows: slice, columns: slice) -> Any:
 
 @lru_cache(maxsize=64)
 def compiled(tape: Tape, rows: frozenset[str], columns: frozenset[str]) -> Grid:
-    """The tape prepared for a grid, once."""
-    return Grid(tape, rows, columns)
+    """The tape prepared for a grid, once; `rows` and `columns` name the inputs that depend on them, or on both."""
+    return Grid(tape, {name: (name in rows) + 2 * (name in columns) for name in tape.inputs}, 3)
 
 
 def run(
