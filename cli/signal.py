@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from balancing.synchronous import OncePerTurn
     from cli.show.commands import ShowOptions
     from cli.show.result import Result
+    from dalembert.arithmetic.doubled import Doubled
     from dalembert.results.columns import Table
     from dalembert.results.way import Topic
     from dalembert.tables.table import Table as ReadTable
@@ -230,30 +231,23 @@ def vectors(recording: Recording) -> Table:
     import numpy as np
 
     from dalembert.angles import degrees
-    from dalembert.arithmetic.doubled_vectors import off
-    from dalembert.results.columns import Column, Table, names, number
+    from dalembert.results.columns import Column, Table, apart, names, number
 
     of, unit = recording.vectors, recording.unit
     rows = len(recording.sensors)
-    size = np.abs(of.vector)
 
-    def sizes() -> Any:
-        return off(size, recording.second.vector.vectors.size)
-
-    def deviations() -> Any:
-        return off(of.deviation, recording.second.deviation.doubled)
+    def column(name: str, values: NDArray[np.float64], exact: Callable[[], Doubled]) -> Column:
+        return Column(name, unit, values, apart(values, "number", "", exact), name, values)
 
     return Table(
         [
             names("sensor", recording.sensors),
             number("speed", "speed", [of.speed] * rows, "rpm", exact=lambda: recording.second.speed.doubled),
-            Column("amplitude", unit, size, sizes, "amplitude", size),
+            column("amplitude", np.abs(of.vector), lambda: recording.second.vector.vectors.size),
             number(
                 "phase", "angle", degrees(of.vector), exact=lambda: recording.second.vector.vectors.degrees
             ),
-            Column(
-                "amplitude_uncertainty", unit, of.deviation, deviations, "amplitude_uncertainty", of.deviation
-            ),
+            column("amplitude_uncertainty", of.deviation, lambda: recording.second.deviation.doubled),
             names("turns", [of.turns] * rows),
         ],
         keys=("sensor",),
