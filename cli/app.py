@@ -62,7 +62,7 @@ GROUPS = {
         "grade": ("cli.grade", "Mark the answers to an exercise, and name likely mistakes."),
     },
     "Files": {
-        "import": ("cli.formats.import_command", "Import a mechanism drawn in another program."),
+        "import": ("cli.formats", "Import a mechanism drawn in another program."),
         "export": (
             "cli.formats.export_command",
             "Write a mechanism for other programs: DXF, SVG, CSV, URDF, SDF, MJCF.",

@@ -322,7 +322,7 @@ def _unknown(count: int) -> list[str]:
 
 
 def _json_parts(result: Result) -> Iterator[str]:
-    from dalembert.results.json_text import json_parts
+    from dalembert.results.text import json_parts
 
     return json_parts({**result.documented(), "warnings": result.warnings})
 

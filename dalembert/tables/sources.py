@@ -112,7 +112,7 @@ class Source:
         line, _ = next(islice(self.rows(), index, None))
         if self.sheet is None:
             return cell_error(self.file, index + 1, line, column, value, expected)
-        from dalembert.tables.places import address
+        from dalembert.tables.reach import address
 
         at = f"row {line}"
         if column in self.header:
@@ -136,7 +136,7 @@ class Source:
     def _warn_of_unseen(self, used: set[int], top: int) -> None:
         """Warn of hidden rows, hidden columns and percentages that take part."""
         assert self.sheet is not None
-        from dalembert.tables.places import address, letters
+        from dalembert.tables.reach import address, letters
 
         looks, of = self.sheet.unseen, f"{self.file}: sheet {quote(self.sheet.name)}"
         filled = {line - 1 for line, _ in self.everything()} if looks.rows else set()
