@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from cli.read.options import bad
 from cli.show.output import command
+from dalembert.angles import degrees
 from dalembert.errors import DataError
+from dalembert.units import AMPLITUDES, UNITS, amplitude_kind, find_unit
 
 if TYPE_CHECKING:
     import numpy as np
@@ -170,8 +172,6 @@ def _without_volts(header: list[str]) -> list[str]:
     >>> _without_volts(["t_s", "keyphasor_V", "A_mV"])
     ['t_s', 'keyphasor', 'A_mV']
     """
-    from dalembert.units import AMPLITUDES, find_unit
-
     parts = [(name, *name.rpartition("_")[::2]) for name in header]
     return [
         mark if mark.lower() in MARKS and find_unit("amplitude", unit) in AMPLITUDES["voltage"] else name
@@ -181,8 +181,6 @@ def _without_volts(header: list[str]) -> list[str]:
 
 def _vibration(file: str, header: list[str], others: tuple[str, ...]) -> dict[str, str]:
     """The columns of vibration: name -> unit, one unit for all."""
-    from dalembert.units import amplitude_kind, find_unit
-
     units: dict[str, str] = {}
     for name in header:
         parts = name.split("_")
@@ -216,7 +214,6 @@ def _exact(
     import numpy as np
 
     from cli.read.exact import long_column
-    from dalembert.units import UNITS
 
     t, mark, tacho = (None if name is None else table.numbers[name] for name in names)
     assert t is not None
@@ -230,7 +227,6 @@ def vectors(recording: Recording) -> Table:
     """A row for each sensor."""
     import numpy as np
 
-    from dalembert.angles import degrees
     from dalembert.results.columns import Column, Table, apart, names, number
 
     of, unit = recording.vectors, recording.unit
@@ -264,7 +260,6 @@ def way(recording: Recording) -> list[Topic]:
     """The worked solution: one topic."""
     import numpy as np
 
-    from dalembert.angles import degrees
     from dalembert.results.way import Topic, figures
 
     of = recording.vectors

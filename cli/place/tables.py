@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from balancing import drill_depth
 from balancing.picture import Places, places
+from balancing.weights import angles_again
 from cli.place.placing import Drill, Placed, Placing, Share
 from cli.show.picture import blank
 from dalembert.angles import degrees, phasor
@@ -221,7 +223,6 @@ class SecondRun:
 
     def _placed(self, share: Share, goal: Vectors) -> tuple[Doubled, Doubled]:
         """Return the masses of a plane and their angles in degrees, (n,) each."""
-        from balancing.weights import angles_again
         from cli.read.exact import writtens
         from dalembert.arithmetic.doubled import PI, Doubled
         from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array
@@ -243,7 +244,6 @@ class SecondRun:
 
 def _depth(mass: Doubled, drill: Drill) -> Doubled:
     """The depth of a hole in 32 digits."""
-    from balancing import drill_depth
     from cli.read.exact import written
     from dalembert.arithmetic.doubled import PI, Doubled
     from dalembert.arithmetic.doubled_arrays import DoubledArray

@@ -21,6 +21,7 @@ from dalembert.tables.table import Table, read
 from dalembert.units import UNITS, to_si
 from rigidbody3d import Body, check, compose, inertia_of, load_mesh, measure_of, mesh, tensor
 from rigidbody3d.shapes import SHAPES
+from rigidbody3d.solids import Solid, of_tensor
 
 if TYPE_CHECKING:
     from rigidbody3d.solids import Solid
@@ -142,8 +143,6 @@ class _Unturned:
 
     def solids(self) -> list[Solid]:
         """Return what they look like."""
-        from rigidbody3d.solids import Solid, of_tensor
-
         solids = []
         for i, (shape, row) in enumerate(zip(self.shapes, self.rows, strict=True)):
             if shape == TENSOR:

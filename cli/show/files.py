@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from cli.show.commands import ShowOptions
     from cli.show.result import Part, Result
-    from dalembert.results.columns import Column, Table, Values
+    from dalembert.results.columns import Column, Values
 
 
 def write_all(files: Mapping[Path, Callable[[], bytes | Iterable[bytes]]]) -> None:

@@ -380,8 +380,6 @@ def _taking() -> Iterator[list[Result]]:
 @cache
 def _runner(name: str) -> Callable[[Sequence[str]], Any]:
     """Return what runs a command on the words behind its name."""
-    import typer
-
     app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
     app.command(name)(import_module(f"cli.{name}").run)
     built = typer.main.get_command(app)
@@ -391,8 +389,6 @@ def _runner(name: str) -> Callable[[Sequence[str]], Any]:
 @cache
 def options_of(name: str) -> frozenset[str]:
     """Return the options that a command takes."""
-    import typer
-
     app = typer.Typer(add_completion=False)
     app.command(name)(import_module(f"cli.{name}").run)
     return frozenset(flag for parameter in typer.main.get_command(app).params for flag in parameter.opts)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator, Mapping, Sequence
 from json.encoder import encode_basestring as _quoted
+from math import floor, isfinite, log10
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dalembert.results.columns import Column, Table
@@ -158,8 +159,6 @@ def with_uncertainty(value: float, uncertainty: float | None) -> str:
     >>> with_uncertainty(2.01168, None), with_uncertainty(0.0, None), with_uncertainty(0.3, 0.0)
     ('2.012', '0', '0.3')
     """
-    from math import floor, isfinite, log10
-
     if uncertainty is None or not isfinite(uncertainty) or uncertainty <= 0:
         return f"{value:.4g}"
     place = floor(log10(uncertainty))
