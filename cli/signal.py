@@ -258,7 +258,6 @@ def vectors(recording: Recording) -> Table:
 
 def way(recording: Recording) -> list[Topic]:
     """The worked solution: one topic."""
-    import numpy as np
 
     from dalembert.results.way import Topic, figures
 
@@ -270,7 +269,7 @@ def way(recording: Recording) -> list[Topic]:
     ]
     entries = []
     for sensor, v in zip(recording.sensors, of.vector.tolist(), strict=True):
-        angle = float(degrees(np.array([v]))[0])
+        angle = degrees(v)
         text.append(
             f"  {sensor}: ({figures(v.real)}, {figures(v.imag)}) = {figures(abs(v))} ∠ {figures(angle)}° {recording.unit}"
         )

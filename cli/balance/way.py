@@ -235,7 +235,7 @@ def _plane_topic(
     mass = abs(made) / radius if radius else 0.0
     x, y = (value + 0.0 for value in (made.real, made.imag))
     q = quadrant(x, y)
-    angle = float(degrees(np.array([made]))[0])
+    angle = degrees(made)
     amount = (
         f"W = {figures(mass * b.request.gravity)} N"
         if b.rotors.weights

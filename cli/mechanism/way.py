@@ -148,7 +148,7 @@ def _root_entry(m: Any, group: Group, name: str, at: GroupAt | None) -> Document
 
 def _root_text(group: Group, at: GroupAt) -> list[str]:
     w, (v, u) = at.offset, at.vectors
-    lines = [f"  W = {_vector(w)}, V = {_vector(v)}, U = {_vector(u)}"]
+    lines = [f"  W = {vector_text(w)}, V = {vector_text(v)}, U = {vector_text(u)}"]
     if group.kind == "RRR":
         d2, r1, r2 = abs(w) ** 2, abs(v), abs(u)
         root = ((r1 + r2) ** 2 - d2) * (d2 - (r1 - r2) ** 2)
@@ -174,10 +174,6 @@ def _root_text(group: Group, at: GroupAt) -> list[str]:
     else:
         lines.append("  s1 = −(W × U2)/(U1 × U2), s2 = −(U1 × W)/(U1 × U2) by Cramer's rule")
     return lines
-
-
-def _vector(z: complex) -> str:
-    return vector_text(z.real, z.imag)
 
 
 def _root_table(analysis: Analysis, m: Any, group: Group, name: str, at: list[GroupAt | None]) -> Table:

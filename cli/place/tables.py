@@ -311,10 +311,10 @@ def way(p: Placing, name: str = "") -> list[Topic]:
         )
     )
     size = float(from_si(abs(p.target), "mass", unit))
-    angle = float(degrees(np.array([p.target]))[0])
+    angle = degrees(p.target)
     text.append(f"  together {figures(size)} {unit} at {figures(angle)}°")
     if goal != p.target:
-        other = float(degrees(np.array([goal]))[0])
+        other = degrees(goal)
         text.append(
             f"  to be made on the places: {figures(float(from_si(abs(goal), 'mass', unit)))} {unit} at {figures(other)}°"
         )
@@ -340,7 +340,7 @@ def way(p: Placing, name: str = "") -> list[Topic]:
 
         def shown(z: complex) -> str:
             scaled = z * float(from_si(1.0, "mass", unit))
-            return f"{vector_text(scaled.real, scaled.imag)} {unit}"
+            return f"{vector_text(scaled)} {unit}"
 
         words: list[str | Table] = [
             f"Σ m·e^(iθ) of the masses{at} and the correction:",

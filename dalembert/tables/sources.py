@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice, takewhile
 from typing import TYPE_CHECKING
 
-from dalembert.dataclass import dataclass, field
+from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError, cell_error, quote
 from dalembert.quantities import is_number
 from dalembert.tables.files import is_workbook, read_bytes, remember, split_sheet
@@ -95,6 +95,19 @@ class Source:
     def rows(self) -> Iterator[tuple[int, list[str]]]:
         """Yield (line, cells) of every row of data."""
         return islice(self.everything(), self.above + 1 + self.units_below, None)
+
+    def laid_out(self, headings: Sequence[Heading], rows: Iterable[tuple[int, list[str]]]) -> Source:
+        """Return the table with other columns, and the rows of data that it then has."""
+        records = [(0, [each.written for each in headings]), *rows]
+        return replace(
+            self,
+            headings=list(headings),
+            records=records,
+            sheet=None,
+            above=0,
+            units_below=False,
+            unnamed_first=False,
+        )
 
     def filled(self, columns: Iterable[int]) -> list[int]:
         """Return those of some columns that have a header, or a cell that is not blank."""
