@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from decimal import Decimal, InvalidOperation
 from functools import cached_property
 from math import ceil, floor, pi
 from typing import TYPE_CHECKING, Any
@@ -18,6 +17,7 @@ from dalembert.arithmetic.shapes import is_doubled
 from dalembert.drawing.curves import Curve, panel, spread
 from dalembert.drawing.sheet import sheet
 from dalembert.errors import DataError
+from dalembert.figures import last_place
 from dalembert.results.columns import Table, computed, names, number
 from dalembert.results.way import Topic, figures
 from dalembert.tables.table import Numbers, read
@@ -129,14 +129,8 @@ def _whole_turns(table: ReadTable, angle: Numbers) -> int:
 
 def _digit(table: ReadTable) -> float:
     """Return the last printed digits of the ends together, at most a thousandth of a turn."""
-    total = 0.0
-    for row in (0, table.rows - 1):
-        try:
-            exponent = Decimal(table.written(row, "angle").replace(",", ".")).as_tuple().exponent
-        except InvalidOperation:
-            exponent = 0
-        total += 10.0 ** int(exponent) if exponent else 0.0
-    return min(total, 2 * pi / 1000)
+    places = [last_place(table.written(row, "angle")) for row in (0, table.rows - 1)]
+    return min(sum(10.0**place for place in places if place), 2 * pi / 1000)
 
 
 METHOD = (
