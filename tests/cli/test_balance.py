@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import cmath
-import csv
-import io
 import json
 import math
 import subprocess
@@ -13,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from tests.cli.printed import rows
 from tests.conftest import Dalembert
 
 ROTOR = "name,mass_kg,radius_mm,angle_deg,z_mm\nm1,9,30,60,20\nm2,6,50,210,65\n"
@@ -30,10 +29,6 @@ def answer(done: subprocess.CompletedProcess[str]) -> dict[str, Any]:
     assert done.returncode == 0, done.stderr
     document: dict[str, Any] = json.loads(done.stdout)
     return document
-
-
-def rows(text: str) -> list[dict[str, str]]:
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 def test_the_document_has_the_promised_keys(dalembert: Dalembert, rotor: Path) -> None:
