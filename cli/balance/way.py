@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 
 COMPONENTS = ("x", "y", "zx", "zy")
+SHOWN = 6
+"""The largest number of terms of a sum in the text."""
 
 
 class Scale:
@@ -148,11 +150,11 @@ def _components(b: Balancing, rotor: int, about: float | None, plane: str, scale
 def _sum_of(scale: Scale, vectors: list[complex], axis: str, levers: list[float] | None = None) -> str:
     """A sum with its numbers: `(20·1 350 + 65·(−2 598.08))`; of many its first terms."""
     terms = []
-    for k, v in enumerate(vectors[:6]):
+    for k, v in enumerate(vectors[:SHOWN]):
         value = scale.of(v.real if axis == "x" else v.imag)
         value = f"({value})" if value.startswith("−") else value
         terms.append(value if levers is None else f"{figures(levers[k] * scale.reach)}·{value}")
-    return f"({' + '.join(terms)}{' + …' if len(vectors) > 6 else ''})"
+    return f"({' + '.join(terms)}{' + …' if len(vectors) > SHOWN else ''})"
 
 
 def _two_planes(
@@ -268,10 +270,6 @@ def _plane_topic(
         ],
     )
     return Topic(f"plane {name}", [*lines, table], heading)
-
-
-SHOWN = 6
-"""The largest number of terms of a sum in the text."""
 
 
 def _modal(b: Balancing, rotor: int, rows: list[int], fix: ModalCorrection, i: int) -> list[Topic]:
