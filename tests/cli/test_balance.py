@@ -7,10 +7,10 @@ import json
 import math
 import subprocess
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from tests.cli.printed import document as answer
 from tests.cli.printed import rows
 from tests.conftest import Dalembert
 
@@ -23,12 +23,6 @@ def rotor(tmp_path: Path) -> Path:
     path = tmp_path / "rotor.csv"
     path.write_text(ROTOR)
     return path
-
-
-def answer(done: subprocess.CompletedProcess[str]) -> dict[str, Any]:
-    assert done.returncode == 0, done.stderr
-    document: dict[str, Any] = json.loads(done.stdout)
-    return document
 
 
 def test_the_document_has_the_promised_keys(dalembert: Dalembert, rotor: Path) -> None:
